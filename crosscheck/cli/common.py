@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
-from rich.console import Console
 
 from crosscheck.engines.registry import BUILT_IN, plug_ins
 from crosscheck.library import find
@@ -22,6 +21,7 @@ from crosscheck.running.scheduler import TIME_LIMIT_S
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
 from crosscheck.terminal.versions import versions_text
+from flexmb.output.terminal import Terminal
 from flexmb.output.writing import in_words
 from flexmb.scene.problems import SceneWarning
 
@@ -41,8 +41,8 @@ Start with `crosscheck run canonical`, then open the report whose path it prints
 file cannot be read; 130 interrupted. Errors go to stderr.
 """,
 )
-console = Console(markup=False, emoji=False)  # names and paths stand in what it prints
-errors = Console(stderr=True, markup=False, emoji=False)
+console = Terminal()
+errors = Terminal(stderr=True)
 
 
 def _show_versions(asked: bool) -> None:

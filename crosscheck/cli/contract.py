@@ -27,11 +27,13 @@ def contract(
     """
     Try whether engines keep the contract: names, statuses, shapes, frames, signs, reference points, repeatability.
 
-    Every clause is a sentence of the contract, tried in a process of its own kind on a small scene whose answer is
-    known. A scene that the engine refuses counts as *not offered*, with the engine's reason.
+    Every clause is a sentence of the contract, tried in a process of its own on a small scene whose answer is known. A
+    scene that the engine refuses, or an output that it leaves out, counts as *not offered*; a line says what to offer
+    for it, and which clauses would then be tried.
 
-    **Exit code**: 0 every clause that is offered holds, and at least one of mechanics is; 1 a clause is broken, nothing
-    was shown, or the engine's library is missing; 2 there is no such engine.
+    **Exit code**: 0 every clause that is offered holds, among them all on the form of an answer and a run that is known
+    in closed form; 1 a clause is broken, too little was shown, or the engine's library is missing; 2 there is no such
+    engine.
 
     **Examples**: `crosscheck contract native` · `crosscheck contract mycode --verbose`
     """
@@ -44,9 +46,12 @@ def contract(
     for name in names:
         with console.status(f"trying {name}"):
             outcomes = list(try_engine(name, limit_s=time_limit))
-        good, text = verdict_on(outcomes)
-        kept.append(good)
-        tried[name] = {"kept": good, "headline": text, "clauses": [asdict(outcome) for outcome in outcomes]}
+        verdict = verdict_on(outcomes)
+        kept.append(verdict.kept)
+        tried[name] = {
+            "kept": verdict.kept, "whole": verdict.whole, "headline": verdict.text,
+            "clauses": [asdict(outcome) for outcome in outcomes],
+        }  # fmt: skip
         print_clauses(console, name, outcomes, shown)
     if as_json:
         print_json(tried)

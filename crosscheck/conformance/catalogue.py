@@ -7,8 +7,10 @@ from crosscheck.conformance.connectors import CONNECTORS
 from crosscheck.conformance.conventions import CONVENTIONS
 from crosscheck.conformance.form import FORM
 from crosscheck.conformance.motion import MOTION
+from crosscheck.conformance.samples import SAMPLES
 from crosscheck.conformance.wheels import WHEELS
 
-CLAUSES: dict[str, Clause] = {
-    clause.name: clause for chapter in (FORM, CONVENTIONS, MOTION, WHEELS, CONNECTORS) for clause in chapter.clauses
-}
+CHAPTERS = (FORM, CONVENTIONS, MOTION, SAMPLES, WHEELS, CONNECTORS)
+CLAUSES: dict[str, Clause] = {clause.name: clause for chapter in CHAPTERS for clause in chapter.clauses}
+SHOWN = ("a-pendulum-swings", "a-thrown-body-flies")
+"""Runs that are known in closed form, of which an engine that is to be believed in anything can make one."""

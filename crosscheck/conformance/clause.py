@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.conformance.contents import to_offer
+from crosscheck.conformance.scenes import simple_scenes
 from crosscheck.engines.answers import checked_model, checked_run, efforts_of, support_of
 from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Trajectory
 from flexmb.scene.schema import Scene
@@ -23,7 +25,14 @@ class ClauseBroken(AssertionError):
 
 
 class NotOffered(Exception):
-    """The engine says that it cannot represent the clause's scene, or does not offer what the clause is about."""
+    """The engine says that it cannot represent the clause's scene, or does not offer what the clause is about.
+
+    `offer` is what it would have to do for the clause to be tried.
+    """
+
+    def __init__(self, reason: str, offer: str) -> None:
+        super().__init__(reason)
+        self.offer = offer
 
 
 @dataclass(frozen=True)
@@ -81,8 +90,17 @@ def offered(engine: Engine, scene: Scene) -> Model:
     """The compiled scene; NotOffered with the engine's reason where it does not represent the scene exactly."""
     support = support_of(engine, scene)
     if support.kind != "exact":
-        raise NotOffered(support.reason)
+        raise NotOffered(support.reason, to_offer(engine, scene))
     return checked_model(engine.compile(scene))
+
+
+def simplest(engine: Engine, rate: float = 0.4) -> Scene:
+    """The first of the simple scenes that the engine represents in some way: what an answer looks like shows in any."""
+    scenes = simple_scenes(rate)
+    for scene in scenes:
+        if support_of(engine, scene).kind != "no":
+            return scene
+    raise NotOffered(support_of(engine, scenes[0]).reason, f"{to_offer(engine, scenes[0])}, or any other simple scene")
 
 
 def snapshot(engine: Engine, scene: Scene) -> Snapshot:
@@ -115,7 +133,7 @@ def finest_two(engine: Engine, scene: Scene, times: Real) -> tuple[Trajectory, T
 def given(what: str, found: Any) -> Any:
     """A part of an answer that an engine may leave out: NotOffered where it did."""
     if found is None:
-        raise NotOffered(f"it does not offer {what}")
+        raise NotOffered(f"it does not offer {what}", f"give {what}")
     return found
 
 

@@ -1,21 +1,30 @@
-"""Trying an engine clause by clause, each in a worker process: one that crashes or hangs costs its clause alone."""
+"""Trying an engine clause by clause, each in a process of its own: what an engine does to one reaches no other clause.
+
+A new interpreter for each would cost a second or two, most of it for importing what all of them need. So where that can
+be done they are forked from a process that has imported this package and no engine but the native one, and has called
+nothing.
+"""
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from multiprocessing import get_all_start_methods, get_context
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from crosscheck.conformance.catalogue import CLAUSES
+from crosscheck.conformance.catalogue import CLAUSES, SHOWN
 from crosscheck.conformance.clause import Clause, ClauseBroken, NotOffered
 from crosscheck.engines.answers import BrokenContract, clean
 from crosscheck.engines.contract import Engine, EngineMissing
 from crosscheck.running.execute import describe, find_engine
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.sweep import PROVIDER
+from crosscheck.running.worker import SPAWN, Method
 
+FORKED: Method = "forkserver"
+IMPORTED = ("crosscheck.conformance.trial", "crosscheck.engines.native")  # before the processes of clauses are forked
 CLAUSE_LIMIT_S = 180.0  # an engine may have to compile at its first clause
 
 ClauseStatus = Literal["holds", "broken", "not offered", "missing"]
@@ -23,12 +32,16 @@ ClauseStatus = Literal["holds", "broken", "not offered", "missing"]
 
 @dataclass(frozen=True)
 class ClauseOutcome:
-    """What came of a clause; `message` says why it does not hold, or was not tried."""
+    """What came of a clause.
+
+    `message` says why it does not hold or was not tried, `offer` what an engine would have to do for it to be tried.
+    """
 
     clause: str
     sentence: str
     status: ClauseStatus
     message: str = ""
+    offer: str = ""
 
 
 class ClauseTrial(NamedTuple):
@@ -44,7 +57,7 @@ def try_clause(engine: Engine, clause: Clause) -> ClauseOutcome:
     try:
         clause.check(engine)
     except NotOffered as reason:
-        return ClauseOutcome(clause.name, clause.sentence, "not offered", clean(str(reason)))
+        return ClauseOutcome(clause.name, clause.sentence, "not offered", clean(str(reason)), clean(reason.offer))
     except EngineMissing as error:
         return ClauseOutcome(clause.name, clause.sentence, "missing", clean(str(error)))
     except (ClauseBroken, BrokenContract) as error:
@@ -63,7 +76,9 @@ def try_engine(
     trials = [ClauseTrial(provider, name, clause) for clause in clauses]
     with tempfile.TemporaryDirectory() as folder:
         log = str(Path(folder) / "log")
-        for event in run_jobs(attempt, trials, 1, log, kind=_engine, time_limit_s=lambda trial: limit_s):
+        for event in run_jobs(
+            attempt, trials, 1, log, kind=_clause, time_limit_s=lambda trial: limit_s, method=_start_method()
+        ):
             if event.kind == "emitted":
                 yield event.content
             elif event.kind in ("crashed", "stopped"):
@@ -81,23 +96,58 @@ def attempt(trial: ClauseTrial, emit: Callable[[ClauseOutcome], None]) -> None:
         emit(try_clause(found, clause))
 
 
-def verdict_on(outcomes: list[ClauseOutcome]) -> tuple[bool, str]:
-    """Whether the contract is kept, and that in a sentence.
+@dataclass(frozen=True)
+class ContractVerdict:
+    """Whether the contract is `kept`, whether the `whole` of it was tried, and that in a sentence."""
 
-    Nothing is broken or missing, and at least one clause that holds numbers against mechanics was tried: an engine that
-    refuses every scene has shown nothing.
+    kept: bool
+    whole: bool
+    text: str
+
+
+def verdict_on(outcomes: list[ClauseOutcome]) -> ContractVerdict:
+    """The verdict on an engine.
+
+    Kept means that nothing is broken or missing and that enough was shown: the form of an answer, and a run that is
+    known in closed form. An engine that refuses what these are about has shown nothing, whatever else holds.
     """
     counts = {status: sum(each.status == status for each in outcomes) for status in ("holds", "broken", "not offered")}
     missing = next((each for each in outcomes if each.status == "missing"), None)
     if missing is not None:
-        return False, missing.message
+        return ContractVerdict(False, False, missing.message)
     text = f"{counts['holds']} of {len(outcomes)} clauses hold, {counts['broken']} broken"
-    text += f", {counts['not offered']} not offered"
-    shown = any(each.status == "holds" and CLAUSES[each.clause].physical for each in outcomes)
-    if not shown and not counts["broken"]:
-        return False, f"{text}: nothing was shown, since the engine refuses every scene with a known answer"
-    return counts["broken"] == 0, text
+    if counts["not offered"]:
+        text += f", {counts['not offered']} not tried, since it does not offer what they are about"
+    holding = {each.clause for each in outcomes if each.status == "holds"}
+    formal = all(each.clause in holding for each in outcomes if not CLAUSES[each.clause].physical)
+    if counts["broken"]:
+        return ContractVerdict(False, not counts["not offered"], text)
+    if not formal or not holding.intersection(SHOWN):
+        return ContractVerdict(False, False, f"{text}: too little was shown. Offer first: {_first_offer(outcomes)}")
+    return ContractVerdict(True, not counts["not offered"], text)
 
 
-def _engine(trial: ClauseTrial) -> str:
-    return trial.engine
+def to_offer(outcomes: list[ClauseOutcome]) -> dict[str, list[str]]:
+    """What an engine would have to do for clauses to be tried, and which: those that need the same together."""
+    found: dict[str, list[str]] = {}
+    for each in outcomes:
+        if each.status == "not offered":
+            found.setdefault(each.offer, []).append(each.clause)
+    return found
+
+
+def _first_offer(outcomes: list[ClauseOutcome]) -> str:
+    wanted = [each for each in outcomes if each.clause in SHOWN or not CLAUSES[each.clause].physical]
+    return next((each.offer for each in wanted if each.status == "not offered"), "a scene with a known answer")
+
+
+def _clause(trial: ClauseTrial) -> str:
+    """Processes serve one kind of trials: so none serves two clauses."""
+    return trial.clause
+
+
+def _start_method() -> Method:
+    if FORKED not in get_all_start_methods():
+        return SPAWN
+    get_context(FORKED).set_forkserver_preload(list(IMPORTED))
+    return FORKED

@@ -9,12 +9,14 @@ verdict where somebody expected more: of an engine that the case names, or for w
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 from crosscheck.judging.against_reference import REFERENCE
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import Verdict
+from crosscheck.library.patterns import most_specific
+from flexmb.run.channels import matches
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,30 @@ def set_apart(case: CaseResults, verdicts: Iterable[Verdict]) -> tuple[list[Verd
             counting.append(verdict)
         else:
             found |= {_inapplicable(case, result, verdict.channel): None for result in refusing}
-    return counting, tuple(found)
+    energies = tuple(_energies_left_out(case, joined))
+    return counting, (*(each for each in found if not any(_includes(each, energy) for energy in energies)), *energies)
+
+
+def _includes(pattern: Inapplicable, one: Inapplicable) -> bool:
+    """Whether the first says of a pattern what the second says of a channel that it names."""
+    same = (pattern.variant, pattern.engine) == (one.variant, one.engine)
+    return same and bool(pattern.channel) and matches(pattern.channel, one.channel)
+
+
+def _energies_left_out(case: CaseResults, joined: Collection[str]) -> Iterator[Inapplicable]:
+    """Kinds of energy that are asked for and that somebody knows, and an engine does not: no verdict tells of them."""
+    reference = case.case.reference
+    for (_, engine, role), result in case.results.items():
+        if engine not in joined or role != "main" or result.status != "finished":
+            continue
+        goals = {pattern for item in case.case.run.comparisons for pattern in item.goals}
+        known = {name for other in case.results.values() if other.variant == result.variant for name in other.channels}
+        if reference is not None and reference.variant == result.variant:
+            goals |= set(reference.asked[engine].goals) if engine in reference.asked else set()
+            known |= set(reference.channels)
+        for name in sorted(known - set(result.channels)):
+            if name.startswith("energy.") and most_specific(goals, name) is not None:
+                yield _inapplicable(case, result, name)
 
 
 def _refusing(case: CaseResults, verdict: Verdict) -> list[Result]:
@@ -65,8 +90,13 @@ def _refusing(case: CaseResults, verdict: Verdict) -> list[Result]:
         refused = [result for result in results if result.status == "refused"]
         return refused or [result for result in results if verdict.channel not in result.channels]
     if verdict.status == "did not run" and len(results) == len(sides):  # no channel has the name of a goal
-        return results if all(result.status == "finished" for result in results) else []
+        finished = all(result.status == "finished" for result in results)
+        return [result for result in results if not _has(result, verdict.channel)] if finished else []
     return []
+
+
+def _has(result: Result, pattern: str) -> bool:
+    return any(matches(pattern, name) for name in result.channels)
 
 
 def _inapplicable(case: CaseResults, result: Result, channel: str) -> Inapplicable:

@@ -156,13 +156,22 @@ def _channels(
             shared = set(a.channels) & set(b.channels)
             offered = [name for name in offered if name in shared or not name.startswith("energy.")]
         if not offered:
-            text = f'neither {a.engine} nor {b.engine} has a channel "{pattern}"'
-            yield pattern, goal, Finding("did not run", text)
+            yield pattern, goal, Finding("did not run", _without(pattern, goals, a, b))
         for name in offered:
             if name in undetermined:
                 yield name, goal, not_determined(undetermined[name])
             else:
                 yield name, goal, _absent(a, name) or _absent(b, name)
+
+
+def _without(pattern: str, goals: Iterable[str], *results: Result) -> str:
+    """Who has no channel of that name."""
+    lacking = [each.engine for each in results if not any(_belongs(name, pattern, goals) for name in each.channels)]
+    if len(lacking) == 1:
+        return f'{lacking[0]} has no channel "{pattern}"'
+    if lacking:
+        return f'neither {" nor ".join(lacking)} has a channel "{pattern}"'
+    return f'{" and ".join(each.engine for each in results)} share no channel "{pattern}"'
 
 
 def _belongs(channel: str, pattern: str, goals: Iterable[str]) -> bool:

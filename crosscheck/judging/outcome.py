@@ -80,6 +80,11 @@ class SessionOutcome:
         return {engine: list(cases) for engine, cases in found.items()}
 
     @property
+    def not_offered(self) -> dict[str, int]:
+        """By engine how many channels it does not offer, of those it would have been judged in."""
+        return dict(Counter(each.engine for each in self.inapplicable if each.channel))
+
+    @property
     def worse(self) -> list[Verdict]:
         """Verdicts as expected, whose E or U has grown beyond what was accepted on the same basis."""
         return [verdict for verdict in self.all if verdict.ok and verdict.worse and not verdict.stale]
@@ -131,7 +136,7 @@ class SessionOutcome:
             return "Nothing was compared" + (f": {why}" if why else "")
         if self.ok:
             grown = f", {len(self.worse)} of them worse than recorded" if self.worse else ""
-            return f"All {len(self.all)} verdicts are as expected{grown}"
+            return f"All {len(self.all)} verdicts are as expected{grown}{self._unoffered}"
         parts = []
         if self.unexpected:
             parts.append(f"{len(self.unexpected)} of {len(self.all)} verdicts are not as expected")
@@ -157,6 +162,11 @@ class SessionOutcome:
     def _uncompared(self) -> str:
         were = "was" if len(self.uncompared) == 1 else "were"
         return f"{', '.join(self.uncompared)} {were} asked for and compared in nothing"
+
+    @property
+    def _unoffered(self) -> str:
+        told = [f"{engine} {count} channel{'s' if count > 1 else ''}" for engine, count in self.not_offered.items()]
+        return f"; not offered and not judged: {', '.join(told)}" if told else ""
 
     @property
     def _broken(self) -> str:

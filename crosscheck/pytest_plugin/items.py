@@ -217,7 +217,7 @@ class ClauseItem(_EngineItem):
         """Hold the engine to the clause."""
         outcome = self.request.runs.clause(self.engine, self.clause)
         if outcome.status == "not offered":
-            pytest.skip(outcome.message)
+            pytest.skip(f"{outcome.message}: it is tried if you {outcome.offer}")
         if outcome.status != "holds":
             raise NotAsExpected(f"{outcome.message}\nthe contract says: {outcome.sentence}")
 

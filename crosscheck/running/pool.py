@@ -20,7 +20,7 @@ from typing import Any
 from crosscheck.running.processes import memory_limit, memory_of
 from crosscheck.running.scheduler import Event, Events, Function, one_kind, usual_limit
 from crosscheck.running.waiting import Waiting
-from crosscheck.running.worker import TICK_S, Worker, keep_short
+from crosscheck.running.worker import SPAWN, TICK_S, Method, Worker, keep_short
 
 
 def run_jobs(
@@ -31,13 +31,14 @@ def run_jobs(
     kind: Callable[[Any], str] = one_kind,
     time_limit_s: Callable[[Any], float] = usual_limit,
     memory_limit_bytes: float | None = None,
+    method: Method = SPAWN,
 ) -> Events:
     """Run jobs in `workers` processes of this machine (by default one per core); see `Scheduler`.
 
     Only one worker is at a kind until its first job is done. The file `log` starts again when it becomes too long.
     Numerical libraries get one thread per worker, and flexmb compiles general kernels where FLEXMB_KERNELS says
     nothing: a session has dozens of scenes, and kernels made for one serve few others. By default each worker may hold
-    an equal part of the machine's memory.
+    an equal part of the machine's memory. `method` is how multiprocessing starts processes.
     """
     count = workers or os.cpu_count() or 1
     kinds: list[str] = []
@@ -45,7 +46,7 @@ def run_jobs(
     prepared: set[str] = set()
     memory_bytes = memory_limit_bytes or memory_limit(count)
     watched = time.monotonic()
-    crew = [Worker() for _ in range(count)]
+    crew = [Worker(method) for _ in range(count)]
     try:
         while len(kinds) < len(jobs) or waiting or any(worker.job is not None for worker in crew):
             for number in range(len(kinds), len(jobs)):

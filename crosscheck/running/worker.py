@@ -1,6 +1,6 @@
 """A worker: a process that does one job after the other, told over a pipe, and watched from outside.
 
-It is a fresh ("spawn") process in a session of its own. It serves one kind of jobs, so that nothing which an engine
+It is a fresh process in a session of its own. It serves one kind of jobs, so that nothing which an engine
 leaves behind in its process (folder, environment, warnings, threads) reaches another engine. A job that exceeds its
 time or its worker its memory is stopped, and whatever the worker started ends with it.
 """
@@ -16,11 +16,13 @@ from math import inf
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from typing import Any
+from typing import Any, Literal
 
 from crosscheck.running.processes import end
 from crosscheck.running.scheduler import Event, Function
 
+Method = Literal["spawn", "forkserver"]  # of multiprocessing
+SPAWN: Method = "spawn"  # a new interpreter for each process, which takes nothing from this one
 START_LIMIT_S = 120.0  # for a worker to start and to read its job
 TICK_S = 0.25
 LOG_LIMIT_BYTES = 64 * 2**20
@@ -33,10 +35,12 @@ _environment = threading.Lock()  # held while it is changed for a process that i
 class Worker:
     """A place for a process, which it gets with its first job and again when it has lost it.
 
-    `job` is the number of the job at work, None when idle, and `kind` the kind that the process serves.
+    `method` is how multiprocessing starts it. `job` is the number of the job at work, None when idle, and `kind` the
+    kind that the process serves.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, method: Method = SPAWN) -> None:
+        self._method = method
         self.job: int | None = None
         self.kind = ""
         self.pipe: Connection | None = None
@@ -87,7 +91,7 @@ class Worker:
 
     def _start(self, function: Function, log: str) -> None:
         """Get a process; the thread limits are set in the environment it inherits, before it imports anything."""
-        context = get_context("spawn")
+        context: Any = get_context(self._method)  # the type that all contexts share lacks what they have
         here, there = context.Pipe()
         process = context.Process(target=_serve, args=(there, function, log), daemon=True)
         with _environment:

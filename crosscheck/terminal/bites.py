@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Column, Table
 
 from crosscheck.biting.score import ENOUGH, CaseBite, Mutant, mean
 from crosscheck.terminal.text import words
+from flexmb.output.listing import Listing, figures, names
 
 
 def print_bites(console: Console, bites: Sequence[CaseBite], verbose: bool = False) -> int:
@@ -30,20 +29,13 @@ def print_bites(console: Console, bites: Sequence[CaseBite], verbose: bool = Fal
     return 0 if good else 1
 
 
-def _table(bites: Sequence[CaseBite]) -> Table:
-    headings = ("noticed", "score", "at goals", "reference")
-    table = Table(
-        Column("case", no_wrap=True),
-        *(Column(name, justify="right", no_wrap=True) for name in headings),
-        box=SIMPLE_HEAD,
-        pad_edge=False,
-        header_style="bold",
-    )
+def _table(bites: Sequence[CaseBite]) -> Listing:
+    table = Listing(*names("case"), *figures("noticed", "score", "at goals", "reference"))
     for each in bites:
         counted = each.counted
         noticed = sum(mutant.outcome == "noticed" for mutant in counted)
-        figures = map(_figure, (each.score, each.score_at_goals, each.score_by_reference))
-        table.add_row(*(words(cell) for cell in (each.case, f"{noticed}/{len(counted)}", *figures)))
+        scores = map(_figure, (each.score, each.score_at_goals, each.score_by_reference))
+        table.add(each.case, f"{noticed}/{len(counted)}", *scores)
     return table
 
 

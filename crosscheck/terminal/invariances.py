@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Column, Table
 from rich.text import Text
 
 from crosscheck.biting.invariance_runs import InvarianceVerdict
 from crosscheck.biting.invariances import INVARIANCES
 from crosscheck.terminal.text import words
+from flexmb.output.listing import Listing, names
 
 MARKS = {"agree": "✓", "not applicable": "–"}
 STYLES = {"agree": "green", "not applicable": "dim"}
@@ -19,16 +18,10 @@ STYLES = {"agree": "green", "not applicable": "dim"}
 
 def print_invariances(console: Console, verdicts: Sequence[InvarianceVerdict], verbose: bool = False) -> int:
     """Print the verdicts; the exit code: 1 where one is neither *agree* nor *not applicable*."""
-    table = Table(
-        Column("case", no_wrap=True),
-        *(Column(each.name, overflow="fold") for each in INVARIANCES),
-        box=SIMPLE_HEAD,
-        pad_edge=False,
-        header_style="bold",
-    )
+    table = Listing(*names("case", *(each.name for each in INVARIANCES)))
     for case in dict.fromkeys(verdict.case for verdict in verdicts):
         row = {verdict.invariance: verdict.status for verdict in verdicts if verdict.case == case}
-        table.add_row(words(case), *(_cell(row[each.name]) for each in INVARIANCES))
+        table.add(case, *(_cell(row[each.name]) for each in INVARIANCES))
     console.print(table)
     console.print(words("✓ the results are the same, – the invariance says nothing about the scene"))
     for verdict in verdicts:

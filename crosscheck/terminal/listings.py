@@ -4,39 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rich.table import Column, Table
-
 from crosscheck.library.find import Case
 from crosscheck.running.installed import EngineState
 from crosscheck.stability.map import StabilityMap
 from crosscheck.terminal.text import words
+from flexmb.output.listing import Listing, figures, names, prose
 
 
-def cases_table(cases: Iterable[Case]) -> Table:
+def cases_table(cases: Iterable[Case]) -> Listing:
     """The case library."""
-    table = Table("case", "title", "tags", "variants", "engines", "accepted figures", header_style="bold")
+    table = Listing(*names("case"), *prose("title", "tags", "variants", "engines"), *figures("accepted figures"))
     for case in cases:
         engines = dict.fromkeys(name for each in case.run.variants for name in (*each.engines, *each.also))
         variants = ", ".join(variant.name for variant in case.run.variants)
-        figures = sum(len(each) for each in case.accepted.values())
+        accepted = sum(len(each) for each in case.accepted.values())
         tags = ", ".join(case.run.tags)
-        cells = (case.name, case.run.title, tags, variants, ", ".join(engines), str(figures or "none"))
-        table.add_row(*map(words, cells))
+        table.add(case.name, case.run.title, tags, variants, ", ".join(engines), str(accepted or "none"))
     return table
 
 
-def engines_table(states: Iterable[EngineState]) -> Table:
+def engines_table(states: Iterable[EngineState]) -> Listing:
     """The engines."""
-    table = Table(Column("engine", no_wrap=True), "what it is", "version", "how to install", header_style="bold")
+    table = Listing(*names("engine"), *prose("what it is", "version", "how to install"))
     for state in states:
         version = words(state.absence, "yellow") if state.version is None else words(state.version, "green")
-        table.add_row(words(state.name), words(state.summary), version, words(state.advice))
+        table.add(state.name, state.summary, version, state.advice)
     return table
 
 
-def maps_table(maps: Iterable[StabilityMap]) -> Table:
+def maps_table(maps: Iterable[StabilityMap]) -> Listing:
     """The stability maps."""
-    table = Table("map", "axes", "overlay", header_style="bold")
+    table = Listing(*names("map"), *prose("axes", "overlay"))
     for what in maps:
-        table.add_row(*map(words, (what.name, f"{what.x.label} x {what.y.label}", what.overlay.name)))
+        table.add(what.name, f"{what.x.label} x {what.y.label}", what.overlay.name)
     return table

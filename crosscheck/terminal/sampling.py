@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -17,10 +16,10 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
-from rich.table import Column, Table
 
 from crosscheck.sampling.statistics import Distribution, Estimated, SweepSummary
 from crosscheck.terminal.text import marked, words
+from flexmb.output.listing import Listing, figures, names
 
 QUANTILES = {"0.05": "5 %", "0.5": "median", "0.95": "95 %"}
 SHOWN = 5  # failures; summary.json has all
@@ -56,16 +55,13 @@ def print_summary(console: Console, summary: SweepSummary) -> None:
     console.print(words(f"{summary.samples} samples: {counts}", "bold green" if summary.ok else "bold red"))
 
 
-def _table(summary: SweepSummary) -> Table:
-    value, error = Column("value", justify="right"), Column("standard error", justify="right")
-    table = Table("quantity", "in", value, error, box=SIMPLE_HEAD, header_style="bold")
+def _table(summary: SweepSummary) -> Listing:
+    table = Listing(*names("quantity", "in"), *figures("value", "standard error"))
     several = len({each.engine for each in summary.distributions}) > 1
     for each in summary.distributions:
         name = f"{each.quantity} · {each.engine}" if several else each.quantity
         for statistic, number, its_error in _lines(each):
-            table.add_row(words(name), words(statistic), words(number), words(its_error))
-            name = ""
-        table.add_section()
+            table.add(name, statistic, number, its_error)
     return table
 
 

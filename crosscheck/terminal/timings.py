@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Column, Table
 
 from crosscheck.terminal.text import marked, words
 from crosscheck.timing.bench import CaseBench, Contest
 from crosscheck.timing.benchmark_json import statistics
+from flexmb.output.listing import Listing, figures, names
 
 
 def print_bench(console: Console, bench: CaseBench) -> None:
@@ -29,19 +28,17 @@ def print_bench(console: Console, bench: CaseBench) -> None:
             console.print(marked("✕", "red", f"{each.rival.name} is not timed: {each.why}"), soft_wrap=True)
 
 
-def _table(timed: list[Contest]) -> Table:
+def _table(timed: list[Contest]) -> Listing:
     """The variant and the level of its bodies stand beside the engine where they are not the same for all."""
-    right = ("min", "quartiles", "ratio", "error", "compile", "again")
-    first = Column("engine and effort", overflow="fold")
-    columns = [first, *(Column(name, justify="right", no_wrap=True) for name in right)]
-    table = Table(*columns, header_style="bold", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    right = figures("min", "quartiles", "ratio", "error", "compile", "again")
+    table = Listing(*names("engine and effort"), *right)
     equals = [each.best_s for each in timed if each.standing == "equal" and each.best_s is not None]
     models = {(each.rival.job.variant, each.rival.level) for each in timed}
     for each in timed:
         assert each.timed is not None and each.timed.prepared is not None and each.rung is not None
         stats = statistics(each)
         job, level = each.rival.job, each.rival.level
-        cells = (
+        table.add(
             f"{job.engine if len(models) == 1 else f'{job.engine}, {job.variant} ({level})'} {each.rung.effort.label}",
             seconds(stats.min),
             f"+{_percent(stats.q1, stats.min)} .. +{_percent(stats.q3, stats.min)} %",
@@ -50,7 +47,6 @@ def _table(timed: list[Contest]) -> Table:
             seconds(each.rival.compile_s),
             seconds(each.timed.prepared.again_s),
         )
-        table.add_row(*map(words, cells))
     return table
 
 

@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.verdict import STATUSES, Verdict
 from crosscheck.terminal.text import marked, words
 from crosscheck.terminal.verbosity import Verbosity
+from flexmb.output.listing import Listing, figures, names
 
 LINES = 7  # of what is not in order, unless all is asked for
 
@@ -51,6 +51,8 @@ def _inventory(outcome: SessionOutcome) -> str:
         parts.append(f"{noticed} of {controls} deliberate faults noticed")
     for engine, cases in outcome.never_applicable.items():
         parts.append(f"{engine} not applicable in {len(cases)}")
+    for engine, channels in outcome.not_offered.items():
+        parts.append(f"{channels} not offered by {engine}")
     return f"{count} case{'s' if count > 1 else ''}: {', '.join(parts)}"
 
 
@@ -93,22 +95,19 @@ def _place(verdict: Verdict) -> str:
     return f"{verdict.case}, {verdict.comparison}, {verdict.pair}, {verdict.channel}"
 
 
-def _verdict_table(verdicts: Sequence[Verdict]) -> Table:
+def _verdict_table(verdicts: Sequence[Verdict]) -> Listing:
     """Counts of statuses by case and comparison; green what is as expected, red what is not."""
     occurring = [status for status in STATUSES if any(verdict.status == status for verdict in verdicts)]
-    table = Table("case", "comparison", "as expected", *occurring, header_style="bold")
+    table = Listing(*names("case", "comparison"), *figures("as expected", *occurring))
     groups: dict[tuple[str, str], list[Verdict]] = {}
     for verdict in verdicts:
         name = "negative controls" if verdict.kind == "control" else verdict.comparison
         groups.setdefault((verdict.case, name), []).append(verdict)
-    previous = ""
     for (case, name), group in groups.items():
         good = sum(verdict.ok for verdict in group)
         colour = "green" if good == len(group) else "red"
         cells = [_count(group, status) for status in occurring]
-        shown = "" if case == previous else case
-        table.add_row(words(shown), words(name), words(f"{good} of {len(group)}", colour), *cells)
-        previous = case
+        table.add(case, name, words(f"{good} of {len(group)}", colour), *cells)
     return table
 
 

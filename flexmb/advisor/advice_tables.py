@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from flexmb.advisor.advice import Advice, Trial
+from flexmb.output.listing import Listing, figures, names, prose
 
 _SHOWN = 20
 
@@ -33,40 +33,34 @@ def _asked(advice: Advice) -> Text:
     return Text(f"{advice.name}: {wanted} to {advice.tolerance:g} of its scale, 0 to {advice.t_end:g} s")
 
 
-def _bodies(advice: Advice) -> Table:
-    table = Table(title="\nModel of each flexible body", title_justify="left", title_style="bold")
-    for name in ("body", "model", "error by itself, predicted", "because"):
-        table.add_column(name, justify="right" if "error" in name else "left")
+def _bodies(advice: Advice) -> Listing:
+    columns = (*names("body", "model"), *figures("error by itself, predicted"), *prose("because"))
+    table = Listing(*columns, title="\nModel of each flexible body")
     for each in advice.bodies:
-        table.add_row(each.body, str(each.rung), _number(each.predicted), each.reason)
+        table.add(each.body, str(each.rung), _number(each.predicted), each.reason)
     return table
 
 
-def _run(advice: Advice) -> Table:
-    table = Table(title="\nThe whole run", title_justify="left", title_style="bold")
-    for name in ("", "predicted", "measured"):
-        table.add_column(name, justify="right" if name else "left")
-    table.add_row("error, of the scale", _number(advice.predicted), _number(advice.measured))
-    table.add_row("of that, uncertainty of the reference", "", _number(advice.uncertainty))
-    table.add_row("operations", _number(advice.predicted_operations), _number(advice.operations))
-    table.add_row("evaluations", "", str(advice.evaluations))
-    table.add_row("seconds here (nothing depends on it)", "", f"{advice.seconds:.2g}")
-    table.add_row("method", "", str(advice.method))
-    if advice.reference:
-        table.caption = f"Measured against: {advice.reference}"
-        table.caption_justify = "left"
+def _run(advice: Advice) -> Listing:
+    caption = f"Measured against: {advice.reference}" if advice.reference else ""
+    table = Listing(*names(""), *figures("predicted", "measured"), title="\nThe whole run", caption=caption)
+    table.add("error, of the scale", _number(advice.predicted), _number(advice.measured))
+    table.add("of that, uncertainty of the reference", "", _number(advice.uncertainty))
+    table.add("operations", _number(advice.predicted_operations), _number(advice.operations))
+    table.add("evaluations", "", str(advice.evaluations))
+    table.add("seconds here (nothing depends on it)", "", f"{advice.seconds:.2g}")
+    table.add("method", "", str(advice.method))
     return table
 
 
-def _trials(advice: Advice) -> Table:
+def _trials(advice: Advice) -> Listing:
     title = "\nModels that were run" + (f" (the {_SHOWN} cheapest)" if len(advice.trials) > _SHOWN else "")
-    table = Table(title=title, title_justify="left", title_style="bold")
-    for name in ("model", "predicted error", "measured error", "operations, finely integrated", ""):
-        table.add_column(name, justify="right" if "err" in name or "op" in name else "left")
+    numbers = figures("predicted error", "measured error", "operations, finely integrated")
+    table = Listing(*prose("model"), *numbers, *names(""), title=title)
     for trial in sorted(advice.trials, key=lambda each: each.operations)[:_SHOWN]:
         fits = Text("adequate", style="green") if trial.adequate else Text("no", style="red")
-        table.add_row(
-            "\n".join(_model(trial)), _number(trial.predicted), _number(trial.measured), _number(trial.operations), fits
+        table.add(
+            ", ".join(_model(trial)), _number(trial.predicted), _number(trial.measured), _number(trial.operations), fits
         )
     return table
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
-from rich.table import Table
 
 from flexmb.cli.terminal import SceneFile, console, no_traceback
+from flexmb.output.listing import Listing, figures, names, prose
 from flexmb.scene.files import load_scene
 
 if TYPE_CHECKING:
@@ -47,23 +47,20 @@ def mass(
 _AXES = "Of the scene in World axes, of bodies in their own frames; inertia about the mass centre."
 
 
-def _table(scene: str, rows: list[tuple[str, MassProperties]]) -> Table:
-    table = Table(title=f"\nMass properties of {scene}", title_justify="left", box=None, padding=(0, 2, 0, 0))
-    table.caption, table.caption_justify = _AXES, "left"
-    table.add_column("with what\nit carries")
-    for heading in ("mass kg", "centre m", "inertia kg m²\nxx, yy, zz,\nxy, xz, yz"):
-        table.add_column(heading, justify="left")
+def _table(scene: str, rows: list[tuple[str, MassProperties]]) -> Listing:
+    vectors = prose("centre m", "inertia kg m²: xx, yy, zz, xy, xz, yz")
+    columns = (*names("with what it carries"), *figures("mass kg"), *vectors)
+    table = Listing(*columns, title=f"\nMass properties of {scene}", caption=_AXES)
     for name, found in rows:
         J = found.inertia_in_body
         six = [*np.diag(J), J[0, 1], J[0, 2], J[1, 2]]
-        table.add_row(name, f"{found.mass:.6g}", _numbers(found.centre_in_body), _numbers(six))
+        table.add(name, f"{found.mass:.6g}", _numbers(found.centre_in_body), _numbers(six))
     return table
 
 
 def _numbers(values: Iterable[float]) -> str:
-    """Six digits, three in a line; what rounding has left of the largest is zero."""
+    """Six digits; what rounding has left of the largest is zero."""
     found = [float(value) for value in values]
     largest = max(map(abs, found))
     kept = [0.0 if abs(value) < 1e-14 * largest else value for value in found]
-    words = [f"{value:.6g}" for value in kept]
-    return ",\n".join(", ".join(words[i : i + 3]) for i in range(0, len(words), 3))
+    return ", ".join(f"{value:.6g}" for value in kept)

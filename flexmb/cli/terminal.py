@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.text import Text
 
 from flexmb.output.printable import printable
+from flexmb.output.terminal import Terminal
 from flexmb.output.writing import in_words
 from flexmb.scene.check import SceneError, SceneWarning
 
@@ -20,8 +20,8 @@ EXIT_STOPPED = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130  # as of shells: 128 and the number of the signal
 
-console = Console(markup=False, emoji=False)  # names and paths stand in what they print
-errors = Console(stderr=True, markup=False, emoji=False)
+console = Terminal()
+errors = Terminal(stderr=True)
 
 SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)]
 Strict = Annotated[bool, typer.Option("--strict", help="Warnings about the scene are errors.")]

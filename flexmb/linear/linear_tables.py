@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from flexmb.linear.campbell import Campbell
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.truncation import Truncation
+from flexmb.output.listing import Listing, figures, prose
 from flexmb.typing import Real
 
 _COLOURS = {"asymptotically stable": "green", "neutral": "yellow", "unstable": "bold red"}
@@ -23,17 +23,16 @@ def modes_table(model: LinearModel, cut: Truncation | None = None) -> Renderable
 
     Then stability, and accelerations that are not balanced.
     """
-    table = _table(f"\nModes of {model.scene}", _caption(cut))
-    for name in ("mode", "Hz", "rad/s", "damping ratio", "Re (1/s)", *([] if cut is None else ["truncation"])):
-        table.add_column(name, justify="right")
-    table.add_column("dominant displacements")
+    numbers = figures("mode", "Hz", "rad/s", "damping ratio", "Re (1/s)", *([] if cut is None else ["truncation"]))
+    shapes = prose("dominant displacements")
+    table = Listing(*numbers, *shapes, title=f"\nModes of {model.scene}", caption=_caption(cut))
     if model.rigid_body_shapes.shape[1]:
-        table.add_row(*_rigid_body_row(model, cut))
+        table.add(*_rigid_body_row(model, cut))
     for i, mode in enumerate(model.modes):
         if mode.is_rigid_body:
             continue
         real = mode.eigenvalue.real if abs(mode.eigenvalue.real) > mode.tolerance else 0.0
-        table.add_row(
+        table.add(
             str(i + 1), f"{mode.frequency_hz:.6g}", f"{mode.frequency_rad_s:.6g}",
             f"{0.0 - real / mode.natural_rad_s:.3g}", f"{real:.4g}",
             *([] if cut is None else ["" if np.isnan(cut.change[i]) else f"{cut.change[i]:.1e}"]),
@@ -74,26 +73,18 @@ def _dominant(model: LinearModel, participation: Real) -> str:
 
 def campbell_table(result: Campbell) -> RenderableType:
     """Frequencies (Hz) against the spin rate; growing modes are red."""
-    table = _table(
-        f"\nFrequencies of {result.scene} in Hz, {result.hinge} spinning", "Red: the mode grows. 0: no oscillation."
-    )
-    table.add_column("rad/s", justify="right")
-    for name in result.names:
-        table.add_column(name, justify="right")
+    title = f"\nFrequencies of {result.scene} in Hz, {result.hinge} spinning"
+    table = Listing(*figures("rad/s", *result.names), title=title, caption="Red: the mode grows. 0: no oscillation.")
     for i, rate in enumerate(result.rates):
         verdict = result.stability[i]
         cells = [
             Text(f"{value.imag / (2.0 * np.pi):.5g}", style="bold red" if value.real > verdict.tolerance else "")
             for value in result.eigenvalues[i]
         ]
-        table.add_row(f"{rate:g}", *cells)
+        table.add(f"{rate:g}", *cells)
     if not np.any(result.unstable):
         return Group(table, Text("no growing mode at these rates", style="green"))
     first = int(np.argmax(result.unstable))
     before = "" if first == 0 else f", not at {result.rates[first - 1]:g}"
     return Group(table, Text(f"unstable at {result.rates[first]:g} rad/s{before}", style="bold red"))
 
-
-def _table(title: str, caption: str) -> Table:
-    left = {"title_justify": "left", "caption_justify": "left"}
-    return Table(title=title, caption=caption, box=None, padding=(0, 2, 0, 0), **left)  # type: ignore[arg-type]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from rich.table import Table
 from rich.text import Text
 
+from flexmb.output.listing import Listing, figures, names, prose
 from flexmb.run.channels import channels_of, signal_range, unit
 from flexmb.run.trajectory import Trajectory
 from flexmb.typing import Real
@@ -15,32 +15,27 @@ from flexmb.typing import Real
 MOST_EVENTS = 8  # that are told one by one
 
 
-def summary(trajectory: Trajectory) -> Table:
+def summary(trajectory: Trajectory) -> Listing:
     """Status, drift of energy and momentum, steps, and where the time went."""
-    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
-    table.add_column(style="dim")
-    table.add_column()
+    table = Listing(*names(""), *prose(""))
     for name, value in _rows(trajectory):
-        table.add_row(name, value)
+        table.add(Text(name, style="dim"), value)
     return table
 
 
-def errors_table(trajectory: Trajectory, errors: Mapping[str, Real]) -> Table:
+def errors_table(trajectory: Trajectory, errors: Mapping[str, Real]) -> Listing:
     """The largest estimated error of each channel, in its unit and relative to its range."""
-    table = Table(
-        title="\nErrors by a tighter run", title_justify="left", box=None, padding=(0, 2, 0, 0),
+    table = Listing(
+        *names("channel"), *figures("largest error", "relative"), title="\nErrors by a tighter run",
         caption="Relative: to the channel's range; for positions and orientations how far they get from the start.",
-        caption_justify="left",
     )  # fmt: skip
-    for name, justify in (("channel", "left"), ("largest error", "right"), ("relative", "right")):
-        table.add_column(name, justify=justify)  # type: ignore[arg-type]
     for name, values in channels_of(trajectory).items():
         if np.any(np.isnan(values)):
             table.add_row(name, "not determined", "")
             continue
         largest, scale = float(np.max(errors[name], initial=0.0)), signal_range(name, values)
         relative = f"{largest / scale:.1e}" if scale > 0.0 else ""
-        table.add_row(name, f"{largest:.1e} {'rad' if name.endswith('.orientation') else unit(name)}", relative)
+        table.add(name, f"{largest:.1e} {'rad' if name.endswith('.orientation') else unit(name)}", relative)
     return table
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from crosscheck.engines.contract import Effort, Status
 from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.beams import PlanarBeam
+from crosscheck.engines.exudyn.kkt import initial_state
 from crosscheck.engines.exudyn.state import States
 from flexmb.typing import Real
 
@@ -74,6 +75,8 @@ class Recorder:
 def integrate(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> ExudynSolution:
     """Integrate from 0 through `times`; uniform sampling for the implicit solvers."""
     run = _fixed if effort.method in IMPLICIT + FIXED_EXPLICIT else _explicit
+    if effort.method in IMPLICIT and _starts_accelerated(assembly):
+        _tell_accelerations(assembly)
     start = perf_counter()
     states, evaluations = run(assembly, times, effort)
     wall = perf_counter() - start
@@ -82,6 +85,22 @@ def integrate(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> E
         return ExudynSolution(states, "finished", "", wall, evaluations)
     last = f"last good output at t = {times[good - 1]:g} s of {times[-1]:g} s"
     return ExudynSolution(states.cut(good), "diverged", f"{effort.label}: {last}", wall, evaluations)
+
+
+def _starts_accelerated(assembly: Assembly | PlanarBeam) -> bool:
+    """Whether a prescribed motion begins with an acceleration.
+
+    Exudyn knows offsets and their rates, so its own initial accelerations lack what the second derivatives add. The
+    trapezoidal rule keeps such an error for ever, with either sign in turn, and loads and drives have it.
+    """
+    return any(profile(0.0).acceleration for _, profile in assembly.prescribed)
+
+
+def _tell_accelerations(assembly: Assembly | PlanarBeam) -> None:
+    """Give Exudyn the accelerations at t = 0."""
+    found = initial_state(assembly).a
+    assert found is not None
+    assembly.shop.mbs.systemData.SetODE2Coordinates_tt(found[0], assembly.shop.exu.ConfigurationType.Initial)
 
 
 def _settings(assembly: Assembly | PlanarBeam):
@@ -124,6 +143,7 @@ def _fixed_steps(
     control.numberOfSteps = steps_between_samples(times, effort.value) * (len(times) - 1)
     control.newton.relativeTolerance = control.newton.absoluteTolerance = tolerance
     control.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
+    control.generalizedAlpha.computeInitialAccelerations = not _starts_accelerated(assembly)
     settings.solution.sensors.writePeriod = float(times[1])
     if shop.mbs.systemData.SystemSize() > SPARSE_FROM:
         settings.linearSolver.solverType = shop.exu.LinearSolverType.EigenSparse

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from flexmb.frisch.equivalence.comparison import BEST, Equivalence, percent
 from flexmb.frisch.equivalence.mode_count import Direction
 from flexmb.frisch.equivalence.relations import Fit, Relation, displacement_relations, modal_effective_inertia
+from flexmb.output.listing import Listing, figures, names, prose
 from flexmb.typing import Real
 
 _UNITS = {149: "m/s", 150: "kg m^2/s", 151: "kg m^2/s", 47: "m", 49: "kg m^2"}
@@ -38,26 +38,25 @@ def _heading(result: Equivalence) -> Text:
     return Text.assemble((body.name, "bold"), words)
 
 
-def _mismatches(result: Equivalence, i: int, angle: float) -> Table:
+def _mismatches(result: Equivalence, i: int, angle: float) -> Listing:
     """Relations of the i-th hinge axis and its mode: size of the modal side, mismatch of each hinge."""
     body, mode = result.appendage, _lead(result).modes[i]
     frequency = body.frequencies[mode] / (2.0 * np.pi)
-    table = _table(
-        f"\nMismatch with mode {mode + 1}, {frequency:.4g} Hz",
-        "Parts of the root-mean-square velocity (displacement) of the appendage; modes: size of their side while the "
-        "best hinge turns at 1 rad/s. In a vibration accelerations, (160), (159), mismatch as (149), (151).",
-    )
-    for name in ("equation", "quantity", "modes", *result.fits):
-        table.add_column(name, justify="left" if name == "quantity" else "right")
+    columns = (*figures("equation"), *names("quantity"), *figures("modes", *result.fits))
+    table = Listing(
+        *columns, title=f"\nMismatch with mode {mode + 1}, {frequency:.4g} Hz",
+        caption="Parts of the root-mean-square velocity (displacement) of the appendage; modes: size of their side "
+        "while the best hinge turns at 1 rad/s. In a vibration accelerations, (160), (159), mismatch as (149), (151).",
+    )  # fmt: skip
     fits = list(result.fits.values())
     for relations in zip(*(fit.relations[i] for fit in fits), strict=True):
         size = float(np.linalg.norm(relations[0].flexible)) / abs(result.fits[BEST].rates[i, i])
         unit = _UNITS[relations[0].equation]
-        table.add_row(*_words(relations[0], f"{size:.4g} {unit}"), *_mismatch(relations, result))
+        table.add(*_words(relations[0], f"{size:.4g} {unit}"), *_mismatch(relations, result))
     shape = np.eye(body.mode_count)[mode]
     turned = [displacement_relations(body, fit.hinge, shape * angle / fit.rates[i, i]) for fit in fits]
     for relations in zip(*turned, strict=True):
-        table.add_row(*_words(relations[0], f"at {angle:g} rad"), *_mismatch(relations, result))
+        table.add(*_words(relations[0], f"at {angle:g} rad"), *_mismatch(relations, result))
     return table
 
 
@@ -72,21 +71,20 @@ def _mismatch(relations: tuple[Relation, ...], result: Equivalence) -> list[Text
     ]
 
 
-def _hinges(result: Equivalence) -> Table:
+def _hinges(result: Equivalence) -> Listing:
     """The rigid models themselves, and the loads that they and their modes exert on the base."""
     body = result.appendage
     caption = "Effective mass and inertia, of the rigid body's, follow the vibration; the rest follows the base."
-    table = _table("\nSpring-hinged rigid models", caption)
-    for name in ("", "modes", *result.fits):
-        table.add_column(name, justify="left" if not name else "right")
+    columns = (*names(""), *figures("modes", *result.fits))
+    table = Listing(*columns, title="\nSpring-hinged rigid models", caption=caption)
     fits = list(result.fits.values())
     lead = fits[0]
-    table.add_row("norm of the mismatches", "", *(percent(fit.mismatch) for fit in fits))
-    table.add_row("point from the clamp (m)", "", *(_vector(fit.hinge.point) for fit in fits))
+    table.add("norm of the mismatches", "", *(percent(fit.mismatch) for fit in fits))
+    table.add("point from the clamp (m)", "", *(_vector(fit.hinge.point) for fit in fits))
     modal = modal_effective_inertia(body, lead.modes)
     for i, (axis, mode) in enumerate(zip(lead.hinge.axes, lead.modes, strict=True)):
         named = _vector(axis)
-        table.add_row(f"spring about {named} (N m/rad)", "", *(f"{fit.hinge.stiffness[i]:.5g}" for fit in fits))
+        table.add(f"spring about {named} (N m/rad)", "", *(f"{fit.hinge.stiffness[i]:.5g}" for fit in fits))
         velocity = body.parameters.A[mode]
         rows = [(f"effective inertia about {named}", slice(0, 3), axis)]
         if np.linalg.norm(velocity) > 1e-6:
@@ -95,28 +93,29 @@ def _hinges(result: Equivalence) -> Table:
         for label, part, along in rows:
             whole = along @ body.rigid_inertia[part, part] @ along
             inertias = [modal, *(fit.effective_inertia for fit in fits)]
-            table.add_row(label, *(percent(along @ one[part, part] @ along / whole) for one in inertias))
+            table.add(label, *(percent(along @ one[part, part] @ along / whole) for one in inertias))
     frequencies = [body.frequencies[sorted(lead.modes)], *(fit.frequencies for fit in fits)]
-    table.add_row("frequency (Hz)", *(", ".join(f"{f:.5g}" for f in some / (2.0 * np.pi)) for some in frequencies))
+    table.add("frequency (Hz)", *(", ".join(f"{f:.5g}" for f in some / (2.0 * np.pi)) for some in frequencies))
     return table
 
 
-def _modes(result: Equivalence) -> Table:
+def _modes(result: Equivalence) -> Listing:
     """How many modes each motion of the base needs."""
     shown = min(_SHOWN_MODES, result.appendage.mode_count)
-    table = _table(
-        f"\nModes needed for {percent(result.accuracy)}",
-        "Parts of the rigid body's inertia about the clamp, or mass, that modes 1, 2, ... and all of them carry away "
-        "from the base. Turning needs (149)-(151) within the accuracy as well. Acting: modes that move so at all.",
-    )
-    for name in ("base moves", "inertia", "needed", "acting", *(str(n + 1) for n in range(shown)), "all"):
-        table.add_column(name, justify="left" if name == "base moves" else "right", no_wrap=True)
+    modes = (str(n + 1) for n in range(shown))
+    table = Listing(
+        *names("base moves"), *figures("inertia", "needed", "acting", *modes, "all"),
+        title=f"\nModes needed for {percent(result.accuracy)}",
+        caption="Parts of the rigid body's inertia about the clamp, or mass, that modes 1, 2, ... and all of them "
+        "carry away from the base. Turning needs (149)-(151) within the accuracy as well. Acting: modes that move so "
+        "at all.",
+    )  # fmt: skip
     for direction in result.directions:
         unit = "kg m^2" if direction.name.startswith("about") else "kg"
         shares = [percent(share) if share > 1e-6 else "-" for share in direction.mode_shares[:shown]]
         total = percent(max(1.0 - direction.remainder[-1], 0.0))
         inertia = f"{direction.inertia:.4g} {unit}"
-        table.add_row(direction.name, inertia, *_needed(direction, result.accuracy), *shares, total)
+        table.add(direction.name, inertia, *_needed(direction, result.accuracy), *shares, total)
     return table
 
 
@@ -132,18 +131,11 @@ def _needed(direction: Direction, accuracy: float) -> tuple[Text, str]:
     return Text(f"more than {every}", style="yellow"), str(acting)
 
 
-def _verdicts(result: Equivalence) -> Table:
-    table = _table("\nWhich model is better", None)
-    table.add_column("for")
-    table.add_column("model")
-    table.add_column("because")
+def _verdicts(result: Equivalence) -> Listing:
+    table = Listing(*prose("for"), *names("model"), *prose("because"), title="\nWhich model is better")
     for verdict in result.verdicts:
-        table.add_row(verdict.question, Text(verdict.better, style=_COLOURS[verdict.better]), verdict.reason)
+        table.add(verdict.question, Text(verdict.better, style=_COLOURS[verdict.better]), verdict.reason)
     return table
-
-
-def _table(title: str, caption: str | None) -> Table:
-    return Table(title=title, caption=caption, title_justify="left", caption_justify="left", title_style="bold")
 
 
 def _vector(vector: Real) -> str:

@@ -118,8 +118,23 @@ def test_a_channel_that_a_guest_does_not_offer_is_not_applicable_and_told_once()
     assert (outcome.ok, len(outcome.all)) == (True, 4)
     (apart,) = outcome.inapplicable
     assert (apart.where, apart.reason) == (f"rigid, {VELOCITY}", "guest does not offer it")
+    assert outcome.headline == "All 4 verdicts are as expected; not offered and not judged: guest 1 channel"
+    assert "1 case: 4 agree, 1 not offered by guest" in told(outcome)[1]
     named = judged(BOTH, [*two[0], *ladder("two", {TIP: way()}), *ladder("guest", {TIP: way()})], asked=THREE)
     assert {verdict.pair for verdict in named.unexpected} == {"one – two"}
+
+
+def test_an_energy_that_a_guest_does_not_know_is_counted_too() -> None:
+    """A kind of energy that one side does not know is no refusal of it; but of a guest it is told."""
+    text = ONE_PAIR.replace("goals = {", 'goals = { "energy" = 1e-3,')
+    known = {TIP: way(), "energy.kinetic": way()}
+    pair = [*ladder("one", known), *ladder("two", known)]
+    outcome = judged(text, [*pair, *ladder("guest", {TIP: way()})], asked=THREE)
+    assert (outcome.ok, outcome.not_offered) == (True, {"guest": 1})
+    assert [each.where for each in outcome.inapplicable] == ["rigid, energy.kinetic"]
+    assert judged(text, [*pair, *ladder("guest", known)], asked=THREE).not_offered == {}
+    unasked = judged(ONE_PAIR, [*pair, *ladder("guest", {TIP: way()})], asked=THREE)
+    assert (unasked.ok, unasked.inapplicable) == (True, ())
 
 
 def test_what_no_guest_offers_is_not_applicable_to_them() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
@@ -98,6 +99,12 @@ def cut(run: Trajectory, status: Any = "diverged", count: int = 2, message: str 
     tip = run.markers["tip"]
     path = replace(tip, position=tip.position[:count], quaternion=tip.quaternion[:count], velocity=tip.velocity[:count])
     return Trajectory(status, message, run.times[:count], {"tip": path}, wall_s=0.001, evaluations=7)
+
+
+def on_a_clock(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
+    """Every look at the worker's clock is so many seconds after the one before."""
+    clock = itertools.count(10.0, seconds)
+    monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
 
 
 @pytest.fixture(autouse=True)
@@ -221,20 +228,20 @@ def test_a_refusal_is_recorded_and_nothing_is_compiled() -> None:
 
 
 def test_a_run_is_recorded_in_every_field(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = iter([10.0, 12.5])
-    monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    on_a_clock(monkeypatch, 2.5)
     actor = Actor(play=lambda run, count: replace(run, wall_s=0.5 + count, evaluations=40 + count, message="fine"))
     ladder = LADDER[:3]
     found = emitted(actor, efforts=ladder, role="control:mass")
     assert found[0] == "compiling"
     assert found[1::2] == LABELS[:3]
-    assert actor.heard == ["version", "supports", "compile", "warm_up", *(f"simulate {each}" for each in LABELS[:3])]
+    runs = [f"simulate {each}" for each in (LABELS[0], *LABELS[:3])]  # the coarsest is run again
+    assert actor.heard == ["version", "supports", "compile", "warm_up", *runs]
     key = found[2].made_by
-    for rung, (record, effort) in enumerate(zip(found[2::2], ladder, strict=True)):
+    for rung, count, record, effort in zip(range(3), (0, 2, 3), found[2::2], ladder, strict=True):
         assert msgspec.structs.replace(record, times=None, channels={}) == the(
             "finished", "fine", role="control:mass", version="1.0", support="rigid for flexible", made_by=key,
             effort=effort.label, effort_kind="step", effort_method="rk4", effort_value=effort.value, rung=rung,
-            rungs=3, compile_s=2.5, wall_s=0.5 + rung, evaluations=40 + rung,
+            rungs=3, compile_s=2.5, wall_s=0.5 + count, evaluations=40 + count,
         )  # fmt: skip
         wanted = channels_of(Pendulum(SCENE).simulate(Run(TIMES), effort))
         assert record.channels.keys() == wanted.keys()
@@ -325,9 +332,23 @@ def test_a_short_run_is_repeated_and_its_shortest_time_counts() -> None:
     actor = Actor(play=lambda run, count: slow(run, times[count % 3]))
     assert [each.wall_s for each in records(actor)] == [0.01] * 5
     assert len(actor.heard) == 5 + 3 * 5
+
+
+def test_of_long_runs_the_coarsest_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    on_a_clock(monkeypatch, 0.125)
     actor = Actor(play=lambda run, count: slow(run, 0.1))
     assert [each.wall_s for each in records(actor)] == [0.1] * 5
-    assert len(actor.heard) == 5 + 5
+    assert len(actor.heard) == 5 + 5 + 1
+    noisy = Actor(play=lambda run, count: replace(run, momentum=run.momentum * (1 + 1e-9 * count)))
+    assert [each.status for each in records(noisy)] == ["failed", *["finished"] * 4]
+
+
+def test_a_run_is_as_short_as_the_worker_says_whatever_the_engine_claims() -> None:
+    """Noise of 1e-9 at each call, and a second claimed for a solve of some milliseconds."""
+    noisy = Actor(play=lambda run, count: replace(run, momentum=run.momentum * (1 + 1e-9 * count), wall_s=1.0))
+    found = records(noisy)
+    assert [each.status for each in found] == ["failed"] * 5
+    assert "not reproducible: momentum.angular is another when the same effort is run again" in found[0].message
 
 
 @pytest.mark.parametrize(
