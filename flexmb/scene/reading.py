@@ -41,12 +41,17 @@ def regular_size(path: str | os.PathLike[str]) -> int:
     return found.st_size
 
 
-def read_text(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> str:
-    """Text of a regular file, with any line ends and with or without a byte order mark. OSError, or Unreadable."""
+def read_bytes(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> bytes:
+    """A regular file as it stands, of at most `limit` bytes. OSError, or Unreadable."""
     size = regular_size(path)
     if size > limit:
         raise Unreadable(f"{size / MIB:.0f} MiB are more than such a file may have, {limit // MIB} MiB", "divide it")
-    data = Path(path).read_bytes()
+    return Path(path).read_bytes()
+
+
+def read_text(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> str:
+    """Text of a regular file, with any line ends and with or without a byte order mark. OSError, or Unreadable."""
+    data = read_bytes(path, limit)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
