@@ -237,7 +237,8 @@ def _upright(axis: Real) -> Real:
 
 
 def _real(word: str) -> float:
+    """A number as XML has it; NaN for what Python alone reads as one, such as 1_0 and digits of other scripts."""
     try:
-        return float(word)
+        return float(word) if word.isascii() and "_" not in word else math.nan
     except ValueError:
         return math.nan
