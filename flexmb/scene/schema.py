@@ -145,6 +145,7 @@ Waiver = Literal[
     "wave_speed",
     "thick_section",
     "shear_stiffness",
+    "many_elements",
     "modal_frequency",
     "negative_stiffness",
     "negative_damping",
@@ -158,7 +159,8 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
     meant. Of beams: "wave_speed", sqrt(EA / mass per length) outside 50 to 20,000 m/s; "thick_section", sqrt(EI / EA)
     above half the length; "shear_stiffness", GJ or GA far above EI or EA. Of raw modes: "modal_frequency", the lowest
     frequency times the size. Of hinges, wheels and modes: "negative_stiffness", "negative_damping". A scene without
-    dimensions or in other units than SI, which have to fit each other (mm, tonne, s, N), lists the first four.
+    dimensions or in other units than SI, which have to fit each other (mm, tonne, s, N), lists the first four. And of
+    beams "many_elements", more than their modes need, which cost time and memory alone.
     """
 
     name: str
