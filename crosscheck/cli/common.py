@@ -23,6 +23,7 @@ from crosscheck.terminal.verbosity import Verbosity
 from crosscheck.terminal.versions import versions_text
 from flexmb.output.writing import in_words
 from flexmb.scene.problems import SceneWarning
+from flexmb.scene.user_code import forbid_user_code
 
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130  # as shells have it
@@ -63,6 +64,12 @@ def everything(
 def _machine_readable(asked: bool) -> bool:
     """Leave stdout to the JSON alone: all else that a command shows goes to stderr."""
     console.stderr = asked
+    return asked
+
+
+def _forbid(asked: bool) -> bool:
+    if asked:
+        forbid_user_code()  # workers inherit it
     return asked
 
 
@@ -119,6 +126,12 @@ Strict = Annotated[
     bool,
     typer.Option(
         "--strict", help="Figures worse than recorded or not recorded, references never made, doubtful scenes: errors."
+    ),
+]
+NoUserCode = Annotated[
+    bool,
+    typer.Option(
+        "--no-user-code", callback=_forbid, help="Import no function that a scene names, and run no exact.py of a case."
     ),
 ]
 SingleFile = Annotated[bool, typer.Option("--single-file", help="The report as one file, report.html, to send around.")]

@@ -33,7 +33,7 @@ def with_values(scene: Scene, sweep: SweepFile, values: Iterable[float]) -> Scen
 
 
 def require_numbers(scene: Scene, sweep: SweepFile, values: Real) -> None:
-    """CaseError, as of `with_values`, where a path leads to no number, or to one that a value of some sample does not fit.
+    """CaseError, as of `with_values`, where a path leads to no number, or to one that some sample's value does not fit.
 
     `values` (number of samples, number of parameters). A count takes whole numbers alone, in every sample.
     """

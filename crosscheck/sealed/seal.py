@@ -41,8 +41,8 @@ def read_results(file: Path) -> SealedResults:
         data = read_bytes(file, LIMIT)  # as it stands: a byte order mark and other line ends are changes too
         content = json.loads(data.decode("ascii"), parse_constant=_no_number, parse_float=_finite)
     except UnicodeDecodeError as error:
-        where = f"byte {error.start} is none that json.dumps writes"
-        raise ResultsError(f"{file} cannot be read: {where}: it was saved by another program, so fetch it anew") from None
+        what = f"byte {error.start} is not ASCII, so another program saved it: fetch it anew"
+        raise ResultsError(f"{file} cannot be read: {what}") from None
     except (OSError, Unreadable, ValueError, RecursionError) as error:
         raise ResultsError(f"{file} cannot be read: {error}") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from flexmb.cli.terminal import SceneFile, console, no_traceback
+from flexmb.cli.terminal import NoUserCode, SceneFile, console, no_traceback
 from flexmb.scene.files import load_scene
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ def mass(
         list[str] | None,
         typer.Option(help="A body with all that it carries; may be repeated. Default: all.", show_default=False),
     ] = None,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Print mass, mass centre and inertia of a scene, and of its bodies with all that they carry, at the initial state.

@@ -15,6 +15,7 @@ from rich.text import Text
 from flexmb.output.printable import printable
 from flexmb.output.writing import in_words
 from flexmb.scene.check import SceneError, SceneWarning
+from flexmb.scene.user_code import forbid_user_code
 
 EXIT_STOPPED = 1
 EXIT_USAGE = 2
@@ -25,6 +26,18 @@ errors = Console(stderr=True, markup=False, emoji=False)
 
 SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)]
 Strict = Annotated[bool, typer.Option("--strict", help="Warnings about the scene are errors.")]
+
+
+def _forbid(asked: bool) -> bool:
+    if asked:
+        forbid_user_code()
+    return asked
+
+
+NoUserCode = Annotated[
+    bool,
+    typer.Option("--no-user-code", callback=_forbid, help="Import no function that a scene names: refuse such scenes."),
+]
 
 
 def vector(option: str, text: str) -> tuple[float, ...]:

@@ -23,15 +23,15 @@ MOST_COPIES = 100_000  # of bodies, in all
 MOST_ENTRIES = 100_000_000  # of a texture or a height field
 MOST_RESERVED = 1_000_000  # numbers of the user for each item, keyframes
 # Attributes whose words are names and texts: a body may be called "inf".
-TEXTS = frozenset(
-    """
-    name class childclass dclass model file content_type plugin instance key text target objname reftype refname objtype
-    body body1 body2 bodyname bodyname1 bodyname2 geom geom1 geom2 geomname site site1 site2 sitename slidersite
-    cranksite refsite joint joint1 joint2 jointinparent joint_name tendon tendon1 tendon2 actuator mesh hfield skin
-    material texture flex node prefix source plane layer sidesite parent child link type kind filename
-    fileup filedown fileleft fileright filefront fileback meshdir texturedir assetdir modelfiledir
-    """.split()
-)
+TEXTS = frozenset((
+    "name", "class", "childclass", "dclass", "model", "file", "content_type", "plugin", "instance", "key", "text",
+    "target", "objname", "reftype", "refname", "objtype", "body", "body1", "body2", "bodyname", "bodyname1",
+    "bodyname2", "geom", "geom1", "geom2", "geomname", "site", "site1", "site2", "sitename", "slidersite",
+    "cranksite", "refsite", "joint", "joint1", "joint2", "jointinparent", "tendon", "tendon1", "tendon2", "actuator",
+    "mesh", "hfield", "skin", "material", "texture", "flex", "node", "prefix", "source", "sidesite", "parent",
+    "child", "link", "type", "filename", "fileup", "filedown", "fileleft", "fileright", "filefront", "fileback",
+    "meshdir", "texturedir", "assetdir",
+))  # fmt: skip
 FOLLOWED = {"include": "file", "model": "file"}  # elements that name a file of the same language
 
 
@@ -81,7 +81,8 @@ def _refuse_elements(file: Path, root: ElementTree.Element) -> None:
                 _refuse_words(file, element, key, text)
         copies *= _copies(element)
         if copies > MOST_COPIES:
-            _fail(file, element, "count", f"it asks for {copies} copies, and {MOST_COPIES} are allowed", "ask for fewer")
+            what = f"it asks for {copies} copies, and {MOST_COPIES} are allowed"
+            _fail(file, element, "count", what, "ask for fewer")
         _refuse_sizes(file, element)
         waiting += [(child, copies) for child in element]
 

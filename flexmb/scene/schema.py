@@ -152,7 +152,7 @@ Waiver = Literal[
 ]
 
 
-class Scene(SceneStruct, frozen=True, kw_only=True):
+class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
     """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it.
 
     Numbers that no usual structure has are warned of, because a slip of units looks like that. `allow` lists what is

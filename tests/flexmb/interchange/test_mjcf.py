@@ -98,7 +98,9 @@ BAD = {
 }
 NAN = "is no finite number: give a finite number, or leave the attribute out"
 UNSOUND = {  # MuJoCo compiles all of the first kind, with a default in place of the number
-    "inertial": ("<geom ", '<inertial pos="nan 0 0" mass="1" diaginertia="1 1 1"/><geom ', f'inertial, pos: "nan" {NAN}'),
+    "inertial": (
+        "<geom ", '<inertial pos="nan 0 0" mass="1" diaginertia="1 1 1"/><geom ', f'inertial, pos: "nan" {NAN}',
+    ),
     "capitals and sign": ('pos="0 0 1"', 'pos="0 -NaN 1"', f'body "trunk", pos: "-NaN" {NAN}'),
     "payload": ('stiffness="3"', 'stiffness="nan(7)"', f'joint "roll", stiffness: "nan(7)" {NAN}'),
     "infinite": ('mass="3"', 'mass="1e999"', f'geom, mass: "1e999" {NAN}'),
@@ -112,7 +114,7 @@ UNSOUND = {  # MuJoCo compiles all of the first kind, with a default in place of
         '<replicate count="1000"><replicate count="1000"><body/></replicate></replicate></worldbody>',
         "it asks for 1000000 copies, and 100000 are allowed",
     ),
-    "texture": ("<worldbody>", '<asset><texture width="99999" height="99999"/></asset><worldbody>', "9999800001 entries"),
+    "texture": ("<worldbody>", '<asset><texture width="99999" height="9999"/></asset><worldbody>', "999890001 entries"),
     "room": ("<worldbody>", '<size nuser_body="999999999"/><worldbody>', "999999999 entries"),
 }  # fmt: skip
 
