@@ -106,7 +106,7 @@ def _text(path: Path) -> str:
 def _nodes(path: Path) -> Nodes:
     try:
         rows = list(csv.reader(read_text(path).splitlines()))
-    except Unreadable as error:
+    except (Unreadable, csv.Error) as error:
         raise SuperElementError(f"{path}: {error}") from None
     header = [word.strip().lower() for word in rows[0]] if rows else []
     if header[:4] != ["id", "x", "y", "z"] or header[4:] not in ([], ["dofs"]):
