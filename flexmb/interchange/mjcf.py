@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from flexmb.interchange.imported import ImportedScene, ModelError, listed
+from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming
 from flexmb.interchange.mjcf_text import refuse_bad_text
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.quaternions import rotation_matrix
@@ -39,7 +39,8 @@ def read_mjcf(path: str | os.PathLike[str]) -> ImportedScene:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise ModelError(f"{path}: MuJoCo refuses the model: {error}") from None
-    return _Model(str(path), model).scene()
+    with naming(str(path)):
+        return _Model(str(path), model).scene()
 
 
 class _Model:

@@ -7,6 +7,7 @@ makes as many copies as `count` says. Both stand in the text alone, of the model
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,10 +38,10 @@ FOLLOWED = {"include": "file", "model": "file"}  # elements that name a file of 
 
 def refuse_bad_text(path: Path) -> None:
     """ModelError naming file, element, attribute and remedy; OSError for a file that cannot be read."""
-    folders, seen = [path.parent], set[Path]()
+    folders, seen = [path.parent], set[str]()
     waiting = [path]
     for file in waiting:
-        if (real := file.resolve()) in seen:
+        if (real := os.path.realpath(file)) in seen:
             continue
         seen.add(real)
         root = _parsed(file)

@@ -40,7 +40,7 @@ INERTIAL = """<mujoco model="given">
   </worldbody>
 </mujoco>"""
 MORE = b'<mujoco><option gravity="0.1 0 -9.81"/></mujoco>'
-NO_NUMBER = re.compile(r"[-+]?(nan(\(.*\))?|inf(inity)?|[\d.]+e\d{3,})", re.IGNORECASE)
+NO_NUMBER = re.compile(r"[-+]?(nan(\(.*\))?|inf(inity)?|[\d.]+e\d{4,}|[\d.]+e[4-9]\d\d)", re.IGNORECASE)
 NAMES = ("name", "class", "childclass", "model", "file", "type", "link", "filename")
 
 
@@ -56,8 +56,8 @@ def of_imports(folder: Path) -> dict[str, Kind]:
     punched = (large_field_dmig("KAAX", K) + large_field_dmig("MAAX", M)).encode()
     packed, _ = written("dense", folder)
     return {
-        "urdf": Kind("robot.urdf", tuple(map(_in_lines, robots)), xml, errors, _urdf, "scene "),
-        "mjcf": Kind("robot.xml", (MJCF.encode(), INERTIAL.encode()), xml, errors, _mjcf, "scene "),
+        "urdf": Kind("robot.urdf", tuple(map(_in_lines, robots)), xml, errors, _urdf),
+        "mjcf": Kind("robot.xml", (MJCF.encode(), INERTIAL.encode()), xml, errors, _mjcf),
         "mjcf include": Kind("more.xml", (MORE,), xml, errors, lambda path: _including(path), "robot.xml"),
         "sid": Kind("body.sid", _sids(folder), lines, (SidError, SceneError), _sid, "body.sid"),
         "punch": Kind("both.pch", (punched,), lines, matrices, lambda path: _structure(path, path)),
@@ -88,7 +88,7 @@ def _urdf(path: Path) -> str | None:
     given = {
         link.get("name"): (link.find("inertial/mass"), link.find("inertial/origin")) for link in root.findall("link")
     }
-    return _texts(root) or _not_finite(scene) or _masses(scene, given, "value", "xyz")
+    return _not_finite(scene) or _masses(scene, given, "value", "xyz")
 
 
 def _mjcf(path: Path) -> str | None:

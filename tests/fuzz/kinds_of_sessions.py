@@ -107,7 +107,7 @@ def _restarts(folder: Path) -> tuple[bytes, ...]:
 def _results(path: Path) -> str | None:
     found = read_results(path)
     text = path.read_bytes()
-    if sealed_text(found).encode() != text and json.loads(sealed_text(found)) != _filled(json.loads(text), found):
+    if sealed_text(found).encode() != text and not _says(json.loads(text), found):
         return "it was read as something else"
     old = read_results(path.with_name("old.json"))
     print_differences(Console(file=io.StringIO()), compare_results(old, found), Verbosity.VERBOSE)
@@ -115,10 +115,9 @@ def _results(path: Path) -> str | None:
     return None
 
 
-def _filled(content: object, found: object) -> object:
-    """What a file says, if it says what was read from it; defaults that stand in it count as left out."""
-    again = msgspec.convert(content, type(found))
-    return json.loads(sealed_text(again)) if again == found else None  # type: ignore[arg-type]
+def _says(content: dict[str, object], found: object) -> bool:
+    """Whether the file says what was read from it; defaults that stand in it count as left out."""
+    return msgspec.convert({key: value for key, value in content.items() if key != "sha256"}, type(found)) == found
 
 
 def _sweep(path: Path) -> str | None:
