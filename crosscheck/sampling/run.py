@@ -29,8 +29,9 @@ from crosscheck.sampling.points import sample_values
 from crosscheck.sampling.sample import SampleJob, SampleRecord, Written, run_sample
 from crosscheck.sampling.sense import require_sense
 from crosscheck.sampling.table import SamplesTable
+from flexmb.output.writing import in_words
 from flexmb.scene.files import load_scene
-from flexmb.scene.problems import closest
+from flexmb.scene.problems import SceneError, closest
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -75,8 +76,10 @@ def run_sweep(
     sweep = load_sweep(file)
     try:
         subject = _subject(sweep, file.parent)
-    except CaseError as error:
+    except (CaseError, SceneError) as error:
         raise CaseError(f"{file}: {error}") from None
+    except OSError as error:
+        raise CaseError(f"{file}: {in_words(error)}: name a scene or a case that is there") from None
     values = sample_values(sweep)
     require_sense(file, sweep, subject.base, subject.times, values, provider)
     records = out / RECORDS

@@ -25,7 +25,7 @@ from tests.fuzz import mutate
 from tests.fuzz.kind import Kind
 
 INERTIAL = """<mujoco model="given">
-  <compiler angle="degree" boundmass="0.01"/>
+  <compiler angle="degree"/>
   <default><joint damping="0.05"/><default class="heavy"><geom density="2000"/></default></default>
   <include file="more.xml"/>
   <worldbody>
