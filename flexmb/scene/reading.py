@@ -16,7 +16,7 @@ MIB = 2**20
 TEXT_LIMIT = 16 * MIB  # of a file that people write; tomllib takes some 10 s for it
 # An archive may unpack to this many bytes at most, and to this many times its own size. Zeros shrink a thousandfold,
 # but a file of nothing but zeros holds no data.
-FREE, RATIO = 64 * MIB, 100
+FREE, RATIO = 64 * MIB, 40
 DEEPEST = 64  # parts of a dotted key: no scene and no run file has more than three
 # Comments and texts, whose dots are none of keys.
 PROSE = re.compile(

@@ -72,6 +72,8 @@ def super_element(
     K, M = (_symmetric(name, each) for name, each in (("K", K), ("M", M)))
     place = _places(numbers, ["123456"] * len(position) if dofs is None else list(dofs))
     rows = int(np.count_nonzero(place >= 0))
+    if not rows:
+        raise SuperElementError("the structure has no node with a displacement: K and M have no rows that belong to one")
     if not len(K) == len(M) == rows:
         raise SuperElementError(f"K has {len(K)} rows, M {len(M)}, and the nodes {rows} displacements: they must agree")
     element = SuperElement(K, M, numbers, position, place)
