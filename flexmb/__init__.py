@@ -18,6 +18,7 @@ from flexmb.scene.check import SceneError, SceneWarning, check_scene
 from flexmb.scene.files import load_scene, save_scene
 from flexmb.scene.open_loop import open_loop
 from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of this API)
+from flexmb.scene.user_code import no_user_code
 
 if TYPE_CHECKING:
     from flexmb.advisor.advice import Advice, advise
@@ -77,11 +78,11 @@ _LATER = {
 }
 
 __all__ = [
-    "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
-    "EventRecord", "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder",
-    "SceneError", "SceneWarning", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell",
-    "check_scene", "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "open_loop", "save_scene",
-    "simulate", "simulate_batch", "simulate_stages", "steady_spin", "user_function",
+    "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError",
+    "Evaluation", "EventRecord", "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage",
+    "SceneBuilder", "SceneError", "SceneWarning", "State", "Status", "SteadySpin", "System", "Trajectory", "advise",
+    "campbell", "check_scene", "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "no_user_code",
+    "open_loop", "save_scene", "simulate", "simulate_batch", "simulate_stages", "steady_spin", "user_function",
     *schema.__all__,
 ]  # fmt: skip
 

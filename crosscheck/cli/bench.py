@@ -12,6 +12,7 @@ import typer
 from crosscheck.cli.common import (
     CaseWords,
     EngineNames,
+    NoUserCode,
     Quiet,
     TimeLimit,
     app,
@@ -48,6 +49,7 @@ def bench(
     ] = None,
     time_limit: TimeLimit = None,
     quiet: Quiet = False,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Time the engines of cases against each other, those that agree.

@@ -11,6 +11,7 @@ from crosscheck.cli.bench import Variants
 from crosscheck.cli.common import (
     CaseWords,
     EngineNames,
+    NoUserCode,
     Quiet,
     TimeLimit,
     app,
@@ -34,6 +35,7 @@ def chart(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for pictures, data and pages.")] = Path("charts"),
     time_limit: TimeLimit = None,
     quiet: Quiet = False,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Draw error against time: every engine and integrator over its efforts.

@@ -24,6 +24,7 @@ from crosscheck.terminal.versions import versions_text
 from flexmb.output.terminal import Terminal
 from flexmb.output.writing import in_words
 from flexmb.scene.problems import SceneWarning
+from flexmb.scene.user_code import forbid_user_code
 
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130  # as shells have it
@@ -69,6 +70,12 @@ def everything(
 def _machine_readable(asked: bool) -> bool:
     """Leave stdout to the JSON alone: all else that a command shows goes to stderr."""
     console.stderr = asked
+    return asked
+
+
+def _forbid(asked: bool) -> bool:
+    if asked:
+        forbid_user_code()  # workers inherit it
     return asked
 
 
@@ -127,6 +134,12 @@ Strict = Annotated[
         "--strict",
         help="Figures worse than recorded, beyond stale ones or not recorded, references never made, doubtful scenes: "
         "errors.",
+    ),
+]
+NoUserCode = Annotated[
+    bool,
+    typer.Option(
+        "--no-user-code", callback=_forbid, help="Import no function that a scene names, and run no exact.py of a case."
     ),
 ]
 SingleFile = Annotated[bool, typer.Option("--single-file", help="The report as one file, report.html, to send around.")]

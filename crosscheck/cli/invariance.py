@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from crosscheck.biting.invariance_runs import VERDICTS, run_invariances
-from crosscheck.cli.common import Jobs, Out, TimeLimit, app, check_limit, console, found, sole_writer
+from crosscheck.cli.common import Jobs, NoUserCode, Out, TimeLimit, app, check_limit, console, found, sole_writer
 from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.invariances import print_invariances
 from crosscheck.terminal.live import LiveProgress
@@ -25,6 +25,7 @@ def invariance(
     jobs: Jobs = None,
     time_limit: TimeLimit = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Every verdict with its reason.")] = False,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Change what means nothing and say whether the results stay the same.

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from crosscheck.biting.campaign import SCORES, run_campaign
-from crosscheck.cli.common import Jobs, Out, TimeLimit, app, check_limit, console, found, sole_writer
+from crosscheck.cli.common import Jobs, NoUserCode, Out, TimeLimit, app, check_limit, console, found, sole_writer
 from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.bites import print_bites
 from crosscheck.terminal.live import LiveProgress
@@ -28,6 +28,7 @@ def mutate(
     jobs: Jobs = None,
     time_limit: TimeLimit = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Every channel and every fault.")] = False,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Plant deliberate faults and say which share of them each case notices: its mutation score.

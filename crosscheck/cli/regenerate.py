@@ -6,7 +6,17 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import Jobs, SchedulerAddress, TimeLimit, app, check_limit, console, found, in_one_line
+from crosscheck.cli.common import (
+    Jobs,
+    NoUserCode,
+    SchedulerAddress,
+    TimeLimit,
+    app,
+    check_limit,
+    console,
+    found,
+    in_one_line,
+)
 from crosscheck.library.case import CaseError
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
@@ -21,6 +31,7 @@ def regenerate(
     jobs: Jobs = None,
     time_limit: TimeLimit = None,
     scheduler: SchedulerAddress = LOCAL,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Make the stored reference of cases again, by the routes of their table `[reference]`.

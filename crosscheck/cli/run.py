@@ -14,6 +14,7 @@ from crosscheck.cli.common import (
     EngineNames,
     Jobs,
     Json,
+    NoUserCode,
     Open,
     Out,
     Quiet,
@@ -69,6 +70,7 @@ def run(
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Run cases in all engines, judge them, write the report.

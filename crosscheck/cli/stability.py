@@ -30,7 +30,8 @@ def stability(
     maps: Annotated[list[str], typer.Argument(help="Names of maps, `all`, or `list` to see which there are.")],
     out: Out = Path("out"),
     depth: Annotated[
-        int | None, typer.Option(help="How often cells at a boundary are halved; by default what the map says.", min=0)
+        int | None,
+        typer.Option(help="How often cells at a boundary are halved; by default what the map says.", min=0, max=8),
     ] = None,
     pictures: Annotated[Path | None, typer.Option(help="Folder for the pictures and maps.json; default --out.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,

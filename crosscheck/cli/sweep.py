@@ -8,7 +8,17 @@ from typing import Annotated
 import msgspec
 import typer
 
-from crosscheck.cli.common import Jobs, Out, SchedulerAddress, TimeLimit, app, check_limit, console, sole_writer
+from crosscheck.cli.common import (
+    Jobs,
+    NoUserCode,
+    Out,
+    SchedulerAddress,
+    TimeLimit,
+    app,
+    check_limit,
+    console,
+    sole_writer,
+)
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.sampling.run import SUMMARY, run_sweep
@@ -26,6 +36,7 @@ def sweep_parameters(
     jobs: Jobs = None,
     time_limit: TimeLimit = None,
     scheduler: SchedulerAddress = LOCAL,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Run a scene many times with other parameters: Monte Carlo, a Latin hypercube or a grid.

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import CaseWord, Json, SchedulerAddress, app, console, found, in_one_line, refuse
+from crosscheck.cli.common import CaseWord, Json, NoUserCode, SchedulerAddress, app, console, found, in_one_line, refuse
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.csv_channels import channels_table
 from crosscheck.terminal.text import words
@@ -33,6 +33,7 @@ def verify(
     template: Annotated[bool, typer.Option("--template", help="Write CSV as a template with the times.")] = False,
     scheduler: SchedulerAddress = LOCAL,
     as_json: Json = False,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Hold a CSV of your own code against a case, without an adapter, and where it has a stored reference without any run.

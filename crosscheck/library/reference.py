@@ -144,7 +144,10 @@ def values_text(times: Real, channels: dict[str, Real]) -> str:
 
 def parse_values(text: str, file: str) -> tuple[Real, dict[str, Real]]:
     """Times (T,) and channels (T, k) of a reference.csv; CaseError names the line or the column that is wrong."""
-    rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))
+    try:
+        rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))
+    except csv.Error as error:
+        raise CaseError(f"{file}: not a table of comma-separated values: {error}") from None
     if len(rows) < 3 or rows[0][:1] != [TIME]:
         raise CaseError(f'{file}: it must begin with a header whose first column is "{TIME}", and hold two samples')
     header = rows[0]

@@ -26,6 +26,7 @@ from crosscheck.running.plan import MAIN, plan
 from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import Listener, run_planned
 from flexmb.run.channels import family, magnitude
+from flexmb.scene.user_code import user_code_is_forbidden
 from flexmb.typing import Real
 
 
@@ -186,6 +187,8 @@ def _closed_form(file: Path, route: ReferenceRoute, times: Real) -> RouteSignals
 
 
 def _function(file: Path) -> Callable[[Real], Mapping[str, Real]]:
+    if user_code_is_forbidden():
+        raise CaseError(f"{file}: it is code, and user code was forbidden: read it, then run without --no-user-code")
     spec = spec_from_file_location(f"closed form of {file.parent.name}", file)
     if spec is None or spec.loader is None or not file.is_file():
         raise CaseError(f"{file}: there is no such Python file, and a route of [reference] names it")

@@ -46,6 +46,7 @@ from scipy.special import ndtri
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import part_of
+from crosscheck.library.check.ranges import check_duration, check_samples
 from flexmb.scene.convert import to_struct
 from flexmb.scene.problems import Defect, Place, SceneError
 from flexmb.scene.reading import Unreadable, parse_toml, read_text
@@ -200,10 +201,10 @@ def _problems(sweep: SweepFile) -> Iterator[Defect]:
         yield Defect("$", "needs either a case or a scene", "give `case` or `scene`, one of them")
     if sweep.scene and (sweep.duration_s is None or sweep.samples is None):
         yield Defect("$", "a scene has no duration", "give `duration_s` and `samples`")
-    if sweep.duration_s is not None and not 0.0 < sweep.duration_s < math.inf:
-        yield Defect("$.duration_s", f"{sweep.duration_s:g} makes no sense", "give a positive number of seconds")
-    if sweep.samples is not None and sweep.samples < 2:
-        yield Defect("$.samples", f"{sweep.samples} are too few", "give 2 at least: the begin and the end")
+    if sweep.duration_s is not None:
+        yield from check_duration(sweep.duration_s, root)
+    if sweep.samples is not None:
+        yield from check_samples(sweep.samples, root)
     if sweep.scene and sweep.variant:
         yield Defect("$.variant", "a scene has no variants", "leave it out")
     if sweep.seed < 0:

@@ -27,11 +27,12 @@ from crosscheck.running.sweep import PROVIDER
 from crosscheck.sampling.file import SweepFile, load_sweep
 from crosscheck.sampling.points import sample_values
 from crosscheck.sampling.sample import SampleJob, SampleRecord, Written, run_sample
-from crosscheck.sampling.scenes import with_values
+from crosscheck.sampling.sense import require_sense
 from crosscheck.sampling.table import SamplesTable
 from flexmb.output.whole import take_away
+from flexmb.output.writing import in_words
 from flexmb.scene.files import load_scene
-from flexmb.scene.problems import closest
+from flexmb.scene.problems import SceneError, closest
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -70,12 +71,18 @@ def run_sweep(
     """Run the sweep of a file; records go to `samples.jsonl` in the folder `out`, and a table to `samples.csv`.
 
     Samples that are recorded with the same values, quantities, sources and machine are not run again unless `fresh`.
-    Raises CaseError where the file, or a path or a channel in it, makes no sense, before anything runs.
+    Raises CaseError where the file, or a path, a channel, an engine or a method in it, makes no sense, before anything
+    runs.
     """
     sweep = load_sweep(file)
-    subject = _subject(sweep, file.parent)
+    try:
+        subject = _subject(sweep, file.parent)
+    except (CaseError, SceneError) as error:
+        raise CaseError(f"{file}: {error}") from None
+    except OSError as error:
+        raise CaseError(f"{file}: {in_words(error)}: name a scene or a case that is there") from None
     values = sample_values(sweep)
-    _require_sense(sweep, subject, values)
+    require_sense(file, sweep, subject.base, subject.times, values, provider)
     records = out / RECORDS
     for name in (TABLE, SUMMARY):  # of an earlier sweep, should this one be killed
         take_away(out / name)
@@ -124,17 +131,6 @@ def _subject(sweep: SweepFile, folder: Path) -> Subject:
         variant, duration_s=sweep.duration_s or variant.duration_s, samples=sweep.samples or variant.samples
     )
     return Subject(cases[0].scene(variant), variant, sample_times(run, timed))
-
-
-def _require_sense(sweep: SweepFile, subject: Subject, values: Real) -> None:
-    """Every path leads to a number, and every marker that a quantity names is there."""
-    with_values(subject.base, sweep, values[0])
-    markers = [marker.name for marker in subject.base.markers]
-    for quantity in sweep.quantities:
-        kind, _, rest = quantity.channel.partition(":")
-        marker = rest.rpartition(".")[0]
-        if kind == "marker" and marker not in markers:
-            raise CaseError(f'quantity "{quantity.name}": no marker "{marker}": {closest(marker, markers)}')
 
 
 def _jobs(

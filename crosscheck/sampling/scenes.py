@@ -1,14 +1,17 @@
-"""The scene of a sample: the swept one with other numbers."""
+"""The scene of a sample: the swept one with other numbers, at paths that lead to numbers of the same kind."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from crosscheck.library.case import CaseError
 from crosscheck.sampling.file import SweepFile
 from flexmb.scene.schema import Scene
 from flexmb.scene.values import PathError, changed_at, number_at
+from flexmb.typing import Real
 
 
 def with_values(scene: Scene, sweep: SweepFile, values: Iterable[float]) -> Scene:
@@ -27,3 +30,25 @@ def with_values(scene: Scene, sweep: SweepFile, values: Iterable[float]) -> Scen
             except PathError as problem:
                 raise CaseError(str(problem)) from None
     return scene
+
+
+def require_numbers(scene: Scene, sweep: SweepFile, values: Real) -> None:
+    """CaseError, as of `with_values`, where a path leads to no number, or to one that some sample's value does not fit.
+
+    `values` (number of samples, number of parameters). A count takes whole numbers alone, in every sample.
+    """
+    for column, parameter in enumerate(sweep.parameters):
+        different = np.unique(values[:, column])
+        for path in parameter.paths:
+
+            def fits(old: Any, path: str = path, relative: bool = parameter.relative, given: Real = different) -> Any:
+                number_at(path, old, 0.0)
+                if isinstance(old, int):
+                    for value in given:
+                        number_at(path, old, value * old if relative else value)
+                return old
+
+            try:
+                changed_at(scene, path, fits)
+            except PathError as problem:
+                raise CaseError(str(problem)) from None

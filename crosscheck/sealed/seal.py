@@ -11,14 +11,15 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import msgspec
 
 from crosscheck.sealed.document import FORMAT, VERSION, SealedResults
 from flexmb.output.whole import write_whole
-from flexmb.scene.reading import MIB, Unreadable, read_text
+from flexmb.scene.reading import MIB, Unreadable, read_bytes
 
 FILE = "results.json"
 LIMIT = 256 * MIB
@@ -43,8 +44,11 @@ def write_results(results: SealedResults, folder: Path) -> None:
 def read_results(file: Path) -> SealedResults:
     """The content of a results.json; ResultsError says what is wrong with the file."""
     try:
-        text = read_text(file, LIMIT)
-        content = json.loads(text, parse_constant=_no_number)
+        data = read_bytes(file, LIMIT)  # as it stands: a byte order mark and other line ends are changes too
+        content = json.loads(data.decode("ascii"), parse_constant=_no_number, parse_float=_finite)
+    except UnicodeDecodeError as error:
+        what = f"byte {error.start} is not ASCII, so another program saved it: fetch it anew"
+        raise ResultsError(f"{file} cannot be read: {what}") from None
     except (OSError, Unreadable, ValueError, RecursionError) as error:
         raise ResultsError(f"{file} cannot be read: {error}") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
@@ -52,7 +56,7 @@ def read_results(file: Path) -> SealedResults:
     if content.get("version") != VERSION:
         raise ResultsError(f"{file} is of version {content.get('version')!r:.40}: this crosscheck reads {VERSION}")
     claimed = content.pop(SEAL, None)
-    if claimed != _seal(content) or text != _canonical(content | {SEAL: claimed}) + "\n":
+    if claimed != _seal(content) or data != (_canonical(content | {SEAL: claimed}) + "\n").encode("ascii"):
         raise ResultsError(f"{file} was changed after it was written: its seal does not fit what it says")
     try:
         return msgspec.convert(content, SealedResults)
@@ -68,5 +72,10 @@ def _canonical(content: dict[str, Any]) -> str:
     return json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
-def _no_number(word: str) -> None:
+def _no_number(word: str) -> NoReturn:
     raise ValueError(f"{word} is no number")
+
+
+def _finite(word: str) -> float:
+    """A number with a point or an exponent; one such as 1e999 overflows, and no figure is that."""
+    return float(word) if math.isfinite(float(word)) else _no_number(word)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.text import Text
 
-from flexmb.cli.terminal import EXIT_STOPPED, SceneFile, console, no_traceback
+from flexmb.cli.terminal import EXIT_STOPPED, NoUserCode, SceneFile, console, no_traceback
 from flexmb.output.writing import check_folder, folder
 from flexmb.scene.files import load_scene, save_scene
 
@@ -23,6 +23,7 @@ def advise(
     t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s; it starts at 0.")] = 10.0,
     out: Annotated[Path, typer.Option("--out", "-o", help="File of the reduced scene.")] = Path("out/advised.toml"),
     trials: Annotated[bool, typer.Option("--trials/--no-trials", help="Show every model that was run.")] = True,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Which model of each flexible body, and which method, are good enough? Run the candidates; print why.

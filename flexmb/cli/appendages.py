@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from flexmb.cli.terminal import SceneFile, console, no_traceback, vector
+from flexmb.cli.terminal import NoUserCode, SceneFile, console, no_traceback, vector
 from flexmb.output.writing import check_folder
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.files import load_scene
@@ -32,6 +32,7 @@ def equivalence(
     ] = None,
     angle: Annotated[float, typer.Option(help="Hinge angle in rad for the displacement forms (47), (49).")] = 0.1,
     picture: Annotated[Path, typer.Option("--picture", "-o", help="Picture file.")] = Path("out/equivalence.png"),
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Modes or a rigid body on a spring hinge? Compare both models of an appendage; print tables, write a picture.

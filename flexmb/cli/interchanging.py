@@ -9,7 +9,7 @@ import numpy as np
 import typer
 from rich.text import Text
 
-from flexmb.cli.terminal import SceneFile, console, errors, no_traceback
+from flexmb.cli.terminal import NoUserCode, SceneFile, console, errors, no_traceback
 from flexmb.output.printable import printable
 from flexmb.output.writing import check_folder, folder
 from flexmb.scene.bodies import BeamBody, ModalBody, SidBody
@@ -54,6 +54,7 @@ def export(
     scene: SceneFile,
     body: Annotated[str, typer.Argument(help="Name of a flexible body.", metavar="BODY", show_default=False)],
     out: Out,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Write a flexible body of a scene (beam, modal or SID) as a SID file, all blocks to first order.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.text import Text
 
-from flexmb.cli.terminal import EXIT_STOPPED, SceneFile, console, errors, no_traceback, range_of
+from flexmb.cli.terminal import EXIT_STOPPED, NoUserCode, SceneFile, console, errors, no_traceback, range_of
 from flexmb.output.printable import printable
 from flexmb.output.writing import check_folder
 from flexmb.scene.bodies import BeamBody
@@ -34,6 +34,7 @@ def linearize(
     export: Annotated[
         Path | None, typer.Option(help="File of matrices, names and eigenvalues: .npz or .mat.", show_default=False)
     ] = None,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Linearise a scene by exact derivatives; print frequency, damping and dominant coordinates of every mode.
@@ -103,6 +104,7 @@ def campbell(
     ] = None,
     picture: Annotated[Path, typer.Option("--picture", "-o", help="Picture file.")] = Path("out/campbell.png"),
     csv: Annotated[Path | None, typer.Option(help="File for the numbers.", show_default=False)] = None,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Frequencies and growth rates against a spin rate: a table and a picture.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from flexmb.cli.terminal import SceneFile, console, no_traceback
+from flexmb.cli.terminal import NoUserCode, SceneFile, console, no_traceback
 from flexmb.output.listing import Listing, figures, names, prose
 from flexmb.scene.files import load_scene
 
@@ -22,6 +22,7 @@ def mass(
         list[str] | None,
         typer.Option(help="A body with all that it carries; may be repeated. Default: all.", show_default=False),
     ] = None,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Print mass, mass centre and inertia of a scene, and of its bodies with all that they carry, at the initial state.

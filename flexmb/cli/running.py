@@ -11,7 +11,7 @@ import typer
 from rich.text import Text
 
 from flexmb.cli import run_options as o
-from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, SceneFile, Strict, console, no_traceback
+from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, NoUserCode, SceneFile, Strict, console, no_traceback
 from flexmb.output.whole import whole_file
 from flexmb.output.writing import check_folder, folder
 from flexmb.scene.bodies import BeamBody
@@ -47,6 +47,7 @@ def simulate(
     sections: o.Sections = None,
     error: o.ErrorEstimate = False,
     strict: Strict = False,
+    no_user_code: NoUserCode = False,
 ) -> None:
     """
     Simulate a scene; write `trajectory.csv`, `restart.npz` and charts; print a summary.

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 from rich.text import Text
 
-from flexmb.cli.terminal import SceneFile, Strict, console, no_traceback
+from flexmb.cli.terminal import NoUserCode, SceneFile, Strict, console, no_traceback
 from flexmb.output.printable import printable
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.files import load_scene
@@ -16,7 +16,7 @@ from flexmb.scene.reference import json_schema
 End = Annotated[float | None, typer.Option("--t-end", help="Check that profiles cover the run up to here, in s.")]
 
 
-def check(scene: SceneFile, t_end: End = None, strict: Strict = False) -> None:
+def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_code: NoUserCode = False) -> None:
     """
     Check a scene without running it: every defect with its place and its remedy.
 

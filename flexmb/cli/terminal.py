@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +16,9 @@ from flexmb.output.printable import printable
 from flexmb.output.terminal import Terminal
 from flexmb.output.writing import in_words
 from flexmb.scene.check import SceneError, SceneWarning
+from flexmb.scene.user_code import forbid_user_code
 
+MOST_STEPS = 10_000  # of a range: each is a steady state that is sought
 EXIT_STOPPED = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130  # as of shells: 128 and the number of the signal
@@ -25,6 +28,18 @@ errors = Terminal(stderr=True)
 
 SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)]
 Strict = Annotated[bool, typer.Option("--strict", help="Warnings about the scene are errors.")]
+
+
+def _forbid(asked: bool) -> bool:
+    if asked:
+        forbid_user_code()
+    return asked
+
+
+NoUserCode = Annotated[
+    bool,
+    typer.Option("--no-user-code", callback=_forbid, help="Import no function that a scene names: refuse such scenes."),
+]
 
 
 def vector(option: str, text: str) -> tuple[float, ...]:
@@ -47,8 +62,8 @@ def range_of(option: str, text: str) -> list[float]:
         start, stop, steps = float(first), float(last), int(count)
     except ValueError:
         raise ValueError(f"--{option} is from:to:count, such as 0:40:41; got {text!r}") from None
-    if steps < 2:
-        raise ValueError(f"--{option}: give at least 2 values, not {steps}")
+    if not 2 <= steps <= MOST_STEPS or not isfinite(stop - start):
+        raise ValueError(f"--{option}: give 2 to {MOST_STEPS} values between finite ends, not {text}")
     return [start + (stop - start) * i / (steps - 1) for i in range(steps)]
 
 

@@ -18,9 +18,11 @@ from functools import reduce
 from importlib import import_module
 from typing import Any
 
+from flexmb.control.lookup import fault
 from flexmb.jit.foreign import Uncompilable, address_of, as_python, foreign
 from flexmb.jit.pointer import NOTHING, REAL, VECTOR
 from flexmb.scene.problems import Defect, Place, SceneError
+from flexmb.scene.user_code import refusal
 from flexmb.tables.status import INTERRUPTED, OK
 from flexmb.typing import Index, Real
 
@@ -40,13 +42,23 @@ def user_function(law: Callable[..., None]) -> Any:
 
 
 def found(address: str, scene: str, place: Place) -> Any:
-    """The function "module:name"; SceneError where it cannot be imported or takes other arguments."""
+    """The function "module:name"; SceneError where it cannot be imported, takes other arguments, or is forbidden.
+
+    To import a module is to run it: what its text says to be no such function is refused before.
+    """
+    if forbidden := refusal(address):
+        raise SceneError(scene, [Defect(str(place), *forbidden)])
     module, _, name = address.partition(":")
     remedy = "it is looked for where Python imports from: give its module's folder in PYTHONPATH, or mend the name"
+    if reason := fault(module, name, len(ARGUMENTS)):
+        what = f'the function "{address}" cannot be imported as one of ({", ".join(ARGUMENTS)}): {reason}'
+        raise SceneError(scene, [Defect(str(place), what, remedy)])
     try:
         law = reduce(getattr, name.split("."), import_module(module))
-    except (ImportError, AttributeError) as error:
-        what = f'the function "{address}" cannot be imported: {error}'
+    except (KeyboardInterrupt, SceneError):
+        raise
+    except BaseException as error:  # modules of others may raise anything, and end the process too
+        what = f'the function "{address}" cannot be imported: {type(error).__name__}: {error}'
         raise SceneError(scene, [Defect(str(place), what, remedy)]) from error
     plain = as_python(law)
     if not callable(plain) or not _takes_six(plain):

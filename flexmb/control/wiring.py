@@ -30,6 +30,7 @@ from flexmb.scene.control import (
     UserLaw,
 )
 from flexmb.scene.convert import ROOT, label
+from flexmb.scene.loaded import called
 from flexmb.scene.tree import rate_name, scalar_paths
 from flexmb.system.tree_system import System
 from flexmb.tables.functions import pack
@@ -87,9 +88,9 @@ def wired(system: System) -> Wiring:
         row["output"], row["outputs"], row["number"], row["numbers"] = outputs, width, len(number), len(numbers)
         if isinstance(each, UserLaw):
             place = ROOT.key("controllers", i).named(label("controllers", each)).key("function")
-            law = found(each.function, scene.name, place)
+            law = found(each.function, called(scene), place)
             if is_foreign(law):
-                row["law"], row["function"] = a.COMPILED, compiled_address(law, scene.name, place)
+                row["law"], row["function"] = a.COMPILED, compiled_address(law, called(scene), place)
             else:
                 row["law"], plain[i] = a.CALLED, law
         else:

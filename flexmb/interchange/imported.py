@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
+from flexmb.scene.problems import SceneError
 from flexmb.scene.schema import Scene
 
 
@@ -22,3 +25,12 @@ class ImportedScene:
 def listed(names: list[str]) -> str:
     """Names for a note: the first five, and how many there are."""
     return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+
+
+@contextmanager
+def naming(file: str) -> Iterator[None]:
+    """Errors of the scene that is made of a file name the file: of a robot's title nobody knows where it came from."""
+    try:
+        yield
+    except SceneError as error:
+        raise SceneError(file, error.problems) from None

@@ -13,10 +13,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from flexmb.interchange.imported import ImportedScene, ModelError, listed
+from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming
+from flexmb.interchange.mjcf_text import refuse_bad_text
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.quaternions import rotation_matrix
-from flexmb.scene.reading import regular_size
 from flexmb.scene.tree import GROUND
 
 FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
@@ -26,19 +26,21 @@ def read_mjcf(path: str | os.PathLike[str]) -> ImportedScene:
     """The rigid tree of an MJCF file (or of a URDF file, as MuJoCo reads it), at its reference pose and at rest.
 
     Springs and dampers of joints come along. Contacts, limits, dry friction, actuators and sensors are left out, as the
-    notes say. Raises ImportError without MuJoCo, ModelError for a file that MuJoCo refuses, and for what changes the
-    motion and has no counterpart: equality constraints, tendons, rotor inertia, fluids, flexible parts.
+    notes say. Raises ImportError without MuJoCo; ModelError for a file that MuJoCo refuses, for numbers that are not
+    finite, in whose place MuJoCo would put defaults (`flexmb.interchange.mjcf_text`), and for what changes the motion
+    and has no counterpart: equality constraints, tendons, rotor inertia, fluids, flexible parts.
     """
     try:
         import mujoco
     except ImportError:
         raise ImportError("MJCF is read by MuJoCo's own compiler: pip install 'flexmb[peers]'") from None
-    regular_size(path)
+    refuse_bad_text(Path(path))
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise ModelError(f"{path}: MuJoCo refuses the model: {error}") from None
-    return _Model(str(path), model).scene()
+    with naming(str(path)):
+        return _Model(str(path), model).scene()
 
 
 class _Model:

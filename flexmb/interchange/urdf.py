@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flexmb.interchange.imported import ImportedScene, ModelError, listed
+from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.options import Placement
 from flexmb.scene.quaternions import about, quaternion_of
@@ -42,7 +42,8 @@ def read_urdf(
     friction, shapes and transmissions are left out, as the notes say. Raises ModelError for what is no URDF, has no one
     root, or has mimic joints; SceneError for inertia that no body has; OSError for a file that cannot be read.
     """
-    return _Robot(str(path), _parsed(Path(path)), repair).scene(gravity, free_base)
+    with naming(str(path)):
+        return _Robot(str(path), _parsed(Path(path)), repair).scene(gravity, free_base)
 
 
 def _parsed(path: Path) -> ElementTree.Element:
@@ -237,7 +238,8 @@ def _upright(axis: Real) -> Real:
 
 
 def _real(word: str) -> float:
+    """A number as XML has it; NaN for what Python alone reads as one, such as 1_0 and digits of other scripts."""
     try:
-        return float(word)
+        return float(word) if word.isascii() and "_" not in word else math.nan
     except ValueError:
         return math.nan

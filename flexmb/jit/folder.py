@@ -1,4 +1,7 @@
-"""The folder of compiled kernels: where it is, and how long files stay there.
+"""The folder of compiled kernels: where it is, who may write to it, and how long files stay there.
+
+A kernel is unpickled and run as code, and its digest, which has no key, shows what was damaged, not who wrote it. So
+all that is there has to be the user's own, or the administrator's, and nobody else may write to it.
 
 Every edit of the sources leaves kernels behind that nobody asks for any more, but no file tells whether an older state
 of the sources will come back. So a file is as young as its last use, and what was not used for two months is deleted.
@@ -7,6 +10,7 @@ of the sources will come back. So a file is as young as its last use, and what w
 from __future__ import annotations
 
 import os
+import stat
 import sys
 import tempfile
 import time
@@ -17,6 +21,8 @@ from pathlib import Path
 
 from numba import config
 
+_MINE_ALONE = 0o700
+_WRITABLE, _ENTERED = stat.S_IWGRP | stat.S_IWOTH, stat.S_IXGRP | stat.S_IXOTH
 _UNUSED = 60 * 24 * 3600.0  # s since a file was last used
 
 
@@ -25,14 +31,22 @@ def cache_directory() -> Path | None:
     """Where kernels are kept; None where nothing can be written.
 
     Below the directory that NUMBA_CACHE_DIR names, or else below numba's own cache directory of the user. Its name is
-    one that nothing else has: a checkout or a program called flexmb may be there, too.
+    one that nothing else has: a checkout or a program called flexmb may be there, too. None, with a warning, also where
+    others may have written.
     """
     root = Path(config.CACHE_DIR or _of_the_user())
     directory = root / "flexmb-kernels"
     try:
         if directory.is_file():
             directory.unlink()
-        directory.mkdir(parents=True, exist_ok=True)
+        directory.mkdir(mode=_MINE_ALONE, parents=True, exist_ok=True)
+        if stranger := _stranger(directory.resolve()):
+            warn_once(
+                f"compiled kernels in {directory} are not used, and every process compiles them again, for {stranger}, "
+                "and they are run as code: remove the folder, which is made anew, or set NUMBA_CACHE_DIR to a folder "
+                "where nobody else may write"
+            )
+            return None
         tempfile.TemporaryFile(dir=directory).close()
     except OSError as problem:
         warn_once(
@@ -41,6 +55,34 @@ def cache_directory() -> Path | None:
         )
         return None
     return directory
+
+
+def _stranger(directory: Path) -> str | None:
+    """Who else than the user and the administrator may have put something into the folder; None where nobody."""
+    if sys.platform == "win32":  # there folders of a user are closed to others, and modes say nothing
+        return None
+    own = directory.stat()
+    if not _owned(own):
+        return f"it belongs to user {own.st_uid}"
+    if own.st_mode & _WRITABLE:
+        return "others may write to it"
+    for above in directory.parents:
+        mode = above.stat().st_mode
+        if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+            return f"everybody may rename what is in {above}"
+    entered = own.st_mode & _ENTERED
+    with os.scandir(directory) as entries:
+        for entry in entries:
+            file = entry.stat(follow_symlinks=False)
+            if not _owned(file):
+                return f"{entry.name} in it belongs to user {file.st_uid}"
+            if entered and file.st_mode & _WRITABLE and not entry.is_symlink():
+                return f"others may write to {entry.name} in it"
+    return None
+
+
+def _owned(file: os.stat_result) -> bool:
+    return file.st_uid in (os.geteuid(), 0)
 
 
 def _of_the_user() -> Path:

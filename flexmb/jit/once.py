@@ -50,7 +50,7 @@ def compiled_once(file: Path, patience: float = PATIENCE) -> Iterator[None]:
 
     lock = FileLock(file.with_name(f"{file.name}.lock"))
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)  # if somebody has removed it meanwhile
         lock.acquire(timeout=patience)
     except (OSError, NotImplementedError, Timeout):
         yield

@@ -12,7 +12,7 @@ from flexmb.spatial.vector import vec3
 
 @helper
 def inertia_and_bias(c, w, k):
-    """Jain & Rodriguez (B1): the rigid body at rest shape, constant modal blocks, centrifugal force w' B_n w by mode."""
+    """Jain & Rodriguez (B1): the rigid body at rest shape, constant modal blocks, w' B_n w on each mode."""
     rigid_block_and_bias(c, w, k)
     modal_masses(c, w, k)
     for n in range(0, c.body[k].modes, width(w)):

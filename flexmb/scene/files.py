@@ -20,6 +20,7 @@ import msgspec
 from flexmb.output.whole import write_whole
 from flexmb.scene.bodies import ModalBody, SidBody
 from flexmb.scene.convert import plain, to_struct
+from flexmb.scene.loaded import remember
 from flexmb.scene.problems import Defect, SceneError
 from flexmb.scene.reading import Unreadable, parse_toml, read_text
 from flexmb.scene.schema import Scene
@@ -37,7 +38,9 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
         text = read_text(path)
     except Unreadable as error:
         raise _unreadable(str(path), error) from None
-    return loads(text, path.parent, name=str(path))
+    scene = loads(text, path.parent, name=str(path))
+    remember(scene, str(path))
+    return scene
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:

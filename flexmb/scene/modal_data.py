@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from flexmb.scene.bodies import InertiaPoint, ModalBody, ModalNode
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.npz import read_arrays
+from flexmb.scene.sizes import MOST_MODES
 from flexmb.typing import Real
 
 
@@ -156,6 +157,10 @@ def _shaped(given: dict[str, Real]) -> ModalArrays:
         raise ValueError(f'"{missing[0]}" is missing')
     n = given["mass"].shape[0] if given["mass"].ndim else 0
     m = given["translation_modes"].shape[-1] if given["translation_modes"].ndim else 0
+    if m > MOST_MODES:
+        raise ValueError(f'"translation_modes" has {m} modes, and a body may have {MOST_MODES}: leave the others out')
+    if n == 0:
+        raise ValueError('"mass" has no points: give the body at least one')
     shapes = {
         "mass": (n,), "position": (n, 3), "translation_modes": (n, 3, m), "rotation_modes": (n, 3, m),
         "inertia": (n, 3, 3), "com_offset": (n, 3), "stiffness": (m, m), "damping": (m, m),

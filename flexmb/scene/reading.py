@@ -8,6 +8,7 @@ import os
 import re
 import stat
 import tomllib
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,17 @@ MIB = 2**20
 TEXT_LIMIT = 16 * MIB  # of a file that people write; tomllib takes some 10 s for it
 # An archive may unpack to this many bytes at most, and to this many times its own size. Zeros shrink a thousandfold,
 # but a file of nothing but zeros holds no data.
-FREE, RATIO = 64 * MIB, 100
+FREE, RATIO = 64 * MIB, 40
 DEEPEST = 64  # parts of a dotted key: no scene and no run file has more than three
+# Comments and texts, whose dots are none of keys.
+PROSE = re.compile(
+    r"""#[^\n]*+|\"{3}(?:[^"\\]|\\.|"{1,2}(?!"))*+\"{3}|'{3}.*?'{3}|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'""", re.DOTALL
+)
+MOST_DOTS = 100_000  # in keys: tomllib makes a table for each, which takes 10 us and half a kilobyte
 # The search starts only where a word begins and never backtracks (possessive quantifiers): a search from every letter
 # of a long word would take a time that grows with the square of its length.
 DOTTED = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
+DOT = re.compile(r"""\.(?=[ \t]*+(?:[A-Za-z_"'-]|[\w-]++[ \t]*+[.=\]]))""")
 
 
 class Unreadable(ValueError):
@@ -41,12 +48,17 @@ def regular_size(path: str | os.PathLike[str]) -> int:
     return found.st_size
 
 
-def read_text(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> str:
-    """Text of a regular file, with any line ends and with or without a byte order mark. OSError, or Unreadable."""
+def read_bytes(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> bytes:
+    """A regular file as it stands, of at most `limit` bytes. OSError, or Unreadable."""
     size = regular_size(path)
     if size > limit:
         raise Unreadable(f"{size / MIB:.0f} MiB are more than such a file may have, {limit // MIB} MiB", "divide it")
-    data = Path(path).read_bytes()
+    return Path(path).read_bytes()
+
+
+def read_text(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> str:
+    """Text of a regular file, with any line ends and with or without a byte order mark. OSError, or Unreadable."""
+    data = read_bytes(path, limit)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -58,6 +70,8 @@ def read_text(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> str:
 
 def parse_toml(text: str) -> dict[str, Any]:
     """TOML as a dict. Unreadable names line and column."""
+    if _many_dots(text) and _many_dots(PROSE.sub('""', text)):
+        raise Unreadable(f"there are more than {MOST_DOTS} dots in keys", "write arrays of tables, [[name]]")
     if DOTTED.search(text):
         raise Unreadable(f"a key has more than {DEEPEST} parts", "correct it")
     try:
@@ -68,6 +82,10 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise Unreadable("arrays or tables are nested too deeply", "correct the brackets") from None
     except ValueError as error:  # an integer of thousands of digits, a date that does not exist
         raise Unreadable(f"not TOML: {error}", "correct that value") from None
+
+
+def _many_dots(text: str) -> bool:
+    return next(islice(DOT.finditer(text), MOST_DOTS, None), None) is not None
 
 
 def allowance(size: int) -> int:

@@ -145,6 +145,7 @@ Waiver = Literal[
     "wave_speed",
     "thick_section",
     "shear_stiffness",
+    "many_elements",
     "modal_frequency",
     "negative_stiffness",
     "negative_damping",
@@ -152,15 +153,16 @@ Waiver = Literal[
 ]
 
 
-class Scene(SceneStruct, frozen=True, kw_only=True):
+class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
     """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it.
 
     Numbers that no usual structure has are warned of, because a slip of units looks like that. `allow` lists what is
     meant. Of beams: "wave_speed", sqrt(EA / mass per length) outside 50 to 20,000 m/s; "thick_section", sqrt(EI / EA)
     above half the length; "shear_stiffness", GJ or GA far above EI or EA. Of raw modes: "modal_frequency", the lowest
     frequency times the size. Of hinges, wheels and modes: "negative_stiffness", "negative_damping". Of friction:
-    "friction_peak", smoothed to less than 99 % of its static value. A scene without
-    dimensions or in other units than SI, which have to fit each other (mm, tonne, s, N), lists the first four.
+    "friction_peak", smoothed to less than 99 % of its static value. A scene without dimensions or in other units than
+    SI, which have to fit each other (mm, tonne, s, N), lists the first four. Of beams also "many_elements", more
+    than their modes need, which cost time and memory alone.
     """
 
     name: str

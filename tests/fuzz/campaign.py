@@ -15,7 +15,9 @@ from typing import Any
 from tests.fuzz.kinds import kinds
 from tests.fuzz.worker import ALARM_S, BAD
 
-SHARES = {"scene": 6, "run file": 4, "verify csv": 5, "npz": 4, "records": 4}  # of the others one each
+SHARES = {  # of the others one each
+    "scene": 6, "run file": 4, "verify csv": 5, "npz": 4, "records": 4, "mjcf": 3, "urdf": 3, "sid": 3, "sweep": 3,
+}  # fmt: skip
 GRACE_S = 30.0  # beyond the alarm, which compiled code does not hear
 START_S = 120.0
 

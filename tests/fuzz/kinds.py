@@ -13,8 +13,8 @@ import math
 import re
 import tomllib
 import zipfile
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,9 @@ from flexmb.scene.problems import SceneError
 from tests.crosscheck.sessions import CASE, PROVIDER
 from tests.flexmb.scene.bad_scenes import satellite
 from tests.fuzz import mutate
+from tests.fuzz.kind import Kind
+from tests.fuzz.kinds_of_imports import of_imports
+from tests.fuzz.kinds_of_sessions import of_sessions
 
 TIMES = np.linspace(0.0, 1.0, 6)
 SHIPPED = Path(__file__).resolve().parents[2] / "cases"
@@ -49,21 +52,6 @@ ACCEPTED = b"""["rigid, all engines"]
 "energy.total | fine (rigid) | stepper (rigid)" = { E = 3.0e-11 }
 "marker:tip.position | fine (rigid) | stepper (rigid)" = { E = 1.2e-9, U = 4.5e-8 }
 """
-Accept = Callable[[Path], "str | None"]
-
-
-@dataclass(frozen=True)
-class Kind:
-    """`file` is its name in the working folder, `refusals` the documented errors, which contain `place`."""
-
-    file: str
-    seeds: tuple[bytes, ...]
-    mutations: tuple[mutate.Mutation, ...]
-    refusals: tuple[type[Exception], ...]
-    accept: Accept
-    place: str = ""
-
-
 def kinds(folder: Path) -> dict[str, Kind]:
     """All kinds by name; `folder` receives what has to lie beside the mutants."""
     _prepare(folder)
@@ -89,6 +77,8 @@ def kinds(folder: Path) -> dict[str, Kind]:
         "records": Kind("records.jsonl", (_records(),), records, (ValueError,), _session),
         "map records": Kind("map.jsonl", (_map(),), jsonl, (ValueError,), _cells),
         "map verdicts": Kind("maps.json", (_verdicts(),), jsonl, (ValueError,), _maps),
+        **of_sessions(folder),
+        **of_imports(folder),
     }
 
 

@@ -36,6 +36,7 @@ def main(folder: Path, seed: int, keep: Path) -> None:
     """Answer every line of the input; bad mutants are kept."""
     warnings.simplefilter("ignore")
     found = kinds(folder)
+    os.chdir(folder)  # MuJoCo writes a log where it is
     known = set(os.listdir(folder))
     used = _status("VmSize")
     resource.setrlimit(resource.RLIMIT_AS, (used + CEILING, used + CEILING))

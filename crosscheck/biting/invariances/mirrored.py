@@ -67,7 +67,7 @@ def _mirrored(scene: Scene) -> Counterpart:
     if scene.modal_states:  # which of a beam's modes are odd in z is known when the model is made
         scene = modal_points(scene)
     polar, axial, quaternion = (np.array(signs) for signs in (POLAR_SIGNS, AXIAL_SIGNS, QUATERNION_SIGNS))
-    drives = {hinge.name: _drive_signs(hinge) for hinge in scene.hinges}
+    drives = {item.name: _drive_signs(item) for item in (*scene.hinges, *scene.point_masses)}
 
     def back(times: Real, channels: Channels) -> Channels:
         found = by_kind(channels, lambda rows: rows * polar, lambda rows: rows * axial, lambda q: q * quaternion)
@@ -168,20 +168,22 @@ def _opposite(coordinate: C) -> C:
     return msgspec.structs.replace(coordinate, **changes)
 
 
-def _drive_signs(hinge: Hinge) -> Real:
-    """The signs of a hinge's drive loads, one for each prescribed coordinate."""
+def _drive_signs(item: Hinge | PointMass) -> Real:
+    """The signs of the drive loads of a hinge or a point mass, one for each prescribed coordinate."""
     found = []
-    for place, (_, each) in enumerate(coordinates(hinge)):
+    for place, (_, each) in enumerate(coordinates(item)):
         angular = isinstance(each, AngularCoordinate)
         if not is_prescribed(each):
             continue
-        match hinge:
+        match item:
+            case PointMass():
+                opposite = len(item.directions) == 3
             case Universal():
                 opposite = True
             case Cylindrical():
                 opposite = angular
             case Gimbal():
-                opposite = hinge.sequence[place] != "z"
+                opposite = item.sequence[place] != "z"
             case _:
                 opposite = False
         found.append(-1.0 if opposite else 1.0)

@@ -121,12 +121,13 @@ def _factor(channel: str, drives: dict[str, float]) -> float:
 
 
 def _drives(scene: Scene) -> dict[str, Any]:
-    """Of each hinge and wheel with prescribed motion, the factors of its drive loads; of connectors, of their loads."""
+    """Of hinges, wheels and point masses with prescribed motion, the factors of their drive loads; of connectors, of
+    their loads."""
     found: dict[str, Any] = {wheel.name: ENERGY.factor for wheel in scene.wheels}
-    for hinge in scene.hinges:
-        prescribed = [each for _, each in coordinates(hinge) if is_prescribed(each)]
+    for item in (*scene.hinges, *scene.point_masses):
+        prescribed = [each for _, each in coordinates(item) if is_prescribed(each)]
         if prescribed:
-            found[hinge.name] = [
+            found[item.name] = [
                 (FORCE if isinstance(each, LinearCoordinate) else ENERGY).factor for each in prescribed
             ]
     for connector in scene.connectors:

@@ -14,6 +14,7 @@ from flexmb.typing import Real
 RIGID = 1e-6
 """Forces of a rigid-body motion, as a share of the forces of the structure's parts, that pass for rounding."""
 ALIKE = 1e-6  # share by which the mass in x, y and z, and two halves of a symmetric matrix, may differ
+LARGEST = 1e60  # as in scenes: no quantity of mechanics is near it, and sums and products of it are finite
 MOTIONS = ("translation x", "translation y", "translation z", "rotation x", "rotation y", "rotation z")
 
 
@@ -65,10 +66,14 @@ def super_element(
     structure: six rigid-body motions need no force, and have one mass in all directions.
     """
     position = np.asarray(position, dtype=float).reshape(-1, 3)
+    if not np.all(np.abs(position) <= LARGEST):
+        raise SuperElementError(f"a coordinate of a node is not finite or beyond {LARGEST:g}: give positions in m")
     numbers = np.arange(1, len(position) + 1) if ids is None else np.asarray(ids, dtype=np.int64)
     K, M = (_symmetric(name, each) for name, each in (("K", K), ("M", M)))
     place = _places(numbers, ["123456"] * len(position) if dofs is None else list(dofs))
     rows = int(np.count_nonzero(place >= 0))
+    if not rows:
+        raise SuperElementError("the structure has no node with a displacement: no row of K and M belongs to one")
     if not len(K) == len(M) == rows:
         raise SuperElementError(f"K has {len(K)} rows, M {len(M)}, and the nodes {rows} displacements: they must agree")
     element = SuperElement(K, M, numbers, position, place)
@@ -79,8 +84,13 @@ def super_element(
 
 def _symmetric(name: str, given: ArrayLike) -> Real:
     matrix = np.asarray(given, dtype=float)
-    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not np.all(np.isfinite(matrix)):
-        raise SuperElementError(f"{name} is no square matrix of finite numbers: it has the shape {matrix.shape}")
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise SuperElementError(f"{name} is no square matrix: it has the shape {matrix.shape}")
+    if not np.all(np.abs(matrix) <= LARGEST):
+        i, j = np.argwhere(~(np.abs(matrix) <= LARGEST))[0] + 1
+        raise SuperElementError(
+            f"{name}[{i},{j}] is {matrix[i - 1, j - 1]:g}: give finite numbers in SI units, of at most {LARGEST:g}"
+        )
     gap = np.abs(matrix - matrix.T)
     if np.max(gap, initial=0.0) > ALIKE * np.max(np.abs(matrix), initial=0.0):
         i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
@@ -110,7 +120,7 @@ def _check_stiffness(element: SuperElement) -> None:
     parts = np.abs(element.K) @ np.abs(R)
     share = np.max(np.abs(element.K @ R) / np.where(parts > 0.0, parts, 1.0), axis=0)
     worst = int(np.argmax(share))
-    if share[worst] > RIGID:
+    if not share[worst] <= RIGID:
         raise SuperElementError(
             f"K resists the rigid-body {MOTIONS[worst]} ({share[worst]:.1g} of its forces do not cancel): write K "
             "without supports, without springs to the ground, and check coordinates, axes and units of the nodes"

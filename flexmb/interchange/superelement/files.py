@@ -106,7 +106,7 @@ def _text(path: Path) -> str:
 def _nodes(path: Path) -> Nodes:
     try:
         rows = list(csv.reader(read_text(path).splitlines()))
-    except Unreadable as error:
+    except (Unreadable, csv.Error) as error:
         raise SuperElementError(f"{path}: {error}") from None
     header = [word.strip().lower() for word in rows[0]] if rows else []
     if header[:4] != ["id", "x", "y", "z"] or header[4:] not in ([], ["dofs"]):
@@ -117,7 +117,7 @@ def _nodes(path: Path) -> Nodes:
             continue
         try:
             identity, x, y, z, *dofs = (word.strip() for word in row)
-            found.ids.append(int(identity))
+            found.ids.append(_number_of_node(identity))
             found.position.append([float(word) for word in (x, y, z)])
             found.dofs.append(dofs[0] if dofs else "123456")
         except ValueError:
@@ -127,6 +127,14 @@ def _nodes(path: Path) -> Nodes:
     if not found.ids:
         raise SuperElementError(f"{path}: there is no node: add a line for each, under id,x,y,z")
     return found
+
+
+def _number_of_node(word: str) -> int:
+    """ValueError for what is no whole number of 64 bits."""
+    number = int(word)
+    if not -(2**63) <= number < 2**63:
+        raise ValueError(f"{word:.40} is too large")
+    return number
 
 
 def _by_labels(K: NamedMatrix, M: NamedMatrix, table: Nodes) -> tuple[NamedMatrix, NamedMatrix, Nodes]:

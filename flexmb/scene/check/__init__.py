@@ -20,6 +20,7 @@ from flexmb.scene.check.topology import tree
 from flexmb.scene.check.walk import finite_numbers, unit_quaternions, unit_vectors
 from flexmb.scene.convert import refuse_wrong_types
 from flexmb.scene.garbage import collector_paused
+from flexmb.scene.loaded import called
 from flexmb.scene.problems import Defect, Doubt, SceneError, SceneWarning, in_short
 from flexmb.scene.schema import Scene
 
@@ -32,8 +33,8 @@ PHYSICS = (
 
 
 def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) -> tuple[Doubt, ...]:
-    """Raise SceneError with all problems of a scene; return what is doubtful. Profiles must cover t_start (s), with
-    `t_end` (s) the run from there.
+    """Raise SceneError with all problems of a scene, by its file if it was read from one; return what is doubtful.
+    Profiles must cover t_start (s), with `t_end` (s) the run from there.
 
     A doubtful scene runs; what its `allow` lists is not returned. `compile`, `simulate` and the command lines show the
     same doubts as a `SceneWarning`, which `pytest -W error::flexmb.SceneWarning` and the option `--strict` turn into an
@@ -46,7 +47,7 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
         problems = _problems(scene, t_end, t_start)
     defects = [problem for problem in problems if not isinstance(problem, Doubt)]
     if defects:
-        raise SceneError(scene.name, defects)
+        raise SceneError(called(scene), defects)
     return tuple(doubt for doubt in problems if isinstance(doubt, Doubt) and doubt.waiver not in scene.allow)
 
 
@@ -54,7 +55,7 @@ def check_and_warn(scene: Scene, t_end: float | None = None, t_start: float = 0.
     """The same with all doubts as one SceneWarning, at the place that called the caller."""
     doubts = check_scene(scene, t_end, t_start)
     if doubts:
-        warnings.warn(in_short(scene.name, doubts), SceneWarning, stacklevel=3)
+        warnings.warn(in_short(called(scene), doubts), SceneWarning, stacklevel=3)
 
 
 def _problems(scene: Scene, t_end: float | None, t_start: float) -> list[Defect]:
@@ -72,7 +73,7 @@ def check_run(scene: Scene, t_end: float, t_start: float = 0.0) -> None:
     profiles have to cover."""
     problems = [*_run_time(t_end, t_start), *functions(scene, t_end, t_start)]
     if problems:
-        raise SceneError(scene.name, problems)
+        raise SceneError(called(scene), problems)
 
 
 def _run_time(t_end: float | None, t_start: float) -> Iterator[Defect]:

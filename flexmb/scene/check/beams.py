@@ -10,6 +10,7 @@ from flexmb.scene.check import inertia
 from flexmb.scene.check.walk import sound
 from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.schema import Scene
+from flexmb.scene.sizes import MOST_BYTES, PER_MODE, PLENTY, beam_estimate
 
 # Axial wave speed sqrt(EA / mass per length): soft rubber has some 50 m/s, diamond 18 km/s. The limits are wider than
 # any structure that is built; the soft benchmark beams of the literature (100 m/s) are inside.
@@ -26,6 +27,7 @@ def beams(scene: Scene) -> Iterator[Defect]:
     of_beams = [i for i, body in enumerate(scene.bodies) if isinstance(body, BeamBody)]
     for place, body in sound(scene, "bodies", of_beams):
         yield from _mesh(place, body)
+        yield from _size(place.key("elements"), body)
         yield from _stations(place, body)
         yield from _along(place, body)
         yield from _modes(place.key("modes"), body)
@@ -41,6 +43,18 @@ def _mesh(place: Place, body: BeamBody) -> Iterator[Defect]:
         yield Defect(str(place.key("length_m")), f"the length is {body.length_m:g} m", "give a positive length")
     if body.elements < 1:
         yield Defect(str(place.key("elements")), f"{body.elements} elements", "use one element at least")
+
+
+def _size(place: Place, body: BeamBody) -> Iterator[Defect]:
+    """More elements than memory has room for, or than the modes need."""
+    modes = max(0, mode_count(body))
+    estimate, enough = beam_estimate(body, modes), max(PLENTY, PER_MODE * modes)
+    if estimate.memory > MOST_BYTES:
+        what = f"{body.elements} elements and {modes} modes would take {estimate.words} to make the modes of one beam"
+        yield Defect(str(place), what, f"give {PLENTY} or fewer, and as few modes as the motion has")
+    elif body.elements > enough:
+        what = f"{body.elements} elements for {modes} modes take {estimate.words}, and change no digit of the motion"
+        yield Doubt(str(place), what, f"give {enough} or fewer: {PER_MODE} for each mode are plenty", "many_elements")
 
 
 def _stations(place: Place, body: BeamBody) -> Iterator[Defect]:

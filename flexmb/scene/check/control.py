@@ -30,6 +30,7 @@ from flexmb.scene.hinges import Free, Spherical
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import coordinates, scalar_paths
+from flexmb.scene.user_code import refusal
 
 REFERENCE = re.compile(r"(?P<name>[^\[\]]+)(?:\[(?P<number>\d+)\])?")
 AT_ONCE = ("acceleration", "angular_acceleration", "specific_force")
@@ -217,6 +218,8 @@ def _sizes(place: Place, controller: Controller, inputs: int | None) -> Iterator
             if not ADDRESS.fullmatch(function):
                 remedy = 'write "package.module:function"'
                 yield Defect(str(place.key("function")), f'"{function}" is no name of a function', remedy)
+            elif forbidden := refusal(function):
+                yield Defect(str(place.key("function")), *forbidden)
             if outputs < 1:
                 yield Defect(str(place.key("outputs")), f"it has {outputs} outputs", "give one or more")
     if inputs == 0 and not isinstance(controller, UserLaw | StateSpace):

@@ -15,6 +15,7 @@ from flexmb.scene.check.walk import LARGEST, entries, sound
 from flexmb.scene.modal_data import ModalArrays, modal_arrays
 from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.schema import Scene
+from flexmb.scene.sizes import MOST_BYTES, modes_memory
 from flexmb.typing import Real
 
 PRINTED = 1e-9  # matrices printed to ten digits are symmetric, and modes zero at the clamp, this well
@@ -95,7 +96,10 @@ def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defe
 
 
 def _matrices(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defect]:
-    m = arrays.translation_modes.shape[2]
+    n, _, m = arrays.translation_modes.shape
+    if (memory := modes_memory(body.level, n, m)) > MOST_BYTES:
+        what = f"{m} modes of {n} points would take {memory / 2**30:.2g} GiB at level \"{body.level}\""
+        yield Defect(str(place), what, "leave modes out, join points, or choose another level")
     if m == 0:
         if body.level != "rigid":
             yield Defect(str(place), "the body has no modes", 'make it a rigid body, or its level "rigid"')

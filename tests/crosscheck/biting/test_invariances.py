@@ -17,8 +17,9 @@ from crosscheck.engines.native import NativeEngine
 from crosscheck.engines.trajectories import stack
 from crosscheck.library.find import resolve
 from flexmb.run.channels import channels_of, distance, family, magnitude
+from flexmb.scene.build import SceneBuilder, linear
 from flexmb.scene.files import load_scene
-from flexmb.scene.functions import Pulse
+from flexmb.scene.functions import Pulse, Sine
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import modal_points
 from tests.crosscheck.engines.random_scenes import random_scene as random_rigid
@@ -93,6 +94,31 @@ def test_nothing_changes_in_a_scene_of_connectors(name: str) -> None:
     counterpart = BY_NAME[name].of(connected())
     assert counterpart.scene != connected()
     assert strangers(connected(), counterpart) == []
+
+
+@cache
+def driven_masses() -> Scene:
+    """Point masses along one to three directions, of which some are driven along a function of time."""
+    ways = np.eye(3)
+    moved, free = linear(prescribed=Sine(amplitude=0.2, angular_frequency_rad_s=3.0)), linear()
+    builder = SceneBuilder("driven masses", gravity=(0.3, -0.5, -9.81)).rigid_body("hub", mass=5.0, inertia=(1, 2, 2.5))
+    builder.free("joint", "ground", "hub", angular_velocity=(0.3, 0.4, -0.2))
+    for count, which in ((1, [moved]), (2, [free, moved]), (3, [moved, free, moved])):
+        offset = (0.5, 0.1 * count, 0.3)
+        builder.point_mass(
+            f"mass {count}", "hub", mass=0.4, offset=offset, directions=ways[:count], coordinates=which
+        )
+    return builder.scene()
+
+
+# One is seen in runs alone: it begins at another time.
+@pytest.mark.parametrize(
+    "invariance", [each for each in INVARIANCES if each is not LATER], ids=lambda each: each.name
+)
+def test_nothing_changes_in_a_scene_of_driven_point_masses(invariance: Invariance) -> None:
+    counterpart = invariance.of(driven_masses())
+    assert sum(name.startswith("drive:") for name in seen(driven_masses())) == 3
+    assert strangers(driven_masses(), counterpart) == []
 
 
 @pytest.mark.parametrize("key", ["stiffening", "stiffness", "damping", "table_m", "free_length_m"])

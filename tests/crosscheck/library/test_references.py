@@ -126,7 +126,8 @@ def test_numbers_come_back_to_the_last_bit() -> None:
     ("\n0.25,", "\n0.75,", "do not rise"),
     ("\n0.25,", "\n0.25,1,", "line 3 has"),
     ("\n0.25,", "\nnan,", "not finite"),
-    ("\n0.25,", "\nx,", "could not convert"),
+    ("\n0.25,", "\nx,", "could not convert"), ("\n0.25,", '\n"0.2"5,', "not a table"),
+    ("\n0.25,", "\n" + "0" * 200_000 + ",", "not a table"),
 ])  # fmt: skip
 def test_a_bad_file_is_refused(old: str, new: str, said: str) -> None:
     text = values_text(TIMES, CHANNELS)

@@ -18,7 +18,9 @@ from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Event, Limits
 from crosscheck.sampling.run import Sampled, run_sweep
 from crosscheck.sampling.statistics import summarise
+from flexmb.scene.files import dumps
 from tests.crosscheck.sessions import CASE, PROVIDER
+from tests.flexmb.scene.bad_scenes import satellite
 
 LENGTH_M = 1.0  # of the rod, to the marker
 HEAD = f"""
@@ -172,7 +174,17 @@ def test_an_interrupted_sweep_leaves_a_table_of_what_was_done_by_a_name_that_say
         (("number = 6", "number = 0"), "0 samples make no sense"),
         (("number = 6", 'number = 6\nsampling = "grid"'), "leave it out"),
         (("duration_s = 1.0", ""), "give `duration_s` and `samples`"),
-        (("samples = 11", "samples = 1"), "1 are too few"),
+        (("samples = 11", "samples = 1"), "a run cannot have 1 samples"),
+        (("samples = 11", "samples = 9007199254740993"), "a run cannot have 9007199254740993 samples"),
+        (("duration_s = 1.0", "duration_s = 1e300"), "give 1e-09 to 1e+07 seconds"),
+        (("duration_s = 1.0", "duration_s = nan"), "give 1e-09 to 1e+07 seconds"),
+        (('method = "dop853"', 'method = "dopri"'), '$.efforts[0].method: fine has no method "dopri"'),
+        (('engines = ["fine"]', 'engines = ["fine", "fien"]'), 'there is no engine "fien"'),
+        (("angle_rad", "angle_rad.0"), "end the path before it"),
+        (('component = "y"', 'component = "w"'), "marker:tip.position has no component 'w'"),
+        (('component = "y"', "component = 3"), "give x, y, z, or a number from 0 to 2"),
+        (("marker:tip.position", "load:pivto.torque"), 'no load "pivto": did you mean "pivot"?'),
+        (("scene.toml", "no.toml"), "no.toml"),
         (("scene =", "# scene ="), "give `case` or `scene`"),
         (('engine = "fine"', 'engine = "fin"'), "no effort of an engine here: fin"),
     ],
@@ -186,8 +198,22 @@ def test_a_file_that_makes_no_sense_is_refused_before_anything_runs(
     file.write_text(text.replace(*change), encoding="utf-8")
     with pytest.raises(CaseError) as refused:
         run(file, tmp_path / "out")
-    assert words in str(refused.value)
+    message = str(refused.value).replace("\n     ->", ":")
+    assert words in message
+    assert message.startswith(f"{file}: ")
     assert not (tmp_path / "out" / "samples.jsonl").exists()
+
+
+def test_a_count_takes_whole_numbers_in_every_sample(tmp_path: Path) -> None:
+    """The first sample of this grid is sound, the second is not."""
+    head = HEAD.replace("number = 6\n", 'sampling = "grid"\n').replace(str(CASE / "scene.toml"), "scene.toml")
+    (tmp_path / "scene.toml").write_text(dumps(satellite().scene()), encoding="utf-8")
+    count = 'distribution = "values"\nvalues = [4, 4.5]\n'
+    parameter = f'[[parameter]]\npath = "bodies.boom.elements"\n{count}'
+    quantity = HEIGHT.replace("marker:tip.position", "energy.total").replace('component = "y"\n', "")
+    file = write(tmp_path, "fine", head=head, parameter=parameter, quantity=quantity)
+    with pytest.raises(CaseError, match=r"sweep\.toml: .* counts something: 4\.5 is no whole number"):
+        run(file, tmp_path / "out")
 
 
 def test_the_command_says_what_came_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

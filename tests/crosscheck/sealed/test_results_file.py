@@ -71,6 +71,32 @@ def test_every_changed_byte_is_noticed(tmp_path: Path) -> None:
             read_results(file)
 
 
+@pytest.mark.parametrize("change", [
+    lambda data: b"\xef\xbb\xbf" + data,
+    lambda data: data.replace(b"\n", b"\r\n"),
+    lambda data: data + b"\n",
+    lambda data: data.rstrip(b"\n"),
+    lambda data: data.decode().encode("utf-16"),
+    lambda data: data.replace(b'"made"', b'"\\u006dade"'),
+])  # fmt: skip
+def test_bytes_that_change_no_word_are_noticed_too(tmp_path: Path, change) -> None:
+    """What editors and file transfers do: a byte order mark, other line ends, another encoding."""
+    file = written(made(), tmp_path)
+    before = file.read_bytes()
+    file.write_bytes(change(before))
+    assert file.read_bytes() != before
+    with pytest.raises(ResultsError, match="results.json"):
+        read_results(file)
+
+
+@pytest.mark.parametrize("number", ["1e999", "-1e999", "9" * 5000, "1e9999999999", "0." + "9" * 10_000 + "e5000"])
+def test_numbers_that_overflow_are_refused(tmp_path: Path, number: str) -> None:
+    file = written(made(), tmp_path)
+    file.write_bytes(file.read_bytes().replace(b'"version":1', f'"version":1,"more":{number}'.encode()))
+    with pytest.raises(ResultsError, match=r"results\.json cannot be read"):
+        read_results(file)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -94,8 +94,43 @@ BAD = {
     "fluid": (MJCF.replace("<option", '<option density="1.2"'), "no fluid"),
     "levity": (MJCF.replace('name="foot"', 'name="foot" gravcomp="1"'), 'body "foot" has gravity compensation'),
     "no model": ("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "MuJoCo refuses"),
-    "no xml": ("hello", "MuJoCo refuses"),
+    "no xml": ("hello", "not XML"),
 }
+NAN = "is no finite number: give a finite number, or leave the attribute out"
+UNSOUND = {  # MuJoCo compiles all of the first kind, with a default in place of the number
+    "inertial": (
+        "<geom ", '<inertial pos="nan 0 0" mass="1" diaginertia="1 1 1"/><geom ', f'inertial, pos: "nan" {NAN}',
+    ),
+    "capitals and sign": ('pos="0 0 1"', 'pos="0 -NaN 1"', f'body "trunk", pos: "-NaN" {NAN}'),
+    "payload": ('stiffness="3"', 'stiffness="nan(7)"', f'joint "roll", stiffness: "nan(7)" {NAN}'),
+    "infinite": ('mass="3"', 'mass="1e999"', f'geom, mass: "1e999" {NAN}'),
+    "word": ('gravity="0.3', 'gravity="-Infinity', f'option, gravity: "-Infinity" {NAN}'),
+    "escaped": ('pos="0 0 1"', 'pos="0 &#110;an 1"', f'body "trunk", pos: "nan" {NAN}'),
+    "default": ('damping="0.05"', 'damping="nan"', f'joint, damping: "nan" {NAN}'),
+    "compiler": ('<compiler ', '<compiler boundmass="nan" ', f'compiler, boundmass: "nan" {NAN}'),
+    "included": ("<worldbody>", '<include file="more.xml"/><worldbody>', f'more.xml: joint, armature: "nan" {NAN}'),
+    "copies": (
+        "</worldbody>",
+        '<replicate count="1000"><replicate count="1000"><body/></replicate></replicate></worldbody>',
+        "it asks for 1000000 copies, and 100000 are allowed",
+    ),
+    "texture": ("<worldbody>", '<asset><texture width="99999" height="9999"/></asset><worldbody>', "999890001 entries"),
+    "room": ("<worldbody>", '<size nuser_body="999999999"/><worldbody>', "999999999 entries"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", UNSOUND)
+def test_numbers_that_are_none_are_seen_before_mujoco_takes_them_for_defaults(fault, tmp_path):
+    old, new, words = UNSOUND[fault]
+    assert old in MJCF
+    (tmp_path / "more.xml").write_text('<mujoco><default><joint armature="nan"/></default></mujoco>')
+    with pytest.raises(ModelError, match=re.escape(words)):
+        read(MJCF.replace(old, new, 1), tmp_path)
+
+
+def test_names_may_be_words_for_infinity_and_comments_may_hold_dashes(tmp_path):
+    text = MJCF.replace('"foot"', '"inf"').replace("<worldbody>", "<!-- nan -- pos='nan' --><worldbody>")
+    assert "inf" in [body.name for body in read(text, tmp_path).scene.bodies]
 
 
 @pytest.mark.parametrize("fault", BAD)

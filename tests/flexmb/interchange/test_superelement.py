@@ -220,7 +220,10 @@ BAD = {
     "rigid": (lambda: reduced(BEAM, [1], 0), "is a rigid body: ask for modes"),
     "damping": (lambda: reduced(BEAM, [1], 2, damping_ratio=-0.1), "the damping ratio is -0.1"),
     "no interface": (lambda: reduced(BEAM, [], 2), "no interface node"),
-    "nan": (lambda: super_element(STIFFNESS * np.nan, BEAM.M, POSITION), "finite numbers"),
+    "nan": (lambda: super_element(STIFFNESS * np.nan, BEAM.M, POSITION), r"K\[1,1\] is nan: give finite numbers"),
+    "nothing": (lambda: super_element(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 3))), "no node with"),
+    "sums overflow": (lambda: super_element(np.sign(STIFFNESS) * 1e308, BEAM.M, POSITION), "at most 1e\\+60"),
+    "far away": (lambda: super_element(STIFFNESS, BEAM.M, POSITION * 1e300), "a coordinate of a node is not finite"),
 }
 
 

@@ -126,6 +126,8 @@ TABLES = {
     "nan": ("id,x,y,z\n1,nan,0,0\n", "line 2: a coordinate"),
     "dofs": ("id,x,y,z,dofs\n1,0,0,0,127\n", 'node 1 has the dofs "127"'),
     "few": ("id,x,y,z\n1,0,0,0\n", "K has 18 rows"),
+    "beyond all numbers": (f"id,x,y,z\n{'9' * 30},0,0,0\n", "line 2: give id,x,y,z as numbers"),
+    "endless cell": (f"id,x,y,z\n{'2' * 200_000},0,0,0\n", "field larger than"),
     "twice": ("id,x,y,z\n1,0,0,0\n1,1,0,0\n", "a node number is there twice"),
 }
 

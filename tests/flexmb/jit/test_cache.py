@@ -13,6 +13,7 @@ import pytest
 from flexmb import jit
 from flexmb.jit import folder as folders
 from flexmb.jit import hooks
+from flexmb.jit.cache import _digest
 from flexmb.jit.folder import cache_directory, delete_unused, warn_once
 from flexmb.jit.kernel import kernel
 
@@ -257,3 +258,63 @@ def test_an_edited_helper_in_another_file_is_compiled_and_edited_words_are_not(t
     assert run(2.0, "Two times what it takes.") == "2.0 1"
     assert run(3.0, "Two times what it takes.") == "3.0 0"
     assert run(2.0, "Two times.") == "2.0 1"
+
+
+def belongs_to_another(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if os.geteuid() == 0:
+        os.chown(path, 12345, -1)
+    else:
+        monkeypatch.setattr(folders.os, "geteuid", lambda: path.stat().st_uid + 1)
+
+
+STRANGERS = {
+    "everybody may write to the folder": lambda place, _: place.chmod(0o777),
+    "a group may": lambda place, _: place.chmod(0o770),
+    "everybody may write to a file": lambda place, _: (place / "a.kernel").chmod(0o666),
+    "the folder is another's": belongs_to_another,
+    "a file is another's": lambda place, monkeypatch: belongs_to_another(place / "a.kernel", monkeypatch),
+    "everybody may rename the folder": lambda place, _: place.parent.chmod(0o777),
+}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="modes say nothing there")
+@pytest.mark.parametrize("how", STRANGERS)
+def test_kernels_that_others_may_have_written_are_not_used(how, tmp_path, monkeypatch):
+    monkeypatch.setattr(folders.config, "CACHE_DIR", str(tmp_path / "numba"))
+    warn_once.cache_clear()
+    place = cache_directory.__wrapped__()
+    (place / "a.kernel").write_bytes(b"")
+    (place / "a.kernel").chmod(0o644)
+    place.chmod(0o755)  # as before it was closed, or by another mask
+    assert cache_directory.__wrapped__() == place
+    STRANGERS[how](place, monkeypatch)
+    with pytest.warns(RuntimeWarning, match="run as code: remove the folder"):
+        assert cache_directory.__wrapped__() is None
+    warn_once.cache_clear()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="modes say nothing there")
+def test_a_new_folder_is_the_users_alone(tmp_path, monkeypatch):
+    """Whatever the mask: many systems let the user's group write."""
+    monkeypatch.setattr(folders.config, "CACHE_DIR", str(tmp_path / "numba"))
+    before = os.umask(0o002)
+    try:
+        place = cache_directory.__wrapped__()
+        (place / "a.kernel").write_bytes(b"")
+    finally:
+        os.umask(before)
+    assert place.stat().st_mode & 0o777 == 0o700
+    assert cache_directory.__wrapped__() == place
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="modes say nothing there")
+def test_a_planted_kernel_is_not_unpickled(tmp_path):
+    """Its digest is right: whoever can write can compute it."""
+    run(tmp_path, "tiny")
+    (file,) = kernels(tmp_path)
+    planted = b"cos\nsystem\n(S'touch " + str(tmp_path / "ran").encode() + b"'\ntR."
+    file.write_bytes(_digest(file, planted) + planted)
+    file.parent.chmod(0o777)
+    done = run(tmp_path, "tiny")
+    assert done.stdout.split() == ["0"] and "others may write to it" in done.stderr
+    assert not (tmp_path / "ran").exists()

@@ -172,6 +172,13 @@ BAD = {
                             ["triangle", "2.1"], ["add up"]),
     # beams
     "no elements": (put("bodies", 1, "elements", 0), ["$.bodies[1].elements"], ["0 elements"], ["one"]),
+    "elements that memory cannot hold": (put("bodies", 1, "elements", 5000), ["$.bodies[1].elements", '"boom"'],
+                                         ["5000 elements and 3 modes", "GiB and"], ["give 200 or fewer"]),
+    "elements beyond all numbers": (put("bodies", 1, "elements", 2**62), ["$.bodies[1].elements"], ["GiB"], ["fewer"]),
+    "modes that memory cannot hold": (
+        both(put("bodies", 1, "elements", 200), put("bodies", 1, "level", "linear"), put(*MODES, "count", 400),
+             STATELESS),
+        ["$.bodies[1].elements"], ["400 modes", "GiB"], ["as few modes"]),
     "no length": (both(put("bodies", 1, "length_m", 0.0), put("bodies", 1, "nodes", []), put(*STATION, "x_m", 0.0)),
                   ["$.bodies[1].length_m"], ["length is 0"], ["positive"]),
     "stations short of the tip": (put(*STATION, "x_m", 2.5), ["$.bodies[1].stations"], ["2.5"], ["x_m = 3.0"]),
@@ -320,6 +327,8 @@ DOUBTFUL = {
                                       ["units"], "shear_stiffness"),
     "shear stiffness off by 1000": (put(*STATION, "GAz_N", 22.5e9), ["stations[1].GAz_N"], ["321 times"], ["units"],
                                     "shear_stiffness"),
+    "elements that change no digit": (put("bodies", 1, "elements", 201), ["$.bodies[1].elements", '"boom"'],
+                                      ["201 elements for 3 modes", "GiB"], ["200 or fewer"], "many_elements"),
     "modal stiffness off by 1e12": (put("bodies", 3, "stiffness", [[50e12, 0.0], [0.0, 80e12]]),
                                     ["$.bodies[3].stiffness"], ["Hz"], ["units"], "modal_frequency"),
     "negative damping ratio": (put(*MODES, "damping_ratio", -0.01), ["modes.damping_ratio"], ["negative"], ["zero"],

@@ -194,6 +194,13 @@ NPZ = {
     "objects": ({"mass": np.array([1.0, None])}, '"mass" holds numbers of type object'),
     "truth values": ({"mass": np.ones(2, bool)}, '"mass" holds numbers of type bool'),
     "beyond all powers": ({"mass": np.array([1.0, 1e300])}, "at most 1e\\+60"),
+    "no points": (
+        {name: values[:0] for name, values in ARRAYS.items()},
+        r'\$\.bodies\[0\]\.file \(body "panel"\): "mass" has no points',
+    ),
+    "more modes than matrices can have": (
+        {"translation_modes": np.zeros((2, 3, 2001))}, '"translation_modes" has 2001 modes, and a body may have 2000',
+    ),
     "bomb": ({"second_translation": np.zeros((2, 3, 2200, 2200))}, "would take 222 MiB of memory, more than a file"),
 }
 

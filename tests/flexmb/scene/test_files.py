@@ -1,5 +1,8 @@
 """Scene files: build -> file -> build is the identity; what a file gets wrong is named with its remedy."""
 
+import gc
+import re
+
 import msgspec
 import numpy as np
 import pytest
@@ -7,11 +10,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec import inspect
 
+from flexmb.scene import loaded
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
+from flexmb.scene.check import SceneWarning, check_and_warn, check_scene
 from flexmb.scene.collecting import COLLECTIONS
 from flexmb.scene.files import dumps, load_scene, loads, save_scene
 from flexmb.scene.problems import SceneError
+from tests.flexmb.scene.bad_scenes import satellite
 
 SCALARS = {
     inspect.StrType: st.text(max_size=8),
@@ -143,3 +149,29 @@ def test_the_json_schema_accepts_what_is_written():
     """The generated schema describes the files: its keys are the struct's keys."""
     schema = msgspec.json.schema(s.Scene)
     assert set(schema["$defs"]["Scene"]["properties"]) == set(s.Scene.__struct_fields__)
+
+
+def test_errors_of_a_scene_name_the_file_it_was_read_from(tmp_path):
+    """Of several scenes with one title, only the file tells which."""
+    scene = satellite().scene()
+    unsound = msgspec.structs.replace(scene, gravity_m_s2=(float("nan"), 0.0, 0.0))
+    doubtful = scene.with_values({"slider.mass_kg": 1.0, "rail.translation.damping_Ns_m": -1.0})
+    for each, name in ((unsound, "unsound.toml"), (doubtful, "doubtful.toml")):
+        save_scene(each, tmp_path / name)
+    read = load_scene(tmp_path / "unsound.toml")
+    with pytest.raises(SceneError, match=re.escape(f'scene "{tmp_path / "unsound.toml"}" has 1 problem')):
+        check_scene(read)
+    with pytest.raises(SceneError, match='scene "satellite" has 1 problem'):
+        check_scene(loads(dumps(read)))
+    with pytest.warns(SceneWarning, match=re.escape(f'scene "{tmp_path / "doubtful.toml"}" is doubtful')):
+        check_and_warn(load_scene(tmp_path / "doubtful.toml"))
+
+
+def test_files_of_scenes_that_are_gone_are_forgotten(tmp_path):
+    save_scene(satellite().scene(), tmp_path / "scene.toml")
+    before = len(loaded._files)
+    scene = load_scene(tmp_path / "scene.toml")
+    assert len(loaded._files) == before + 1 and loaded.called(scene) == str(tmp_path / "scene.toml")
+    del scene
+    gc.collect()
+    assert len(loaded._files) == before

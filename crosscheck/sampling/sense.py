@@ -1,0 +1,109 @@
+"""Whether a sweep makes sense in its scene and its engines, found before the first of what may be a million samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import get_args
+
+from crosscheck.engines.answers import efforts_of
+from crosscheck.library.case import CaseError
+from crosscheck.library.channels import part_of
+from crosscheck.running.execute import find_engine
+from crosscheck.sampling.file import SampleEffort, SweepFile, SweptQuantity
+from crosscheck.sampling.quantities import LETTERS
+from crosscheck.sampling.scenes import require_numbers
+from flexmb.integrate.integrator import Method
+from flexmb.scene.problems import Defect, Place, closest
+from flexmb.scene.schema import Scene
+from flexmb.typing import Real
+
+SCIPY = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
+# Integrators that engines take besides those of their own ladders, by what an engine's name begins with.
+BESIDE = {
+    "native": get_args(Method),
+    "pinocchio": SCIPY,
+    "dart": SCIPY,
+    "basilisk": SCIPY,
+    "mujoco": ("RK4", "Euler", "implicit", "implicitfast"),
+    "exudyn": (
+        "TrapezoidalIndex2", "GeneralizedAlpha", "ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "ODE23",
+        "DOPRI5", "DVERK6",
+    ),
+    "drake": (
+        "runge_kutta5", "runge_kutta3", "runge_kutta2", "bogacki_shampine3", "explicit_euler", "semi_explicit_euler",
+        "implicit_euler", "radau1", "radau3", "velocity_implicit_euler",
+    ),
+}  # fmt: skip
+
+
+def require_sense(file: Path, sweep: SweepFile, scene: Scene, times: Real, values: Real, provider: str) -> None:
+    """CaseError naming the file, every place and its remedy: paths without a number, unknown items, engines, methods.
+
+    `values` are those of all samples (number of samples, number of parameters), `times` (T,) s when each is sampled.
+    """
+    try:
+        require_numbers(scene, sweep, values)
+    except CaseError as error:
+        raise CaseError(f"{file}: {error}") from None
+    problems = [*_quantities(sweep, scene), *_engines(sweep, scene, float(times[-1]), provider)]
+    if problems:
+        raise CaseError(f"{file}: {'; '.join(map(str, problems))}")
+
+
+def _quantities(sweep: SweepFile, scene: Scene) -> Iterator[Defect]:
+    for index, quantity in enumerate(sweep.quantities):
+        place = Place().key("quantity", index).named(f'quantity "{quantity.name}"')
+        kind, _, rest = quantity.channel.partition(":")
+        if kind in (items := _items(scene)) and (name := rest.rpartition(".")[0]) not in items[kind]:
+            what = f'no {kind.replace("_", " ")} "{name}"'
+            yield Defect(str(place.key("channel")), what, closest(name, items[kind]))
+        if wrong := _component(quantity):
+            yield Defect(str(place.key("component")), *wrong)
+
+
+def _items(scene: Scene) -> dict[str, list[str]]:
+    """By kind of channel, the names that the scene has for it."""
+    of = {
+        "marker": scene.markers, "load": (*scene.hinges, *scene.closures), "wheel_load": scene.wheels,
+        "connector": scene.connectors,
+    }  # fmt: skip
+    return {kind: [item.name for item in items] for kind, items in of.items()}
+
+
+def _component(quantity: SweptQuantity) -> tuple[str, str] | None:
+    part, component = part_of(quantity.channel), quantity.component
+    width = None if part is None else part.width
+    if component is None or width is None:
+        return None
+    letters = LETTERS.get(width, "")
+    if isinstance(component, int) and 0 <= component < width:
+        return None
+    if isinstance(component, str) and len(component) == 1 and component in letters:
+        return None
+    choice = f"{', '.join(letters)}, or " if letters else ""
+    return f"{quantity.channel} has no component {component!r}", f"give {choice}a number from 0 to {width - 1}"
+
+
+def _engines(sweep: SweepFile, scene: Scene, duration_s: float, provider: str) -> Iterator[Defect]:
+    for index, name in enumerate(sweep.engines):
+        engine = find_engine(provider, name)
+        if isinstance(engine, str):
+            yield Defect(str(Place().key("engines", index)), engine, "name one of them")
+            continue
+        for number, effort in enumerate(sweep.efforts):
+            if effort.engine != name:
+                continue
+            try:
+                own = {each.method for each in efforts_of(engine, scene, duration_s)}
+            except Exception:  # it is not installed, or does not take the scene: every sample says so
+                continue
+            if wrong := _method(effort, own):
+                yield Defect(str(Place().key("efforts", number, "method")), *wrong)
+
+
+def _method(effort: SampleEffort, own: set[str]) -> tuple[str, str] | None:
+    known = own | {method for begin, beside in BESIDE.items() if effort.engine.startswith(begin) for method in beside}
+    if effort.method in known:
+        return None
+    return f'{effort.engine} has no method "{effort.method}"', closest(effort.method, known)

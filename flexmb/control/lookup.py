@@ -1,0 +1,125 @@
+"""What a law "module:function" is, found in the text of its module: to import a module is to run it.
+
+Only what the text says plainly is decided here. A module without text (compiled, built in), and names that are made
+otherwise than by `def`, are left to the import.
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator, Sequence
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+
+BOUND_BY_HAND = ("globals", "exec", "setattr", "vars", "locals")  # what makes names that no text shows
+DEEPEST = 8  # modules in a row that import the name from one another
+
+
+def fault(module: str, name: str, arguments: int, depth: int = 0) -> str | None:
+    """Why "module:name" can be no function of so many arguments, by the text alone; None where that cannot be told."""
+    if module in sys.modules:
+        return None  # what it runs, it has run
+    found = _spec(module)
+    if found is None:
+        return f"No module named {module!r}"
+    tree = _parsed(found)
+    if tree is None or _makes_names(tree):
+        return None
+    first, _, inner = name.partition(".")
+    bindings = list(_bindings(tree.body, first))
+    if not bindings:
+        return f"module {module!r} has no attribute {first!r}"
+    last = bindings[-1]
+    match last:
+        case ast.FunctionDef() if not inner and len(bindings) == 1 and not _replaced(last):
+            return None if _takes(last.args, arguments) else f"it does not take {arguments} arguments"
+        case ast.AsyncFunctionDef():
+            return "it is asynchronous"
+        case ast.Import() if not inner:
+            return "it is a module"
+        case ast.ImportFrom(module=str(other), level=0) if len(bindings) == 1 and depth < DEEPEST:
+            true = next(each.name for each in last.names if (each.asname or each.name) == first)
+            return None if inner else fault(other, true, arguments, depth + 1)
+    return None
+
+
+def _spec(module: str) -> ModuleSpec | None:
+    """As Python's own search along sys.path, but for the parents, which that would import."""
+    path: Sequence[str] | None = None
+    parts, found = module.split("."), None
+    for count in range(1, len(parts) + 1):
+        full = ".".join(parts[:count])
+        loaded = getattr(sys.modules.get(full), "__spec__", None)
+        found = loaded or _searched(full, path)
+        if found is None:
+            return None
+        path = list(found.submodule_search_locations or ())
+        if count < len(parts) and found.submodule_search_locations is None:
+            return None
+    return found
+
+
+def _searched(module: str, path: Sequence[str] | None) -> ModuleSpec | None:
+    for finder in sys.meta_path:
+        if found := getattr(finder, "find_spec", lambda *_: None)(module, path, None):
+            return found
+    return None
+
+
+def _parsed(spec: ModuleSpec) -> ast.Module | None:
+    if not spec.has_location or spec.origin is None or Path(spec.origin).suffix != ".py":
+        return None
+    try:
+        return ast.parse(Path(spec.origin).read_bytes())
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
+        return None  # the import says it better
+
+
+def _makes_names(tree: ast.Module) -> bool:
+    """Whether names may come from elsewhere: `from m import *`, `__getattr__`, `globals()`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and any(each.name == "*" for each in node.names):
+            return True
+        if isinstance(node, ast.FunctionDef) and node.name == "__getattr__":
+            return True
+        if isinstance(node, ast.Name) and node.id in BOUND_BY_HAND:
+            return True
+    return False
+
+
+def _bindings(body: Sequence[ast.stmt], name: str) -> Iterator[ast.stmt]:
+    """The statements at the top of a module, those in its branches and blocks among them, that bind a name."""
+    for statement in body:
+        match statement:
+            case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
+                if statement.name == name:
+                    yield statement
+                continue
+            case ast.Import() | ast.ImportFrom():
+                if any((each.asname or each.name.partition(".")[0]) == name for each in statement.names):
+                    yield statement
+                continue
+        inner = [block for key in ("body", "orelse", "finalbody") for block in getattr(statement, key, ())]
+        inner += [line for handler in getattr(statement, "handlers", ()) for line in handler.body]
+        inner += [line for case in getattr(statement, "cases", ()) for line in case.body]
+        yield from _bindings(inner, name)
+        if any(_binds(node, name) for node in ast.walk(statement)):
+            yield statement
+
+
+def _binds(node: ast.AST, name: str) -> bool:
+    return isinstance(node, ast.Name) and node.id == name and not isinstance(node.ctx, ast.Load)
+
+
+def _replaced(function: ast.FunctionDef) -> bool:
+    """Whether a decorator may make something else of it; that of flexmb does not change its arguments."""
+    names = {ast.unparse(each).rpartition(".")[2] for each in function.decorator_list}
+    return bool(names - {"user_function"})
+
+
+def _takes(arguments: ast.arguments, count: int) -> bool:
+    most = len(arguments.posonlyargs) + len(arguments.args)
+    least = most - len(arguments.defaults)
+    required = any(default is None for default in arguments.kw_defaults)
+    return least <= count and (count <= most or arguments.vararg is not None) and not required
