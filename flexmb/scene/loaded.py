@@ -27,4 +27,8 @@ def called(scene: Scene) -> str:
 
 
 def _forget(number: int) -> Callable[[Any], None]:
-    return lambda gone: _files.pop(number, None) if _files.get(number, (None,))[0] is gone else None
+    def forget(gone: Any) -> None:
+        if _files.get(number, (None,))[0] is gone:  # not of a younger scene in the same place
+            _files.pop(number, None)
+
+    return forget
