@@ -214,8 +214,8 @@ def _loads(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody, turn: Real
 
     for hinge in scene.hinges:
         if hinge.parent == body.name:
-            load = np.nan_to_num(rigid.run.loads[hinge.name])  # what rigid bodies leave open only deformation decides
-            add(hinge.parent_node, rigid.hinge_point(hinge.name), load, -1.0)
+            known = np.nan_to_num(rigid.run.loads[hinge.name])  # what rigid bodies leave open only deformation decides
+            add(hinge.parent_node, rigid.hinge_point(hinge.name), known, -1.0)
     for key, loads in (("point_masses", rigid.run.loads), ("wheels", rigid.run.wheel_loads)):
         for item in getattr(scene, key):
             if item.body == body.name:
