@@ -34,6 +34,7 @@ class FourBar(NamedTuple):
 
 
 GRASHOF = FourBar()
+RATE = 3.826937  # rad/s, of its crank; steps and tolerances of tests go by it
 
 
 def bar(scene: SceneBuilder, name: str, length: float, *, modes: int = 0) -> SceneBuilder:
@@ -46,7 +47,7 @@ def bar(scene: SceneBuilder, name: str, length: float, *, modes: int = 0) -> Sce
 
 
 def four_bar(
-    lengths: FourBar = GRASHOF, *, crank: float = 1.0, rate: float = 3.8, closure: str = "revolute",
+    lengths: FourBar = GRASHOF, *, crank: float = 1.0, rate: float = RATE, closure: str = "revolute",
     gravity: float = -9.81, modes: int = 0, off: float = 0.0, prescribed: s.Function | None = None, **place,
 ) -> s.Scene:  # fmt: skip
     """A four-bar in the x-y plane, cut at the pin between coupler and rocker; `off` spoils its initial angles (rad)."""

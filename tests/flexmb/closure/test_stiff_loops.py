@@ -26,7 +26,7 @@ def stiff_four_bar(level: s.Level = "full") -> s.Scene:
     scene = fm.SceneBuilder("stiff four-bar", gravity=(0.0, -9.81, 0.0))
     for name, length in zip(("crank", "coupler", "rocker"), bars[:3], strict=True):
         scene.beam(name, length=length, elements=4, section=STEEL, modes=modes, level=level)
-    scene.revolute("drive", "ground", "crank", angle=1.0, rate=3.8)
+    scene.revolute("drive", "ground", "crank", angle=1.0, rate=m.RATE)
     scene.revolute("pin", "crank", "coupler", parent_node="tip", angle=coupler - 1.0)
     scene.revolute("pivot", "ground", "rocker", parent_position=(bars.ground, 0.0, 0.0), angle=rocker)
     scene.closure("loop", "revolute", "coupler", "rocker", node_a="tip", node_b="tip")

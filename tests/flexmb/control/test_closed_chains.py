@@ -115,7 +115,7 @@ def crank_turn(rate: float, times: Any) -> Any:
 @pytest.mark.parametrize("settings", RUNS)
 def test_a_controlled_crank_turns_through_where_its_rod_lies_on_it(settings: str) -> None:
     """Accelerations depend on speeds here; the rod passes the crank back and forth."""
-    scene = controlled(m.slider_crank(0.5, 0.5, angle=1.3, rate=1.9), "drive", LAGGING)
+    scene = controlled(m.slider_crank(0.5, 0.5, angle=1.3, rate=1.894969), "drive", LAGGING)
     run = fm.simulate(scene, 1.0, samples=21, **RUNS[settings])
     assert run.finished, run.message
     assert np.sum(np.diff(np.sign(np.cos(run.q[:, 0]))) != 0.0) >= 2
