@@ -20,7 +20,9 @@ TWO = ("version-is-text", "a-run-is-what-was-asked-for")
 
 
 def bad_engines() -> dict[str, Any]:
-    """Engines that end, hang or spoil their process, as a worker asks for them."""
+    """Engines that end, hang or spoil their process, as a worker asks for them; as plug-ins, none without a path."""
+    if not sys.path:
+        return {}
     bad = {name: (CRASHES | ENDLESS)[name].make() for name in ("segmentation_fault", "hangs")}
     return bad | {"clears_its_path": Faulty("clears_its_path", does(sys.path.clear), {})}
 
