@@ -6,7 +6,6 @@ It is no part of the scene: scenes are equal by what they say, and one with othe
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 from weakref import ref
 
 from flexmb.scene.schema import Scene
@@ -26,9 +25,9 @@ def called(scene: Scene) -> str:
     return known[1] if known is not None and known[0]() is scene else scene.name
 
 
-def _forget(number: int) -> Callable[[Any], None]:
-    def forget(gone: Any) -> None:
-        if _files.get(number, (None,))[0] is gone:  # not of a younger scene in the same place
-            _files.pop(number, None)
+def _forget(number: int) -> Callable[[ref[Scene]], None]:
+    def forget(gone: ref[Scene]) -> None:
+        if number in _files and _files[number][0] is gone:  # else another scene has taken its place
+            del _files[number]
 
     return forget

@@ -73,7 +73,7 @@ def super_element(
     place = _places(numbers, ["123456"] * len(position) if dofs is None else list(dofs))
     rows = int(np.count_nonzero(place >= 0))
     if not rows:
-        raise SuperElementError("the structure has no node with a displacement: no row of K and M belongs to one")
+        raise SuperElementError("there is no node with a displacement: list nodes and displacements for the rows of K")
     if not len(K) == len(M) == rows:
         raise SuperElementError(f"K has {len(K)} rows, M {len(M)}, and the nodes {rows} displacements: they must agree")
     element = SuperElement(K, M, numbers, position, place)
