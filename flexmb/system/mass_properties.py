@@ -10,6 +10,7 @@ import numpy as np
 
 from flexmb.modal.cross import cross_matrix
 from flexmb.system.frames import AT_GROUND, body_pose, link_pose
+from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
 from flexmb.typing import Real
 
@@ -42,8 +43,8 @@ class MassProperties:
         return self.rotation.T @ self.inertia @ self.rotation
 
     def about(self, point: Real) -> Real:
-        """Inertia (3,3) kg m² about a point (3,) m of World, World axes."""
-        arm = cross_matrix(self.centre - np.asarray(point, float))
+        """Inertia (3,3) kg m² about a point (3,) m of World, World axes; ValueError or TypeError for no point."""
+        arm = cross_matrix(self.centre - arguments.finite("point", arguments.vector("point", point, 3)))
         return self.inertia - self.mass * arm @ arm
 
     @cached_property
