@@ -25,6 +25,7 @@ from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Index, Real
 
 NEAR = 1e-6  # m, rad: a way by which rates of signals are found where nothing is integrated yet
+SLOWEST = 1e-100  # m/s, rad/s: what is slower is at rest, and its way would take longer than numbers are large
 NOISE = 1e-8  # of that way: what moves by less, while other things move, is at rest
 
 
@@ -192,7 +193,7 @@ class Feedback:
         loop.project(t, y.copy(), self.running)
         loop.rhs(t, y, slope, self.running, self.running)
         fastest = float(np.max(np.abs(slope[: self._plant.nq]), initial=0.0))
-        if not 0.0 < fastest < np.inf:
+        if not SLOWEST < fastest < np.inf:
             return there
         loop.look(t, y, there, self.running)
         loop.look(t + NEAR / fastest, y + NEAR / fastest * slope, ahead, self.running)

@@ -38,13 +38,13 @@ class Watch(NamedTuple):
     """entry (k,) of y, or -1 - j for signal j; level (k,); direction (k,): 1 rising, -1 falling, 0 either.
 
     side (k,): -1 where it is below its level, 1 above, 0 at it, kept from step to step. came (k,): of what is at its
-    level where a run begins and may go either way, the side that it came from, else 0; see `RESTED`. still (k,): what moves by less
-    within a step is at rest; 0 for entries of y, which are exact. found (k,): 1 where a level is reached at the time at
-    which a run paused, and rate (k,) per second there, of signals. value, after, reach (k,): scratch: above its level,
-    its side at the end of a step, and what becomes of it there. signal (S,): scratch; empty where only entries are
-    watched. leap (2,): start and end (s) of the leap in which a level is reached, NaN if it is none; before (n,): y at
-    its start. kept (1,): 1 where the run can be taken up from before a step that its end cut short, and kept_side,
-    kept_came (k,) as they were there.
+    level where a run begins and may go either way, the side that it came from, else 0; see `RESTED`. still (k,): what
+    moves by less within a step is at rest; 0 for entries of y, which are exact. found (k,): 1 where a level is reached
+    at the time at which a run paused, and rate (k,) per second there, of signals. value, after, reach (k,): scratch:
+    above its level, its side at the end of a step, and what becomes of it there. signal (S,): scratch; empty where only
+    entries are watched. leap (2,): start and end (s) of the leap in which a level is reached, NaN if it is none; before
+    (n,): y at its start. kept (1,): 1 where the run can be taken up from before a step that its end cut short, and
+    kept_side, kept_came (k,) as they were there.
     look(t, y, signal, constants) finds all signals and returns a status code.
     """
 

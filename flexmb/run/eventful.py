@@ -23,6 +23,7 @@ from flexmb.run.outputs import observed
 from flexmb.run.propagate import Integration, Raw, integrate, integration
 from flexmb.run.restart import Restart
 from flexmb.run.resting import with_stops
+from flexmb.run.sides import DIRECTIONS, Sides
 from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.standing import stand
 from flexmb.run.trajectory import Trajectory
@@ -36,7 +37,6 @@ from flexmb.system.tree_system import System
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
-DIRECTIONS = {"rising": 1, "falling": -1, "either": 0}
 # Chattering: so many instants of events within this part of a run, the fewer of them if nothing moves meanwhile further
 # than the error that is allowed. At the pace of the others it would need a thousand million. Sequences without end come
 # to any pace, for their intervals shrink by a factor, or to roundings of time.
@@ -89,8 +89,7 @@ class EventfulRun:
         self._algorithm, self._stabilise = algorithm, stabilise
         self._together = slack(float(times[0]), float(times[-1]))
         self._events = _by_what_they_watch(whole)
-        self._side, self._came = dict[str, int](), dict[str, int]()
-        """By name of an event: see `Watch`."""
+        self._sides = Sides(self._situation, settings, self._integration, self._beginning)
         self._done = set[str]()
         """Names of events on time that have happened, or were due before the run."""
         self._happened: list[EventRecord] = []
@@ -116,7 +115,7 @@ class EventfulRun:
             raw = _unmoved(begin)
             raw, ends = self._at_instant(raw, self._due_at_start(raw.t), None)
             if ends:
-                return self._over(raw, ends, anew=True)
+                return self._over(*self._concluded(raw, ends), anew=True)
             begin = self._going_on(raw)
         else:
             self._recall(begin.events)
@@ -131,7 +130,9 @@ class EventfulRun:
             if found:
                 self._count(begin, raw)
             raw, ends = self._at_instant(raw, found, piece.levels, piece.early)
-            if ends or self._chatters() or raw.t >= self._times[-1]:
+            if ends or raw.t >= self._times[-1]:
+                return self._over(*self._concluded(raw, ends), anew=True)
+            if self._chatters():
                 return self._over(raw, ends, anew=True)
             begin = self._going_on(raw)
 
@@ -141,23 +142,19 @@ class EventfulRun:
         """All that happens at one time, in its order: events that are found, in that of the scene, then what stands on
         stops. Controllers that are due act where a run goes on, or is over. Returns what is left, and whether it ends.
         """
-        watched, before = self._watched, set(self._side)
         y, controlled = self._apart(raw.y)
-        arrived = found if early else self._arriving(raw, found, levels, y)
+        arrived = found if early else self._sides.arriving(self._watched, raw, found, levels, y)
         for event in arrived:
             self._do(event, raw, y, early)
         raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
         if self._whole is None:  # the run starts
-            self._side = {event.name: self._first_side(event, y) for event in watched}
-            self._came = dict.fromkeys(self._side, 0)
+            self._sides.start(self._watched, y)
         else:
-            self._move_sides(raw, found, y)
+            self._sides.move(self._watched, raw, found, y)
         struck = self._stand(raw, found, y)
         raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
         self._events = _by_what_they_watch(self.system)  # rest on a stop adds one
-        for event in self._watched:
-            if event.name not in before and event.name not in self._side:
-                self._side[event.name], self._came[event.name] = -DIRECTIONS[event.crossing], 0
+        self._sides.make_known(self._watched)
         return raw, any(isinstance(action, EndRun) for event in (*arrived, *struck) for action in event.actions)
 
     def _do(self, event: SceneEvent, raw: Raw, y: Real, early: float) -> None:
@@ -170,29 +167,17 @@ class EventfulRun:
         """See `flexmb.run.standing`; which events happened."""
         struck = []
         for event in self._watched:
-            is_new = event not in found and self._came.get(event.name, 0) == 0
-            if is_new and (self._whole is None or self._side.get(event.name, 0) in (0, UNKNOWN)):
+            is_new = event not in found and self._sides.came[event.name] == 0
+            if is_new and (self._whole is None or self._sides.side[event.name] in (0, UNKNOWN)):
                 stood = stand(
-                    self._situation, event, raw.t, y, self._near(event), partial(self._probe, raw),
+                    self._situation, event, raw.t, y, self._sides.near(event), partial(self._sides.probe, raw),
                     partial(self._accelerations, raw),
                 )  # fmt: skip
                 if stood is not None:
                     self._happened += stood.records
-                    self._side[event.name], self._came[event.name] = stood.side, stood.came
+                    self._sides.side[event.name], self._sides.came[event.name] = stood.side, stood.came
                     struck += [event] * any(record.name == event.name for record in stood.records)
         return struck
-
-    def _probe(self, raw: Raw, event: SceneEvent, t: float, y: Real) -> tuple[float, float]:
-        """See `flexmb.run.standing.Probe`."""
-        rate = self._situation.rate_of(event.watch)
-        if not self._is_signal(event):
-            return float(y[self._situation.places[event.watch]] - event.level), 0.0 if rate is None else float(y[rate])
-        begin = self._going_on(self._elsewhere(raw, y))
-        with self._integration() as solve:
-            assert solve.feedback is not None
-            place = solve.feedback.place_of(event.watch)
-            height = solve.feedback.signals(begin)[place] - event.level
-            return float(height), float(solve.feedback.signal_rates(begin)[place])
 
     def _due_at_start(self, t: float) -> list[SceneEvent]:
         """Events on time that are due where the run starts; earlier ones are gone."""
@@ -209,6 +194,15 @@ class EventfulRun:
             known = solve.feedback.look(self._going_on(raw), acts=True, anew=anew)
         return raw._replace(controllers=known)
 
+    def _concluded(self, raw: Raw, ends: bool) -> tuple[Raw, bool]:
+        """After events at the end of a run: controllers that are due act, and so do events on what they say."""
+        raw = self._acted(raw, anew=True)
+        jumped = self._jumped(raw)
+        if jumped:
+            raw, by_jump = self._at_instant(raw, jumped, None)
+            ends = ends or by_jump
+        return raw, ends
+
     @property
     def _samples(self) -> bool:
         return any(each.period_s for each in self.system.scene.controllers)
@@ -221,34 +215,18 @@ class EventfulRun:
         with self._integration() as solve:
             assert solve.feedback is not None
             for event in self._watched:
-                if self._is_signal(event) and solve.feedback.is_sampled(event.watch):
+                if self._sides.is_signal(event) and solve.feedback.is_sampled(event.watch):
                     height = raw.controllers.signal[solve.feedback.place_of(event.watch)] - event.level
-                    side, direction = self._side[event.name], DIRECTIONS[event.crossing]
-                    if side in (-1, 1) and side * height < -self._near(event) and side * direction <= 0:
+                    side, direction = self._sides.side[event.name], DIRECTIONS[event.crossing]
+                    if side in (-1, 1) and side * height < -self._sides.near(event) and side * direction <= 0:
                         found.append(event)
         return found
-
-    def _near(self, event: SceneEvent) -> float:
-        """What is nearer to its level is at it: no run tells it from there."""
-        return self._settings.atol + self._settings.rtol * abs(event.level)
-
-    def _first_side(self, event: SceneEvent, y: Real) -> int:
-        """On which side of its level something is where a run starts; at it, on that to which it moves.
-
-        It has been at it before. Of signals the first step tells.
-        """
-        if self._is_signal(event):
-            return UNKNOWN
-        height, rate = y[self._situation.places[event.watch]] - event.level, self._situation.rate_of(event.watch)
-        if abs(height) > self._near(event):
-            return int(np.sign(height))
-        return 0 if rate is None or self._situation.is_held(event.watch) else int(np.sign(y[rate]))
 
     def _remember(self, ended: float, anew: bool) -> EventMemory:
         """As things are; sides of the events that are watched are those of the moment."""
         events = self.system.scene.events
-        side = [1 if event.name in self._done else self._side.get(event.name, 0) for event in events]
-        came = [self._came.get(event.name, 0) for event in events]
+        side = [1 if event.name in self._done else self._sides.side.get(event.name, 0) for event in events]
+        came = [self._sides.came.get(event.name, 0) for event in events]
         passed = [int(event.name in self._passed) for event in events]
         whole = (np.array(each, np.int64) for each in (side, came, passed))
         return EventMemory(*whole, self._until, anew, ended, 0, self._situation.given)
@@ -259,20 +237,15 @@ class EventfulRun:
             if memory.passed[i]:
                 self._passed.add(event.name)
             if event.watch != "time":
-                self._side[event.name], self._came[event.name] = int(memory.side[i]), int(memory.came[i])
+                self._sides.side[event.name], self._sides.came[event.name] = int(memory.side[i]), int(memory.came[i])
             elif memory.side[i]:
                 self._done.add(event.name)
 
-    def _keep_cut(self, raw: Raw, levels: Watch, watched: Sequence[SceneEvent]) -> None:
+    def _keep_cut(self, raw: Raw) -> None:
         """Before a step that the end of the run cut short, and in which an event was found all the same: it is found
         otherwise, in the last bits, by a run that goes on."""
         if self._cut is None and raw.memory is not None:
-            names = [event.name for event in watched]
-            now = self._side, self._came
-            self._side = dict(zip(names, levels.kept_side.tolist(), strict=True))
-            self._came = dict(zip(names, levels.kept_came.tolist(), strict=True))
             self._cut = self._restart(raw, raw.memory, anew=False)
-            self._side, self._came = now
 
     def _restart(self, raw: Raw, memory: Memory, anew: bool) -> Restart:
         events = self._remember(raw.t, anew)
@@ -295,8 +268,6 @@ class EventfulRun:
     def _over(self, raw: Raw, ends: bool, anew: bool) -> tuple[Trajectory, Raw]:
         """The end of the run, with what controllers say there; anew: events happened there."""
         chatters = anew and not ends and raw.t < self._times[-1]
-        if anew and not chatters:
-            raw = self._acted(raw, anew=True)
         if anew or (self._samples and raw.status is Status.OK and raw.t == self._times[-1]):
             self._last(raw, ends, chatters)
         if not chatters and raw.status in (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED):
@@ -327,15 +298,15 @@ class EventfulRun:
 
     def _accelerations(self, raw: Raw, t: float, y: Real) -> Real:
         """Under what controllers say where a piece ended, with another motion y = [q, u, work] there."""
-        begin = self._going_on(self._elsewhere(raw, y))
+        begin = self._beginning(raw, y)
         with self._integration() as solve:
             if solve.feedback is None:
                 return self.system.accelerations(begin.state, self._algorithm)
             return solve.feedback.accelerations(begin)
 
-    def _elsewhere(self, raw: Raw, y: Real) -> Raw:
-        """Where a piece ended, with another motion y = [q, u, work]."""
-        return raw._replace(y=np.concatenate([y[:-1], self._apart(raw.y)[1], y[-1:]]))
+    def _beginning(self, raw: Raw, y: Real) -> Beginning:
+        """From where a piece ended, with another motion y = [q, u, work]."""
+        return self._going_on(raw._replace(y=np.concatenate([y[:-1], self._apart(raw.y)[1], y[-1:]])))
 
     def _apart(self, y: Real) -> tuple[Real, Real]:
         """[q, u, work], and the states of controllers, which events do not touch."""
@@ -355,7 +326,7 @@ class EventfulRun:
         stop = min(first if first < t_end - self._together else t_end, self._until if t < self._until else np.inf)
         due = [event for event in timed if event.level <= stop + self._together]
         watched = self._watched
-        watching = partial(self._watch, watched)
+        watching = partial(self._sides.watching, watched)
         piece = self._run_to(stop, begin, watching, due)
         early = longest_leap(self.system, piece.raw) if due and self.system.scene.closures else np.inf
         if early < stop - t and self._is_singular(piece.raw, stop, early):
@@ -368,22 +339,14 @@ class EventfulRun:
             self._passed |= {event.name for event in piece.found}
             self._until = piece.raw.t + 2.5 * piece.early
         self._join(piece.part)
-        if piece.levels is not None:
-            if piece.raw.paused and piece.levels.kept[0]:
-                self._keep_cut(piece.raw, piece.levels, watched)
-            self._side, self._came = self._sides_of(piece, watched)
-        return piece
-
-    def _sides_of(self, piece: _Piece, watched: Sequence[SceneEvent]) -> tuple[dict[str, int], dict[str, int]]:
-        """Where things are at the end of a piece; or, where nothing was found, where it is taken up, which differs
-        where a step was cut short."""
         levels = piece.levels
-        assert levels is not None
-        is_cut = bool(levels.kept[0]) and not piece.raw.paused
-        both = (levels.kept_side, levels.kept_came) if is_cut else (levels.side, levels.came)
-        names = [event.name for event in watched]
-        side, came = (dict(zip(names, each.tolist(), strict=True)) for each in both)
-        return side, came
+        if levels is not None and levels.kept[0]:
+            self._sides.take(watched, levels.kept_side.tolist(), levels.kept_came.tolist())
+            if piece.raw.paused:
+                self._keep_cut(piece.raw)
+        if levels is not None and (piece.raw.paused or not levels.kept[0]):
+            self._sides.take(watched, levels.side.tolist(), levels.came.tolist())
+        return piece
 
     def _run_to(
         self, stop: float, begin: Beginning, watching: Callable[[Integration], Watch | None],
@@ -418,7 +381,7 @@ class EventfulRun:
         """On to a time (s), whatever comes to its level."""
         begin = self._going_on(raw._replace(y=raw.y.copy()))
         with self._integration() as solve:
-            nothing = watch((), (), (), (), (), (), self._size(solve))
+            nothing = watch((), (), (), (), (), (), self._sides.size(solve))
             return integrate(self.system, solve, begin, np.array([raw.t, t]), self._left(), nothing, goes_on=True)
 
     def _integration(self) -> AbstractContextManager[Integration]:
@@ -448,91 +411,6 @@ class EventfulRun:
             return []
         crossed = [self._watched[i] for i in np.flatnonzero(levels.found)] if levels is not None and raw.paused else []
         return [event for event in self._events if event in crossed or event in due]
-
-    def _arriving(self, raw: Raw, found: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[SceneEvent]:
-        """Those that come to their levels, where coordinates are set exactly.
-
-        Rounding may find one again that flies off.
-        """
-        off = []
-        for i, event in enumerate(self._watched):
-            if levels is not None and event in found:
-                if self._is_signal(event):
-                    has_jumped = not levels.found[i] or self._side[event.name] * levels.value[i] < -self._near(event)
-                    rate = levels.rate[i] or self._probe(raw, event, raw.t, y)[1]  # steps may be roundings of time
-                    rate = 0.0 if has_jumped else rate
-                else:
-                    y[self._situation.places[event.watch]] = event.level
-                    place = self._situation.rate_of(event.watch)
-                    rate = 0.0 if place is None else y[place]
-                if self._side[event.name] * rate > 0.0:
-                    off.append(event)
-        return [event for event in found if event not in off]
-
-    def _is_signal(self, event: SceneEvent) -> bool:
-        return event.watch not in self._situation.places
-
-    def _watch(self, watched: Sequence[SceneEvent], solve: Integration) -> Watch | None:
-        if not watched:
-            return None
-        entries, still = [], []
-        for event in watched:
-            if self._is_signal(event):
-                assert solve.feedback is not None
-                entries.append(-1 - solve.feedback.place_of(event.watch))
-                still.append(self._near(event))
-            else:
-                entries.append(self._situation.places[event.watch])
-                still.append(0.0)
-        directions = [DIRECTIONS[event.crossing] for event in watched]
-        levels, names = [event.level for event in watched], [event.name for event in watched]
-        sides, came = [self._side[name] for name in names], [self._came[name] for name in names]
-        return watch(entries, levels, directions, sides, came, still, self._size(solve))
-
-    def _size(self, solve: Integration) -> int:
-        """Of what is integrated, [q, u, work] or [q, u, x, work]."""
-        controlled = 0 if solve.feedback is None else len(solve.feedback.state_names)
-        return self.system.nq + self.system.nu + controlled + 1
-
-    def _move_sides(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> None:
-        """After events. What was found at its level is beyond it, or back where it does not go on, or at it: 0; of
-        what is left at rest the next steps tell, and `came` from where it came.
-
-        By what events make of them signals pass no level.
-        """
-        heights = self._heights(raw, [event for event in self._watched if self._is_signal(event)])
-        for event in self._watched:
-            is_signal, side, came = self._is_signal(event), self._side.get(event.name, 0), self._came.get(event.name, 0)
-            if event in found:
-                self._side[event.name], self._came[event.name] = self._side_after(raw, event, side, y)
-                continue
-            height = heights[event.name] if is_signal else y[self._situation.places[event.watch]] - event.level
-            if abs(height) > (self._near(event) if is_signal else 0.0):
-                self._side[event.name], self._came[event.name] = int(np.sign(height)), 0
-            else:
-                self._side[event.name], self._came[event.name] = UNKNOWN if is_signal else side, came
-
-    def _side_after(self, raw: Raw, event: SceneEvent, came: int, y: Real) -> tuple[int, int]:
-        """Side, and `came`, of what was found at its level: it goes on, or back, or stays."""
-        if self._situation.is_held(event.watch):
-            return 0, 0
-        if self._situation.rate_of(event.watch) is None and not self._is_signal(event):
-            return -came, 0
-        height, rate = self._probe(raw, event, raw.t, y)
-        if abs(height) > self._near(event):
-            return int(np.sign(height)), 0  # of a signal that jumped, or by its own event comes to jump
-        if rate == 0.0:
-            return UNKNOWN if self._is_signal(event) else 0, came
-        return (-came if came * rate < 0.0 else came), 0
-
-    def _heights(self, raw: Raw, events: Sequence[SceneEvent]) -> dict[str, float]:
-        """Of signals above their levels, before controllers act that are due."""
-        if not events:
-            return {}
-        with self._integration() as solve:
-            assert solve.feedback is not None
-            signals = solve.feedback.signals(self._going_on(raw))
-            return {event.name: float(signals[solve.feedback.place_of(event.watch)] - event.level) for event in events}
 
     def _count(self, begin: Beginning, raw: Raw) -> None:
         """An event that ends a piece; it is idle if neither speeds at the piece's ends nor time led anywhere."""
