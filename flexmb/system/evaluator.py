@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, partial
+from functools import partial
 from threading import get_ident
 from typing import Any
 
@@ -116,7 +116,7 @@ class _Careful:
         """For a thread that is not the owner."""
         return Evaluator(self.system, self.algorithm, self.algorithm.fresh(self.system))
 
-    @cached_property
+    @per_thread
     def _evaluate(self) -> Direct:
         """(t, y): the kernel by an entry of its own, compiled when first needed."""
         return direct(self.algorithm.kernel(), STATUS, REAL, VECTOR, *self._tables)

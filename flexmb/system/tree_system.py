@@ -260,7 +260,7 @@ class System(Mechanics):
             self._evaluators[chosen.name] = Evaluator(self, chosen, chosen.own(self))
         return self._evaluators[chosen.name]
 
-    @cached_property
+    @per_thread  # not `cached_property`: before Python 3.12 it holds a lock meanwhile, and this may have to compile
     def start_precision(self) -> Precision | None:
         """`_precision_if_doubtful` of the initial state, found once."""
         return self._precision_if_doubtful(self.initial_state)

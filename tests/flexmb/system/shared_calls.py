@@ -89,6 +89,9 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
         "simulate": lambda s, x: seen(fm.simulate(s, x.t + 2e-3, state=x, t_start=x.t, samples=3)),
         "simulate_batch": lambda s, x: fm.simulate_batch(s, 2e-3, q=x.q[None], u=x.u[None], samples=3, threads=1).q,
     }
+    found["loads_in, of a run"] = lambda s, x: once(
+        shared, (s, "run"), lambda: fm.simulate(s, 2e-3, samples=5)
+    ).loads_in("outboard")  # fmt: skip
     if is_tree:
         found["hinge_loads, forced"] = lambda s, x: s.hinge_loads(x, rates)
         for each in algorithms:
@@ -107,6 +110,8 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
     if any(body.name == "arm" for body in scene.bodies):
         found["section_loads"] = lambda s, x: s.section_loads(x, "arm", [0.0, 0.25]).load
         found["equilibrium"] = lambda s, x: fm.equilibrium(s, x)
+        found["steady_spin"] = lambda s, x: fm.steady_spin(s, "rotor", 0.5 + x.t).state
+        found["campbell"] = lambda s, x: fm.campbell(s, "rotor", np.array([0.5, 1.0]) + x.t).eigenvalues
     return found
 
 
