@@ -15,7 +15,7 @@ import os
 from collections.abc import Callable, Sequence
 from functools import cache
 from threading import RLock
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -71,16 +71,26 @@ class Gate:
     python: Index  # `flexmb.jit.objects.interpreter`
 
 
+class GateNotes(NamedTuple):
+    """What the gate and the function of Python that it leaves calls to tell each other.
+
+    owner (1,): number of the thread that it is for, or NOBODY; returned (1,): address of the array that is returned, a
+    view of the rates, which the function holds.
+    """
+
+    owner: Index
+    returned: Index
+
+
 def gate(
-    quaternions: Index, rates: Real, nq: int, speed: Record, doubt: Index, behind: Sequence[int], owner: Index,
-    returned: Index, careful: Any,
+    quaternions: Index, rates: Real, nq: int, speed: Record, doubt: Index, behind: Sequence[int], notes: GateNotes,
+    careful: Any,
 ) -> Callable[..., Real]:  # fmt: skip
     """(t, q, u): an array of the rates (nu,), which every call writes anew, or what `careful` makes of these arguments.
 
-    speed and doubt are those of the workspace of the kernel behind the gate. owner (1,): the thread that it is for;
-    returned (1,): where the array is, a view of `rates`. Both may change, and `careful` holds the array.
+    speed and doubt are those of the workspace of the kernel behind the gate.
     """
-    passed = _gate(quaternions, rates, nq, speed, doubt, behind, owner, returned, id(careful))
+    passed = _gate(quaternions, rates, nq, speed, doubt, behind, notes, id(careful))
     address = _address()
     with _making:
         return builtin(address, passed, careful)
@@ -95,11 +105,11 @@ def _address() -> int:
 
 
 def _gate(
-    quaternions: Index, rates: Real, nq: int, speed: Record, doubt: Index, behind: Sequence[int], owner: Index,
-    returned: Index, careful: int,
+    quaternions: Index, rates: Real, nq: int, speed: Record, doubt: Index, behind: Sequence[int], notes: GateNotes,
+    careful: int,
 ) -> Gate:  # fmt: skip
     y, (kernel_and_tables, function) = np.zeros(nq + len(rates) + 1), map(_whole, (behind, [careful]))
-    return Gate(quaternions, y, rates, speed, doubt, kernel_and_tables, owner, returned, function, interpreter())
+    return Gate(quaternions, y, rates, speed, doubt, kernel_and_tables, *notes, function, interpreter())
 
 
 def _whole(numbers: Sequence[int]) -> Index:
@@ -107,7 +117,8 @@ def _whole(numbers: Sequence[int]) -> Index:
 
 
 _NOTHING = np.zeros(0, np.int64)
-gate_at = at_address(_gate(_NOTHING, np.zeros(0), 0, np.zeros(0, SPEED_STATE), _NOTHING, (), _NOTHING, _NOTHING, 0))
+_NO_NOTES = GateNotes(_NOTHING, _NOTHING)
+gate_at = at_address(_gate(_NOTHING, np.zeros(0), 0, np.zeros(0, SPEED_STATE), _NOTHING, (), _NO_NOTES, 0))
 
 
 @kernel

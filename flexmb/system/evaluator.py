@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexmb.entry.gate import NOBODY, gate
+from flexmb.entry.gate import NOBODY, GateNotes, gate
 from flexmb.jit.direct import Direct, addresses, direct
 from flexmb.jit.objects import readable
 from flexmb.jit.pointer import REAL, STATUS, VECTOR
@@ -17,7 +17,7 @@ from flexmb.system.mechanics import Mechanics
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import finite_result
 from flexmb.tables.status import OK
-from flexmb.typing import Index, Real
+from flexmb.typing import Real
 
 
 class Evaluator(partial):  # a partial, so that a call takes no way through Python
@@ -38,8 +38,7 @@ class Evaluator(partial):  # a partial, so that a call takes no way through Pyth
         if readable():
             behind = addresses(algorithm.kernel(), STATUS, REAL, VECTOR, *tables)
             call = gate(
-                system.layout.quaternions, careful.rates, system.nq, w.speed, w.doubt, behind, careful.owner,
-                careful.returned, careful,
+                system.layout.quaternions, careful.rates, system.nq, w.speed, w.doubt, behind, careful.notes, careful
             )  # fmt: skip
         self = super().__new__(cls, call)
         self._careful = careful
@@ -68,9 +67,7 @@ class _Careful:
         self.rates = numbers[:]
         numbers.flags.writeable = False  # hence those of all other views
         self._numbers = numbers
-        self.owner: Index = np.full(1, NOBODY)
-        self.returned: Index = np.zeros(1, np.int64)
-        """(1,) Address of the array that is shown, for the gate."""
+        self.notes = GateNotes(np.full(1, NOBODY), np.zeros(1, np.int64))
         self._first = dict[str, int]()
         self._show()
 
@@ -89,7 +86,7 @@ class _Careful:
     @property
     def shown(self) -> Real:
         """What calls of this thread return: a new view of the rates where somebody has made another of the last."""
-        if self.owner[0] not in (NOBODY, get_ident()):
+        if self.notes.owner[0] not in (NOBODY, get_ident()):
             return self._of_this_thread.accelerations
         one, other = self._shown, self._numbers
         if (one.shape, one.dtype, one.flags.c_contiguous) != (other.shape, other.dtype, True):
@@ -98,7 +95,7 @@ class _Careful:
 
     def _show(self) -> None:
         shown = self._numbers.view()
-        self.returned[0] = id(shown)  # first: the gate must not return what is let go
+        self.notes.returned[0] = id(shown)  # first: the gate must not return what is let go
         self._shown = shown
 
     def _is_owner(self) -> bool:
@@ -107,9 +104,9 @@ class _Careful:
         The gate has noted it. Where there is none, as in an interpreter without a lock, one of several at once is.
         """
         this = get_ident()
-        if self.owner[0] == NOBODY:
-            self.owner[0] = self._first.setdefault("thread", this)
-        return bool(self.owner[0] == this)
+        if self.notes.owner[0] == NOBODY:
+            self.notes.owner[0] = self._first.setdefault("thread", this)
+        return bool(self.notes.owner[0] == this)
 
     @per_thread
     def _of_this_thread(self) -> Evaluator:
