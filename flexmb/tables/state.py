@@ -36,7 +36,7 @@ class PrecisionWarning(SceneWarning):
     """Rounding leaves few digits of the accelerations at this state; the message says how many, and why."""
 
 
-class _Part:
+class _StateRow:
     """An array of a state, seen through a new view at each look.
 
     NumPy lets anybody change shape, strides and type of an array in place. Of a view that changes nothing else: the
@@ -56,7 +56,7 @@ class _Part:
         state.__dict__[self._kept] = values
 
 
-class _Kept:
+class _KernelArrays:
     """The arrays of a state as kernels take them, which nobody else holds."""
 
     _y: Real
@@ -75,7 +75,7 @@ class _Kept:
 
 
 @dataclass(frozen=True, eq=False)
-class State(_Kept):
+class State(_KernelArrays):
     """Coordinates q (nq,), speeds u (nu,) and time t (s).
 
     q and u are copied; their entries may be changed in place, their lengths may not. Quaternions need not have unit
@@ -84,8 +84,8 @@ class State(_Kept):
     layout says.
     """
 
-    q: _Part = _Part()
-    u: _Part = _Part()
+    q: _StateRow = _StateRow()
+    u: _StateRow = _StateRow()
     t: float = 0.0
     layout: Layout | None = field(default=None, repr=False)
 

@@ -74,10 +74,14 @@ def test_what_is_no_state_is_refused(system):
         ({"elbow": [1.0, 0.0]}, "4 numbers in a row"),
         ({"shoulder.rotation": np.nan}, "is nan"),
         ({"elbow": [0.0, 0.0, 0.0, 0.0]}, "not zero"),
+        ({"shoulder.rotation": 0.1, "shoulder": 0.2}, "another name gives the same coordinates"),
+        ({"elbow": np.ma.array([1.0, 0.0, 0.0, 0.0], mask=[0, 1, 0, 0])}, r"state\["elbow"\]\[1\] is masked"),
         (fm.State([0.0], [0.0]), "belongs to another"),
     ):
         with pytest.raises(ValueError, match=message):
             fm.simulate(system, 1.0, state=state)
+    same = {"shoulder.rotation": 0.1, "shoulder": 0.1}
+    assert fm.simulate(system, 1e-3, state=same, samples=2).q[0, 0] == 0.1
     with pytest.raises(TypeError, match="give a State"):
         fm.simulate(system, 1.0, state=np.zeros(6))
     for t_start, t_end in ((1.0, 1.0), (2.0, 1.0)):
