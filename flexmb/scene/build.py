@@ -26,6 +26,7 @@ from flexmb.scene.options import (
     BeamOptions,
     ClosureFrames,
     Displacement,
+    GivenHinge,
     ModalMatrices,
     Placement,
     SlidingHinge,
@@ -204,13 +205,13 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
 
     def spherical(
         self, name: str, parent: str, child: str, *, quaternion: ArrayLike = IDENTITY,
-        angular_velocity: ArrayLike = ZERO, given: bool = False, stiffness: float = 0.0, damping: float = 0.0,
-        **placement: Unpack[Placement],
+        angular_velocity: ArrayLike = ZERO, stiffness: float = 0.0, damping: float = 0.0,
+        **placement: Unpack[GivenHinge],
     ) -> Self:  # fmt: skip
         """Three rotations: initial `quaternion`, relative `angular_velocity` (rad/s, outboard axes), `given` where both
         are kept, spring `stiffness` (N m/rad) and `damping` (N m s/rad)."""
         return self._append(
-            s.Spherical, name=name, parent=parent, child=child, quaternion=quaternion, given=given,
+            s.Spherical, name=name, parent=parent, child=child, quaternion=quaternion,
             angular_velocity=angular_velocity, stiffness=stiffness, damping=damping, **placement,
         )  # fmt: skip
 
@@ -225,14 +226,13 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
 
     def free(
         self, name: str, parent: str, child: str, *, position: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY,
-        angular_velocity: ArrayLike = ZERO, velocity: ArrayLike = ZERO, given: bool = False,
-        **placement: Unpack[Placement],
+        angular_velocity: ArrayLike = ZERO, velocity: ArrayLike = ZERO, **placement: Unpack[GivenHinge],
     ) -> Self:  # fmt: skip
         """Six freedoms: initial `position` (m, inboard axes), `quaternion`, and relative `angular_velocity` (rad/s) and
         `velocity` (m/s) of the outboard origin, both in outboard axes; `given` where all are kept."""
         return self._append(
             s.Free, name=name, parent=parent, child=child, position=position, quaternion=quaternion,
-            angular_velocity=angular_velocity, velocity=velocity, given=given, **placement,
+            angular_velocity=angular_velocity, velocity=velocity, **placement,
         )  # fmt: skip
 
     # What acts on the tree, and what is asked of it

@@ -63,6 +63,12 @@ class Displacement(TypedDict, total=False):
     prescribed: s.Function | None
 
 
+class GivenHinge(Placement, total=False):
+    """Where a hinge sits that has no scalar coordinates, and whether all its initial values are kept, `given`."""
+
+    given: bool
+
+
 class TurningHinge(Placement, Angle, total=False):
     """Where a hinge sits, and its one angle."""
 

@@ -76,11 +76,3 @@ def test_drives_inside_a_loop_that_holds_itself():
     run = flexmb.simulate(pendulum("weld", driven=s.Constant(value=0.0)), 0.1, samples=3)
     assert run.undetermined["turn.drive"].tolist() == [True] and np.all(np.isnan(run.drives["turn"]))
     assert np.all(np.isfinite(run.work))
-
-
-def test_impulses_are_as_open_as_loads():
-    latch = s.SceneEvent(name="hit", watch="time", level=0.05, actions=(s.Latch(coordinate="pivot.rotation"),))
-    run = flexmb.simulate(msgspec.structs.replace(m.four_bar(), events=(latch,)), 0.1, samples=3)
-    (event,) = run.events
-    assert np.array_equal(np.isnan(event.closures["loop"]), OUT_OF_PLANE)
-    assert np.isfinite(event.impulses["pivot.rotation"]) and abs(event.energy_change) > 1e-3

@@ -335,6 +335,10 @@ DOUBTFUL = {
                                "negative_damping"),
     "damping that drives": (put("bodies", 3, "damping", [[1.0, 0.0], [0.0, -1.0]]), ["$.bodies[3].damping"],
                             ["indefinite"], ["sign"], "negative_damping"),
+    "friction smoothed away": (
+        put("connectors", [{"kind": "angular_friction", "name": "rub", "hinge": "root", "sliding_Nm": 1.0,
+                            "static_Nm": 1.5, "stribeck_rad_s": 0.05, "smoothing_rad_s": 0.01}]),
+        ["$.connectors[0]"], ["86.7%", "runs away"], ["smoothing of"], "friction_peak"),
     "indefinite stiffness": (put("bodies", 3, "stiffness", 1, 1, -80.0), ["$.bodies[3].stiffness"], ["indefinite"],
                              ["sign"], "negative_stiffness"),
     "negative stiffness": (put("hinges", 2, "rotations", 0, "stiffness_Nm_rad", -1.0),
