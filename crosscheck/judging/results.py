@@ -272,6 +272,8 @@ def _result(key: Key, group: list[RunRecord]) -> Result:
     variant, engine, _ = key
     last = group[-1]
     if not last.effort:
+        if last.status == "finished":  # only a damaged record says so
+            return Result(variant, engine, "failed", "its record names no effort", ())
         return Result(variant, engine, last.status, last.message, ())
     stamp = (last.scene, last.version, last.rungs, last.made_by)
     same = [run for run in group if run.effort and (run.scene, run.version, run.rungs, run.made_by) == stamp]

@@ -50,7 +50,7 @@ def refuse_bad_text(path: Path) -> None:
         _refuse_elements(file, root)
         for named in _named_files(root):
             found = (folder / named for folder in (*folders, file.parent))
-            waiting += [each for each in found if each.is_file()]  # MuJoCo itself says which is not there
+            waiting += [each for each in found if os.path.lexists(each)]  # MuJoCo says which is not there
 
 
 def _parsed(file: Path) -> ElementTree.Element:

@@ -13,6 +13,7 @@ from flexmb.scene.bodies import BeamBody, Level
 MOST_BYTES = 2**32
 """Memory that the model of one body may take while it is made, as much as the outputs of a run may."""
 MOST_MODES = 2_000  # of one body: its matrices are decomposed as a whole, in minutes
+ENDLESS = 10**18  # whole numbers of files have any number of digits, and floats overflow
 _COORDINATES = {"axial": 1, "torsion": 1, "bending_y": 2, "bending_z": 2}  # of an element, twice in bending with shear
 _PER_COORDINATE = 170.0  # bytes, times the square of the number of coordinates
 _PER_PAIR = 130.0  # bytes of each inertia point and pair of modes, of second order
@@ -38,12 +39,13 @@ class Estimate(NamedTuple):
 def beam_estimate(body: BeamBody, modes: int) -> Estimate:
     """Of a beam with so many modal coordinates, static ones included."""
     shear = 2 if body.theory == "timoshenko" else 1
-    size = float(body.elements) * sum(
+    elements, modes = float(min(body.elements, ENDLESS)), min(modes, ENDLESS)
+    size = elements * sum(
         count * (shear if name.startswith("bending") else 1)
         for name, count in _COORDINATES.items()
         if name in body.modes.families
     )
-    points = float(body.elements) * _POINTS[body.points]
+    points = elements * _POINTS[body.points]
     memory = _PER_COORDINATE * size**2 + modes_memory(body.level, points, modes)
     return Estimate(memory, 1e-3 * size**3 / _SPEED)
 

@@ -15,12 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.interchange.superelement.element import SuperElement, SuperElementError, super_element
+from flexmb.interchange.superelement.matrix_market import market_matrix, refuse_large
 from flexmb.interchange.superelement.nastran import NamedMatrix, dmig_matrices, op4_matrices
 from flexmb.scene.reading import MIB, Unreadable, read_text, regular_size
 from flexmb.typing import Real
 
 LIMIT = 512 * MIB
-LARGEST = 8_000  # rows: a dense matrix of half a GiB, minutes
 OP4, DMIG = (".op4",), (".pch", ".bdf", ".dat")
 MATRIX_MARKET, HARWELL_BOEING = (".mtx", ".mm"), (".hb", ".rb", ".rua", ".rsa")
 
@@ -63,37 +63,30 @@ def _matrix(path: Path, letter: str) -> NamedMatrix:
     if ending not in MATRIX_MARKET + HARWELL_BOEING:
         known = ", ".join(MATRIX_MARKET + HARWELL_BOEING + OP4 + DMIG)
         raise SuperElementError(f'{path}: "{ending}" is no known format: write the matrix as one of {known}')
-    return NamedMatrix(letter, _by_scipy(path, ending in MATRIX_MARKET), None)
+    market = ending in MATRIX_MARKET
+    return NamedMatrix(letter, _whole(market_matrix(str(path), _text(path)) if market else _harwell_boeing(path)), None)
 
 
-def _by_scipy(path: Path, market: bool) -> Real:
-    from scipy.io import hb_read, mminfo, mmread
+def _harwell_boeing(path: Path) -> Real:
+    from scipy.io import hb_read
 
     if regular_size(path) > LIMIT:
         raise SuperElementError(f"{path} has more than {LIMIT // MIB} MiB: reduce the structure where it was made")
     try:
-        if market:
-            refuse_large(str(path), *mminfo(path)[:2])
-        found = mmread(path) if market else hb_read(path)
-    except SuperElementError:
-        raise
+        found = hb_read(path)
     except (ValueError, IndexError, OverflowError, MemoryError, TypeError) as error:
-        form = "Matrix Market" if market else "Harwell-Boeing"
-        raise SuperElementError(f"{path} is no {form} file ({error}): write it anew") from None
+        raise SuperElementError(f"{path} is no Harwell-Boeing file ({error}): write it anew") from None
     refuse_large(str(path), *found.shape)
     dense = np.asarray(found.todense() if hasattr(found, "todense") else found)
     if np.iscomplexobj(dense):
         raise SuperElementError(f"{path} is complex: give real matrices, without structural damping")
+    return dense
+
+
+def _whole(dense: Real) -> Real:
+    """The matrix of which one half may be left out."""
     lower = np.tril(dense, -1)
     return dense + lower.T if np.any(lower) and not np.any(np.triu(dense, 1)) else dense
-
-
-def refuse_large(file: str, rows: int, columns: int) -> None:
-    if max(rows, columns) > LARGEST:
-        raise SuperElementError(
-            f"{file}: {rows} x {columns} is too large for dense matrices ({LARGEST} rows): reduce it statically where "
-            "it was made, or condense rotations and inner nodes"
-        )
 
 
 def _text(path: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 
 import numpy as np
@@ -126,6 +127,14 @@ def test_numbers_that_are_none_are_seen_before_mujoco_takes_them_for_defaults(fa
     (tmp_path / "more.xml").write_text('<mujoco><default><joint armature="nan"/></default></mujoco>')
     with pytest.raises(ModelError, match=re.escape(words)):
         read(MJCF.replace(old, new, 1), tmp_path)
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)])
+def test_an_included_file_that_is_none_is_refused(make, tmp_path):
+    """MuJoCo would wait for a pipe for ever."""
+    make(tmp_path / "more.xml")
+    with pytest.raises(OSError, match="no regular file"):
+        read(MJCF.replace("<worldbody>", '<include file="more.xml"/><worldbody>'), tmp_path)
 
 
 def test_names_may_be_words_for_infinity_and_comments_may_hold_dashes(tmp_path):

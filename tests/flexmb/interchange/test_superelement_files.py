@@ -99,6 +99,12 @@ BAD = {
     "no DMIG": ("K.pch", "$ nothing\n", "it holds none"),
     "no header": ("K.pch", "DMIG*   KAAX                           1               1\n", "line 1"),
     "no matrix market": ("K.mtx", "1 2 3", "no Matrix Market file"),
+    "NUL in a number": ("K.mtx", "%%MatrixMarket matrix array real general\n1 1\n1\x000\n", "not numbers alone"),
+    "too few": ("K.mtx", "%%MatrixMarket matrix array real symmetric\n2 2\n1 2\n", "2 numbers, and 2 x 2 needs 3"),
+    "outside of it": ("K.mtx", "%%MatrixMarket matrix coordinate real general\n2 2 1\n3 1 1.0\n", "element 1 lies"),
+    "sizes": ("K.mtx", "%%MatrixMarket matrix array real general\n2 -2\n", '"2 -2" stands where 2 sizes belong'),
+    "pattern": ("K.mtx", "%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "known are array or coord"),
+    "complex": ("K.mtx", "%%MatrixMarket matrix array complex general\n1 1\n1 1\n", "is complex"),
     "no HB": ("K.rb", "x", "no Harwell-Boeing file"),
     "large": (
         "K.mtx",

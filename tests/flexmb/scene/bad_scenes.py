@@ -175,6 +175,7 @@ BAD = {
     "elements that memory cannot hold": (put("bodies", 1, "elements", 5000), ["$.bodies[1].elements", '"boom"'],
                                          ["5000 elements and 3 modes", "GiB and"], ["give 200 or fewer"]),
     "elements beyond all numbers": (put("bodies", 1, "elements", 2**62), ["$.bodies[1].elements"], ["GiB"], ["fewer"]),
+    "elements of 400 digits": (put("bodies", 1, "elements", 10**400), ["$.bodies[1].elements"], ["GiB"], ["fewer"]),
     "modes that memory cannot hold": (
         both(put("bodies", 1, "elements", 200), put("bodies", 1, "level", "linear"), put(*MODES, "count", 400),
              STATELESS),
