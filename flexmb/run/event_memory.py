@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from flexmb.integrate.watch import RESTED, UNKNOWN
+from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
 from flexmb.typing import Index
@@ -76,17 +77,19 @@ def examined(memory: EventMemory, scene: Scene) -> EventMemory:
         raise TypeError("anew is True or False, given a scene")
     if not 0.0 <= shown <= MOST or shown != int(shown):
         raise ValueError(f"shown is {shown:g}, and counts events")
-    if not _alike(msgspec.to_builtins(memory.given), msgspec.to_builtins(scene)):
-        raise ValueError("what changes have left of the scene differs from the scene in more than numbers")
+    if _items(memory.given) != _items(scene):
+        raise ValueError("what changes have left of the scene has other bodies, hinges or events than the scene")
+    check_scene(memory.given)
     return EventMemory(**rows, until=memory.until, anew=memory.anew, ended=ended, shown=int(shown), given=memory.given)
 
 
-def _alike(one: Any, other: Any) -> bool:
-    """Whether two scenes as plain data differ in nothing but finite numbers, which events may have changed."""
-    if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(_alike(value, other[key]) for key, value in one.items())
-    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
-        return len(one) == len(other) and all(map(_alike, one, other))
-    if isinstance(one, float) and isinstance(other, float):
-        return math.isfinite(one)
-    return bool(one == other)
+def _items(scene: Scene) -> list[tuple[str, str, str]]:
+    """All items of a scene by list, kind and name, which neither latches nor changes of values alter."""
+    lists = {name: getattr(scene, name) for name in scene.__struct_fields__}
+    return [
+        (name, type(item).__name__, getattr(item, "name", ""))
+        for name, items in lists.items()
+        if isinstance(items, tuple)
+        for item in items
+        if isinstance(item, msgspec.Struct)
+    ]

@@ -54,6 +54,11 @@ def unpacked(file: str | os.PathLike[str], kinds: Mapping[str, str]) -> dict[str
         return found
     except Unreadable:
         raise
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        # The zip reader moves to where a damaged table of contents says, which may be before the start of the file.
+        raise Unreadable(f"it is not an .npz archive of plain arrays ({error})", "write it with numpy.savez") from None
     except DAMAGED as error:
         raise Unreadable(f"it is not an .npz archive of plain arrays ({error})", "write it with numpy.savez") from None
 

@@ -75,7 +75,7 @@ def test_what_is_no_state_is_refused(system):
         ({"shoulder.rotation": np.nan}, "is nan"),
         ({"elbow": [0.0, 0.0, 0.0, 0.0]}, "not zero"),
         ({"shoulder.rotation": 0.1, "shoulder": 0.2}, "another name gives the same coordinates"),
-        ({"elbow": np.ma.array([1.0, 0.0, 0.0, 0.0], mask=[0, 1, 0, 0])}, r"state\["elbow"\]\[1\] is masked"),
+        ({"elbow": np.ma.array([1.0, 0.0, 0.0, 0.0], mask=[0, 1, 0, 0])}, r'state\["elbow"\]\[1\] is masked'),
         (fm.State([0.0], [0.0]), "belongs to another"),
     ):
         with pytest.raises(ValueError, match=message):
