@@ -26,6 +26,7 @@ RECORDING = (
     "crosscheck.running.execute",
     "crosscheck.engines.answers",
     "crosscheck.engines.contract",
+    "crosscheck.engines.trajectories",
     "crosscheck.records.kinds",
     "crosscheck.records.packing",
     "crosscheck.records.archive",

@@ -25,9 +25,9 @@ class EventMemory(NamedTuple):
     where it has happened; passed 1 where it happened before its instant, within a leap, and is not watched up to the
     time `until` (s).
 
-    anew: whether the integration begins anew, as it does after an event. ended (s): where the run ended; events before
-    that are in its trajectory, and so many of those at that time as `shown` says. given: the scene whose coordinates
-    come back where they are released, as changes alone have left it.
+    anew: whether the integration begins anew, as it does after an event. shown: how many events happen again, in steps
+    that the end of the run has cut short, which are in its trajectory already. given: the scene whose coordinates come
+    back where they are released, as changes alone have left it.
     """
 
     side: Index
@@ -35,7 +35,6 @@ class EventMemory(NamedTuple):
     passed: Index
     until: float
     anew: bool
-    ended: float
     shown: int
     given: Scene
 
@@ -55,11 +54,11 @@ def written(memory: EventMemory | None) -> dict[str, Any]:
 def read(file: Mapping[str, Any]) -> EventMemory:
     """What a file says, to be examined; KeyError for what it lacks, ValueError for what is nothing of the kind."""
     side, came, passed, *numbers, given = (file[name] for name in NAMES)
-    until, anew, ended, shown = (each.item() for each in numbers)
+    until, anew, shown = (each.item() for each in numbers)
     if anew not in (0, 1):
         raise ValueError(f"{_KEY}anew is {anew:g}, and is 0 or 1")
     scene = msgspec.json.decode(given.tobytes(), type=Scene)
-    return EventMemory(side, came, passed, until, bool(anew), ended, shown, scene)
+    return EventMemory(side, came, passed, until, bool(anew), shown, scene)
 
 
 def examined(memory: EventMemory, scene: Scene) -> EventMemory:
@@ -70,7 +69,7 @@ def examined(memory: EventMemory, scene: Scene) -> EventMemory:
         if not np.all(np.isin(row, known)):
             raise ValueError(f"{name} of the events is {row}, and each is one of {known}")
         rows[name] = row.astype(np.int64)
-    ended, shown = arguments.number("ended", memory.ended), arguments.number("shown", memory.shown)
+    shown = arguments.number("shown", memory.shown)
     if not isinstance(memory.until, float) or math.isnan(memory.until):
         raise ValueError(f"until is {memory.until!r}, and is a time, or -inf")
     if not isinstance(memory.anew, bool) or not isinstance(memory.given, Scene):
@@ -80,16 +79,16 @@ def examined(memory: EventMemory, scene: Scene) -> EventMemory:
     if _items(memory.given) != _items(scene):
         raise ValueError("what changes have left of the scene has other bodies, hinges or events than the scene")
     check_scene(memory.given)
-    return EventMemory(**rows, until=memory.until, anew=memory.anew, ended=ended, shown=int(shown), given=memory.given)
+    return EventMemory(**rows, until=memory.until, anew=memory.anew, shown=int(shown), given=memory.given)
 
 
-def _items(scene: Scene) -> list[tuple[str, str, str]]:
-    """All items of a scene by list, kind and name, which neither latches nor changes of values alter."""
-    lists = {name: getattr(scene, name) for name in scene.__struct_fields__}
-    return [
+def _items(scene: Scene) -> set[tuple[str, str, str]]:
+    """By list, kind and name what neither latches nor changes of values alter: all but sensors, which stops add."""
+    lists = {name: getattr(scene, name) for name in scene.__struct_fields__ if name != "sensors"}
+    return {
         (name, type(item).__name__, getattr(item, "name", ""))
         for name, items in lists.items()
         if isinstance(items, tuple)
         for item in items
         if isinstance(item, msgspec.Struct)
-    ]
+    }

@@ -222,14 +222,14 @@ class EventfulRun:
                         found.append(event)
         return found
 
-    def _remember(self, ended: float, anew: bool) -> EventMemory:
+    def _remember(self, anew: bool) -> EventMemory:
         """As things are; sides of the events that are watched are those of the moment."""
         events = self.system.scene.events
         side = [1 if event.name in self._done else self._sides.side.get(event.name, 0) for event in events]
         came = [self._sides.came.get(event.name, 0) for event in events]
         passed = [int(event.name in self._passed) for event in events]
         whole = (np.array(each, np.int64) for each in (side, came, passed))
-        return EventMemory(*whole, self._until, anew, ended, 0, self._situation.given)
+        return EventMemory(*whole, self._until, anew, 0, self._situation.given)
 
     def _recall(self, memory: EventMemory) -> None:
         self._until = memory.until
@@ -248,7 +248,7 @@ class EventfulRun:
             self._cut = self._restart(raw, raw.memory, anew=False)
 
     def _restart(self, raw: Raw, memory: Memory, anew: bool) -> Restart:
-        events = self._remember(raw.t, anew)
+        events = self._remember(anew)
         return Restart(self._settings.method, self.system.scene, raw.t, memory, raw.controllers, events)
 
     def _restart_of(self, raw: Raw, ends: bool, anew: bool) -> Restart | None:
@@ -256,8 +256,8 @@ class EventfulRun:
         if raw.memory is None:
             return None
         if self._cut is not None and self._cut.events is not None and not ends:
-            shown = sum(record.t >= raw.t - self._together for record in self._happened)
-            return replace(self._cut, t=raw.t, events=self._cut.events._replace(ended=raw.t, shown=shown))
+            shown = sum(record.t > self._cut.since for record in self._happened)
+            return replace(self._cut, t=raw.t, events=self._cut.events._replace(shown=shown))
         if not anew:
             return self._restart(raw, raw.memory, anew)
         memory = self._settings.integrator.memory(len(raw.y))
@@ -276,17 +276,12 @@ class EventfulRun:
         return replace(self._whole, events=self._new_events()), raw
 
     def _new_events(self) -> tuple[EventRecord, ...]:
-        """Those that the run that was taken up has not shown."""
-        if self._taken_up is None:
-            return tuple(self._happened)
-        new, left = list[EventRecord](), self._taken_up.shown
-        for record in self._happened:
-            is_there = abs(record.t - self._taken_up.ended) <= self._together
-            if is_there and left > 0:
-                left -= 1
-            elif is_there or record.t > self._taken_up.ended:
-                new.append(record)
-        return tuple(new)
+        """Those that the run that was taken up has not shown.
+
+        They are counted: found again in a step that is not cut short, their instants differ by the error of its dense
+        output.
+        """
+        return tuple(self._happened[0 if self._taken_up is None else self._taken_up.shown :])
 
     @property
     def _watched(self) -> list[SceneEvent]:

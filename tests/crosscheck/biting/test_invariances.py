@@ -103,6 +103,8 @@ def driven_masses() -> Scene:
     moved, free = linear(prescribed=Sine(amplitude=0.2, angular_frequency_rad_s=3.0)), linear()
     builder = SceneBuilder("driven masses", gravity=(0.3, -0.5, -9.81)).rigid_body("hub", mass=5.0, inertia=(1, 2, 2.5))
     builder.free("joint", "ground", "hub", angular_velocity=(0.3, 0.4, -0.2))
+    builder.rigid_body("arm", mass=1.0, com=(0.4, 0.0, 0.0), inertia=(0.1, 0.2, 0.2))
+    builder.revolute("elbow", "hub", "arm", parent_position=(0.0, 0.3, 0.0), stiffness=5.0)  # loads to measure by
     for count, which in ((1, [moved]), (2, [free, moved]), (3, [moved, free, moved])):
         offset = (0.5, 0.1 * count, 0.3)
         builder.point_mass(

@@ -131,6 +131,7 @@ def hinge_forces(scene: Scene, snapshot: Snapshot, hinge) -> tuple[np.ndarray, n
 
 
 def _passive(coordinate) -> float:
-    value, rate, k, c, rest, motor = (getattr(coordinate, key) for key in coordinate.__struct_fields__[:6])
+    named = [key for key in coordinate.__struct_fields__ if key != "given"]
+    value, rate, k, c, rest, motor = (getattr(coordinate, key) for key in named[:6])
     push = motor.value if isinstance(motor, Constant) else 0.0
     return push - k * (value - rest) - c * rate
