@@ -20,7 +20,7 @@ Value = tuple[tuple[int, ...], tuple[int, ...]]
 """Of one value: its places in [q, u, work], and the speeds that must not change for it to stay."""
 
 
-class Hold(NamedTuple):
+class KeptValues(NamedTuple):
     """Places in [q, u, work] of coordinates and of speeds that stay as they are, and speeds that nothing may move."""
 
     coordinates: Index
@@ -35,7 +35,7 @@ class Wishes(NamedTuple):
     insisted: tuple[Value, ...] = ()
 
 
-class Asked(NamedTuple):
+class AskedFor(NamedTuple):
     """modes: all of them, as values; prescribed: numbers of speeds that move by themselves. names: of all places in
     [q, u].
 
@@ -50,12 +50,12 @@ class Asked(NamedTuple):
     names: tuple[str, ...]
     is_marked: bool
 
-    def hold(self, values: tuple[Value, ...], *, modes: bool) -> Hold:
+    def hold(self, values: tuple[Value, ...], *, modes: bool) -> KeptValues:
         """Of these values, with all modes too if these are not to move."""
         values = (*values, *self.modes) if modes else values
         places = [place for value, _ in values for place in value]
         fixed = {speed for _, speeds in values for speed in speeds}
-        return Hold(
+        return KeptValues(
             np.array([place for place in places if place < self.coordinate_count], np.int64),
             np.array([place for place in places if place >= self.coordinate_count], np.int64),
             np.array(sorted(fixed - self.prescribed), np.int64),
@@ -79,5 +79,5 @@ class Asked(NamedTuple):
 
 
 _NONE = np.zeros(0, np.int64)
-NO_HOLD = Hold(_NONE, _NONE, _NONE)
-NOTHING_ASKED = Asked(Wishes(), Wishes(), 0, (), frozenset(), (), is_marked=False)
+NO_HOLD = KeptValues(_NONE, _NONE, _NONE)
+NOTHING_ASKED = AskedFor(Wishes(), Wishes(), 0, (), frozenset(), (), is_marked=False)

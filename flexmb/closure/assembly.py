@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.closure.asked import NO_HOLD, NOTHING_ASKED, Asked, Hold, Value, Wishes
+from flexmb.closure.asked import NO_HOLD, NOTHING_ASKED, AskedFor, KeptValues, Value, Wishes
 from flexmb.closure.closures import ClosureError, Closures, GroupResponse
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.projection import CLOSED, MOVING_APART, OPEN
@@ -28,7 +28,7 @@ NEARLY_CLOSED = 2.0**-40  # of what is held: as closed as rounding leaves what f
 STRONGEST = 1e12  # damping beyond which no step makes the errors smaller
 
 
-def consistent(closures: Closures, t: float, y: Real, asked: Asked = NOTHING_ASKED) -> Real:
+def consistent(closures: Closures, t: float, y: Real, asked: AskedFor = NOTHING_ASKED) -> Real:
     """y = [q, u, work] with closed closures, close to the one given, that keeps what is asked for to the last digit.
 
     Where that cannot be kept, the nearest one; ClosureError where there is none, or where what is insisted on in the
@@ -41,12 +41,12 @@ def consistent(closures: Closures, t: float, y: Real, asked: Asked = NOTHING_ASK
     return _as_asked(closures, t, y, asked.speeds, asked, _moving, _rates)
 
 
-Closing = Callable[[Closures, float, Real, Hold], Real]
+Closing = Callable[[Closures, float, Real, KeptValues], Real]
 Opening = Callable[[Closures, float, Real, Real], float]
 
 
 def _as_asked(
-    closures: Closures, t: float, y: Real, wishes: Wishes, asked: Asked, closing: Closing, opening: Opening
+    closures: Closures, t: float, y: Real, wishes: Wishes, asked: AskedFor, closing: Closing, opening: Opening
 ) -> Real:
     """By `closing`, which takes a hold and may raise ClosureError; `opening`: how far one y is from closed, beside
     another."""
@@ -72,15 +72,15 @@ def _as_asked(
 
 
 def _holds(
-    closures: Closures, t: float, y: Real, wish: tuple[Value, ...], asked: Asked, closing: Closing
-) -> Iterator[Hold]:
+    closures: Closures, t: float, y: Real, wish: tuple[Value, ...], asked: AskedFor, closing: Closing
+) -> Iterator[KeptValues]:
     """Modes give way only where hinges alone do not close the loops, whatever is asked for."""
     yield asked.hold(wish, modes=True)
     if asked.modes and not _closes(closing, closures, t, y, asked.hold((), modes=True)):
         yield asked.hold(wish, modes=False)
 
 
-def _closes(closing: Closing, closures: Closures, t: float, y: Real, hold: Hold) -> bool:
+def _closes(closing: Closing, closures: Closures, t: float, y: Real, hold: KeptValues) -> bool:
     try:
         closing(closures, t, y, hold)
     except ClosureError:
@@ -88,7 +88,7 @@ def _closes(closing: Closing, closures: Closures, t: float, y: Real, hold: Hold)
     return True
 
 
-def _closed(closures: Closures, t: float, y: Real, hold: Hold) -> Real:
+def _closed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
     start, y = y, y.copy()
     errors, damping = _all_errors(closures, t, y), 1e-3
     for _ in range(STEPS):
@@ -116,7 +116,7 @@ def _closed(closures: Closures, t: float, y: Real, hold: Hold) -> Real:
     return y
 
 
-def _moving(closures: Closures, t: float, y: Real, hold: Hold) -> Real:
+def _moving(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
     """Speeds in the range that the closures leave."""
     start = y
     closures.linearise_stiff(t, y)
@@ -199,7 +199,7 @@ class Held(NamedTuple):
         return found
 
 
-def decomposed(closures: Closures, t: float, y: Real, hold: Hold) -> Decomposed | Held:
+def decomposed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Decomposed | Held:
     """At the state y that was linearised last."""
     speeds, responses = len(closures.constants[0].speed), closures.responses()
     if not len(hold.fixed):

@@ -77,14 +77,14 @@ def examined(memory: EventMemory, scene: Scene) -> EventMemory:
     if not 0.0 <= shown <= MOST or shown != int(shown):
         raise ValueError(f"shown is {shown:g}, and counts events")
     if _items(memory.given) != _items(scene):
-        raise ValueError("what changes have left of the scene has other bodies, hinges or events than the scene")
+        raise ValueError("what changes have left of the scene has other bodies or hinges than the scene")
     check_scene(memory.given)
     return EventMemory(**rows, until=memory.until, anew=memory.anew, shown=int(shown), given=memory.given)
 
 
 def _items(scene: Scene) -> set[tuple[str, str, str]]:
-    """By list, kind and name what neither latches nor changes of values alter: all but sensors, which stops add."""
-    lists = {name: getattr(scene, name) for name in scene.__struct_fields__ if name != "sensors"}
+    """By list, kind and name what neither latches nor changes of values alter; stops add sensors and events."""
+    lists = {name: getattr(scene, name) for name in scene.__struct_fields__ if name not in ("sensors", "events")}
     return {
         (name, type(item).__name__, getattr(item, "name", ""))
         for name, items in lists.items()

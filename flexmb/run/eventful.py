@@ -355,7 +355,7 @@ class EventfulRun:
         with self._integration() as solve:
             levels = watching(solve)
             breaks, left = not is_last or bool(due), self._left()
-            raw = integrate(self.system, solve, begin, times, left, levels, breaks, beyond, goes_on=True)
+            raw = integrate(solve, begin, times, left, levels, breaks, beyond, goes_on=True)
             found = self._found(raw, levels, due if raw.t >= stop - self._together else ())
             if levels is not None and not all(isinstance(each, EndRun) for event in found for each in event.actions):
                 raw, early = placed(raw, levels, times, self._further, self._speeds)
@@ -377,7 +377,7 @@ class EventfulRun:
         begin = self._going_on(raw._replace(y=raw.y.copy()))
         with self._integration() as solve:
             nothing = watch((), (), (), (), (), (), self._sides.size(solve))
-            return integrate(self.system, solve, begin, np.array([raw.t, t]), self._left(), nothing, goes_on=True)
+            return integrate(solve, begin, np.array([raw.t, t]), self._left(), nothing, goes_on=True)
 
     def _integration(self) -> AbstractContextManager[Integration]:
         return integration(self.system, self._algorithm, self._stabilise, self._settings.integrator)

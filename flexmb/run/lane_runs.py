@@ -161,7 +161,7 @@ class Controlled:
         y, clock, accuracy = self._solve.begin(begin, clock, accuracy, counts)
         found = np.empty((len(out), len(y)))
         status, t = self._solve(y, clock, accuracy, found, counts, self._method.memory(len(y)), None)
-        self._solve.ended()
+        self._solve.ended(None)
         out[:, :-1], out[:, -1] = found[:, : out.shape[1] - 1], found[:, -1]
         return status, t
 

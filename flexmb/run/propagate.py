@@ -67,7 +67,7 @@ class Integration:
 
     def __init__(self, system: System, algorithm: DynamicsAlgorithm, route: Route, integrator: Integrator) -> None:
         constants, self._workspace = route.tables()
-        self._integrator = integrator
+        self.system, self._integrator = system, integrator
         self.feedback: Feedback | None = None
         """Of a scene with controllers, or with events that watch signals."""
         if system.scene.controllers or watches_signals(system.scene):
@@ -168,7 +168,7 @@ def integration(
 
 
 def integrate(
-    system: System, solve: Integration, begin: Beginning, times: Real, settings: Settings, watch: Watch | None = None,
+    solve: Integration, begin: Beginning, times: Real, settings: Settings, watch: Watch | None = None,
     breaks: bool = False, beyond: float = 0.0, goes_on: bool = False,
 ) -> Raw:  # fmt: skip
     """Run over the whole time, after what has to be compiled for it.
@@ -177,7 +177,8 @@ def integrate(
     beyond (s): how much further it may go, to leap over where it ends. goes_on: it is a piece of a run, at whose end
     sampled controllers do not act yet.
     """
-    method, accuracy = settings.integrator, settings.accuracy(system.nq, system.nu)
+    system, method = solve.system, settings.integrator
+    accuracy = settings.accuracy(system.nq, system.nu)
     ends = segment_ends(system, begin.state.t, times[-1] + beyond, method.fixed, breaks)
     counts = np.zeros(COUNTS, np.int64)
     y, clock, accuracy = solve.begin(begin, Clock(times, ends), accuracy, counts)

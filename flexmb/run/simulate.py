@@ -116,13 +116,13 @@ def simulate(
             return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve)
         if not system.scene.events:
             again = begin._replace(y=begin.y.copy())
-            raw = integrate(system, solve, begin, times, chosen)
+            raw = integrate(solve, begin, times, chosen)
             trajectory = observed(system, times, raw, algorithm, solve)
     if not system.scene.events:
         beyond = ends_within(system, raw, times[-1])
         if beyond:
             with integration(system, algorithm, stabilise, chosen.integrator) as solve:
-                raw = integrate(system, solve, again, times, chosen, beyond=beyond)
+                raw = integrate(solve, again, times, chosen, beyond=beyond)
                 trajectory = observed(system, times, raw, algorithm, solve)
         trajectory = replace(trajectory, made_by=made_by)
     else:

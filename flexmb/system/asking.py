@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.closure.asked import Asked, Value, Wishes
+from flexmb.closure.asked import AskedFor, Value, Wishes
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.hinges import Free, Spherical
 from flexmb.typing import Real
@@ -27,7 +27,7 @@ class _Item(NamedTuple):
     rest: tuple[float, ...] | None = None
 
 
-def asked(system: System, y: Real, named: NDArray[np.bool_] | None = None) -> Asked:
+def asked(system: System, y: Real, named: NDArray[np.bool_] | None = None) -> AskedFor:
     """Of values y = [q, u, work] of a scene, or of those of them that a run has named (nq+nu+1,)."""
     items = list(_items(system))
     known = named if named is not None else np.zeros(len(y), bool)
@@ -44,15 +44,15 @@ def asked(system: System, y: Real, named: NDArray[np.bool_] | None = None) -> As
         return Wishes(tuple(given), tuple(insisted))
 
     names = tuple(name for names in system.state_names for name, _ in names)
-    return Asked(
+    return AskedFor(
         wishes(coordinates), wishes(speeds), system.nq, tuple(_modes(system)), prescribed, names,
         is_marked=named is None,
     )  # fmt: skip
 
 
-def everything(system: System) -> Asked:
+def everything(system: System) -> AskedFor:
     """Of a state that was given as a whole."""
-    return Asked(
+    return AskedFor(
         Wishes(tuple(((i,), ()) for i in range(system.nq))),
         Wishes(tuple(((system.nq + j,), (j,)) for j in range(system.nu))),
         system.nq, (), frozenset(), tuple(name for names in system.state_names for name, _ in names), is_marked=False,

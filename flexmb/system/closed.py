@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure import jacobian as closed_jacobian
-from flexmb.closure.asked import NOTHING_ASKED, Asked
+from flexmb.closure.asked import NOTHING_ASKED, AskedFor
 from flexmb.closure.assembly import consistent
 from flexmb.closure.branch import noticed, watch_steps
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures, Spread
@@ -112,7 +112,7 @@ class ClosedSystem(System):
     def _is_prescribed(self) -> NDArray[np.bool_]:
         return self.constants.speed["prescribed"] >= 0
 
-    def _as_asked(self, t: float, y: Real, wish: Asked) -> Real:
+    def _as_asked(self, t: float, y: Real, wish: AskedFor) -> Real:
         """y = [q, u, work] with closed closures; warns of what it does not keep."""
         found = consistent(self.closures, t, y, wish)
         broken = wish.broken(y, found)
@@ -138,7 +138,7 @@ class ClosedSystem(System):
             )
         return self.layout.known(t, self._as_asked(t, rough, self._wish(rough, given)))
 
-    def _wish(self, y: Real, given: Given) -> Asked:
+    def _wish(self, y: Real, given: Given) -> AskedFor:
         if isinstance(given, np.ndarray):
             return asked(self, y, given)
         match given:

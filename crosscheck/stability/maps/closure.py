@@ -19,7 +19,7 @@ from flexmb.typing import Real
 
 CRANK, COUPLER, ROCKER, GROUND = 0.3, 0.8, 0.7, 1.0  # m
 SIZE = GROUND
-RATE = 2.0  # rad/s of the crank at the start
+RATE = 3.826937  # rad/s of the crank at the start, at which the maps have been drawn since there are any
 SAMPLES = 33
 LEAST = 1e-17
 REAL_RK4 = 2.785293563405282  # |R(z)| = 1 at z = -2.785 on the real axis

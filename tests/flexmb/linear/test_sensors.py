@@ -74,6 +74,13 @@ def said(scene: fm.Scene, state: fm.State | None) -> Any:
     return np.concatenate([run.signals[sensor.name][0] for sensor in scene.sensors])
 
 
+def determined(scene: fm.Scene, signals: Any) -> Any:
+    """Which signals the motion determines: not the loads out of the plane of a loop that is closed in space."""
+    known = ~np.isnan(signals)
+    assert known.all() == (not scene.closures) and known.sum() > 0.6 * len(known)
+    return known
+
+
 @pytest.mark.parametrize("make", [tree, four_bar])
 def test_by_the_state_as_runs_beside_it_say(make: Any) -> None:
     scene = make()
@@ -96,7 +103,8 @@ def test_by_the_state_as_runs_beside_it_say(make: Any) -> None:
             return said(scene, system.state(state.q + x * (model.motion @ z[:n]), u))
 
         found, _ = spectral.at_zero(np.array([beside(x) for x in spectral.times(SPAN)]), SPAN)
-        assert np.max(np.abs(C @ z - found)) <= DIFFERENCED * np.max(np.abs(found))
+        known = determined(scene, found)
+        assert np.max(np.abs((C @ z - found)[known])) <= DIFFERENCED * np.max(np.abs(found[known]))
 
 
 @pytest.mark.parametrize(("make", "hinge"), [(tree, "elbow"), (four_bar, "pin")])
@@ -107,8 +115,9 @@ def test_by_a_torque_at_once(make: Any, hinge: str) -> None:
     d = model.D[-len(before):, [name for name, _ in model.inputs].index(f"{hinge}.rotation")]
     pushed = scene.with_values({f"{hinge}.rotation.torque_Nm": fm.Constant(value=64.0)})
     found = (said(pushed, None) - before) / 64.0
-    assert np.max(np.abs(found)) > 0.1
-    assert np.max(np.abs(d - found)) <= 1e-10 * np.max(np.abs(found))
+    known = determined(scene, found)
+    assert np.max(np.abs(found[known])) > 0.1
+    assert np.max(np.abs((d - found)[known])) <= 1e-10 * np.max(np.abs(found[known]))
 
 
 def test_a_controller_that_reads_a_load_through_a_filter() -> None:

@@ -152,6 +152,10 @@ def calls() -> dict[str, Call]:
         "precision",
     ):  # fmt: skip
         add(f"ClosedSystem.{name}", getattr(chain, name), {"state": start}, state=closed_states)
+    add(
+        "ClosedSystem.closure_operators", lambda state: chain.closure_operators(state).Lambda_inverse, {"state": start},
+        state=closed_states,
+    )  # fmt: skip
     for algorithm in ("articulated", "composite"):
         arguments = {"state": start, "algorithm": algorithm}
         add(
@@ -321,11 +325,12 @@ EXEMPT = {
     "Trajectory.section_loads", "Trajectory.loads_in",  # the system's
     "Trajectory.state_at", "Trajectory.values_at", "Trajectory.then",  # a place in a list; a trajectory
     "RunStage", "Restart", "EventRecord",  # what runs are given, or give
-    "open_loop", "user_function",  # a scene; a function
+    "open_loop", "user_function", "no_user_code",  # a scene; a function; nothing
     "ClosedSystem.section_loads",  # the closed chain here has no beam
     "LinearModel.save", "Campbell.plot", "Campbell.to_csv",  # a path
     "ClosedSystem.consistent_inverse_dynamics", "ClosedSystem.modal_residual", "ClosedSystem.applied",  # the tree's
-    "ClosedSystem.factorise", "ClosedSystem.operators", "ClosedSystem.partitions", "ClosedSystem.nested",
+    "ClosedSystem.factorise",
+    "ClosedSystem.operators", "ClosedSystem.partitions", "ClosedSystem.nested",  # always refused
     "ClosedSystem.coordinate", "ClosedSystem.speed", "ClosedSystem.state",
     "ClosedSystem.evaluator",  # always refused
     "ClosedSystem.workspace", "ClosedSystem.recursion_workspace", "ClosedSystem.composite_workspace",

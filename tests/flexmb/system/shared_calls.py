@@ -81,9 +81,6 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
         "consistent_inverse_dynamics": lambda s, x: s.consistent_inverse_dynamics(x, rates),
         "hinge_loads, outboard": lambda s, x: s.hinge_loads(x, axes="outboard"),
         "factorise": lambda s, x: s.factorise(x).solve(rates),
-        "operators": lambda s, x: s.operators(x).M,
-        "partitions": lambda s, x: s.partitions(x).matrix,
-        "reduced": lambda s, x: s.nested().reduced(x.t, x.y),
         "accelerations_batch": lambda s, x: s.accelerations_batch(x.q[None], x.u[None], x.t, threads=1),
         "initial_state": lambda s, x: s.initial_state,
         "simulate": lambda s, x: seen(fm.simulate(s, x.t + 2e-3, state=x, t_start=x.t, samples=3)),
@@ -93,6 +90,9 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
         shared, (s, "run"), lambda: fm.simulate(s, 2e-3, samples=5)
     ).loads_in("outboard")  # fmt: skip
     if is_tree:
+        found["operators"] = lambda s, x: s.operators(x).M
+        found["partitions"] = lambda s, x: s.partitions(x).matrix
+        found["reduced"] = lambda s, x: s.nested().reduced(x.t, x.y)
         found["hinge_loads, forced"] = lambda s, x: s.hinge_loads(x, rates)
         for each in algorithms:
             found[f"evaluator, {each}"] = lambda s, x, each=each: once(
@@ -100,6 +100,7 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
             )(x.t, x.q, x.u).copy()  # fmt: skip
         found["factors"] = lambda s, x: once(shared, (s, "factors"), lambda: s.factorise(state)).solve(x.u)
     else:
+        found["closure_operators"] = lambda s, x: tuple(vars(s.closure_operators(x)).values())
         found["closure_gaps"] = lambda s, x: s.closure_gaps(x)
         found["determined_loads"] = lambda s, x: s.determined_loads(x)
     if not scene.controllers:
