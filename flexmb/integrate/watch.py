@@ -29,6 +29,7 @@ CROSSED = -1  # returned in place of a status code: no end of the run
 UNKNOWN = 2  # a side that is for the first step to find
 RESTED = 2  # times the side from which something came that has been at its level for a step
 
+_FINEST = 2.0**-52  # of a step: instants within it are told apart no better
 _NEAR = 2.0**-13  # of a step: over so much of it rates are found as differences
 _NARROW = 2.0**-20  # of a step: a turning point that is found so well is found to rounding, as values are flat there
 _NOWHERE, _PASSES, _TURNS = range(3)  # what becomes of a level in a step
@@ -322,20 +323,23 @@ def _beyond(within, i):
 def _arrival(within, i, low, high):
     """When i comes to its level between two times, to rounding: (status, time).
 
-    By the regula falsi of Illinois; every third time, and where the step starts at the level, by halving.
+    By the regula falsi of Illinois; every third time, and where the step starts at the level, by halving. Beside time 0
+    floats are dense without end: there the rounding is that of the step, for one of 1e-323 s leads nowhere.
     """
     side, last_side, count = within.watch.side[i], 0, 0
+    finest = _FINEST * (within.step.end - within.step.start)
     status, below = _value_at(within, i, low)
     if _has_jumped(side, below, within.watch.still[i]):
         return status, low
     above = 0.0
     if status == OK:
         status, above = _value_at(within, i, high)
-    while status == OK and above != 0.0 and high - low > 2.0 * (np.nextafter(high, math.inf) - high):
+    while status == OK and above != 0.0 and high - low > max(2.0 * (np.nextafter(high, math.inf) - high), finest):
         middle, count = 0.5 * (low + high), count + 1
         if count % 3 != 0 and crosses(side, above, 0) and not crosses(side, below, 0):
             middle = low + (high - low) * below / (below - above)
-            middle = min(max(middle, np.nextafter(low, high)), np.nextafter(high, low))
+            middle = max(middle, np.nextafter(low, high), low + 0.5 * finest)
+            middle = min(middle, np.nextafter(high, low), high - 0.5 * finest)
         status, value = _value_at(within, i, middle)
         if crosses(side, value, 0):
             high, above = middle, value

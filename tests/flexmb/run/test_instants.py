@@ -135,8 +135,7 @@ def test_events_of_one_instant_happen_in_the_order_of_the_scene() -> None:
 @pytest.mark.parametrize("crossing", ["falling", "either"])
 def test_what_stands_on_a_stop_does_not_fall_through_it(crossing: str, watch: str, chain: bool) -> None:
     """At rest it rests; what moves into the stop is struck, what leaves it is not; without `rests` it chatters."""
-    few, many = ((0.0,), (0.0,), (0.0, -1.0), (True,)), ((0.0, 0.3), (0.0, -6e-17), (0.0, -1.0, 1.0), (True, False))
-    for level, off, speed, rests in product(*(few if chain else many)):
+    for level, off, speed, rests in product((0.0, 0.3), (0.0, -6e-17), (0.0, -1.0, 1.0), (True, False)):
         stop = fm.Impact(coordinate=WHERE, restitution=0.5, rests=rests)
         there = {"position": level + off, "rate": speed}
         scene = cart(event(watch, level, stop, crossing=crossing), gravity=G, chain=chain, **there)
