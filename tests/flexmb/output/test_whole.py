@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+import crosscheck
+import flexmb
 from flexmb.output.whole import clear_parts, take_away, whole_file, write_whole
 from tests.repo.project import ROOT
 
@@ -103,11 +105,12 @@ def test_an_error_of_the_disk_names_the_file_that_was_asked_for(tmp_path: Path) 
 
 def test_every_file_of_both_packages_is_written_whole() -> None:
     """A call that writes under the name it is given stands in a `with whole_file(...)`."""
-    files = [file for package in ("flexmb", "crosscheck") for file in (ROOT / package).rglob("*.py")]
+    packages = [Path(str(package.__file__)).parent for package in (flexmb, crosscheck)]
+    files = [(folder.parent, file) for folder in packages for file in folder.rglob("*.py")]
     torn = {
         f"{name}:{line}"
-        for file in files
-        if (name := file.relative_to(ROOT).as_posix()) not in APART
+        for above, file in files
+        if (name := file.relative_to(above).as_posix()) not in APART
         for line in torn_writes(file.read_text(encoding="utf-8"))
     }
     assert len(files) > 300 and not torn

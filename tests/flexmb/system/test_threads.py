@@ -49,6 +49,11 @@ def program(name: str, *words: str, **environment: str) -> str:
     return done.stdout + done.stderr[-2000:]
 
 
+def first_word(printed: str) -> str:
+    """What a program says on stdout: on stderr it may say that it compiles."""
+    return next(iter(printed.split()), "nothing")
+
+
 def wrong(printed: str) -> tuple[int, int]:
     """Wrong answers, and all."""
     found = re.findall(r"(\d+) wrong of (\d+)", printed)
@@ -76,14 +81,14 @@ def test_ten_million_shared_calls():
 
 @pytest.mark.parametrize("kernels", ["exact", "general"])
 def test_the_first_calls_of_a_process_may_be_those_of_threads(kernels):
-    assert program("first_calls", "shared", FLEXMB_KERNELS=kernels).strip() == "right"
+    assert first_word(program("first_calls", "shared", FLEXMB_KERNELS=kernels)) == "right"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("whose", ["shared", "own"])
 @pytest.mark.parametrize("kernels", ["exact", "general"])
 def test_the_first_calls_of_twenty_processes(kernels, whose):
-    assert [program("first_calls", whose, FLEXMB_KERNELS=kernels).strip() for _ in range(20)] == ["right"] * 20
+    assert {first_word(program("first_calls", whose, FLEXMB_KERNELS=kernels)) for _ in range(20)} == {"right"}
 
 
 def test_a_thread_that_forbids_what_another_compiles_is_noticed():
