@@ -121,12 +121,19 @@ def _masses(scene: Scene, given: dict[Any, Any], mass: str, place: str) -> str |
     bodies = {body.name: body for body in scene.bodies}
     for name, (of_mass, of_place) in given.items():
         body = bodies.get(name)
-        if body is not None and of_mass is not None and of_mass.get(mass) and body.mass_kg != float(of_mass.get(mass)):
+        if body is None or of_mass is None:
+            continue
+        if of_mass.get(mass) and body.mass_kg != _real(of_mass.get(mass)):
             return f"{name} has the mass {body.mass_kg}, not {of_mass.get(mass)}"
         where = None if of_place is None else of_place.get(place)
-        if body is not None and of_mass is not None and where and body.com_m != tuple(map(float, where.split())):
+        if where and body.com_m != tuple(map(_real, where.split())):
             return f"{name} has its mass centre at {body.com_m}, not {where}"
     return None
+
+
+def _real(text: str) -> float:
+    """As C reads numbers, and so MuJoCo: hexadecimal ones too."""
+    return float.fromhex(text) if "0x" in text.lower() else float(text)
 
 
 def _not_finite(value: Any) -> str | None:
