@@ -117,13 +117,16 @@ def hold(
 
 
 def shared_times(wanted: Real, given: Real) -> np.ndarray | None:
-    """Where the `wanted` times (s) are among those `given`, both rising; None unless all of them are."""
+    """Where the `wanted` times (s) are among those `given`, both rising; None unless all of them are.
+
+    Told apart by the size of those wanted: one of 1e308 s that is given besides must not make all others equal.
+    """
     if not (len(wanted) and len(given)):
         return None
     after = np.minimum(np.searchsorted(given, wanted), len(given) - 1)
     before = np.maximum(after - 1, 0)
     places = np.where(np.abs(given[before] - wanted) < np.abs(given[after] - wanted), before, after)
-    return places if np.all(np.abs(given[places] - wanted) <= CLOCK * np.max(np.abs(given))) else None
+    return places if np.all(np.abs(given[places] - wanted) <= CLOCK * np.max(np.abs(wanted))) else None
 
 
 def at_samples(signal: Signal, places: np.ndarray) -> Signal:

@@ -20,7 +20,7 @@ from flexmb.scene.reading import MIB, Unreadable, read_text
 LIMIT = 256 * MIB
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)  # MuJoCo's reader takes "--" in them, which XML does not
 NO_NUMBER = re.compile(r"[-+]?(nan(\(.*\))?|inf(inity)?)", re.IGNORECASE)
-MOST_COPIES = 100_000  # of bodies, in all
+MOST_COPIES = 10_000  # of bodies, in all: MuJoCo takes some 30 kB for each
 MOST_ENTRIES = 100_000_000  # of a texture or a height field
 MOST_RESERVED = 1_000_000  # numbers of the user for each item, keyframes
 # Attributes whose words are names and texts: a body may be called "inf".

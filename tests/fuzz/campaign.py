@@ -53,7 +53,9 @@ def _work(folder: Path, seed: int, keep: Path, asked: list[tuple[str, int]]) -> 
             worker.kill()
             worker.wait()
             worker = None
-            answer = json.dumps({"kind": name, "number": number, "done": "", "outcome": "died", "detail": "no answer"})
+            died = f"no answer: mutant {number} of {name}, seed {seed}, which `tests.fuzz.worker.content` makes again"
+            print(died, flush=True)
+            answer = json.dumps({"kind": name, "number": number, "done": "", "outcome": "died", "detail": died})
         found.append(json.loads(answer))
     if worker is not None:
         worker.stdin.close()

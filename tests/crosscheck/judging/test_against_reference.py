@@ -225,6 +225,8 @@ def test_times_that_both_have() -> None:
     np.testing.assert_array_equal(shared_times(given, given), np.arange(251))
     assert shared_times(given[:3] + 1e-3, given) is None
     assert shared_times(np.array([11.0]), given) is None
+    far = np.array([0.0, 0.1, 0.2, 0.5, 0.7, 1e308])  # a time beyond all measure makes no others equal
+    assert shared_times(np.linspace(0.0, 1.0, 6), far) is None
     assert shared_times(np.array([0.0]), given[:1]) == 0
     assert shared_times(given, given[:1]) is None
 

@@ -113,7 +113,7 @@ UNSOUND = {  # MuJoCo compiles all of the first kind, with a default in place of
     "copies": (
         "</worldbody>",
         '<replicate count="1000"><replicate count="1000"><body/></replicate></replicate></worldbody>',
-        "it asks for 1000000 copies, and 100000 are allowed",
+        "it asks for 1000000 copies, and 10000 are allowed",
     ),
     "texture": ("<worldbody>", '<asset><texture width="99999" height="9999"/></asset><worldbody>', "999890001 entries"),
     "room": ("<worldbody>", '<size nuser_body="999999999"/><worldbody>', "999999999 entries"),
