@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
+
 from crosscheck.engines.answers import efforts_of
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import part_of
@@ -43,12 +45,21 @@ def require_sense(file: Path, sweep: SweepFile, scene: Scene, times: Real, value
     `values` are those of all samples (number of samples, number of parameters), `times` (T,) s when each is sampled.
     """
     try:
+        _require_finite(sweep, values)
         require_numbers(scene, sweep, values)
     except CaseError as error:
         raise CaseError(f"{file}: {error}") from None
     problems = [*_quantities(sweep, scene), *_engines(sweep, scene, float(times[-1]), provider)]
     if problems:
         raise CaseError(f"{file}: {'; '.join(map(str, problems))}")
+
+
+def _require_finite(sweep: SweepFile, values: Real) -> None:
+    """Distributions of finite parameters may still be so wide that what is drawn overflows."""
+    for parameter, drawn in zip(sweep.parameters, values.T, strict=True):
+        if not np.all(np.isfinite(drawn)):
+            what = f'parameter "{parameter.path}": {np.sum(~np.isfinite(drawn))} of {len(drawn)} values drawn overflow'
+            raise CaseError(f"{what}: give a narrower distribution")
 
 
 def _quantities(sweep: SweepFile, scene: Scene) -> Iterator[Defect]:

@@ -170,6 +170,7 @@ def test_an_interrupted_sweep_leaves_a_table_of_what_was_done_by_a_name_that_say
         (("marker:tip.position", "marker:tap.position"), 'no marker "tap": did you mean "tip"?'),
         (("marker:tip.position", "speed"), 'no channel "speed"'),
         (("sd = 0.1", "sd = -0.1"), "sd positive"),
+        (("sd = 0.1", "sd = 1.7e308"), "drawn overflow: give a narrower distribution"),
         (("sd = 0.1", "s = 0.1"), "$.parameter[0]: Object contains unknown field `s`"),
         (("number = 6", "number = 0"), "0 samples make no sense"),
         (("number = 6", 'number = 6\nsampling = "grid"'), "leave it out"),
