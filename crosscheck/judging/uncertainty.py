@@ -54,6 +54,7 @@ from flexmb.typing import Real
 
 SAFETY = 1.25
 UNPROVEN_SAFETY = 3.0
+MOST_COUNTED = 2**63  # evaluations: a record may hold any whole number, and larger ones are no numbers of NumPy
 RUNGS = 4  # of a ladder that can count
 ORDER_BAND = 0.1
 SPREAD = 10.0
@@ -143,7 +144,7 @@ def _enveloped(factor: float, gap: Real, floor: float, how: str, order: float | 
 
 def roundoff_floor(size: float, evaluations: int) -> float:
     """eps sqrt(N) times the size of the signals."""
-    return float(np.finfo(np.float64).eps * np.sqrt(evaluations) * size)
+    return float(np.finfo(np.float64).eps * np.sqrt(float(min(evaluations, MOST_COUNTED))) * size)
 
 
 def spatial(channel: str, coarse: Real, fine: Real, ratio: float, order: float) -> Real:
