@@ -73,7 +73,10 @@ def _stranger(directory: Path) -> str | None:
     entered = own.st_mode & _ENTERED
     with os.scandir(directory) as entries:
         for entry in entries:
-            file = entry.stat(follow_symlinks=False)
+            try:
+                file = entry.stat(follow_symlinks=False)
+            except FileNotFoundError:  # another process has just put it in its place, under another name
+                continue
             if not _owned(file):
                 return f"{entry.name} in it belongs to user {file.st_uid}"
             if entered and file.st_mode & _WRITABLE and not entry.is_symlink():

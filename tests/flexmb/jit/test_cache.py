@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 import warnings
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -318,3 +319,20 @@ def test_a_planted_kernel_is_not_unpickled(tmp_path):
     done = run(tmp_path, "tiny")
     assert done.stdout.split() == ["0"] and "others may write to it" in done.stderr
     assert not (tmp_path / "ran").exists()
+
+
+def test_a_file_that_is_renamed_while_the_folder_is_looked_at_is_no_stranger(tmp_path, monkeypatch):
+    """Processes that start at once write kernels under one name and rename them: nobody loses the folder by that."""
+    (tmp_path / "written").write_text("kernel")
+    look = os.scandir
+
+    @contextmanager
+    def renamed(directory):
+        with look(directory) as entries:
+            found = list(entries)
+        (tmp_path / "written").rename(tmp_path / "kept")
+        yield found
+
+    tmp_path.chmod(0o700)
+    monkeypatch.setattr(folders.os, "scandir", renamed)
+    assert folders._stranger(tmp_path) is None
