@@ -41,7 +41,12 @@ def equivalent_masses(gram: Real) -> EquivalentMasses:
     """
     gram = np.triu(gram) + np.triu(gram, 1).T
     size = _sizes(np.diag(gram))
-    values, vectors = np.linalg.eigh(gram / np.outer(size, size))
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = gram / size[:, None] / size
+    largest = np.max(np.abs(scaled), axis=1)
+    if not np.all(np.isfinite(largest)):  # of positive semidefinite matrices no element is above those of the diagonal
+        raise NoMasses(int(np.argmin(np.isfinite(largest))))
+    values, vectors = np.linalg.eigh(scaled)
     if values[0] < -NEGATIVE * values[-1]:
         raise NoMasses(int(np.argmax(np.abs(vectors[:, 0]))))
     kept = values > ROUNDING * values[-1]

@@ -9,6 +9,14 @@ from dataclasses import dataclass
 from flexmb.scene.problems import SceneError
 from flexmb.scene.schema import Scene
 
+MAGNITUDE = 1e150
+"""Largest magnitude of a number in a foreign file: the sum of a million squares of such numbers is a number still."""
+
+
+def usable(number: float) -> bool:
+    """Whether a number is finite and its square too; not so for NaN."""
+    return abs(number) <= MAGNITUDE
+
 
 class ModelError(ValueError):
     """A model that no scene can represent, or no model at all: the file, the place, the reason and the remedy."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NoReturn
 from xml.etree import ElementTree
 
-from flexmb.interchange.imported import ModelError
+from flexmb.interchange.imported import MAGNITUDE, ModelError, usable
 from flexmb.scene.reading import MIB, Unreadable, read_text
 
 LIMIT = 256 * MIB
@@ -90,9 +90,9 @@ def _refuse_elements(file: Path, root: ElementTree.Element) -> None:
 
 def _refuse_words(file: Path, element: ElementTree.Element, key: str, text: str) -> None:
     for word in text.split():
-        if NO_NUMBER.fullmatch(word) or _overflows(word):
+        if NO_NUMBER.fullmatch(word) or _is_too_large(word):
             remedy = "give a finite number, or leave the attribute out for MuJoCo's default"
-            _fail(file, element, key, f'"{word}" is no finite number', remedy)
+            _fail(file, element, key, f'"{word}" is no finite number up to {MAGNITUDE:g}', remedy)
 
 
 def _copies(element: ElementTree.Element) -> int:
@@ -120,9 +120,10 @@ def _counts(element: ElementTree.Element, key: str) -> list[int]:
         return []
 
 
-def _overflows(word: str) -> bool:
+def _is_too_large(word: str) -> bool:
+    """Quaternions are divided by their length, which takes squares: MuJoCo makes zeros of those that overflow."""
     try:
-        return math.isinf(float(word))
+        return not usable(float(word))
     except ValueError:
         return False
 

@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming
+from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming, usable
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.options import Placement
 from flexmb.scene.quaternions import about, quaternion_of
@@ -188,7 +188,7 @@ class _Robot:
     def _vector(self, place: str, element: ElementTree.Element, key: str) -> Real:
         words = element.get(key, "0 0 0").split()
         numbers = [_real(word) for word in words]
-        if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+        if len(numbers) != 3 or not all(map(usable, numbers)):
             self._fail(place, f'{key} is "{element.get(key)}"', "give three numbers")
         return np.array(numbers)
 
@@ -196,7 +196,7 @@ class _Robot:
         element = inertial.find(tag)
         text = None if element is None else element.get(key)
         value = math.nan if text is None else _real(text)
-        if not math.isfinite(value):
+        if not usable(value):
             self._fail(
                 place, f"{tag} {key} is {'missing' if text is None else repr(text)}", "give a number in SI units"
             )

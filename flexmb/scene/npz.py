@@ -19,7 +19,7 @@ REAL, BOOLEAN, TEXT = "fiu", "b", "U"  # kinds of NumPy's types
 WORD = 256  # bytes of a text, at most
 HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 ENCRYPTED = 0x1
-ONE_ARRAY = np.lib.format.MAGIC_PREFIX
+ONE_ARRAY, ARCHIVE = np.lib.format.MAGIC_PREFIX, b"PK"  # how such files begin
 DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OverflowError, ValueError)
 PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
@@ -42,8 +42,11 @@ def unpacked(file: str | os.PathLike[str], kinds: Mapping[str, str]) -> dict[str
     try:
         left = allowance(regular_size(file))
         with open(file, "rb") as stream:
-            if stream.read(len(ONE_ARRAY)) == ONE_ARRAY:
-                raise Unreadable("it holds one array", "save the arrays by name with numpy.savez")
+            begin = stream.read(len(ONE_ARRAY))
+        if begin == ONE_ARRAY:
+            raise Unreadable("it holds one array", "save the arrays by name with numpy.savez")
+        if not begin.startswith(ARCHIVE):  # zip readers find their contents from the end, and take anything in front
+            raise Unreadable("it does not begin as an .npz archive", "write it with numpy.savez")
         found: dict[str, NDArray[Any]] = {}
         with zipfile.ZipFile(file) as archive:
             for member in archive.infolist():

@@ -7,7 +7,7 @@ from math import isfinite
 
 from crosscheck.library.case import Provenance, RunFile, Variant
 from crosscheck.library.check.judged import check_pattern, check_patterns
-from crosscheck.library.check.ranges import ROOT, check_within, problem
+from crosscheck.library.check.ranges import MOST_SAMPLES, ROOT, check_within, problem
 from crosscheck.library.check.runs import check_engines_once, find_variant, no_variant
 from crosscheck.library.check.variants import check_ladder
 from crosscheck.library.patterns import fault
@@ -62,13 +62,16 @@ def check_anchors(provenance: Provenance) -> Iterator[Defect]:
 def _times(run: RunFile, recipe: ReferenceRecipe, variant: Variant, place: Place) -> Iterator[Defect]:
     """The reference's samples must be some of the variant's: what is compared is then interpolated nowhere."""
     samples = variant.samples or run.samples
+    if not 2 <= samples <= MOST_SAMPLES:  # `check_samples` says so
+        return
     duration = variant.duration_s or run.duration_s
     if recipe.samples is not None and (recipe.samples < 2 or (samples - 1) % (recipe.samples - 1)):
         fitting = [n + 1 for n in range(samples - 1, 0, -1) if (samples - 1) % n == 0]
         text = f"{recipe.samples} samples are not some of the {samples} of the variant"
         yield problem(place.key("samples"), text, f"give one of {', '.join(map(str, fitting[:8]))}")
+        return
     if recipe.horizon_s is not None:
-        first = duration / ((recipe.samples or samples) - 1) if (recipe.samples or samples) > 1 else duration
+        first = duration / ((recipe.samples or samples) - 1)
         yield from check_within(recipe.horizon_s, (first, duration), place.key("horizon_s"))
 
 

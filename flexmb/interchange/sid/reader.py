@@ -10,6 +10,7 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
+from flexmb.interchange.imported import MAGNITUDE, usable
 from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor, node_shapes, shapes
 from flexmb.scene.reading import MIB, Unreadable, read_text
 
@@ -217,8 +218,9 @@ class _Reader:
             value = float(text.strip().lower().replace("d", "e"))
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
-            self._fail(f'"{text.strip()[:40]}" is no finite number', "write it as 1.5, 1.5E-3 or 1.5D-3")
+        if not usable(value):
+            what = f'"{text.strip()[:40]}" is no finite number up to {MAGNITUDE:g}'
+            self._fail(what, "write it as 1.5, 1.5E-3 or 1.5D-3")
         return value
 
     def _whole(self, text: str) -> int:

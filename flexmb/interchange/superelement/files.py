@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flexmb.interchange.imported import MAGNITUDE, usable
 from flexmb.interchange.superelement.element import SuperElement, SuperElementError, super_element
 from flexmb.interchange.superelement.matrix_market import market_matrix, refuse_large
 from flexmb.interchange.superelement.nastran import NamedMatrix, dmig_matrices, op4_matrices
@@ -115,8 +116,8 @@ def _nodes(path: Path) -> Nodes:
             found.dofs.append(dofs[0] if dofs else "123456")
         except ValueError:
             raise SuperElementError(f"{path}, line {number}: give {','.join(header)} as numbers, not {row}") from None
-        if not np.all(np.isfinite(found.position[-1])):
-            raise SuperElementError(f"{path}, line {number}: a coordinate is not finite")
+        if not all(map(usable, found.position[-1])):
+            raise SuperElementError(f"{path}, line {number}: a coordinate is not finite, or beyond {MAGNITUDE:g}")
     if not found.ids:
         raise SuperElementError(f"{path}: there is no node: add a line for each, under id,x,y,z")
     return found

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flexmb.interchange.imported import MAGNITUDE, usable
 from flexmb.interchange.superelement.element import SuperElementError
 from flexmb.typing import Real
 
@@ -166,6 +167,6 @@ def _real(word: str) -> float:
     """A number of Fortran: 1.5, 1.5D+3, 1.5+3. ValueError where it is none, or not finite."""
     text = re.sub(r"(?<=[\d.])([+-]\d+)$", r"E\1", word.strip().upper().replace("D", "E"))
     value = float(text)
-    if not np.isfinite(value):
-        raise ValueError(f"{word.strip()} is not finite")
+    if not usable(value):
+        raise ValueError(f"{word.strip()} is not finite, or beyond {MAGNITUDE:g}")
     return value

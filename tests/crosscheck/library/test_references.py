@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,7 @@ BAD = [
     ("samples = 11", "samples = 12", "reference.samples", "give one of 21, 11, 6, 5, 3, 2"),
     ("samples = 11", "samples = 1", "reference.samples", "1 samples"),
     ("samples = 11", "samples = 41", "reference.samples", "not some of the 21"),
+    ("samples = 11", f"samples = {10**400}", "reference.samples", "not some of the 21"),
     ("samples = 11", "horizon_s = 3.0", "reference.horizon_s", "3 makes no sense"),
     ("samples = 11", "horizon_s = nan", "reference.horizon_s", "nan makes no sense"),
     ("samples = 11", 'channels = ["marker.position"]', "reference.channels", "can name no channel"),
@@ -64,6 +66,15 @@ BAD = [
     ("values = [1e-6, 1e-8]", "values = [1e-6]", "reference.route[0].efforts[0].values", "at least two efforts"),
     ("values = [1e-6, 1e-8]", "values = [1e-8, 1e-6]", "reference.route[0].efforts[0].values", "they do not fall"),
 ]
+
+
+def test_a_run_of_impossibly_many_samples_is_refused_at_once(tmp_path: Path) -> None:
+    """Nothing counts what divides them, nor divides by them."""
+    text = GOOD.replace("samples = 11", "samples = 11\nhorizon_s = 0.5")
+    file = copy_case(tmp_path, text) / "run.toml"
+    file.write_text(re.sub(r"(?m)^samples = 21$", f"samples = {10**400}", file.read_text(), count=1))
+    with pytest.raises(CaseError, match="a run cannot have 1000"):
+        load_case(file.parent)
 
 
 @pytest.mark.parametrize(("old", "new", "place", "said"), BAD, ids=[f"{new[:30]}" for _, new, _, _ in BAD])

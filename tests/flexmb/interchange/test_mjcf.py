@@ -97,7 +97,7 @@ BAD = {
     "no model": ("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "MuJoCo refuses"),
     "no xml": ("hello", "not XML"),
 }
-NAN = "is no finite number: give a finite number, or leave the attribute out"
+NAN = r"is no finite number up to 1e+150: give a finite number, or leave the attribute out"
 UNSOUND = {  # MuJoCo compiles all of the first kind, with a default in place of the number
     "inertial": (
         "<geom ", '<inertial pos="nan 0 0" mass="1" diaginertia="1 1 1"/><geom ', f'inertial, pos: "nan" {NAN}',
@@ -105,6 +105,7 @@ UNSOUND = {  # MuJoCo compiles all of the first kind, with a default in place of
     "capitals and sign": ('pos="0 0 1"', 'pos="0 -NaN 1"', f'body "trunk", pos: "-NaN" {NAN}'),
     "payload": ('stiffness="3"', 'stiffness="nan(7)"', f'joint "roll", stiffness: "nan(7)" {NAN}'),
     "infinite": ('mass="3"', 'mass="1e999"', f'geom, mass: "1e999" {NAN}'),
+    "its square infinite": ('pos="0 0 1"', 'pos="0 0 1" quat="1 0 -1e151 0"', f'body "trunk", quat: "-1e151" {NAN}'),
     "word": ('gravity="0.3', 'gravity="-Infinity', f'option, gravity: "-Infinity" {NAN}'),
     "escaped": ('pos="0 0 1"', 'pos="0 &#110;an 1"', f'body "trunk", pos: "nan" {NAN}'),
     "default": ('damping="0.05"', 'damping="nan"', f'joint, damping: "nan" {NAN}'),

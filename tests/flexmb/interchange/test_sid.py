@@ -11,6 +11,7 @@ import pytest
 
 import flexmb as fm
 from flexmb.dense.dense_system import DenseSystem
+from flexmb.interchange.gram import NoMasses, equivalent_masses
 from flexmb.interchange.sid import Sid, SidError, Taylor, imported_sid, read_sid, sid_of, write_sid
 from flexmb.modal.first_order import first_order
 from flexmb.modal.flexible import flexible_model
@@ -216,10 +217,21 @@ def test_blocks_that_contradict_each_other_are_refused(fault):
         imported_sid(change(sid_of(beam())), "rod")
 
 
+def test_sums_whose_ratios_overflow_belong_to_no_masses():
+    """Neither an eigenvalue that is not a number nor LAPACK's message."""
+    gram = np.diag([1.0, 1e-200, 1e-200, 1e-200])
+    gram[0, 2] = 1e150
+    gram[1, 2] = 1e150
+    with pytest.raises(NoMasses) as refused:
+        equivalent_masses(gram)
+    assert refused.value.field in (1, 2)
+
+
 BROKEN = {
     "cut": (lambda text: text[: len(text) // 2], "ends before|is no finite number|is no statement"),
     "a word for a number": (lambda text: text.replace("m0(1,1) = ", "m0(1,1) = one", 1), r"line 47: .* finite number"),
     "infinite": (lambda text: re.sub(r"mass = .*", "mass = 1e999", text), "line 5: .*finite"),
+    "its square infinite": (lambda text: re.sub(r"mass = .*", "mass = -1e151", text), "line 5: .*finite"),
     "an element outside": (lambda text: text.replace("m0(1,1)", "m0(9,1)", 1), r"\(9, 1\) is no element of"),
     "a missing block": (lambda text: re.sub(r"    Me\n.*    end Me\n", "", text, flags=re.DOTALL), "no block Me"),
     "an unknown block": (lambda text: text.replace("    Me\n", "    Mx\n"), '"Mx" is no block'),
