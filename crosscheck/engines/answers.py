@@ -177,7 +177,7 @@ def _known(scene: Scene) -> dict[str, set[str]]:
     return {
         "loads": hinges | _names(scene.closures) | _names(scene.point_masses),
         "wheel_loads": wheels,
-        "drives": hinges | wheels,
+        "drives": hinges | wheels | _names(scene.point_masses),
         "connectors": _names(each for each in scene.connectors if isinstance(each, BetweenNodes)),
         "hinge_forces": _names(each for each in scene.connectors if not isinstance(each, BetweenNodes)),
         "energy": set(ENERGIES),

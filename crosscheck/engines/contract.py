@@ -76,8 +76,9 @@ class Snapshot:
 
     `loads[hinge]` (6,) [torque; force]: total load across the hinge, or closure, on the outboard body about the
     outboard hinge point; an engine may add its point masses, under their names. `wheel_loads[wheel]` (6,): on the wheel
-    about its centre. `drives[name]` (n,): generalised drive load of each prescribed coordinate of a hinge or wheel,
-    beyond springs and motors. `energy`: "kinetic", "strain", "spring", "gravity" (J), as far as the engine knows them.
+    about its centre. `drives[name]` (n,): generalised drive load of each prescribed coordinate of a hinge, wheel or
+    point mass, beyond springs and motors. `energy`: "kinetic", "strain", "spring", "gravity" (J), as far as the engine
+    knows them.
     `momentum` (6,): [angular about the World origin; linear]. `connectors[name]` (6,): [torque; force] of a connector
     between nodes on body_b about frame B; `hinge_forces[name]` (1,): of one along a hinge, along its coordinate.
     """

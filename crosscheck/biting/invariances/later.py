@@ -6,18 +6,23 @@ must not notice. Laws of users are told the time: those of flexmb, which alone a
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import msgspec
 
 from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, NotApplicable
 from crosscheck.library.time_functions import delayed, in_functions
 from flexmb.scene.check.control import named
+from flexmb.scene.columns import struct_keys
 from flexmb.scene.control import Controller, TimeSensor
 from flexmb.scene.events import Change, SceneEvent
 from flexmb.scene.functions import Function, SpinUp, Table
-from flexmb.scene.schema import Scene
+from flexmb.scene.hinges import AngularCoordinate, LinearCoordinate
+from flexmb.scene.schema import PointMass, Scene, Wheel
 from flexmb.scene.tree import watchable
 
 START_S = 2.375  # no multiple of any period
+Item = TypeVar("Item", bound=msgspec.Struct)
 OF_THE_CLOCK = ("start_s", "phase_rad", "offset_s")
 
 
@@ -38,10 +43,29 @@ def _later(scene: Scene) -> Counterpart:
     shifted: Scene = in_functions(scene, _shifted)
     other = msgspec.structs.replace(
         shifted,
+        hinges=tuple(map(_as_its_profiles_begin, shifted.hinges)),
+        point_masses=tuple(map(_as_its_profiles_begin, shifted.point_masses)),
+        wheels=tuple(map(_as_its_profiles_begin, shifted.wheels)),
         events=tuple(map(event_later, shifted.events)),
         controllers=tuple(map(controller_later, shifted.controllers)),
     )
     return Counterpart(other, lambda times, channels: channels, starts_s=START_S)
+
+
+def _as_its_profiles_begin(item: Item) -> Item:
+    """Without initial values of what is prescribed: a scene may repeat there what its profile is at t = 0."""
+    match item:
+        case AngularCoordinate(prescribed_rad=profile) if profile is not None:
+            return msgspec.structs.replace(item, angle_rad=0.0, rate_rad_s=0.0)
+        case LinearCoordinate(prescribed_m=profile) if profile is not None:
+            return msgspec.structs.replace(item, position_m=0.0, rate_m_s=0.0)
+        case Wheel(prescribed_rad=profile) if profile is not None:
+            return msgspec.structs.replace(item, angle_rad=0.0, speed_rad_s=0.0)
+        case PointMass():
+            return msgspec.structs.replace(item, coordinates=tuple(map(_as_its_profiles_begin, item.coordinates)))
+    inner = {key: getattr(item, key) for key in struct_keys(type(item))}
+    coordinates = {k: v for k, v in inner.items() if isinstance(v, AngularCoordinate | LinearCoordinate)}
+    return msgspec.structs.replace(item, **{k: _as_its_profiles_begin(v) for k, v in coordinates.items()})
 
 
 def _shifted(function: Function) -> Function:

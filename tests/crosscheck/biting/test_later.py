@@ -23,8 +23,8 @@ from flexmb.scene.bodies import RigidBody
 from flexmb.scene.control import CoordinateSensor, Pid, ProfileSensor, StateSpace, TimeSensor
 from flexmb.scene.events import Change, Latch, SceneEvent
 from flexmb.scene.functions import Constant, ControlSignal, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
-from flexmb.scene.hinges import AngularCoordinate, Revolute
-from flexmb.scene.schema import Load, Marker, Scene
+from flexmb.scene.hinges import AngularCoordinate, LinearCoordinate, Revolute
+from flexmb.scene.schema import Load, Marker, PointMass, Scene, Wheel
 from flexmb.typing import Real
 
 TIMES = np.linspace(0.0, 1.0, 11)
@@ -104,6 +104,27 @@ def strangers(scene: Scene, other: Scene, engine: Engine | None = None) -> list[
         return np.max(distance(name, told[name], true[name])) - SAME * max(signal_range(name, true[name]), 1.0)
 
     return [name for name in true if excess(name) > 0.0]
+
+
+def test_initial_values_that_repeat_a_profile_are_left_to_it() -> None:
+    """At t = 0 the profile of the scene begun later is elsewhere: of a hinge, a wheel and a point mass."""
+    sine = Sine(amplitude=0.3, angular_frequency_rad_s=4.0)
+    angle = AngularCoordinate(rate_rad_s=1.2, prescribed_rad=sine)
+    scene = Scene(
+        name="repeated",
+        bodies=(rod("arm"),),
+        hinges=(Revolute(name="pivot", parent="ground", child="arm", axis=Y, rotation=angle),),
+        wheels=(
+            Wheel(name="wheel", body="arm", axis=Y, mass_kg=0.5, axial_inertia_kg_m2=0.2, transverse_inertia_kg_m2=0.1,
+                  speed_rad_s=1.2, prescribed_rad=sine),
+        ),
+        point_masses=(
+            PointMass(name="slosh", body="arm", mass_kg=0.2, directions=((1.0, 0.0, 0.0),),
+                      coordinates=(LinearCoordinate(rate_m_s=1.2, prescribed_m=sine),)),
+        ),
+        markers=(Marker(name="arm", body="arm", offset_m=(0.6, 0.0, 0.0)),),
+    )  # fmt: skip
+    assert strangers(scene, LATER.of(scene).scene) == []
 
 
 @pytest.mark.parametrize("kind", ["ramp", "smooth_step", "pulse"])
