@@ -5,4 +5,11 @@ That kernels of a scene's own features compute the same is for tests/flexmb/tabl
 
 import os
 
+import pytest
+
 os.environ.setdefault("FLEXMB_KERNELS", "general")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """A kernel that cannot be kept fails the test that compiles it: every process would compile it anew."""
+    config.addinivalue_line("filterwarnings", "error:.* holds addresses of this process:RuntimeWarning")

@@ -1,13 +1,16 @@
-"""Laws for the attitude of spacecraft, ready to be named in a scene, as in "flexmb.control.attitude:eigenaxis_slew"."""
+"""Laws for the attitude of spacecraft, ready to be named in a scene, as in "flexmb.control.attitude:eigenaxis_slew".
+
+They are kernels, not functions of the user's (`flexmb.control.user`): what they reach is known, and they are kept.
+"""
 
 from __future__ import annotations
 
 import math
 
-from flexmb.control.user import user_function
+from flexmb.jit.kernel import kernel
 
 
-@user_function
+@kernel
 def eigenaxis_slew(t, inputs, state, parameters, outputs, change):
     """Three torques in body axes that turn a body about a fixed axis as a profile says, and hold it there.
 

@@ -34,7 +34,7 @@ from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
 from flexmb.integrate.watch import Ends, Within, end_at_crossing, keep_sides, meets
-from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.kernel import handed_on, helper, kernel
 from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
 END = STAGES  # row of A with the weights of the result; k[END] is the derivative there
@@ -154,7 +154,7 @@ def store_samples(problem, step, y, s, times, out, counts):
     return OK
 
 
-@helper
+@handed_on
 def state_at(problem, step, ends, s, t, result, run):
     """The state inside a step whose interpolant is built, projected; see `flexmb.integrate.watch`."""
     interpolate(ends.y, s.f, (t - step.start) / (step.end - step.start), result)

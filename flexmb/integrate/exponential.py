@@ -43,7 +43,7 @@ from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_qu
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
 from flexmb.integrate.settling import prepare_settling, settle
 from flexmb.integrate.watch import Ends, keep_sides, pause
-from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.kernel import handed_on, helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
 NODES = np.array([0.25, 0.5, 0.75, 1.0])
@@ -193,7 +193,7 @@ def attempt(problem, step, y, s, accuracy, counts):
     return status, error
 
 
-@helper
+@handed_on
 def state_at(problem, step, ends, s, t, result, run):
     """The state inside a step, by the exact flow under the same polynomial, projected; see `flexmb.integrate.watch`."""
     accuracy, _ = run

@@ -33,7 +33,7 @@ from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import DONE, FACTORED, FRESH, STRETCH, TAKEN_UP, begin, keep_place
 from flexmb.integrate.watch import Ends, pause
-from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.kernel import handed_on, helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
 _ITERATIONS = 12  # of Newton's method, at most
@@ -179,7 +179,7 @@ def finish(problem, step, y, s, result, controlled):
     problem.project(step.end, result, problem.constants)
 
 
-@helper
+@handed_on
 def inside(problem, step, ends, s, t, result, run):
     """The state within a step, by a shorter one from the same start with a Jacobian of its own."""
     accuracy, counts = run

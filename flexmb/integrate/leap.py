@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from flexmb.integrate.control import EVALUATIONS, SAMPLES, copy
 from flexmb.integrate.watch import CROSSED, pause
-from flexmb.jit.kernel import helper, sweep
+from flexmb.jit.kernel import handed_on, helper, sweep
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR, OK
 
 EVALUATED = 8  # about as often a leap evaluates equations of motion
@@ -41,7 +41,7 @@ def cubic(step, y, dy, y_new, dy_new, t, result):
         result[i] = y[i] + x * (change + (1.0 - x) * bend)
 
 
-@helper
+@handed_on
 def in_leap(problem, step, ends, s, t, result, run):
     """The state within a leap, as `flexmb.integrate.watch` asks for it."""
     cubic(step, ends.y, ends.dy, ends.y_new, ends.dy_new, t, result)

@@ -36,7 +36,7 @@ from flexmb.integrate.radau5_stages import ITERATIONS, evaluate_polynomial, fact
 from flexmb.integrate.radau5_tableau import REAL, E
 from flexmb.integrate.settling import settle
 from flexmb.integrate.watch import Ends, keep_sides, pause
-from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.kernel import handed_on, helper, kernel
 from flexmb.tables.status import NOT_CONVERGED, OK, STEP_TOO_SMALL
 
 _GROW = 8.0  # strongest growth of a step
@@ -93,7 +93,7 @@ def attempt(problem, step, y, s, filter_again, accuracy, counts):
     return status, error, iterations, rate
 
 
-@helper
+@handed_on
 def state_at(problem, step, ends, s, t, result, run):
     """The state inside a step, by the collocation polynomial, projected; see `flexmb.integrate.watch`."""
     accuracy, _ = run

@@ -23,7 +23,7 @@ from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
 from flexmb.integrate.memory import DONE, STRETCH, begin, keep_place
 from flexmb.integrate.watch import Ends, pause
-from flexmb.jit.kernel import helper, kernel, written_out
+from flexmb.jit.kernel import handed_on, helper, kernel, written_out
 from flexmb.tables.status import NONFINITE, OK
 
 
@@ -52,7 +52,7 @@ def rk4_step(problem, t, last, y, h, k, trial, counts):
     return OK if all_finite(trial) else NONFINITE
 
 
-@helper
+@handed_on
 def inside(problem, step, ends, k, t, result, run):
     """The state within a step, by a shorter one from the same start, which is as accurate as the whole one."""
     status = rk4_step(problem, step.start, step.last, ends.y, t - step.start, k, result, run[1])

@@ -5,8 +5,9 @@ come to it. What is on the same side may have been beyond it in between: where i
 start and away from it at its end, its turning point is looked for. So what turns once within a step is seen; of what
 turns twice, the motion there and back between both turns is not.
 
-An integrator says what a step is: `Ends`, and a helper `state_at(problem, step, ends, s, t, result, run)` that puts the
-state at a time t (s) within it into `result` (n,) and returns a status code; s is whatever that helper needs.
+An integrator says what a step is: `Ends`, and a helper `state_at(problem, step, ends, s, t, result, run)`, marked by
+`handed_on`, that puts the state at a time t (s) within it into `result` (n,) and returns a status code; s is whatever
+that helper needs.
 """
 
 from __future__ import annotations

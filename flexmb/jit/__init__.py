@@ -1,6 +1,6 @@
 """How kernels are compiled, kept and counted: all of the project that knows numba.
 
-kernel.py       `kernel`, `helper`, `sweep`, `by_bundle`, `by_number`: what the mechanics is written with
+kernel.py       `kernel`, `helper`, `sweep`, `handed_on`, `by_bundle`, `by_number`: what the mechanics is written with
 features.py     `has`: kernels hold what their bundles contain, and nothing else
 numbered.py     one helper for several, chosen by a number in front
 bundle.py       many arrays as one argument

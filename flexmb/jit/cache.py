@@ -92,7 +92,13 @@ class KernelCache(NullCache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a version; a warning where that cannot be done."""
-        if data.library.has_dynamic_globals:  # addresses of this process
+        if data.library.has_dynamic_globals:
+            name = f"{self._function.__module__}.{self._function.__qualname__}"
+            warn_once(
+                f"{name} holds addresses of this process, so it cannot be kept, and every process compiles it again: "
+                "results are right; this is a defect of flexmb's own, please report it (see `handed_on` in "
+                "flexmb/jit/kernel.py)"
+            )
             return
         file, contents = self._file(sig, data.codegen), dumps(data._reduce())
         written = file.with_name(f"{file.name}.{uuid.uuid4().hex[:16]}")

@@ -2,7 +2,8 @@
 
 `kernel` marks an entry point: compiled for the argument types of its first call, callable from Python, cached on disk.
 `helper` marks a function that is called from kernels only: it is compiled into its callers, has no Python wrapper, no
-machine code and no cache entry of its own (see `parts.py`). From Python, call its `.py_func`.
+machine code and no cache entry of its own (see `parts.py`). From Python, call its `.py_func`. `handed_on` marks one
+that kernels take as an argument.
 """
 
 from __future__ import annotations
@@ -53,6 +54,28 @@ def written_out(function: Callable[..., Any]) -> Any:
     their way there are counted again. It takes longer to compile.
     """
     return njit(inline="always", **AS_PART)(function)
+
+
+def handed_on(function: Callable[..., Any]) -> Any:
+    """A helper that kernels take as an argument, or hold in a tuple, and hand on to others, which call it.
+
+    It is handed on by its type alone, and chosen by that while its caller is compiled, like `by_bundle`. A plain helper
+    is a value too, its address in this process: a kernel that hands one on to what is not written out cannot be kept.
+    """
+    part = helper(function)
+
+    def choose(*args: Any) -> Any:
+        return function(*args)
+
+    @overload(choose, jit_options=AS_PART)
+    def _typed(*args):
+        def call(*args):
+            return part(*args)
+
+        return _named_after(part, call)
+
+    choose.py_func = function  # type: ignore[attr-defined]
+    return choose
 
 
 def by_bundle(kind: type, of_kind: Callable[..., Any], others: Callable[..., Any]) -> Callable[..., Any]:

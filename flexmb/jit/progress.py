@@ -1,5 +1,8 @@
 """A line for who waits: what is being compiled, when it takes longer than two seconds, and that it is once.
 
+A kernel is compiled once for each kind of arguments, as an integrator is for runs that watch for events and for those
+that do not. So lines about one kernel say which version it is, and no line comes twice.
+
 It is a warning of the logger `flexmb.jit`, which Python shows on stderr unless the program has set up its logging:
 `logging.getLogger("flexmb.jit").setLevel(logging.ERROR)` silences it.
 """
@@ -9,6 +12,7 @@ from __future__ import annotations
 import logging
 import re
 import threading
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +21,8 @@ from types import FunctionType
 AFTER = 2.0  # s
 _LOGGER = logging.getLogger("flexmb.jit")
 _at_it = threading.local()
+_versions = Counter[str]()  # that were announced, by the name of the kernel
+_counting = threading.Lock()
 
 
 @contextmanager
@@ -26,7 +32,7 @@ def announced(function: FunctionType, folder: Path | None) -> Iterator[None]:
         yield
         return
     _at_it.outermost = function
-    timer = threading.Timer(AFTER, _LOGGER.warning, (_sentence(function, folder),))
+    timer = threading.Timer(AFTER, _announce, (function, folder))
     timer.daemon = True
     timer.start()
     try:
@@ -36,8 +42,12 @@ def announced(function: FunctionType, folder: Path | None) -> Iterator[None]:
         _at_it.outermost = None
 
 
-def _sentence(function: FunctionType, folder: Path | None) -> str:
-    purpose = re.split(r"[.;:\n]", (function.__doc__ or "a kernel").strip(), maxsplit=1)[0]
+def _announce(function: FunctionType, folder: Path | None) -> None:
     name = f"{function.__module__}.{function.__qualname__}"
+    with _counting:
+        _versions[name] += 1
+        version = _versions[name]
+    purpose = re.split(r"[.;:\n]", (function.__doc__ or "a kernel").strip(), maxsplit=1)[0]
+    which = name if version == 1 else f"version {version} of {name}"
     how_often = f"once: it is kept in {folder}" if folder else "in every process: no folder is writable to keep it"
-    return f"flexmb is compiling {name} ({purpose}) for scenes of this kind, {how_often}"
+    _LOGGER.warning("flexmb is compiling %s (%s) for scenes of this kind, %s", which, purpose, how_often)

@@ -1,5 +1,6 @@
 """The cache of compiled kernels: whatever happens to its files, results stay right and nothing ends in a traceback."""
 
+import math
 import os
 import shutil
 import subprocess
@@ -16,7 +17,7 @@ from flexmb.jit import folder as folders
 from flexmb.jit import hooks
 from flexmb.jit.cache import _digest
 from flexmb.jit.folder import cache_directory, delete_unused, warn_once
-from flexmb.jit.kernel import kernel
+from flexmb.jit.kernel import handed_on, helper, kernel, sweep
 
 ROOT = Path(__file__).parents[3]
 TINY = """
@@ -156,6 +157,50 @@ def test_a_kernel_that_cannot_be_kept_runs_with_one_warning(tmp_path, monkeypatc
     assert len({str(warning.message) for warning in warned}) == len(warned)
 
 
+def wave(x):
+    return math.sin(x) + math.exp(-x) * math.atan(x)
+
+
+@sweep
+def interfering(function, x):
+    """So long that no optimiser writes it out where it is called: the function is handed on."""
+    first = function(x) * function(2.0 * x) + function(3.0 * x) * function(5.0 * x)
+    second = function(7.0 * x) * function(11.0 * x) + function(13.0 * x) * function(17.0 * x)
+    return first + second + function(19.0 * x) * function(23.0 * x) + function(29.0 * x) * function(31.0 * x)
+
+
+HANDED_ON, PLAIN = handed_on(wave), helper(wave)
+
+
+def of_handed_on(x):
+    return interfering(HANDED_ON, x)
+
+
+def of_plain(x):
+    return interfering(PLAIN, x)
+
+
+EXPECTED = interfering.py_func(wave, 0.1)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_kernel_that_hands_a_function_on_is_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(hooks, "cache_directory", lambda: tmp_path)
+    first, second = kernel(of_handed_on), kernel(of_handed_on)
+    assert first(0.1) == second(0.1) == pytest.approx(EXPECTED, rel=1e-14)
+    assert sum(second.stats.cache_hits.values()) == len(kernels(tmp_path)) == 1
+    assert HANDED_ON(0.1) == HANDED_ON.py_func(0.1) == wave(0.1)
+
+
+def test_of_a_kernel_that_cannot_be_kept_a_warning_says_that_it_is_a_defect(tmp_path, monkeypatch):
+    """A plain helper in place of one that is handed on."""
+    monkeypatch.setattr(hooks, "cache_directory", lambda: tmp_path)
+    warn_once.cache_clear()
+    with pytest.warns(RuntimeWarning, match=r"test_cache.of_plain holds addresses .* defect of flexmb's") as warned:
+        assert kernel(of_plain)(0.1) == pytest.approx(EXPECTED, rel=1e-14)
+    assert len(warned) == 1 and not list(tmp_path.rglob("*.kernel"))
+
+
 def test_a_file_in_place_of_the_folder_is_replaced(tmp_path, monkeypatch):
     monkeypatch.setattr(folders.config, "CACHE_DIR", str(tmp_path))
     place = cache_directory.__wrapped__()
@@ -223,7 +268,7 @@ def test_without_the_compiler_one_line_says_why():
 
 EDITED = "from flexmb.entry import entry; print(entry(1.0), sum(entry.stats.cache_hits.values()))"
 ENTRY = """
-from flexmb.jit.kernel import kernel
+from flexmb.jit.kernel import handed_on, helper, kernel, sweep
 from flexmb.part import part
 
 @kernel

@@ -39,6 +39,8 @@ def slowly(*arguments):
 
 slow._compiler.compile = slowly
 assert slow(1.5) == 3.0
+if "whole" in sys.argv:
+    assert slow(2) == 4
 """
 
 
@@ -58,6 +60,12 @@ def test_a_slow_kernel_is_announced_once(tmp_path):
         f"flexmb is compiling __main__.slow (Twice a number) for scenes of this kind, once: it is kept in {tmp_path}"
     )
     assert lines(tmp_path, 0.1) == []  # it is found
+
+
+def test_of_another_version_of_a_kernel_the_line_is_another(tmp_path):
+    """As of an integrator, which is compiled for runs with events and for those without."""
+    first, second = lines(tmp_path, 0.1, "whole")
+    assert second == first.replace("compiling ", "compiling version 2 of ")
 
 
 def test_a_fast_one_is_not(tmp_path):
