@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from flexmb.run.situation import EventRecord
     from flexmb.run.stages import RunStage, simulate_stages
     from flexmb.run.trajectory import Trajectory
-    from flexmb.scene import schema
+    from flexmb.scene import schema as schema
     from flexmb.scene.build import SceneBuilder
     from flexmb.scene.check import SceneError, SceneWarning, check_scene
     from flexmb.scene.files import load_scene, save_scene

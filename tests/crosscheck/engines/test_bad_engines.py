@@ -73,7 +73,8 @@ class Ran:
             inner.syspath_prepend(plugs)
             inner.setenv("CHILDREN", str(folder / "children"))
             if limits:
-                inner.setattr(cli.run, "sweep", lambda *words, **more: sweep(*words, **(more | {"limits": limits})))
+                few = {"limits": limits}
+                inner.setattr("crosscheck.running.sweep.sweep", lambda *words, **more: sweep(*words, **(more | few)))
             result = CliRunner().invoke(cli.app, ["run", str(case), "--out", str(folder / "out"), "--jobs", "2"])
         assert result.exception is None or isinstance(result.exception, SystemExit), result.output
         self.code, self.folder = result.exit_code, folder
