@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
+from crosscheck.library.case_error import CaseError
+from crosscheck.library.own_files import OURS, source_folder
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
@@ -59,9 +61,6 @@ def everything(
     ] = False,
 ) -> None:
     """Has no words of its own: the application's help stands above."""
-    from crosscheck.library.case import CaseError  # a command runs, and reads cases or records
-    from crosscheck.library.own_files import OURS, source_folder
-
     try:
         for package in OURS:
             source_folder(package)
@@ -154,7 +153,6 @@ Open = Annotated[bool, typer.Option("--open", help="Open the report in the brows
 
 def found(words: tuple[str, ...]) -> tuple[Case, ...]:
     """The cases asked for, or the end of the program with exit code 2."""
-    from crosscheck.library.case import CaseError
     from crosscheck.library.find import resolve
 
     try:
