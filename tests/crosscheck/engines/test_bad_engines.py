@@ -107,7 +107,7 @@ def here(function: Callable[..., None], jobs: Sequence[Any], *_: object) -> Iter
 def mild(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
     """What does no harm to its process, all in this one, which is quicker."""
     with patch.context() as inner:
-        inner.setattr("crosscheck.running.schedulers.run_jobs", here)
+        inner.setattr(cli.run, "scheduler_at", lambda address: here)
         return Ran(tmp_path_factory.mktemp("mild"), MILD, inner)
 
 
