@@ -1,4 +1,7 @@
-"""The command `crosscheck`, one file a command: it reads the command line and shows what the other rooms do."""
+"""The command `crosscheck`, one file a command: it reads the command line and shows what the other rooms do.
+
+What a command does is imported when it runs: `--help`, completion and a mistyped word load neither cases nor NumPy.
+"""
 
 from crosscheck.cli import (  # noqa: F401, I001 - each adds its commands, in this order
     run, bench, chart, compare, listing, verify, regenerate, contract, mutate, invariance, stability, sweep,

@@ -24,7 +24,6 @@ from crosscheck.cli.common import (
     verbosity,
 )  # fmt: skip
 from crosscheck.running.scheduler import Limits
-from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import words
 from flexmb.output.whole import take_away, write_whole
 from flexmb.output.writing import check_folder, folder
@@ -64,6 +63,7 @@ def bench(
     **Examples**: `crosscheck bench tops/gyrostat` · `crosscheck bench canonical --rounds 30 --json bench.json` ·
     `crosscheck bench closed_chains/four_bar -e native -e pinocchio --accuracy 1e-6`
     """
+    from crosscheck.terminal.live import LiveProgress
     from crosscheck.terminal.timings import print_bench
     from crosscheck.timing.bench import bench as bench_case
     from crosscheck.timing.benchmark_json import MISSING, available, benchmark_document

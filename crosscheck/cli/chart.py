@@ -22,7 +22,6 @@ from crosscheck.cli.common import (
     verbosity,
 )  # fmt: skip
 from crosscheck.running.scheduler import Limits
-from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import marked, words
 
 
@@ -50,6 +49,7 @@ def chart(
 
     **Examples**: `crosscheck chart tops/gyrostat --out charts` · `crosscheck chart canonical -e native -e mujoco`
     """
+    from crosscheck.terminal.live import LiveProgress
     from crosscheck.timing.chart import chart as chart_case
     from crosscheck.timing.page import INDEX, write_case, write_index  # it loads matplotlib
 

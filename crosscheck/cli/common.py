@@ -8,23 +8,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from math import inf, isfinite
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from crosscheck.engines.registry import BUILT_IN, plug_ins
-from crosscheck.library import find
-from crosscheck.library.case import CaseError
+from crosscheck.library.case_error import CaseError
 from crosscheck.library.own_files import OURS, source_folder
-from crosscheck.records.lock import FolderInUseError, locked
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
-from crosscheck.terminal.versions import versions_text
 from flexmb.output.terminal import Terminal
 from flexmb.output.writing import in_words
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.user_code import forbid_user_code
+
+if TYPE_CHECKING:
+    from crosscheck.library.find import Case
 
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130  # as shells have it
@@ -48,6 +47,8 @@ errors = Terminal(stderr=True)
 
 def _show_versions(asked: bool) -> None:
     if asked:
+        from crosscheck.terminal.versions import versions_text  # it asks the engines
+
         typer.echo(versions_text())
         raise typer.Exit
 
@@ -80,10 +81,14 @@ def _forbid(asked: bool) -> bool:
 
 
 def _complete_case(begun: str) -> list[str]:
-    return [name for name in find.shipped_names() if name.startswith(begun)]
+    from crosscheck.library.find import shipped_names  # it reads the names of cases, of nothing else
+
+    return [name for name in shipped_names() if name.startswith(begun)]
 
 
 def _complete_engine(begun: str) -> list[str]:
+    from crosscheck.engines.registry import BUILT_IN, plug_ins
+
     return [name for name in (*BUILT_IN, *plug_ins()) if name.startswith(begun)]
 
 
@@ -146,10 +151,12 @@ SingleFile = Annotated[bool, typer.Option("--single-file", help="The report as o
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser when done.")]
 
 
-def found(words: tuple[str, ...]) -> tuple[find.Case, ...]:
+def found(words: tuple[str, ...]) -> tuple[Case, ...]:
     """The cases asked for, or the end of the program with exit code 2."""
+    from crosscheck.library.find import resolve
+
     try:
-        return find.resolve(words)
+        return resolve(words)
     except CaseError as error:
         refuse(str(error))
 
@@ -160,6 +167,8 @@ def sole_writer(out: Path, strict: bool = False) -> Iterator[None]:
 
     `strict`: a doubtful scene is an error.
     """
+    from crosscheck.records.lock import locked
+
     with in_one_line(), locked(out):
         if strict:
             warnings.simplefilter("error", SceneWarning)
@@ -174,6 +183,8 @@ def check_limit(seconds: float | None) -> None:
 @contextmanager
 def in_one_line() -> Iterator[None]:
     """Show each warning once, and the error that ends the command, without a traceback."""
+    from crosscheck.records.lock import FolderInUseError
+
     shown = set[str]()
 
     def show(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from crosscheck.cli.common import Json, Quiet, Verbose, app, console, print_json, refuse, verbosity
-from crosscheck.sealed.compare import compare_results
-from crosscheck.sealed.document import SealedResults
-from crosscheck.sealed.seal import ResultsError, read_results
-from crosscheck.terminal.differences import print_differences
+
+if TYPE_CHECKING:
+    from crosscheck.sealed.document import SealedResults
 
 
 @app.command()
@@ -35,6 +34,10 @@ def compare(
 
     **Example**: `crosscheck compare main/results.json out/results.json`
     """
+    from crosscheck.sealed.compare import compare_results
+    from crosscheck.sealed.seal import ResultsError
+    from crosscheck.terminal.differences import print_differences
+
     shown = verbosity(quiet, verbose)
     try:
         differences = compare_results(_finished(old), _finished(new))
@@ -48,6 +51,8 @@ def compare(
 
 def _finished(file: Path) -> SealedResults:
     """The results of a session that has come to its end; ResultsError for any other."""
+    from crosscheck.sealed.seal import ResultsError, read_results
+
     found = read_results(file)
     if found.unfinished:
         began = f", begun at {found.made.at}" if found.made.at else ""

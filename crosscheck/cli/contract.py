@@ -8,9 +8,7 @@ from typing import Annotated
 import typer
 
 from crosscheck.cli.common import EngineWords, Json, Quiet, Verbose, app, console, print_json, refuse, verbosity
-from crosscheck.conformance.trial import CLAUSE_LIMIT_S, try_engine, verdict_on
-from crosscheck.engines.registry import engines
-from crosscheck.terminal.clauses import print_clauses
+from crosscheck.conformance.limit import CLAUSE_LIMIT_S
 from flexmb.scene.problems import closest
 
 
@@ -37,6 +35,10 @@ def contract(
 
     **Examples**: `crosscheck contract native` · `crosscheck contract mycode --verbose`
     """
+    from crosscheck.conformance.trial import try_engine, verdict_on
+    from crosscheck.engines.registry import engines
+    from crosscheck.terminal.clauses import print_clauses
+
     shown = verbosity(quiet, verbose)
     known = engines()
     for name in names:

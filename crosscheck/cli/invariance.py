@@ -7,11 +7,8 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.biting.invariance_runs import VERDICTS, run_invariances
 from crosscheck.cli.common import Jobs, NoUserCode, Out, TimeLimit, app, check_limit, console, found, sole_writer
 from crosscheck.running.scheduler import Limits
-from crosscheck.terminal.invariances import print_invariances
-from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
 
@@ -41,6 +38,10 @@ def invariance(
 
     **Examples**: `crosscheck invariance torque_driven` · `crosscheck invariance four_bar -e pinocchio`
     """
+    from crosscheck.biting.invariance_runs import VERDICTS, run_invariances
+    from crosscheck.terminal.invariances import print_invariances
+    from crosscheck.terminal.live import LiveProgress
+
     check_limit(time_limit)
     chosen = found(tuple(cases))
     with sole_writer(out):

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from crosscheck.cli.common import Json, app, console, found, print_json
-from crosscheck.library.find import Case
-from crosscheck.running.installed import EngineState, describe_engines
-from crosscheck.terminal.listings import cases_table, engines_table
+
+if TYPE_CHECKING:
+    from crosscheck.library.find import Case
+    from crosscheck.running.installed import EngineState
 
 
 @app.command("list")
 def list_cases(as_json: Json = False) -> None:
     """List the shipped cases with their tags, variants and engines."""
+    from crosscheck.terminal.listings import cases_table
+
     cases = found(("all",))
     if as_json:
         print_json([_plain(case) for case in cases])
@@ -23,6 +26,9 @@ def list_cases(as_json: Json = False) -> None:
 @app.command()
 def engines(as_json: Json = False) -> None:
     """List the engines: which are installed, in which version, and how to install the others."""
+    from crosscheck.running.installed import describe_engines
+    from crosscheck.terminal.listings import engines_table
+
     states = describe_engines()
     if as_json:
         print_json([_state(state) for state in states])

@@ -7,11 +7,8 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.biting.campaign import SCORES, run_campaign
 from crosscheck.cli.common import Jobs, NoUserCode, Out, TimeLimit, app, check_limit, console, found, sole_writer
 from crosscheck.running.scheduler import Limits
-from crosscheck.terminal.bites import print_bites
-from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
 
@@ -50,6 +47,10 @@ def mutate(
     **Examples**: `crosscheck mutate torque_driven` · `crosscheck mutate all --jobs 2` ·
     `crosscheck mutate ./my_case --all-targets --verbose`
     """
+    from crosscheck.biting.campaign import SCORES, run_campaign
+    from crosscheck.terminal.bites import print_bites
+    from crosscheck.terminal.live import LiveProgress
+
     check_limit(time_limit)
     chosen = found(tuple(cases))
     with sole_writer(out):

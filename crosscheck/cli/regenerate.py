@@ -17,10 +17,9 @@ from crosscheck.cli.common import (
     found,
     in_one_line,
 )
-from crosscheck.library.case import CaseError
+from crosscheck.library.case_error import CaseError
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
-from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import marked, words
 
 
@@ -51,7 +50,8 @@ def regenerate(
     **Examples**: `crosscheck regenerate wheel_gyrostat/torque_free` · `crosscheck regenerate all --check` ·
     `crosscheck regenerate ./my_case`
     """
-    from crosscheck.references.regenerate import regenerate as make_again  # it loads SciPy
+    from crosscheck.references.regenerate import regenerate as make_again
+    from crosscheck.terminal.live import LiveProgress
 
     check_limit(time_limit)
     good = True

@@ -5,7 +5,7 @@ from __future__ import annotations
 import webbrowser
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -32,21 +32,14 @@ from crosscheck.cli.common import (
     sole_writer,
     verbosity,
 )
-from crosscheck.judging.accept import NotAccepted, accept_figures
-from crosscheck.judging.outcome import SessionOutcome
-from crosscheck.library import find
-from crosscheck.library.reference import has_reference
-from crosscheck.library.selection import without_part
-from crosscheck.records.session import last_session, standing
-from crosscheck.report import mark_unfinished, write_all
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
-from crosscheck.running.sweep import sweep
-from crosscheck.sealed.seal import FILE
-from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
-from crosscheck.terminal.verdicts import print_outcome
+
+if TYPE_CHECKING:
+    from crosscheck.judging.outcome import SessionOutcome
+    from crosscheck.library.find import Case
 
 
 @app.command()
@@ -102,6 +95,13 @@ def run(
     `crosscheck run all -e mycode --alone --out results` · `crosscheck run ./my_case --accept` ·
     `crosscheck run all --strict --time-limit 600`
     """
+    from crosscheck.library.selection import without_part
+    from crosscheck.records.session import last_session
+    from crosscheck.report import mark_unfinished, write_all
+    from crosscheck.running.sweep import sweep
+    from crosscheck.sealed.seal import FILE
+    from crosscheck.terminal.live import LiveProgress
+
     check_limit(time_limit)
     shown = verbosity(quiet, verbose)
     chosen = found(tuple(cases))
@@ -139,6 +139,10 @@ def report(
 
     **Exit code** as of `run`.
     """
+    from crosscheck.records.session import standing
+    from crosscheck.report import write_all
+    from crosscheck.sealed.seal import FILE
+
     if not records.is_file():
         refuse(f"{records} is no file")
     shown = verbosity(quiet, verbose)
@@ -147,8 +151,10 @@ def report(
     _conclude(outcome, page, shown, results=out / FILE if as_json else None, open_report=open_report)
 
 
-def _alone(cases: tuple[find.Case, ...]) -> tuple[find.Case, ...]:
+def _alone(cases: tuple[Case, ...]) -> tuple[Case, ...]:
     """The cases, to be run without partners; those without a stored reference are named and left out."""
+    from crosscheck.library.reference import has_reference
+
     without = [case.name for case in cases if case.run.reference is None or not has_reference(case.folder)]
     if len(without) == len(cases):
         refuse(f"no stored reference: {', '.join(without)}. `crosscheck regenerate` makes them; or leave --alone out")
@@ -157,8 +163,10 @@ def _alone(cases: tuple[find.Case, ...]) -> tuple[find.Case, ...]:
     return tuple(replace(case, alone=True) for case in cases if case.name not in without)
 
 
-def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:
+def _accept(cases: tuple[Case, ...], records: Path, partial: bool) -> bool:
     """Write the figures that the cases have reached beside their run files, or say why not; whether it was done."""
+    from crosscheck.judging.accept import NotAccepted, accept_figures
+
     try:
         for file, count in accept_figures(cases, records, partial):
             console.print(words(f"{count} figures accepted: review {file}"), soft_wrap=True)
@@ -173,6 +181,8 @@ def _conclude(
     failed: bool = False,
 ) -> None:  # fmt: skip
     """Show what came out, print the file of `results` if one is given, leave with the exit code: 1 if it `failed`."""
+    from crosscheck.terminal.verdicts import print_outcome
+
     code = print_outcome(console, outcome, shown)
     if shown is not Verbosity.QUIET:
         console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)

@@ -21,7 +21,6 @@ from crosscheck.cli.common import (
 )
 from crosscheck.running.scheduler import TIME_LIMIT_S, Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
-from crosscheck.terminal.listings import maps_table
 from flexmb.scene.problems import closest
 
 
@@ -57,7 +56,8 @@ def stability(
     """
     from crosscheck.stability.run import PROVIDER, maps_of
     from crosscheck.stability.verdict_file import VERDICTS
-    from crosscheck.terminal.map_runs import run_and_draw  # they load the compiler
+    from crosscheck.terminal.listings import maps_table
+    from crosscheck.terminal.map_runs import run_and_draw
 
     check_limit(time_limit)
     known = maps_of(PROVIDER)

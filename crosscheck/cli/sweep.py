@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
 import typer
 
 from crosscheck.cli.common import (
@@ -21,9 +20,6 @@ from crosscheck.cli.common import (
 )
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
-from crosscheck.sampling.run import SUMMARY, run_sweep
-from crosscheck.sampling.statistics import summarise
-from crosscheck.terminal.sampling import print_summary, sampling_bar
 from crosscheck.terminal.text import words
 from flexmb.output.whole import write_whole
 
@@ -49,6 +45,12 @@ def sweep_parameters(
 
     **Examples**: `crosscheck sweep tolerances.toml` · `crosscheck sweep grid.toml --scheduler tcp://10.0.0.1:8786`
     """
+    import msgspec
+
+    from crosscheck.sampling.run import SUMMARY, run_sweep
+    from crosscheck.sampling.statistics import summarise
+    from crosscheck.terminal.sampling import print_summary, sampling_bar
+
     check_limit(time_limit)
     with sole_writer(out):
         runs_on = scheduler_at(scheduler)

@@ -9,10 +9,7 @@ import typer
 
 from crosscheck.cli.common import CaseWord, Json, NoUserCode, SchedulerAddress, app, console, found, in_one_line, refuse
 from crosscheck.running.schedulers import LOCAL, scheduler_at
-from crosscheck.terminal.csv_channels import channels_table
 from crosscheck.terminal.text import words
-from crosscheck.terminal.verdicts import print_outcome
-from crosscheck.verify.against_case import outcome_json, sample_times_csv, verify_csv
 from flexmb.output.whole import write_whole
 
 
@@ -56,6 +53,10 @@ def verify(
 
     **Exit code**: 0 every channel in the file agrees; 1 some do not; 2 the file cannot be compared.
     """
+    from crosscheck.terminal.csv_channels import channels_table
+    from crosscheck.terminal.verdicts import print_outcome
+    from crosscheck.verify.against_case import outcome_json, sample_times_csv, verify_csv
+
     with in_one_line():
         cases = found((case,))
         if len(cases) > 1:

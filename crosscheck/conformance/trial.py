@@ -16,6 +16,7 @@ from typing import Literal, NamedTuple
 
 from crosscheck.conformance.catalogue import CLAUSES, SHOWN
 from crosscheck.conformance.clause import Clause, ClauseBroken, NotOffered
+from crosscheck.conformance.limit import CLAUSE_LIMIT_S
 from crosscheck.engines.answers import BrokenContract, clean
 from crosscheck.engines.contract import Engine, EngineMissing
 from crosscheck.running.execute import describe, find_engine
@@ -25,7 +26,6 @@ from crosscheck.running.worker import SPAWN, Method
 
 FORKED: Method = "forkserver"
 IMPORTED = ("crosscheck.conformance.trial", "crosscheck.engines.native")  # before the processes of clauses are forked
-CLAUSE_LIMIT_S = 180.0  # an engine may have to compile at its first clause
 
 ClauseStatus = Literal["holds", "broken", "not offered", "missing"]
 

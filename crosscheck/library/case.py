@@ -111,6 +111,7 @@ from typing import Literal
 
 import msgspec
 
+from crosscheck.library.case_error import CaseError
 from crosscheck.library.recipe import EffortLadder, ReferenceRecipe
 from flexmb.scene.schema import Level
 
@@ -142,10 +143,6 @@ FAMILIES: dict[str, Family] = {
     "independent codes": "agreed",
 }
 Quantity = Literal["energy", "linear_momentum", "angular_momentum"]
-
-
-class CaseError(ValueError):
-    """A case folder that cannot be run: the message names the file, the place in it and the remedy."""
 
 
 class _CasePart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-from crosscheck.library.case import CaseError
+from crosscheck.library.case_error import CaseError
 
 OURS = ("flexmb", "crosscheck")
 

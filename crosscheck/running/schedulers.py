@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Scheduler
 
 LOCAL = "local"
@@ -14,6 +13,8 @@ def scheduler_at(address: str) -> Scheduler:
     Raises OSError where the cluster cannot be used, and ValueError where Dask is not installed; both say what to do.
     """
     if address == LOCAL:
+        from crosscheck.running.pool import run_jobs  # command lines take their default from this file
+
         return run_jobs
     try:
         from crosscheck.running.dask_cluster import DaskCluster

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
-from crosscheck.library.find import Case
-from crosscheck.running.installed import EngineState
-from crosscheck.stability.map import StabilityMap
 from crosscheck.terminal.text import words
 from flexmb.output.listing import Listing, figures, names, prose
+
+if TYPE_CHECKING:  # a table of one kind needs not what the others are of
+    from crosscheck.library.find import Case
+    from crosscheck.running.installed import EngineState
+    from crosscheck.stability.map import StabilityMap
 
 
 def cases_table(cases: Iterable[Case]) -> Listing:

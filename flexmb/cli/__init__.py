@@ -1,4 +1,7 @@
-"""The command `flexmb`: thin, it only reads words and shows results."""
+"""The command `flexmb`: thin, it only reads words and shows results.
+
+What a command does is imported when it runs: `--help`, completion and a mistyped word load neither scenes nor NumPy.
+"""
 
 from __future__ import annotations
 

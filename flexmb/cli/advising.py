@@ -10,7 +10,6 @@ from rich.text import Text
 
 from flexmb.cli.terminal import EXIT_STOPPED, NoUserCode, SceneFile, console, no_traceback
 from flexmb.output.writing import check_folder, folder
-from flexmb.scene.files import load_scene, save_scene
 
 
 def advise(
@@ -47,6 +46,7 @@ def advise(
     with no_traceback():
         from flexmb.advisor.advice import advise as search
         from flexmb.advisor.advice_tables import advice_tables
+        from flexmb.scene.files import load_scene, save_scene
 
         loaded = load_scene(scene)
         check_folder(out.parent)

@@ -9,8 +9,6 @@ import typer
 
 from flexmb.cli.terminal import NoUserCode, SceneFile, console, no_traceback, vector
 from flexmb.output.writing import check_folder
-from flexmb.scene.check import check_and_warn
-from flexmb.scene.files import load_scene
 
 
 def equivalence(
@@ -53,6 +51,8 @@ def equivalence(
         from flexmb.frisch.equivalence.comparison import equivalence as compare
         from flexmb.frisch.equivalence.equivalence_picture import write_equivalence_plot
         from flexmb.frisch.equivalence.equivalence_tables import equivalence_tables
+        from flexmb.scene.check import check_and_warn
+        from flexmb.scene.files import load_scene
 
         loaded = load_scene(scene)
         check_and_warn(loaded)

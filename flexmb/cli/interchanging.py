@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 from rich.text import Text
 
 from flexmb.cli.terminal import NoUserCode, SceneFile, console, errors, no_traceback
 from flexmb.output.printable import printable
 from flexmb.output.writing import check_folder, folder
-from flexmb.scene.bodies import BeamBody, ModalBody, SidBody
-from flexmb.scene.build import SceneBuilder
-from flexmb.scene.files import load_scene, save_scene
-from flexmb.scene.schema import Scene
+
+if TYPE_CHECKING:
+    from flexmb.scene.schema import ModalBody, Scene, SidBody
 
 SID = (".sid", ".sid_fem")
 Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.", show_default=False)]
@@ -65,7 +63,9 @@ def export(
     """
     with no_traceback():
         from flexmb.interchange.sid import sid_of, with_sid_bodies, write_sid
+        from flexmb.scene.bodies import BeamBody, ModalBody
         from flexmb.scene.check import check_and_warn
+        from flexmb.scene.files import load_scene
 
         loaded = load_scene(scene)
         check_and_warn(loaded)
@@ -107,6 +107,8 @@ def reduce(
     **Exit code**: 0 written, 2 the matrices are not those of a free structure, or do not fit the nodes.
     """
     with no_traceback():
+        import numpy as np
+
         from flexmb.interchange.sid import sid_of, write_sid
         from flexmb.interchange.superelement import read_super_element, reduced
 
@@ -157,12 +159,17 @@ def _imported(model: Path, free_base: bool, repair: bool) -> tuple[Scene, tuple[
 
 def _held(body: ModalBody | SidBody) -> Scene:
     """The body welded to the ground at its first node."""
+    from flexmb.scene.bodies import ModalBody
+    from flexmb.scene.build import SceneBuilder
+
     assert isinstance(body, ModalBody)
     node = body.nodes[0].name if body.nodes else "origin"
     return SceneBuilder(body.name).add(body).weld("base", "ground", body.name, child_node=node).scene()
 
 
 def _write(scene: Scene, out: Path, notes: tuple[str, ...]) -> None:
+    from flexmb.scene.files import save_scene
+
     _tell(notes)
     folder(out.parent)
     save_scene(scene, out)

@@ -11,8 +11,6 @@ from rich.text import Text
 from flexmb.cli.terminal import EXIT_STOPPED, NoUserCode, SceneFile, console, errors, no_traceback, range_of
 from flexmb.output.printable import printable
 from flexmb.output.writing import check_folder
-from flexmb.scene.bodies import BeamBody
-from flexmb.scene.files import load_scene
 
 if TYPE_CHECKING:
     from flexmb.linear.linear_model import LinearModel
@@ -62,6 +60,8 @@ def linearize(
         from flexmb.linear.linearize import linearize as linearized
         from flexmb.linear.spin import steady_spin
         from flexmb.linear.truncation import truncation
+        from flexmb.scene.bodies import BeamBody
+        from flexmb.scene.files import load_scene
         from flexmb.system.compile import compile
         from flexmb.system.tree_system import System
 
@@ -124,6 +124,7 @@ def campbell(
         from flexmb.linear.campbell_picture import write_campbell_plot
         from flexmb.linear.equilibrium import EquilibriumError
         from flexmb.linear.linear_tables import campbell_table
+        from flexmb.scene.files import load_scene
 
         loaded, values = load_scene(scene), range_of("rates", rates)
         for file in (picture, *([] if csv is None else [csv])):

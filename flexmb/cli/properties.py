@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from flexmb.cli.terminal import NoUserCode, SceneFile, console, no_traceback
 from flexmb.output.listing import Listing, figures, names, prose
-from flexmb.scene.files import load_scene
 
 if TYPE_CHECKING:
     from flexmb.system.mass_properties import MassProperties
@@ -36,6 +34,7 @@ def mass(
     **Exit code**: 0 printed, 2 the scene is wrong, or has no such body.
     """
     with no_traceback():
+        from flexmb.scene.files import load_scene
         from flexmb.system.compile import compile
 
         system = compile(load_scene(scene))
@@ -54,7 +53,7 @@ def _table(scene: str, rows: list[tuple[str, MassProperties]]) -> Listing:
     table = Listing(*columns, title=f"\nMass properties of {scene}", caption=_AXES)
     for name, found in rows:
         J = found.inertia_in_body
-        six = [*np.diag(J), J[0, 1], J[0, 2], J[1, 2]]
+        six = [*J.diagonal(), J[0, 1], J[0, 2], J[1, 2]]
         table.add(name, f"{found.mass:.6g}", _numbers(found.centre_in_body), _numbers(six))
     return table
 

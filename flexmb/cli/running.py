@@ -14,13 +14,10 @@ from flexmb.cli import run_options as o
 from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, NoUserCode, SceneFile, Strict, console, no_traceback
 from flexmb.output.whole import whole_file
 from flexmb.output.writing import check_folder, folder
-from flexmb.scene.bodies import BeamBody
-from flexmb.scene.files import load_scene
-from flexmb.scene.schema import Scene
-from flexmb.scene.values import parsed
 
 if TYPE_CHECKING:
     from flexmb.run.trajectory import Trajectory
+    from flexmb.scene.schema import Scene
 
 FORMATS = {"npz": "to_npz", "parquet": "to_parquet", "rrd": "to_rerun"}
 """Endings, and the methods of a trajectory that write them."""
@@ -77,6 +74,8 @@ def simulate(
         from flexmb.run.section_table import write_sections
         from flexmb.run.simulate import simulate as run  # after the words are understood: it loads the compiler
         from flexmb.run.summary import errors_table, summary
+        from flexmb.scene.files import load_scene
+        from flexmb.scene.values import parsed
 
         check_folder(out)
         strange = [word for word in also or () if word not in FORMATS]
@@ -130,6 +129,8 @@ def _written(trajectory: Trajectory, out: Path, also: Sequence[str], plots: bool
 
 def _sections(scene: Scene, word: str) -> tuple[str, list[float]]:
     """A beam and positions along it (m), by default equally spaced ones; ValueError where there is no such beam."""
+    from flexmb.scene.bodies import BeamBody
+
     name, _, places = word.rpartition(":") if ":" in word else (word, "", "")
     beams = {body.name: body for body in scene.bodies if isinstance(body, BeamBody)}
     if word in beams:  # a name may hold a colon

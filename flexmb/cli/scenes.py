@@ -9,9 +9,6 @@ from rich.text import Text
 
 from flexmb.cli.terminal import NoUserCode, SceneFile, Strict, console, no_traceback
 from flexmb.output.printable import printable
-from flexmb.scene.check import check_and_warn
-from flexmb.scene.files import load_scene
-from flexmb.scene.reference import json_schema
 
 End = Annotated[float | None, typer.Option("--t-end", help="Check that profiles cover the run up to here, in s.")]
 
@@ -29,6 +26,9 @@ def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_c
     **Exit code**: 0 sound, 2 wrong, or with `--strict` doubtful.
     """
     with no_traceback(strict):
+        from flexmb.scene.check import check_and_warn
+        from flexmb.scene.files import load_scene
+
         loaded = load_scene(scene)
         check_and_warn(loaded, t_end)
     counts = ", ".join(
@@ -45,4 +45,6 @@ def schema() -> None:
 
         flexmb schema > scene.schema.json
     """
+    from flexmb.scene.reference import json_schema
+
     print(json_schema())

@@ -15,7 +15,7 @@ from rich.text import Text
 from flexmb.output.printable import printable
 from flexmb.output.terminal import Terminal
 from flexmb.output.writing import in_words
-from flexmb.scene.check import SceneError, SceneWarning
+from flexmb.scene.problems import SceneError, SceneWarning
 from flexmb.scene.user_code import forbid_user_code
 
 MOST_STEPS = 10_000  # of a range: each is a steady state that is sought

@@ -24,8 +24,8 @@ WIDE = {"COLUMNS": "200"}
 
 @pytest.fixture
 def runner(monkeypatch: pytest.MonkeyPatch) -> CliRunner:
-    monkeypatch.setattr(cli.run, "sweep", functools.partial(sweep, provider=PROVIDER))
-    monkeypatch.setattr(cli.verify, "verify_csv", functools.partial(verify_csv, provider=PROVIDER))
+    monkeypatch.setattr("crosscheck.running.sweep.sweep", functools.partial(sweep, provider=PROVIDER))
+    monkeypatch.setattr("crosscheck.verify.against_case.verify_csv", functools.partial(verify_csv, provider=PROVIDER))
     monkeypatch.setattr(cli.common.console, "_width", 200)
     return CliRunner()
 
@@ -58,7 +58,7 @@ def test_an_unknown_case_ends_with_two(runner: CliRunner, tmp_path: Path) -> Non
 
 def test_engines_are_listed_with_how_to_install_them(runner: CliRunner, monkeypatch: pytest.MonkeyPatch) -> None:
     states = [EngineState("fine", "1.0", "", "a pendulum"), EngineState("absent", None, "pip install 'flexmb[absent]'")]
-    monkeypatch.setattr(cli.listing, "describe_engines", lambda: states)
+    monkeypatch.setattr("crosscheck.running.installed.describe_engines", lambda: states)
     output = runner.invoke(cli.app, ["engines"], env=WIDE).output
     assert "not installed" in output
     assert "pip install 'flexmb[absent]'" in output

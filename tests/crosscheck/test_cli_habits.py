@@ -71,7 +71,7 @@ def test_lists_are_json_too(runner: CliRunner, monkeypatch: pytest.MonkeyPatch) 
     assert [case["name"] for case in cases] == list(find.shipped_names())
     assert all(case["variants"] and case["title"] for case in cases)
     states = [EngineState("fine", "1.0", "", "a pendulum"), EngineState("absent", None, "pip install it")]
-    monkeypatch.setattr(cli.listing, "describe_engines", lambda: states)
+    monkeypatch.setattr("crosscheck.running.installed.describe_engines", lambda: states)
     found = json.loads(runner.invoke(cli.app, ["engines", "--json"]).stdout)
     assert [each["version"] for each in found] == ["1.0", None]
     assert [each["problem"] for each in found] == ["", "not installed"]
@@ -126,7 +126,7 @@ def test_compare_says_what_became_worse(runner: CliRunner, records: Path, tmp_pa
 
 
 def test_run_writes_what_can_be_compared(runner: CliRunner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cli.run, "sweep", functools.partial(sweep_here, provider=PROVIDER))
+    monkeypatch.setattr("crosscheck.running.sweep.sweep", functools.partial(sweep_here, provider=PROVIDER))
     result = runner.invoke(cli.app, ["run", str(CASE), "--out", str(tmp_path), "--quiet"])
     assert (result.exit_code, result.stdout) == (0, "All 15 verdicts are as expected\n")
     assert read_results(tmp_path / "results.json").exit_code == 0

@@ -113,7 +113,7 @@ def green(tmp_path: Path) -> Path:
 
 
 def test_a_session_says_unfinished_before_it_touches_the_records(green: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cli.run, "sweep", killed)
+    monkeypatch.setattr("crosscheck.running.sweep.sweep", killed)
     with pytest.raises(Killed):
         CliRunner().invoke(cli.app, ["run", str(CASE), "--out", str(green), "--fresh"], catch_exceptions=False)
     says_unfinished(green)

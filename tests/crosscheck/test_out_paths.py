@@ -34,7 +34,7 @@ FILES = ("advise", "campbell")  # these write one file, whose folder is asked fo
 
 @pytest.fixture
 def runner(monkeypatch: pytest.MonkeyPatch) -> CliRunner:
-    monkeypatch.setattr(cli.run, "sweep", functools.partial(sweep, provider=PROVIDER))
+    monkeypatch.setattr("crosscheck.running.sweep.sweep", functools.partial(sweep, provider=PROVIDER))
     return CliRunner()
 
 

@@ -1,7 +1,7 @@
-"""How long a newcomer waits: the README's example and the canonical cases, in processes of their own.
+"""How long a newcomer waits: the README's example, the canonical cases, whatever starts; in processes of their own.
 
-The example is judged by its processor time, which is what it takes on the wall where nobody else is at work; the
-canonical cases, whose work is spread over processes, by the wall.
+All are judged by their processor time, which is what they take on the wall where nobody else is at work, but for the
+canonical cases, whose work is spread over processes, by the wall. What a start loads is held by tests/repo/test_starts.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from tests.repo.project import ROOT
 
 GROUP = "Start"
 COLD_ROUNDS, WARM_ROUNDS = 2, 5
+SHORT_ROUNDS = 15  # of a fraction of a second each
 
 
 class Spent(NamedTuple):
@@ -38,6 +39,15 @@ def rows() -> list[Row]:
         Row("readme_cold", GROUP, "README's first example, cold", 15.0, partial(_readme, True), "at most", "s"),
         Row("readme_warm", GROUP, "README's first example, warm", 1.2, partial(_readme, False), "at most", "s"),
         Row("canonical_cold", GROUP, "crosscheck run canonical, cold", 300.0, _canonical, "at most", "s"),
+        *(
+            Row(name, GROUP, what, goal, partial(_start, code, *words), "at most", "s")
+            for name, what, goal, code, *words in (
+                ("import_flexmb", "import flexmb", 0.25, "import flexmb"),
+                ("flexmb_help", "flexmb --help", 0.3, "from flexmb.cli import main; main()", "--help"),
+                ("crosscheck_help", "crosscheck --help", 0.3, "from crosscheck.__main__ import main; main()", "--help"),
+            )
+        ),
+        Row("plug_in", GROUP, "pytest session, what the plug-in adds where nobody asks", 0.1, _plug_in, "at most", "s"),
     ]
 
 
@@ -61,6 +71,34 @@ def _canonical() -> Measured:
         spent = run(crosscheck(Path(folder) / "out"), Path(folder) / "kernels")
     detail = f"on the wall; {spent.processor:.3g} s of {os.cpu_count()} processors"
     return Measured(spent.wall, spent.wall, spent.wall, detail)
+
+
+def _start(code: str, *words: str) -> Measured:
+    """Python's own start included, and the bytecode there."""
+    command = [sys.executable, "-c", code, *words]
+    run(command)
+    spent = [run(command) for _ in range(SHORT_ROUNDS)]
+    seconds = [each.processor for each in spent]
+    wall = f"processor time; {median(each.wall for each in spent):.3g} s on the wall"
+    return Measured(median(seconds), min(seconds), max(seconds), wall)
+
+
+def _plug_in() -> Measured:
+    """Sessions of one empty test with the plug-in, less those without, in turns; no other plug-in takes part."""
+    with tempfile.TemporaryDirectory() as folder:
+        test, configuration = Path(folder) / "test_theirs.py", Path(folder) / "pytest.ini"
+        test.write_text("def test_theirs():\n    pass\n", encoding="utf-8")
+        configuration.write_text("[pytest]\n", encoding="utf-8")
+        session = [sys.executable, "-m", "pytest", "-c", str(configuration), "--rootdir", folder, str(test)]
+
+        def seconds(*words: str) -> float:
+            return run([*session, *words], PYTEST_DISABLE_PLUGIN_AUTOLOAD="1", PYTEST_ADDOPTS="").processor
+
+        seconds("-p", "crosscheck.pytest_plugin")
+        pairs = [(seconds("-p", "crosscheck.pytest_plugin"), seconds()) for _ in range(SHORT_ROUNDS)]
+    more = [with_it - without for with_it, without in pairs]
+    sessions = " against ".join(f"{median(times):.3g} s" for times in zip(*pairs, strict=True))
+    return Measured(median(more), min(more), max(more), f"processor time; {sessions}")
 
 
 def crosscheck(out: Path, *options: str) -> Sequence[str]:

@@ -73,7 +73,8 @@ class Ran:
             inner.syspath_prepend(plugs)
             inner.setenv("CHILDREN", str(folder / "children"))
             if limits:
-                inner.setattr(cli.run, "sweep", lambda *words, **more: sweep(*words, **(more | {"limits": limits})))
+                few = {"limits": limits}
+                inner.setattr("crosscheck.running.sweep.sweep", lambda *words, **more: sweep(*words, **(more | few)))
             result = CliRunner().invoke(cli.app, ["run", str(case), "--out", str(folder / "out"), "--jobs", "2"])
         assert result.exception is None or isinstance(result.exception, SystemExit), result.output
         self.code, self.folder = result.exit_code, folder
@@ -106,7 +107,7 @@ def here(function: Callable[..., None], jobs: Sequence[Any], *_: object) -> Iter
 def mild(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
     """What does no harm to its process, all in this one, which is quicker."""
     with patch.context() as inner:
-        inner.setattr("crosscheck.running.schedulers.run_jobs", here)
+        inner.setattr(cli.run, "scheduler_at", lambda address: here)
         return Ran(tmp_path_factory.mktemp("mild"), MILD, inner)
 
 

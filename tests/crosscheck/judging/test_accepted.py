@@ -277,7 +277,7 @@ def test_accepting_and_being_strict_on_the_command_line(
     own: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Accept, pass strictly; loosen an effort by three digits, warn, fail strictly; break a thing, accept nothing."""
-    monkeypatch.setattr(cli.run, "sweep", functools.partial(sweep, provider=PROVIDER))
+    monkeypatch.setattr("crosscheck.running.sweep.sweep", functools.partial(sweep, provider=PROVIDER))
     monkeypatch.setattr(cli.common.console, "_width", 200)
     folder = copy_case(tmp_path)
     file, run = folder / "accepted.toml", folder / "run.toml"

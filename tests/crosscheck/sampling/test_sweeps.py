@@ -219,9 +219,8 @@ def test_a_count_takes_whole_numbers_in_every_sample(tmp_path: Path) -> None:
 
 def test_the_command_says_what_came_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     quick = functools.partial(run_sweep, provider=PROVIDER)
-    monkeypatch.setattr(
-        cli.sweep, "run_sweep", lambda *words, **more: quick(*words, **(more | {"scheduler": here_and_backwards}))
-    )
+    backwards = {"scheduler": here_and_backwards}
+    monkeypatch.setattr("crosscheck.sampling.run.run_sweep", lambda *words, **more: quick(*words, **(more | backwards)))
     out = tmp_path / "out"
     good = CliRunner().invoke(cli.app, ["sweep", str(write(tmp_path, "fine")), "--out", str(out)])
     assert good.exit_code == 0 and "6 samples: 6 finished" in good.output, good.output
