@@ -14,11 +14,11 @@ from crosscheck.library.case import TAKES_APART, ComparisonSide, Control, Mutati
 from crosscheck.library.find import Case
 from crosscheck.library.mutations import CATALOGUE, applicable, mutate
 from crosscheck.running.plan import at_level, variant_scene
-from flexmb.run.warm_up import general_kernels
 from flexmb.scene.bodies import BeamBody, ModalBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
+from flexmb.tables.features import asking
 
 OF_THE_START: tuple[MutationKind, ...] = ("initial_place", "initial_unit", "initial_rate", "initial_speed_sign")
 SAME = 1e-12  # of the largest coordinate or speed: what projections leave
@@ -89,7 +89,7 @@ def _no_mutant(scene: Scene, kind: MutationKind, target: str, true: Scene, what:
 
 def _begin_alike(one: Scene, other: Scene) -> bool:
     """Whether two closed chains that differ in the values which they start from begin in the same state."""
-    with general_kernels():
+    with asking("general"):
         try:
             a, b = (compile(scene).initial_state for scene in (one, other))
         except (ValueError, NotImplementedError):  # the engine will say why

@@ -24,6 +24,7 @@ from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.tree import GROUND
 from flexmb.tables import arrays as a
+from flexmb.tables.features import as_asked
 from flexmb.tables.functions import pack
 
 DOUBTFUL = 2.0**-33  # of all that a speed moves: chains of hundreds of bodies yield no less than this
@@ -167,6 +168,7 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
         speed=speed,
         function=function,
         table=table,
+        kernels=as_asked(),
         **connected,
         **inertia,
         **points,

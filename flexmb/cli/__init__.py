@@ -11,6 +11,7 @@ import typer
 
 from flexmb.cli.advising import advise
 from flexmb.cli.appendages import equivalence
+from flexmb.cli.compiling import warmup
 from flexmb.cli.interchanging import export, import_, reduce
 from flexmb.cli.linearising import campbell, linearize
 from flexmb.cli.properties import mass
@@ -50,7 +51,7 @@ def everything(
     """Has no words of its own: the application's help stands above."""
 
 
-for command in (simulate, check, mass, equivalence, advise, linearize, campbell, export, reduce, schema):
+for command in (simulate, check, mass, equivalence, advise, linearize, campbell, export, reduce, schema, warmup):
     app.command()(command)
 app.command("import")(import_)  # as a function it cannot have this name
 

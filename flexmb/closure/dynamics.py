@@ -7,7 +7,7 @@ from flexmb.closure.rows import load_on_b
 from flexmb.closure.sizes import measure_ports
 from flexmb.entry.articulated import world_loads
 from flexmb.jain.balance import power
-from flexmb.jit.kernel import kernel
+from flexmb.jit.kernel import kernel, written_out
 from flexmb.motion.coordinates import load_state, store_slope
 from flexmb.spatial.vector import mat3, store3, times
 from flexmb.tables.status import OK
@@ -21,6 +21,12 @@ def rhs(t, y, dy, s, _):
 
     A closed chain is constants and workspace in one: it is passed as both.
     """
+    return slope(t, y, dy, s)
+
+
+@written_out
+def slope(t, y, dy, s):
+    """The same within other kernels."""
     c, w, cw = s.c, s.w, s.cw
     if cw.failure[0] != OK and t >= cw.time[1]:  # earlier: a step is tried again, shorter
         w.fault[0] = cw.failure[1]

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.closure.dynamics import rhs
+from flexmb.closure.dynamics import slope
 from flexmb.closure.factor import solve
 from flexmb.closure.tables import ClosureConstants
 from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace, evaluate
@@ -54,7 +54,7 @@ def jacobian(t, y, J, s, x):
     Of the rows that s has chosen. Columns and rows of prescribed coordinates and speeds vanish.
     """
     n, columns, w, cw = y.shape[0], x.w.column.shape[0], x.w, x.cw
-    status = rhs(t, y, x.slope, s, s)
+    status = slope(t, y, x.slope, s)
     w.time[0] = t
     for i in range(n):
         w.state[i] = y[i]
@@ -101,4 +101,4 @@ def _hold_rows(s, cw, lane):
 @kernel
 def move(y, increment, result, s):
     """Coordinates of result = those of y moved for a unit of time at the constant speeds `increment` (nu,)."""
-    retraction.move(y, increment, result, s.c)
+    retraction.move_by(y, increment, result, s.c)

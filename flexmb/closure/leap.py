@@ -37,8 +37,7 @@ from flexmb.integrate.leap import cubic
 from flexmb.integrate.lobatto import EDGE_WEIGHT, INNER, INNER_WEIGHT
 from flexmb.jain.balance import power
 from flexmb.jit.kernel import helper, kernel, sweep
-from flexmb.motion.coordinates import load_state, store_slope
-from flexmb.motion.coordinates import project as project_tree
+from flexmb.motion.coordinates import load_state, put_back, store_slope
 from flexmb.tables.status import CLOSURE_SINGULAR, OK
 
 # Sizes of the mechanism to a singular position from where a leap goes: the error above.
@@ -110,7 +109,7 @@ def beside(t, y, dy, s):
 @sweep
 def _slope(t, y, dy, s):
     """dy at y once it is closed to rounding; a status code, and what is left in R, loads and Q belongs to y."""
-    project_tree(t, y, s.c)
+    put_back(t, y, s.c)
     status = _tree(t, y, s)
     if status != OK:
         return status
@@ -152,7 +151,7 @@ def _length(t, end, y, dy, trial, s):
     _keep_demands(0, cc, cw)
     for i in range(y.shape[0]):
         trial[i] = y[i] + probe * dy[i]
-    project_tree(t + probe, trial, s.c)
+    put_back(t + probe, trial, s.c)
     if _tree(t + probe, trial, s) != OK:
         return 0.0
     last, too_near = _vanish(probe, cc, cw)

@@ -11,8 +11,7 @@ from flexmb.closure.factor import solve, sum_rows
 from flexmb.closure.forces import choose, factorised, free_tree, locate, on_branch, respond
 from flexmb.closure.rows import fastest_opening, largest_gap
 from flexmb.jit.kernel import helper
-from flexmb.motion.coordinates import configuration_rate, load_state, normalise_quaternions
-from flexmb.motion.coordinates import project as project_tree
+from flexmb.motion.coordinates import configuration_rate, load_state, normalise_quaternions, put_back
 from flexmb.tables.status import CLOSURE_OPEN, OK
 
 CLOSED = 2.0**-44  # a closed row's value in the size of its closure: 5.7e-14, two hundred roundings
@@ -26,7 +25,7 @@ REPEATS = 6
 @helper
 def project_closed(t, y, s):
     """Put y on the manifold of the closures, in place; what prevents it is left in cw.failure."""
-    project_tree(t, y, s.c)
+    put_back(t, y, s.c)
     s.cw.failure[0] = OK
     status = _project(t, y, s)
     if status != OK:

@@ -5,7 +5,7 @@ from flexmb.jain.balance import power
 from flexmb.jain.kinematics import pose_sweep
 from flexmb.jain.loads import drive_loads
 from flexmb.jain.sweeps import forward_dynamics
-from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.motion.coordinates import load_state, store_slope
 from flexmb.spatial.spatial_vector import store6, times6, vec6
 from flexmb.spatial.vector import mat3
@@ -15,6 +15,12 @@ from flexmb.tables.status import OK
 @kernel
 def rhs(t, y, dy, c, w):
     """dy/dt of y = [q, u, work] at time t; returns a status code. `work` collects the non-conservative power."""
+    return slope(t, y, dy, c, w)
+
+
+@written_out
+def slope(t, y, dy, c, w):
+    """The same within other kernels."""
     load_state(t, y, c, w)
     status = forward_dynamics(c, w)
     if status != OK:

@@ -25,7 +25,7 @@ DOUBTFUL = -1  # a status: among the copies of a block one met a pivot that may 
 @kernel
 def rhs(s, c, w):
     """Slopes (n,) of the states s.trial (n,) at the times s.time; returns a status code of all copies."""
-    return articulated.rhs(s.time[0], s.trial, s.k[s.stage[0]], c, w)
+    return articulated.slope(s.time[0], s.trial, s.k[s.stage[0]], c, w)
 
 
 @bundle
@@ -120,7 +120,7 @@ def _scatter(first, copies, lanes, rows):
 @kernel
 def project(s, c):
     """Put the states s.trial (n,) back on the manifold at the times s.time."""
-    coordinates.project(s.time[0], s.trial, c)
+    coordinates.put_back(s.time[0], s.trial, c)
 
 
 @kernel

@@ -6,7 +6,7 @@ markers are found and the others zero, then `drives`.
 
 from __future__ import annotations
 
-from flexmb.entry.articulated import rhs, world_loads
+from flexmb.entry.articulated import slope, world_loads
 from flexmb.entry.observation import Outputs, observe_marker, places
 from flexmb.jain.accelerations import acceleration_sweep
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
@@ -58,7 +58,7 @@ def observed_jacobian(t, y, J, c, w, out):
         for lane in range(count):
             j = w.column[first + lane]
             w.state[j] = seeded(w.state[j], lane)
-        status = rhs(w.time[0], w.state, w.slope, c, w)
+        status = slope(w.time[0], w.state, w.slope, c, w)
         if status == OK:
             sense(c, w, out)
         for lane in range(count):

@@ -16,7 +16,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from flexmb.entry.articulated import rhs
+from flexmb.entry.articulated import slope
 from flexmb.jit.bundle import bundle
 from flexmb.jit.duals import DUAL, rate, seeded
 from flexmb.jit.kernel import kernel
@@ -65,14 +65,12 @@ def jacobian(t, y, J, c, w):
         w.state[i] = y[i]
         for j in range(n):
             J[i, j] = 0.0
-    if columns == 0:
-        return rhs(w.time[0], w.state, w.slope, c, w)
-    for first in range(0, columns, LANES):
+    for first in range(0, max(columns, 1), LANES):  # once, for its status, where there is no column
         count = min(LANES, columns - first)
         for lane in range(count):
             j = w.column[first + lane]
             w.state[j] = seeded(w.state[j], lane)
-        status = rhs(w.time[0], w.state, w.slope, c, w)
+        status = slope(w.time[0], w.state, w.slope, c, w)
         for lane in range(count):
             j = w.column[first + lane]
             w.state[j] = y[j]
@@ -90,7 +88,7 @@ def time_derivative(t, y, out, c, w):
     w.time[0] = seeded(w.time[0], 0)
     for i in range(y.shape[0]):
         w.state[i] = y[i]
-    status = rhs(w.time[0], w.state, w.slope, c, w)
+    status = slope(w.time[0], w.state, w.slope, c, w)
     for i in range(y.shape[0]):
         out[i] = rate(w.slope[i], 0)
     return status

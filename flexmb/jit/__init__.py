@@ -16,6 +16,10 @@ prefetch.py     records asked for ahead of their turn, in sweeps over many bodie
 objects.py      kernels as functions of the interpreter: what they read of Python's objects
 parts.py        helpers are compiled into their callers only
 cache.py        compiled kernels on disk
+stored.py       a compiled kernel as bytes
+processors.py   which processors a kernel runs on
+warmed.py       special kernels that were compiled ahead
+installed.py    kernels that came with the installation, and whether they fit
 fingerprint.py  the key of a compiled kernel: the code that it reaches
 folder.py       where compiled kernels are kept, and for how long
 once.py         of many processes, one compiles a kernel

@@ -5,6 +5,9 @@ And its index gives two processes that compile one kernel at once, for different
 named after all that its contents depend on, appears at once, and begins with their digest. What does not match it is
 deleted and compiled anew, with one warning.
 
+Two folders are looked into: the user's own, where what is compiled here is kept, and that of the installation, with
+kernels that were compiled when flexmb was installed (`flexmb.ready`). Nothing is ever written into the second.
+
 A pendulum's first accelerations, with all imports, take 1 s of processor time where its kernel is found, and 20 s where
 it is compiled.
 """
@@ -13,36 +16,36 @@ from __future__ import annotations
 
 import hashlib
 import os
-import pickle
 import shutil
 import uuid
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import nullcontext, suppress
 from functools import cached_property
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 from numba.core.caching import NullCache
-from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.runtime.nrt import rtsys
-from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 
 from flexmb.jit.collector import no_searches
 from flexmb.jit.fingerprint import fingerprint
 from flexmb.jit.folder import delete_unused, mark_used, warn_once
+from flexmb.jit.installed import installed_directory
 from flexmb.jit.once import compiled_once
+from flexmb.jit.processors import compiled_for, running
 from flexmb.jit.progress import announced
+from flexmb.jit.stored import packed, unpacked
 
 _DIGEST = hashlib.sha256().digest_size
 
 
 class KernelCache(NullCache):
-    """What numba's dispatcher asks for compiled versions of one function, kept in a folder."""
+    """What numba's dispatcher asks for compiled versions of one function; `folder`: where they are kept, if at all."""
 
-    def __init__(self, function: FunctionType, folder: Path) -> None:
+    def __init__(self, function: FunctionType, folder: Path | None) -> None:
         self._folder, self._function = folder, function
 
     @cached_property
@@ -58,7 +61,14 @@ class KernelCache(NullCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The version for a signature, or None where there is none that is sound."""
         rtsys.initialize(target_context)  # no more: numba's registries, which only its compiler needs, take 0.4 s
-        file = self._file(sig, target_context.codegen())
+        for file in self._places(sig, target_context.codegen()):
+            contents = self._contents(file)
+            if contents is not None:
+                return unpacked(target_context, contents)
+        return None
+
+    def _contents(self, file: Path) -> memoryview | None:
+        """What a file holds behind its digest; None where there is none that is sound."""
         try:
             data = file.read_bytes()
         except FileNotFoundError:
@@ -70,7 +80,7 @@ class KernelCache(NullCache):
             self._discard(file)
             return None
         mark_used(file)
-        return CompileResult._rebuild(target_context, *pickle.loads(contents))
+        return contents
 
     def filling(self, kernel: Any) -> Callable[[Any], Any]:
         """What compiles the versions of `kernel`: one that is not on disk by one process, with a line where it is long.
@@ -82,16 +92,19 @@ class KernelCache(NullCache):
         def compile_once(signature: Any) -> Any:
             if tuple(normalize_signature(signature)[0]) in kernel.overloads:
                 return plain(signature)
-            file = self._file(signature, kernel.targetctx.codegen())
-            if file.is_file():
+            codegen = kernel.targetctx.codegen()
+            if any(file.is_file() for file in self._places(signature, codegen)):
                 return plain(signature)
-            with global_compiler_lock, announced(self._function, self._folder), compiled_once(file), no_searches():
+            own = nullcontext() if self._folder is None else compiled_once(self._own(self._folder, signature, codegen))
+            with global_compiler_lock, announced(self._function, self._folder), own, no_searches():
                 return plain(signature)
 
         return compile_once
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a version; a warning where that cannot be done."""
+        if self._folder is None:
+            return
         if data.library.has_dynamic_globals:
             name = f"{self._function.__module__}.{self._function.__qualname__}"
             warn_once(
@@ -100,7 +113,7 @@ class KernelCache(NullCache):
                 "flexmb/jit/kernel.py)"
             )
             return
-        file, contents = self._file(sig, data.codegen), dumps(data._reduce())
+        file, contents = self._own(self._folder, sig, data.codegen), packed(data)
         written = file.with_name(f"{file.name}.{uuid.uuid4().hex[:16]}")
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -117,11 +130,28 @@ class KernelCache(NullCache):
             with suppress(OSError):
                 written.unlink()
 
-    def _file(self, sig: Any, codegen: Any) -> Path:
-        key = repr((self._fingerprint, str(sig), codegen.magic_tuple()))
-        return self._folder / f"{self._function.__name__}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.kernel"
+    def _places(self, sig: Any, codegen: Any) -> Iterator[Path]:
+        """Where the version for a signature may be, the user's own first."""
+        if self._folder is not None:
+            yield self._own(self._folder, sig, codegen)
+        installed = installed_directory()
+        if installed is not None:
+            for processor in running(codegen):
+                yield installed / self._name(sig, processor)
+
+    def _own(self, folder: Path, sig: Any, codegen: Any) -> Path:
+        return folder / self._name(sig, compiled_for(codegen))
+
+    def _name(self, sig: Any, processor: tuple[str, ...]) -> str:
+        key = repr((self._fingerprint, str(sig), processor))
+        return f"{self._function.__name__}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.kernel"
 
     def _discard(self, file: Path) -> None:
+        if file.parent != self._folder:
+            warn_once(
+                f"damaged files in {file.parent}: install flexmb again; their kernels are compiled anew till then"
+            )
+            return
         try:
             if file.is_dir() and not file.is_symlink():
                 shutil.rmtree(file)

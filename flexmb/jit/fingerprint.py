@@ -33,7 +33,8 @@ import numba
 import numpy as np
 
 _BY_VERSION = {"builtins", "math", "cmath", "numpy", "numba"}
-_COMPILE_NOTHING = {"collector", "counting", "folder", "once", "progress"}  # modules of this room
+# Modules of this room.
+_COMPILE_NOTHING = {"collector", "counting", "folder", "installed", "once", "processors", "progress", "warmed"}
 _PLAIN = {type(None), type(...), bool, int, float, complex, str, bytes}
 _KIND = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS | inspect.CO_GENERATOR  # other flags say how the file was compiled
 _CONSTANT, _GLOBAL, _EXTENDED = frozenset(dis.hasconst), dis.opmap["LOAD_GLOBAL"], dis.opmap["EXTENDED_ARG"]
@@ -47,7 +48,7 @@ def fingerprint(kernel: FunctionType) -> str:
     """
     functions = reached(kernel)
     place = {function: i for i, function in enumerate(functions)}
-    digest = hashlib.sha256(_compiler())
+    digest = hashlib.sha256(compiler())
     for function in functions:
         own = _own(function)
         digest.update(own.digest + b"".join(place[called].to_bytes(4) for called in own.refers_to))
@@ -67,7 +68,7 @@ def reached(kernel: FunctionType) -> list[FunctionType]:
 
 
 @cache
-def _compiler() -> bytes:
+def compiler() -> bytes:
     """Digest of what compiles: Python, numba and what it stands on, and the code of this room."""
     versions = sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__
     names = sorted(module.name for module in iter_modules(sys.modules[__package__].__path__))  # in a zip file, too
@@ -233,7 +234,7 @@ def _code_of(module: str) -> CodeType:
     spec = find_spec(module)
     if spec is not None and spec.origin and spec.has_location and Path(spec.origin).suffix == ".py":
         with suppress(OSError):
-            return compile(Path(spec.origin).read_bytes(), spec.origin, "exec", dont_inherit=True)
+            return compile(Path(spec.origin).read_bytes(), spec.origin, "exec", dont_inherit=True, optimize=0)
     code = getattr(spec and spec.loader, "get_code", lambda _: None)(module)
     if not isinstance(code, CodeType):
         raise TypeError(f"the code of {module} cannot be read, and it is part of the key of a compiled kernel")

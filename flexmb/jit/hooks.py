@@ -73,12 +73,8 @@ def _by_internals() -> Hooks:
     from flexmb.jit.parts import KernelCompiler, PartCompiler
 
     def keep(compiled: Any, function: FunctionType) -> None:
-        directory = cache_directory()
-        if directory is None:
-            _compiled_anew(compiled, function)
-        else:
-            compiled._cache = cache = KernelCache(function, directory)
-            compiled.compile = cache.filling(compiled)
+        compiled._cache = cache = KernelCache(function, cache_directory())
+        compiled.compile = cache.filling(compiled)
 
     def address(kernel: Any, signature: Any) -> int:
         return int(CompileResultWAP(kernel.overloads[signature.args]).__wrapper_address__())

@@ -96,11 +96,10 @@ def builtin(address: int, bundle: Any, *held: Any) -> Callable[..., Any]:
     """
     place = bundle._table.view(Anchor)
     place.held = bundle, held
-    if address not in _methods:
-        _methods[address] = _Method(b"evaluator", address, _FAST | _WITH_NAMES, None)
+    method = _methods.setdefault(address, _Method(b"evaluator", address, _FAST | _WITH_NAMES, None))
     make = ctypes.pythonapi.PyCFunction_NewEx
     make.restype, make.argtypes = ctypes.py_object, (ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)
-    function: Callable[..., Any] = make(ctypes.byref(_methods[address]), place, None)
+    function: Callable[..., Any] = make(ctypes.byref(method), place, None)
     return function
 
 

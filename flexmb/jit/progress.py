@@ -18,20 +18,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FunctionType
 
+from flexmb.jit.installed import unfit
+
 AFTER = 2.0  # s
 _LOGGER = logging.getLogger("flexmb.jit")
-_at_it = threading.local()
 _versions = Counter[str]()  # that were announced, by the name of the kernel
 _counting = threading.Lock()
 
 
 @contextmanager
 def announced(function: FunctionType, folder: Path | None) -> Iterator[None]:
-    """Say after a while that a kernel is being compiled; of kernels within kernels the outermost says so."""
-    if getattr(_at_it, "outermost", None) is not None:
-        yield
-        return
-    _at_it.outermost = function
+    """Say after a while that a kernel is being compiled, and why it has to be."""
     timer = threading.Timer(AFTER, _announce, (function, folder))
     timer.daemon = True
     timer.start()
@@ -39,7 +36,6 @@ def announced(function: FunctionType, folder: Path | None) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
-        _at_it.outermost = None
 
 
 def _announce(function: FunctionType, folder: Path | None) -> None:
@@ -50,4 +46,5 @@ def _announce(function: FunctionType, folder: Path | None) -> None:
     purpose = re.split(r"[.;:\n]", (function.__doc__ or "a kernel").strip(), maxsplit=1)[0]
     which = name if version == 1 else f"version {version} of {name}"
     how_often = f"once: it is kept in {folder}" if folder else "in every process: no folder is writable to keep it"
-    _LOGGER.warning("flexmb is compiling %s (%s) for scenes of this kind, %s", which, purpose, how_often)
+    why = f" (no general kernel can be taken: {unfit()})" if unfit() else ""
+    _LOGGER.warning("flexmb is compiling %s (%s) for scenes of this kind, %s%s", which, purpose, how_often, why)

@@ -7,7 +7,7 @@ Both algorithms, Jain's recursion and Frisch's matrices, start here.
 from flexmb.connectors.along_hinges import add_loads_along_hinges, power_along_hinges
 from flexmb.hinges import catalogue
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.jit.lanes import some
 from flexmb.spatial.rotation import rotation_vector
 from flexmb.spatial.scalar import sqrt
@@ -75,6 +75,12 @@ def normalise_quaternions(q, c):
 @kernel
 def project(t, y, c):
     """Put y back on the configuration manifold: unit quaternions, prescribed coordinates and speeds exact."""
+    put_back(t, y, c)
+
+
+@sweep
+def put_back(t, y, c):
+    """The same within other kernels."""
     if has(c, QUATERNIONS):
         normalise_quaternions(y, c)
     if has(c, PRESCRIBED):

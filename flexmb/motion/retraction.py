@@ -2,7 +2,7 @@
 
 from flexmb.hinges import catalogue
 from flexmb.jit.features import has
-from flexmb.jit.kernel import kernel
+from flexmb.jit.kernel import kernel, sweep
 from flexmb.tables.features import QUATERNIONS
 
 
@@ -13,6 +13,12 @@ def move(y, increment, result, c):
     Quaternions turn about carried axes by their exact exponential; the origin of a free hinge, whose velocity is held
     in turning axes, follows its screw motion.
     """
+    move_by(y, increment, result, c)
+
+
+@sweep
+def move_by(y, increment, result, c):
+    """The same within other kernels."""
     for k in range(c.body.shape[0]):
         i, j = c.body[k].q_index, c.body[k].u_index
         if not has(c, QUATERNIONS) or c.body[k].quaternion < 0:

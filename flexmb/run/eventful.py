@@ -34,6 +34,7 @@ from flexmb.scene.tree import watchable
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
+from flexmb.tables.features import asking
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -83,7 +84,8 @@ class EventfulRun:
     ) -> None:  # fmt: skip
         """times (T,) s of the output."""
         scene = with_stops(system.scene)
-        whole = system if scene == system.scene else assembled(scene)
+        with asking(system.kernels):
+            whole = system if scene == system.scene else assembled(scene)
         self._situation = Situation(whole, settings, None if taken_up is None else taken_up.given)
         self._times, self._settings, self._taken_up = times, settings, taken_up
         self._algorithm, self._stabilise = algorithm, stabilise

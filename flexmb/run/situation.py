@@ -20,6 +20,7 @@ from flexmb.scene.tree import Coordinate, rate_name, scalar_paths
 from flexmb.scene.values import changed_at
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
+from flexmb.tables.features import asking
 from flexmb.tables.state import State
 from flexmb.typing import Real
 
@@ -186,7 +187,9 @@ class Situation:
             if system.scene == scene:
                 self.system = system
                 return
-        before, self.system = self.system, assembled(scene)
+        before = self.system
+        with asking(before.kernels):  # those of the whole run
+            self.system = assembled(scene)
         self._built.append(self.system)
         if scene.closures:
             from flexmb.system.closed import ClosedSystem  # a tree needs none of it

@@ -54,10 +54,11 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
         rows.append(("events", _events(trajectory)))
     if len(trajectory.t):
         rows += [("energy drift", _energy(trajectory)), *_momentum(trajectory)]
+    by = "" if trajectory.made_by is None else f", by {trajectory.made_by.system.kernels} kernels"
     return [
         *rows,
         ("steps", steps),
-        ("time", f"{cost.compile_s:.2f} s compile, {cost.run_s:.4f} s run, {cost.output_s:.2f} s output"),
+        ("time", f"{cost.compile_s:.2f} s compile, {cost.run_s:.4f} s run{by}, {cost.output_s:.2f} s output"),
     ]
 
 

@@ -1,16 +1,14 @@
-"""Compile ahead: `python -m flexmb.warmup SCENE` fills the disk cache, so that the first real run starts at once.
+"""Compile ahead: `python -m flexmb.warmup SCENE` makes the special kernels of a scene, which later runs then take.
 
-Kernels are compiled for what a scene contains: those of one scene serve all that contain the same kinds of hinges,
-levels, loads and so on. Without scenes, general kernels are compiled, which contain everything: a process in whose
-environment FLEXMB_KERNELS=general is set runs every scene by them, somewhat slower than by its own. Compiled is what
-`simulate` runs by its defaults; --method, --algorithm and --scene add others.
+They are for what the scene contains: those of one scene serve all that contain the same kinds of hinges, levels, loads
+and so on. Without scenes, general kernels are compiled, which contain everything, where the installation has none.
+Compiled is what `simulate` runs by its defaults; --method, --algorithm and --scene add others.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Literal, get_args
@@ -18,6 +16,7 @@ from typing import Literal, get_args
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.jit.folder import cache_directory
+from flexmb.jit.warmed import note_warm
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.files import load_scene
@@ -28,7 +27,7 @@ from flexmb.system.algorithms import ON_CHAINS, RUNNING, WITH_JACOBIAN
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
-from flexmb.tables.features import GENERAL, KERNELS
+from flexmb.tables.features import asking, contained
 
 Kind = Literal["tree", "condensed", "closed"]
 
@@ -62,7 +61,8 @@ def warm_up(
 ) -> float:
     """Compile, or find compiled, all kernels behind `simulate` and `System`; returns the seconds it took.
 
-    scenes: a scene, for its own kernels; or the name of a kind, for general ones (FLEXMB_KERNELS=general): "tree";
+    scenes: a scene, for its special kernels, which systems of such scenes take from then on unless they are asked not
+    to (`compile`); or the name of a kind, for general ones: "tree";
     "condensed", trees with bodies of so many modes that they are eliminated in condensed form; "closed", scenes with
     closures. Every method is compiled with every algorithm and scene that `simulate` runs it with. Raises ValueError
     for a name that does not exist, and what `compile` raises for a scene.
@@ -76,14 +76,16 @@ def warm_up(
     start = perf_counter()
     for each in scenes:
         if isinstance(each, Scene):
-            _compile(each, "closed" if each.closures else "tree", methods, algorithms)
+            with asking("special"):
+                system = _compile(each, "closed" if each.closures else "tree", methods, algorithms)
+            note_warm(contained(system.constants))
         else:
-            with general_kernels():
+            with asking("general"):
                 _compile(SCENES[each](), each, methods, algorithms)
     return perf_counter() - start
 
 
-def _compile(scene: Scene, kind: Kind, methods: Sequence[Method], algorithms: Sequence[Algorithm]) -> None:
+def _compile(scene: Scene, kind: Kind, methods: Sequence[Method], algorithms: Sequence[Algorithm]) -> System:
     system = compile(scene)
     for algorithm in algorithms:
         for method in methods:
@@ -91,16 +93,7 @@ def _compile(scene: Scene, kind: Kind, methods: Sequence[Method], algorithms: Se
                 step = 1e-3 if INTEGRATORS[method].fixed else None
                 simulate(system, 1e-3, method, samples=2, step=step, algorithm=algorithm)
     _pointwise(system)
-
-
-@contextmanager
-def general_kernels() -> Iterator[None]:
-    """For the tables that this thread makes meanwhile; the environment is that of all threads."""
-    before = KERNELS.set(GENERAL)
-    try:
-        yield
-    finally:
-        KERNELS.reset(before)
+    return system
 
 
 def _runs(kind: Kind, algorithm: Algorithm, method: Method) -> bool:

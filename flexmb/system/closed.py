@@ -32,8 +32,9 @@ from flexmb.system.evaluator import Evaluator
 from flexmb.system.load_axes import Axes
 from flexmb.system.observables import Evaluation
 from flexmb.system.section_loads import AllLoads
-from flexmb.system.tree_system import Given, System
+from flexmb.system.tree_system import Given, System, copied
 from flexmb.tables import arguments
+from flexmb.tables.features import asking
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, finite_result, pack
 from flexmb.tables.status import Status
@@ -70,11 +71,12 @@ class ClosedSystem(System):
 
     def _anew(self) -> ClosedSystem:
         """The same scene turned into other arrays."""
-        return ClosedSystem(self.scene)
+        with asking(self.kernels):
+            return ClosedSystem(self.scene)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As of a tree."""
-        return ClosedSystem, (self.scene,)
+        return copied, (ClosedSystem, self.kernels, self.scene)
 
     @property
     def initial_state(self) -> State:

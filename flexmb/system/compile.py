@@ -11,9 +11,12 @@ from flexmb.scene.garbage import collector_paused
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
+from flexmb.tables.features import Kernels, asking
 
 
-def compile(scene: Scene, elimination: Elimination = "fastest") -> System:  # noqa: A001  (used as flexmb.compile)
+def compile(  # noqa: A001  (used as flexmb.compile)
+    scene: Scene, elimination: Elimination = "fastest", kernels: Kernels | None = None
+) -> System:
     """Check a scene and turn it into arrays.
 
     elimination: how the recursion eliminates the modes of each body, (63) of Jain & Rodriguez: "explicit" factorises
@@ -21,12 +24,21 @@ def compile(scene: Scene, elimination: Elimination = "fastest") -> System:  # no
     All give the same accelerations; "fastest" chooses by body, and `System.elimination` says what was chosen. Scenes
     with closures factorise D_f whatever is asked for.
 
+    kernels: "general" ones take every scene and come with the installation; "special" ones are compiled for the kind of
+    this scene, in seconds, when first needed, are kept on disk, and run faster by a tenth to a third; "auto" takes
+    general ones where they are at hand, unless special ones were compiled ahead (`flexmb warmup SCENE`).
+    None: what the environment variable FLEXMB_KERNELS says, or "auto". `System.kernels` says which it is; results of
+    the two differ by rounding.
+
     SID bodies are read from their files here. Warns (`SceneWarning`) of what is doubtful. Raises SceneError for a scene
-    that is wrong, SidError or OSError for a SID file that cannot be used, ValueError for an elimination that does not
-    exist, NotImplementedError for a scene that is right but needs what is not supported yet.
+    that is wrong, SidError or OSError for a SID file that cannot be used, ValueError for an elimination or kernels that
+    do not exist, NotImplementedError for a scene that is right but needs what is not supported yet.
     """
+    if kernels is not None:
+        arguments.one_of("kernels", kernels, get_args(Kernels))
     check_and_warn(scene)
-    return assembled(scene, elimination)
+    with asking(kernels):
+        return assembled(scene, elimination)
 
 
 def assembled(scene: Scene, elimination: Elimination = "fastest") -> System:

@@ -38,6 +38,7 @@ from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.system.section_loads import AllLoads, SectionBalance, SectionLoads
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
+from flexmb.tables.features import GENERAL, Kernels, asking
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.tables.status import OK, Status
@@ -79,7 +80,13 @@ class System(Mechanics):
 
     def _anew(self) -> System:
         """The same scene turned into other arrays."""
-        return System(self.scene, self._asked)
+        with asking(self.kernels):
+            return System(self.scene, self._asked)
+
+    @property
+    def kernels(self) -> Literal["general", "special"]:
+        """Which kernels run it: those that take every scene, or those compiled for its kind; see `compile`."""
+        return "general" if GENERAL in self.constants.features() else "special"
 
     @per_thread
     def _w(self) -> Workspace:
@@ -107,7 +114,7 @@ class System(Mechanics):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copied and pickled as its scene: addresses are of one process, and arrays are parts of each other."""
-        return System, (self.scene, self._asked)
+        return copied, (System, self.kernels, self.scene, self._asked)
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -411,6 +418,12 @@ class System(Mechanics):
             return {}
         places = ((name, self.speed(name)) for name in names)
         return {name: at.start + np.flatnonzero(driven[at]) for name, at in places if np.any(driven[at])}
+
+
+def copied(kind: type[System], kernels: Kernels, *given: Any) -> System:
+    """What a pickled system becomes again, run by the same kind of kernels."""
+    with asking(kernels):
+        return kind(*given)
 
 
 def _along_hinges(scene: s.Scene) -> Iterator[str]:

@@ -198,6 +198,7 @@ class Constants:
     speed: Record  # (nu,) SPEED
     function: Record  # (F,) FUNCTION
     table: Real  # (T,7) spline pieces: left end of the interval, then six coefficients, highest power first
+    kernels: Index  # (1,) which kernels run them: see `flexmb.tables.features`
 
     def features(self) -> frozenset[str]:
         """What kernels for these constants contain."""

@@ -1,26 +1,35 @@
 """What a scene contains, as names: kernels are compiled for these alone (see `flexmb.jit.features`).
 
-A name stands for code that other scenes do without; that something is there in one body is enough. With the
-environment variable FLEXMB_KERNELS=general kernels contain everything and are compiled once for all scenes: for who
-runs many different ones for a moment each, as a suite of tests does.
+A name stands for code that other scenes do without; that something is there in one body is enough.
+
+General kernels contain everything and serve all scenes. They come with the installation, so that nothing is compiled
+before the first run; special ones, for the features of one scene, are faster by a tenth to a third and take seconds to
+compile. Which of them a scene's tables ask for is decided once, when they are made, and kept in `Constants.kernels`:
+all that is derived from them asks for the same.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from flexmb.jit.features import GENERAL
-from flexmb.typing import Flags, Record
+from flexmb.jit.installed import unfit
+from flexmb.jit.warmed import is_warm
+from flexmb.typing import Flags, Index, Record
 
 if TYPE_CHECKING:
     from flexmb.tables.arrays import Constants
 
-KERNELS: ContextVar[str] = ContextVar("kernels", default="")
-"""What this thread asks for, whatever the environment says; nothing: see there."""
+Kernels = Literal["auto", "general", "special"]
+_VARIABLE = "FLEXMB_KERNELS"  # of the environment: what is asked for where nobody says otherwise
+UNDECIDED, EVERYTHING, ITS_OWN = range(3)  # `Constants.kernels`
+_ASKED: ContextVar[Kernels | None] = ContextVar("kernels", default=None)
 
 HINGE = "hinge"  # "hinge 1": the number of a kind in flexmb.hinges.catalogue
 LEVEL = "level"  # "level 1": the number of a level in flexmb.levels.body
@@ -50,16 +59,51 @@ DAMPERS = "dampers"
 MODAL_DAMPING = "modal damping"
 
 
-def features(c: Constants) -> frozenset[str]:
-    """Of the tables of a scene; GENERAL alone where this thread or the environment asks for it.
+@contextmanager
+def asking(kernels: Kernels | None) -> Iterator[None]:
+    """For the tables that this thread makes meanwhile, whatever the environment says; None: what it says."""
+    before = _ASKED.set(kernels or _ASKED.get())
+    try:
+        yield
+    finally:
+        _ASKED.reset(before)
 
-    Raises ValueError for a value of FLEXMB_KERNELS that means nothing.
+
+def asked() -> Kernels:
+    """What this thread asks for, or the environment; ValueError for a value of FLEXMB_KERNELS that means nothing."""
+    found = _ASKED.get() or os.environ.get(_VARIABLE, "auto")
+    match found:
+        case "auto" | "general" | "special":
+            return found
+        case "exact":  # as it was called before
+            return "special"
+        case _:
+            names = ", ".join(f'"{name}"' for name in get_args(Kernels))
+            raise ValueError(f"{_VARIABLE} is {found!r}: use one of {names}; auto is meant if it is not set")
+
+
+def as_asked() -> Index:
+    """(1,) For new tables: `Constants.kernels` as this thread asks."""
+    return np.array([{"auto": UNDECIDED, "general": EVERYTHING, "special": ITS_OWN}[asked()]])
+
+
+def features(c: Constants) -> frozenset[str]:
+    """What kernels for these tables contain: GENERAL alone, or what is in them.
+
+    Undecided tables are run by general kernels where these came with the installation, unless the special ones were
+    compiled ahead (`flexmb.run.warm_up`); that is noted in them.
     """
-    asked = KERNELS.get() or os.environ.get("FLEXMB_KERNELS", "exact")
-    if asked not in ("exact", GENERAL):
-        raise ValueError(f'FLEXMB_KERNELS is {asked!r}: use "exact", which is meant if it is not set, or "{GENERAL}"')
-    if asked == GENERAL:
+    if c.kernels[0] == EVERYTHING:
         return frozenset({GENERAL})
+    found = contained(c)
+    if c.kernels[0] == UNDECIDED:
+        c.kernels[0] = ITS_OWN if unfit() or is_warm(found) else EVERYTHING
+        return features(c)
+    return found
+
+
+def contained(c: Constants) -> frozenset[str]:
+    """What is in the tables of a scene."""
     body, speed = c.body, c.speed
     found = {
         SEVERAL: not np.all(_single(body, speed)),

@@ -22,5 +22,5 @@ def text_files() -> Iterator[Path]:
 
 
 def is_cache(path: Path) -> bool:
-    """Whether a relative path lies in a folder that tools leave behind."""
-    return any(part == "__pycache__" or part.startswith(".") for part in path.parts)
+    """Whether a relative path lies in a folder that tools leave behind, or in that of the compiled kernels."""
+    return any(part in ("__pycache__", "kernels") or part.startswith(".") for part in path.parts)

@@ -34,13 +34,13 @@ from flexmb.jit.cache import KernelCache
 
 
 def test_user():
-    asked, named = set(), KernelCache._file
+    asked, named = set(), KernelCache._own
 
     def noted(cache, *words):
         asked.add(named(cache, *words).name)
         return named(cache, *words)
 
-    KernelCache._file = noted
+    KernelCache._own = noted
     body = {"mass": 1.0, "com": (0.5, 0, 0), "inertia": (0.1, 0.1, 0.1)}
     scene = fm.SceneBuilder("a user's", gravity=(0, 0, -9.81)).rigid_body("rod", **body)
     scene = scene.revolute("pivot", "ground", "rod", axis=(0, 1, 0)).scene()

@@ -16,7 +16,6 @@ from crosscheck.biting.invariances.counterpart import (
     without_feedback,
 )
 from crosscheck.library.time_functions import scaled, slowed
-from flexmb.run.warm_up import general_kernels
 from flexmb.scene.bodies import ModalBody, SidBody
 from flexmb.scene.connectors import AngularSpring, Bushing, LinearFriction, LinearSpring, SpringDamper
 from flexmb.scene.functions import Function
@@ -27,6 +26,7 @@ from flexmb.scene.units import split_unit
 from flexmb.surrogate import modal_points
 from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import compile
+from flexmb.tables.features import asking
 from flexmb.typing import Real
 
 # Speeds, accelerations, forces, energies and all else have another factor than 1.
@@ -104,7 +104,7 @@ def _undetermined(scene: Scene) -> set[str]:
     take, are others in other units."""
     if not scene.closures:
         return set()
-    with general_kernels():
+    with asking("general"):
         system = compile(scene)
         assert isinstance(system, ClosedSystem)  # it has closures
         determined = system.determined_loads(system.initial_state)

@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from functools import cache
 
-from tests.benchmarks.must_hold import charts, evaluation, floating_frames, growth, missions, modes, runs, start
+from tests.benchmarks.must_hold import (
+    charts,
+    evaluation,
+    first_use,
+    floating_frames,
+    growth,
+    missions,
+    modes,
+    runs,
+    start,
+)
 from tests.benchmarks.must_hold.row import Row
 
-SOURCES = (evaluation, runs, missions, modes, floating_frames, growth, charts, start)
+SOURCES = (evaluation, runs, missions, modes, floating_frames, growth, charts, start, first_use)
 
 
 @cache

@@ -170,7 +170,7 @@ BREACHES: list[tuple[dict[str, Any], str]] = [
     ({"wheel_loads": {"wheel": numbers(5)}}, "wheel_loads['wheel'] has shape (11, 5); (11, 6) was expected"),
     ({"wheel_loads": {"wheel": spoilt(numbers(6))}}, f"wheel_loads['wheel'] {FINITE}"),
     ({"drives": None}, "drives is None, not a mapping"),
-    ({"drives": {"loop": numbers(1)}}, "drives has 'loop', and the scene has pivot, wheel"),
+    ({"drives": {"loop": numbers(1)}}, "drives has 'loop', and the scene has bob, pivot, wheel"),
     ({"drives": {"pivot": numbers()}}, "drives['pivot'] has shape (11,); (11, n) was expected"),
     ({"drives": {"pivot": numbers(0)}}, "drives['pivot'] has shape (11, 0); (11, n) was expected"),
     ({"drives": {"pivot": np.array(1.0)}}, "drives['pivot'] has shape (); (11, n) was expected"),

@@ -14,6 +14,7 @@ from flexmb.closure.tables import GROUP
 from flexmb.scene import build
 from flexmb.scene import schema as s
 from flexmb.tables.status import Status
+from tests.bounds import gamma
 from tests.flexmb.closure import mechanisms as m
 
 LOST = (Status.BRANCH_UNKNOWN, Status.CLOSURE_SINGULAR)
@@ -91,7 +92,11 @@ def test_a_step_over_many_turns_is_not_taken(settings):
 
 @pytest.mark.parametrize("settings", ["dop853", "rk4"])
 def test_samples_and_ends_may_lie_at_singular_positions(settings):
-    """Every half second all bars lie on one line, whatever steps end there."""
+    """Every half second all bars lie on one line, whatever steps end there.
+
+    Beside such a position, at a distance d, the rows of the closure are independent by d, so that the roundings on the
+    way round the loop, some thirty, are divided by d in the loads: of what is sampled there they make a per cent.
+    """
     for t_end in (4.0, 4.5 - 1e-4, 4.5 + 1e-4):
         run = flexmb.simulate(m.windows(1, np.pi, gravity=0.0), t_end, **SETTINGS[settings])
         assert run.finished, run.message
@@ -99,7 +104,9 @@ def test_samples_and_ends_may_lie_at_singular_positions(settings):
     times = [0.0, 0.499, 0.5, 0.501, 1.0]
     run = flexmb.simulate(m.windows(1, np.pi, gravity=0.0), 1.0, samples=times, **SETTINGS[settings])
     before, there, after = run.loads["window 0"][1:4, 2:5]  # the rest is open, at all times
-    assert run.finished and np.max(np.abs(there - 0.5 * (before + after))) < 1e-3 * np.linalg.norm(there)
+    distance = np.max(np.abs(run.q[2] - 0.5 * (run.q[1] + run.q[3])))  # the turn is even
+    known = max(1e-3, gamma(32) / distance)
+    assert run.finished and np.max(np.abs(there - 0.5 * (before + after))) < known * np.linalg.norm(there)
     assert np.array_equal(run.undetermined["window 0"], [True, True, False, False, False, True])
 
 

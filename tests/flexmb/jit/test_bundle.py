@@ -30,6 +30,11 @@ class Other:
 @kernel
 def fill(pair, factor):
     """Doubles the counts; returns the sum of the last column times `factor`."""
+    return filled(pair, factor)
+
+
+@helper
+def filled(pair, factor):
     total = 0.0
     for i in range(pair.values.shape[0]):
         total += scaled(pair, i, factor)
@@ -61,7 +66,7 @@ def fill_inner(nested, factor):
     total = 0.0
     for i in range(nested.weights.shape[0]):
         total += nested.weights[i]
-    return total * fill(nested.inner, factor)
+    return total * filled(nested.inner, factor)
 
 
 def test_bundles_hold_bundles():

@@ -31,8 +31,12 @@ from flexmb.integrate.rk4 import rk4 as kernel
 from tests.flexmb.integrate.integration_problems import HARMONIC, exact, solve
 assert abs(solve(HARMONIC, [0.0, 1.0], step=1e-2).last - exact(HARMONIC, 1.0)).max() < 1e-6
 """
+ALONE = """
+from flexmb.jit import cache
+cache.installed_directory = lambda: None  # what came with the installation would be found before anything is compiled
+"""
 HITS = "\nprint(sum(kernel.stats.cache_hits.values()))"
-PROBES = {"tiny": TINY + HITS, "real": REAL + HITS}
+PROBES = {"tiny": ALONE + TINY + HITS, "real": ALONE + REAL + HITS}
 
 
 def run(cache: Path, probe: str, *options: str) -> subprocess.CompletedProcess:

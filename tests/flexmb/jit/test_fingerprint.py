@@ -22,6 +22,7 @@ from flexmb.jain import explicit
 from flexmb.jit import fingerprint as module
 from flexmb.jit.cache import KernelCache
 from flexmb.jit.fingerprint import fingerprint, reached
+from tests.flexmb.jit.test_cache import ALONE
 
 ROOT = Path(__file__).parents[3]
 
@@ -300,14 +301,14 @@ class Speechless:
 
 def test_the_room_is_read_from_its_files_whatever_loaded_it(monkeypatch):
     """pytest's loader runs other code than the file says, and shows none."""
-    plain = module._compiler.__wrapped__()
+    plain = module.compiler.__wrapped__()
     found = module.find_spec
 
     def rewritten(name: str) -> ModuleSpec:
         return spec_from_file_location(name, found(name).origin, loader=Speechless())
 
     monkeypatch.setattr(module, "find_spec", rewritten)
-    assert module._compiler.__wrapped__() == plain
+    assert module.compiler.__wrapped__() == plain
 
 
 @pytest.mark.parametrize("place", [None, "hidden.so", "gone.py"])
@@ -317,14 +318,14 @@ def test_a_room_that_cannot_be_read_gives_no_key(place, monkeypatch, tmp_path):
     spec.has_location = place is not None
     monkeypatch.setattr(module, "find_spec", lambda name: spec)
     with pytest.raises(TypeError, match="cannot be read"):
-        module._compiler.__wrapped__()
+        module.compiler.__wrapped__()
 
 
 def test_a_room_that_is_not_listed_gives_no_key(monkeypatch):
     """As by a loader of a frozen program that finds modules by their names and lists none."""
     monkeypatch.setattr(module, "iter_modules", lambda path: iter(()))
     with pytest.raises(TypeError, match="shows none of its modules"):
-        module._compiler.__wrapped__()
+        module.compiler.__wrapped__()
 
 
 def _counts(function: FunctionType) -> bool:
@@ -386,7 +387,7 @@ print(compiled_beyond(*kernels))
 
 def unknown(program: str, cache: Path) -> str:
     environment = os.environ | {"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-c", program]
+    command = [sys.executable, "-c", ALONE + program]
     done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()

@@ -15,14 +15,15 @@ PROGRAM = """
 import logging, sys, time
 from pathlib import Path
 from flexmb.jit import cache, hooks, progress
-from flexmb.jit.kernel import kernel
+from flexmb.jit.kernel import helper, kernel
 
 hooks.cache_directory = lambda: Path(sys.argv[1])
+progress.unfit = lambda: "they are for another processor" if "foreign" in sys.argv else ""
 progress.AFTER = float(sys.argv[2])
 if "silent" in sys.argv:
     logging.getLogger("flexmb.jit").setLevel(logging.ERROR)
 
-@kernel
+@helper
 def inner(x):
     return 2.0 * x
 
@@ -54,7 +55,7 @@ def lines(folder: Path, after: float, *options: str) -> list[str]:
 
 
 def test_a_slow_kernel_is_announced_once(tmp_path):
-    """What, for what, and that it is once; also of a kernel that contains another."""
+    """What, for what, and that it is once."""
     [line] = lines(tmp_path, 0.1)
     assert line == (
         f"flexmb is compiling __main__.slow (Twice a number) for scenes of this kind, once: it is kept in {tmp_path}"
@@ -66,6 +67,11 @@ def test_of_another_version_of_a_kernel_the_line_is_another(tmp_path):
     """As of an integrator, which is compiled for runs with events and for those without."""
     first, second = lines(tmp_path, 0.1, "whole")
     assert second == first.replace("compiling ", "compiling version 2 of ")
+
+
+def test_the_line_says_why_no_general_kernel_does_instead(tmp_path):
+    [line] = lines(tmp_path, 0.1, "foreign")
+    assert line.endswith(f"kept in {tmp_path} (no general kernel can be taken: they are for another processor)")
 
 
 def test_a_fast_one_is_not(tmp_path):

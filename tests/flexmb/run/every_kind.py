@@ -124,9 +124,13 @@ def compiled() -> Iterator[str]:
         if each.targetoptions.get("no_cpython_wrapper"):  # a helper: it is compiled into kernels
             continue
         for signature in each.stats.cache_misses:
-            folder = each._cache
-            kept = isinstance(folder, KernelCache) and folder._file(signature, each.targetctx.codegen()).is_file()
+            places = each._cache._places(signature, each.targetctx.codegen()) if _has_places(each) else ()
+            kept = any(file.is_file() for file in places)
             yield f"{each.py_func.__module__}.{each.py_func.__qualname__}: {'kept' if kept else 'not kept'}"
+
+
+def _has_places(dispatcher: Dispatcher) -> bool:
+    return isinstance(dispatcher._cache, KernelCache)
 
 
 def main(*parts: str) -> None:

@@ -10,7 +10,7 @@ from flexmb.run import warm_up as warming
 from flexmb.run.warm_up import looped, main, warm_up
 from flexmb.scene.files import save_scene
 from flexmb.system.compile import compile
-from flexmb.tables.features import GENERAL, features
+from flexmb.tables.features import GENERAL, contained, features
 
 # Compiled versions of every function of the package, before and after the scenes of the tests are run.
 PROBE = """
@@ -86,14 +86,19 @@ def test_kinds_are_compiled_for_everything_and_scenes_for_what_they_contain(monk
     asked = []
 
     def note(scene, kind, methods, algorithms):
-        asked.append((scene.name, kind, features(compile(scene).constants) == {GENERAL}))
+        system = compile(scene)
+        asked.append((scene.name, kind, features(system.constants) == {GENERAL}))
+        return system
 
+    noted = []
     monkeypatch.setattr(warming, "_compile", note)
+    monkeypatch.setattr(warming, "note_warm", noted.append)
     monkeypatch.delenv("FLEXMB_KERNELS", raising=False)
     save_scene(looped(), tmp_path / "scene.toml")
     main([])
     main([str(tmp_path / "scene.toml"), "--scene", "condensed"])
     assert [each[1:] for each in asked] == [("tree", True), ("closed", False), ("condensed", True)]
+    assert noted == [contained(compile(looped()).constants)]  # of the scene alone: those are at hand from now on
     assert "FLEXMB_KERNELS" not in os.environ
     monkeypatch.setenv("FLEXMB_KERNELS", "mine")
     warm_up(scenes=["tree"])

@@ -26,11 +26,11 @@ import flexmb as fm
 from flexmb.closure.closures import Closures
 from flexmb.frisch.nested_system import NestedSystem
 from flexmb.jit.direct import Direct
-from flexmb.run.warm_up import general_kernels, looped
+from flexmb.run.warm_up import looped
 from flexmb.system.closed import ClosedSystem
 from flexmb.system.evaluator import Evaluator
 from flexmb.system.factors import MassMatrixFactors
-from flexmb.tables.features import GENERAL, features
+from flexmb.tables.features import asking
 from flexmb.tables.per_thread import per_thread
 from tests.benchmarks.rivals import rigid_chain
 from tests.flexmb.system.argument_kinds import W
@@ -269,15 +269,14 @@ def test_closures_count_their_rows_for_all_threads():
 
 def test_general_kernels_are_asked_for_by_one_thread_only():
     """What compiles ahead must not change what others are compiling."""
-    with general_kernels():
-        assert features(W.tree.constants) == {GENERAL}
-        before = os.environ.get("FLEXMB_KERNELS")
-        try:
-            os.environ["FLEXMB_KERNELS"] = "exact"
-            assert features(W.tree.constants) == {GENERAL}
-            assert GENERAL not in in_a_thread(lambda: features(W.tree.constants))
-        finally:
-            os.environ["FLEXMB_KERNELS"] = before or "general"
+    before = os.environ.get("FLEXMB_KERNELS")
+    try:
+        os.environ["FLEXMB_KERNELS"] = "special"
+        with asking("general"):
+            assert fm.compile(looped()).kernels == "general"
+            assert in_a_thread(lambda: fm.compile(looped()).kernels) == "special"
+    finally:
+        os.environ["FLEXMB_KERNELS"] = before or "general"
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")

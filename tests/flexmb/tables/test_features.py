@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
 import flexmb as fm
 from flexmb.jit.features import GENERAL
+from flexmb.run import situation
 from flexmb.scene.build import SceneBuilder
+from flexmb.system.compile import assembled
 from flexmb.tables import features
 from flexmb.tables.status import OK
 from flexmb.typing import Real
@@ -46,7 +51,8 @@ def test_each_thing_has_its_name(exact):
     assert features.DAMPERS in fm.compile(chain(damping=2.0).scene()).constants.features()
     scenes = random_scene(0, EVERYTHING), random_scene(0, Recipe(levels=("stiffened",))), connected()
     found = frozenset.union(*(fm.compile(scene).constants.features() for scene in scenes))
-    names = {value for name, value in vars(features).items() if name.isupper() and isinstance(value, str)}
+    named = {name: value for name, value in vars(features).items() if not name.startswith("_") and name.isupper()}
+    names = {value for value in named.values() if isinstance(value, str)}
     missing = names - {GENERAL} - {name.rstrip("0123456789- ") for name in found}
     assert missing <= {features.BALL_SPRINGS}, missing  # drawn at random: another seed may have others
 
@@ -55,8 +61,54 @@ def test_the_environment_asks_for_everything(monkeypatch):
     monkeypatch.setenv("FLEXMB_KERNELS", "general")
     assert fm.compile(chain().scene()).constants.features() == {GENERAL}
     monkeypatch.setenv("FLEXMB_KERNELS", "all")
-    with pytest.raises(ValueError, match=r"'all'.*exact"):
+    with pytest.raises(ValueError, match=r"'all'.*special"):
         fm.compile(chain().scene())
+
+
+def test_a_call_asks_whatever_the_environment_says(monkeypatch):
+    monkeypatch.setenv("FLEXMB_KERNELS", "general")
+    assert fm.compile(chain().scene(), kernels="special").kernels == "special"
+    monkeypatch.setenv("FLEXMB_KERNELS", "special")
+    assert fm.compile(chain().scene(), kernels="general").kernels == "general"
+    with pytest.raises(ValueError, match="kernels"):
+        fm.compile(chain().scene(), kernels="exact")
+
+
+@pytest.mark.parametrize(
+    ("came", "warm", "kernels"),
+    [("", False, "general"), ("", True, "special"), ("for another numba", False, "special")],
+    ids=["at hand", "compiled ahead", "not at hand"],
+)
+def test_what_is_at_hand_decides_where_nobody_does(came, warm, kernels, monkeypatch):
+    monkeypatch.setenv("FLEXMB_KERNELS", "auto")
+    monkeypatch.setattr(features, "unfit", lambda: came)
+    monkeypatch.setattr(features, "is_warm", lambda found: warm)
+    assert fm.compile(chain().scene()).kernels == kernels
+
+
+def loop() -> fm.Scene:
+    return chain().closure("end", "spherical", "ground", "b1", position_a=(2.0, 0, 0), node_b="tip").scene()
+
+
+@pytest.mark.parametrize("scene", [chain().scene(), loop()], ids=["tree", "loop"])
+@pytest.mark.parametrize("kernels", ["general", "special"])
+def test_copies_are_run_by_the_same_kernels(scene, kernels, monkeypatch):
+    """Whatever is asked for by then."""
+    system = fm.compile(scene, kernels=kernels)
+    monkeypatch.setenv("FLEXMB_KERNELS", "special" if kernels == "general" else "general")
+    for other in (copy.copy(system), copy.deepcopy(system), pickle.loads(pickle.dumps(system)), system._anew()):
+        assert other.kernels == kernels
+
+
+def test_what_came_up_in_a_run_is_run_by_the_same_kernels(monkeypatch):
+    """A latch makes another scene of it."""
+    monkeypatch.setenv("FLEXMB_KERNELS", "special")
+    latched = chain(1).event("held", "time", 0.1, fm.Latch(coordinate="h0.rotation"))
+    system = fm.compile(latched.scene(), kernels="general")
+    made = []
+    monkeypatch.setattr(situation, "assembled", lambda scene: made.append(assembled(scene)) or made[-1])
+    assert fm.simulate(system, 0.2, samples=3).finished
+    assert [each.kernels for each in made] == ["general"]
 
 
 def test_constants_are_read_only(exact):

@@ -1,0 +1,48 @@
+"""`flexmb warmup`: compile the special kernels of scenes ahead."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from flexmb.cli.terminal import NoUserCode, console, no_traceback
+
+
+def warmup(
+    scenes: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Scene files; none: general kernels, where the installation has none.", metavar="SCENE"),
+    ] = None,
+    method: Annotated[
+        list[str] | None, typer.Option(help="Beside `dop853` and `rk4`; may be repeated.", show_default=False)
+    ] = None,
+    algorithm: Annotated[
+        list[str] | None, typer.Option(help="Beside `articulated`; may be repeated.", show_default=False)
+    ] = None,
+    no_user_code: NoUserCode = False,
+) -> None:
+    """
+    Compile the special kernels of scenes ahead: those of what the scenes contain, faster than the general ones.
+
+        flexmb warmup robot.toml
+        flexmb warmup robot.toml --method radau5
+
+    From then on all runs of scenes that contain the same take them, in this process and in later ones, unless they are
+    asked for general ones (`FLEXMB_KERNELS=general`, or `flexmb.compile(scene, kernels="general")`).
+
+    **Exit code**: 0 compiled, 2 a scene is wrong, or a name does not exist.
+    """
+    with no_traceback():
+        from flexmb.jit.folder import cache_directory
+        from flexmb.run.warm_up import warm_up
+        from flexmb.scene.files import load_scene
+
+        seconds = warm_up(
+            ("dop853", "rk4", *(method or ())),  # type: ignore[arg-type]  # names are checked there
+            ("articulated", *(algorithm or ())),  # type: ignore[arg-type]
+            [load_scene(path) for path in scenes or ()] or ["tree"],
+        )
+        where = cache_directory() or "memory only: no folder is writable"
+        console.print(f"Compiled in {seconds:.1f} s, kept in {where}.", highlight=False, soft_wrap=True)

@@ -1,0 +1,41 @@
+"""A compiled kernel as bytes: its machine code, the symbols in it, and what numba has to know to call it.
+
+Numba keeps beside the machine code the same once more as bitcode of LLVM, for functions that it will be compiled into,
+and the type of every variable as text. Nobody compiles kernels into anything, nor reads the text: without them a file
+has a tenth of the size, and is loaded in a third of the time.
+"""
+
+from __future__ import annotations
+
+import pickle
+import zlib
+from functools import cache
+from typing import Any
+
+from llvmlite import binding
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+_LEVEL = 6  # of compression: nine takes four times as long, for 2 %
+
+
+def packed(compiled: Any) -> bytes:
+    """Bytes of a compiled version of a kernel; afterwards it can be called as before."""
+    (name, kind, (machine_code, _)), fndesc, environment, signature, objectmode, lifted, _, *rest = compiled._reduce()
+    library = name, kind, (machine_code, _nothing_to_link())
+    module = compiled.library._final_module
+    symbols = [each.name for each in (*module.functions, *module.global_variables) if not each.is_declaration]
+    state = library, fndesc, environment, signature, objectmode, lifted, "", *rest
+    return zlib.compress(dumps((symbols, state)), _LEVEL)
+
+
+def unpacked(context: Any, contents: Any) -> Any:
+    """The compiled version again, in this process."""
+    symbols, state = pickle.loads(zlib.decompress(contents))
+    context.codegen()._engine._defined_symbols.update(symbols)
+    return CompileResult._rebuild(context, *state)
+
+
+@cache
+def _nothing_to_link() -> bytes:
+    return bytes(binding.parse_assembly("").as_bitcode())

@@ -1,0 +1,104 @@
+"""Compile all general kernels: `python -m flexmb.ready.make FOLDER [--processor x86-64-v3]`.
+
+Several processes share out the uses of `flexmb.ready.uses`. What is already in the folder of the installation is not
+compiled again; what no use asks for any more is deleted from it. The build hook runs this where flexmb is installed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import multiprocessing
+import os
+import shutil
+import sys
+import tempfile
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from time import perf_counter
+
+from flexmb.jit.installed import MADE_BY, description
+from flexmb.output.whole import whole_file
+
+KERNELS = "*.kernel"
+BEGUN = "begun"  # a file whose age tells which kernels were used since
+
+
+def make(folder: Path, processes: int, processor: str = "") -> list[Path]:
+    """The kernels in the folder, after all uses: for this processor, or another one by LLVM's name.
+
+    RuntimeError where a use failed, when all others are through and what they compiled is in the folder.
+    """
+    failed = []
+    folder.mkdir(parents=True, exist_ok=True)
+    begun = folder / BEGUN
+    begun.touch()
+    with tempfile.TemporaryDirectory() as made, _environment(Path(made), processor):
+        names = list(_uses())
+        with multiprocessing.get_context("spawn").Pool(processes) as pool:
+            for done, (name, seconds, trouble) in enumerate(pool.imap_unordered(_use, names), 1):
+                print(f"{done:3d} of {len(names)}  {seconds:6.1f} s  {name}{trouble}", file=sys.stderr, flush=True)
+                failed += [name] if trouble else []
+            text = pool.apply(description)
+        for file in Path(made).rglob(KERNELS):
+            with whole_file(folder / file.name) as place:
+                shutil.copyfile(file, place)
+    with whole_file(folder / MADE_BY) as place:
+        place.write_text(text, encoding="utf-8")
+    for file in folder.glob(KERNELS):
+        if file.stat().st_mtime_ns < begun.stat().st_mtime_ns:
+            file.unlink()
+    begun.unlink()
+    if failed:
+        raise RuntimeError(f"uses that failed, whose kernels may be missing: {'; '.join(failed)}")
+    return sorted(folder.glob(KERNELS))
+
+
+@contextmanager
+def _environment(made: Path, processor: str) -> Iterator[None]:
+    """Of processes that are started meanwhile: numba reads it when it is imported."""
+    before = dict(os.environ)
+    os.environ |= {"FLEXMB_KERNELS": "general", "NUMBA_CACHE_DIR": str(made), "OPENBLAS_NUM_THREADS": "1"}
+    if processor:
+        os.environ |= {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ |= before
+
+
+def _uses() -> dict[str, object]:
+    from flexmb.ready.uses import uses  # it imports all mechanics, with the environment of who makes kernels
+
+    return dict(uses())
+
+
+def _use(name: str) -> tuple[str, float, str]:
+    """In a process of its own: the name, how long it took (s), and what went wrong."""
+    start = perf_counter()
+    logging.getLogger("flexmb.jit").setLevel(logging.ERROR)  # everything is compiled here, and who waits knows it
+    try:
+        _uses()[name]()
+    except Exception:
+        return name, perf_counter() - start, f"\n{traceback.format_exc()}"
+    return name, perf_counter() - start, ""
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(prog="python -m flexmb.ready.make", description=__doc__)
+    parser.add_argument("folder", type=Path, help="flexmb/ready/kernels of the installation")
+    parser.add_argument("--processor", default="", help="LLVM's name of another one than this")
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    asked = parser.parse_args(words)
+    start = perf_counter()
+    files = make(asked.folder, asked.processes, asked.processor)
+    size = sum(file.stat().st_size for file in files)
+    print(f"{len(files)} kernels, {size / 2**20:.1f} MiB, in {perf_counter() - start:.0f} s", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

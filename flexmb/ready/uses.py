@@ -1,0 +1,145 @@
+"""What is asked of the scenes, one function for each kind of use: together they compile every general kernel.
+
+A use is whole and small, so that several processes can share them out. What two of them need, one compiles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+
+from flexmb.advisor.advice import advise
+from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.integrate.integrator import Method
+from flexmb.jain.elimination import Elimination
+from flexmb.linear.campbell import campbell
+from flexmb.linear.equilibrium import equilibrium
+from flexmb.linear.linearize import linearize
+from flexmb.linear.spin import steady_spin
+from flexmb.ready import scenes
+from flexmb.run.simulate import simulate
+from flexmb.run.simulate_batch import simulate_batch
+from flexmb.scene.bodies import Level
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.schema import Scene
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.algorithms import ALGORITHMS, ON_CHAINS, RUNNING, WITH_JACOBIAN
+from flexmb.system.batch import compile_batch
+from flexmb.system.compile import compile
+
+Use = Callable[[], object]
+BODIES: tuple[tuple[int, Level, Elimination], ...] = (
+    (2, "full", "explicit"), (2, "ruthless", "woodbury"), (18, "ruthless", "fastest"),
+)  # fmt: skip
+T_END, STEP = 1e-3, 2.5e-4  # s
+BATCHED: tuple[Method, ...] = ("rk4", "dop853")
+
+
+def uses() -> Iterator[tuple[str, Use]]:
+    """By name, those that take longest to compile first; neighbours need few kernels together, so that none waits."""
+    yield "linear models", _linear_models
+    yield "laws that a scene may name", _laws
+    yield "batches", _batches
+    yield "single states of a loop", _single_states_of_a_loop
+    yield "single states", _single_states
+    for method in sorted(INTEGRATORS, key=lambda name: not INTEGRATORS[name].linearises):
+        yield f"{method}, loop, feedback", partial(_regulated, scenes.looped, method)
+        yield f"{method}, tree, feedback", partial(_regulated, scenes.pendulum, method)
+        yield f"{method}, loop, events", partial(_eventful, scenes.looped, method)
+        yield f"{method}, tree, events", partial(_eventful, scenes.pendulum, method)
+        for algorithm in RUNNING:
+            if algorithm in WITH_JACOBIAN or not INTEGRATORS[method].linearises:
+                yield f"{method}, tree, {algorithm}", partial(_run, scenes.pendulum().scene(), method, algorithm)
+                if algorithm in ON_CHAINS:
+                    yield f"{method}, loop, {algorithm}", partial(_run, scenes.looped().scene(), method, algorithm)
+        yield f"{method}, condensed", partial(_run, scenes.panelled(18, "ruthless").scene(), method, "articulated")
+    yield "advice", _advice
+
+
+def _run(scene: Scene, method: Method, algorithm: Algorithm = "articulated") -> None:
+    step = STEP if INTEGRATORS[method].fixed else None
+    simulate(scene, T_END, method, samples=3, step=step, algorithm=algorithm)
+
+
+def _eventful(builder: Callable[[], SceneBuilder], method: Method) -> None:
+    _run(scenes.with_events(builder(), "pivot.rotation"), method)
+
+
+def _regulated(builder: Callable[[], SceneBuilder], method: Method) -> None:
+    _run(scenes.with_feedback(builder(), period=4e-4, delay=1e-4), method)
+    _run(scenes.with_feedback(builder()), method)
+
+
+def _linear_models() -> None:
+    rest = equilibrium(scenes.panelled(2, "full").scene())
+    linearize(scenes.panelled(2, "full").scene(), rest, held=True)
+    linearize(scenes.looped().scene())
+    linearize(scenes.with_feedback(scenes.pendulum()))
+    linearize(scenes.with_feedback(scenes.looped()))
+    steady_spin(scenes.spinner().scene(), "pivot", 1.0)
+    campbell(scenes.spinner().scene(), "pivot", [0.0, 1.0])
+
+
+def _single_states() -> None:
+    for modes, level, elimination in BODIES:
+        system = compile(scenes.panelled(modes, level).scene(), elimination)
+        state = system.initial_state
+        for algorithm in ALGORITHMS:
+            if level == "ruthless" or not algorithm.startswith("frisch"):
+                rates = system.accelerations(state, algorithm)
+                system.evaluate(state.t, state.q, state.u, algorithm)
+                evaluator = system.evaluator(algorithm)
+                evaluator(state.t, state.q, state.u)
+                evaluator(state.t, state.q.tolist(), state.u.tolist())
+        system.inverse_dynamics(state, rates)
+        system.consistent_inverse_dynamics(state, rates)
+        system.modal_residual(state, rates)
+        system.hinge_loads(state)
+        system.hinge_loads(state, rates)
+        system.section_loads(state, "panel", np.array([0.5]))
+        system.mass_matrix(state)
+        system.energy(state)
+        system.momentum(state)
+        system.precision(state)
+        factors = system.factorise(state)
+        for solve in (factors.solve, factors.half_solve, factors.half_multiply, factors.multiply):
+            solve(rates)
+        assert np.isfinite(factors.log_determinant)
+    nested = system.nested()
+    y = np.concatenate([state.q, state.u, [0.0]])
+    nested.motion(0.0, y)
+    nested.partitions(0.0, y)
+    nested.relative_motion(0.0, y)
+
+
+def _laws() -> None:
+    _run(scenes.slewed(), "dop853")
+
+
+def _single_states_of_a_loop() -> None:
+    system = compile(scenes.looped().scene())
+    state = system.initial_state
+    for algorithm in ON_CHAINS:
+        system.accelerations(state, algorithm)
+        system.evaluate(state.t, state.q, state.u, algorithm)
+    system.hinge_loads(state)
+    system.closure_gaps(state)
+    system.closure_operators(state)
+
+
+def _batches() -> None:
+    scene = scenes.panelled(2, "full").scene()
+    batch = compile_batch([scene] * 9)
+    system = compile(scene)
+    state = system.initial_state
+    system.accelerations_batch(np.tile(state.q, (9, 1)), np.tile(state.u, (9, 1)))
+    for method in BATCHED:
+        step = STEP if INTEGRATORS[method].fixed else None
+        for copies in (batch, system):
+            simulate_batch(copies, T_END, method, samples=3, step=step)
+
+
+def _advice() -> None:
+    advise(scenes.panelled(2, "full").scene(), 1e-2, t_end=1e-2)

@@ -1,0 +1,84 @@
+"""What comes with the installation is enough: processes with nothing of their own compile nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import flexmb
+from flexmb.jit.installed import unfit
+from flexmb.ready.make import KERNELS
+from flexmb.ready.uses import uses
+from tests.repo.project import ROOT
+
+at_hand = pytest.mark.skipif(bool(unfit()), reason=f"there are no general kernels: {unfit()}")
+PROGRAMS = {
+    "first loads": "fm.compile(scene).hinge_loads(fm.compile(scene).initial_state)",
+    "a run": "assert fm.simulate(scene, 0.1, samples=3).finished",
+    "a run by equal steps": 'assert fm.simulate(scene, 1e-3, "rk4", step=1e-5, samples=3).finished',
+    "a linear model": "fm.linearize(scene)",
+    "a batch": "assert fm.simulate_batch([scene] * 3, 0.1, samples=3).finished",
+}
+SCENE = """
+import flexmb as fm
+from tests.benchmarks.rivals import flexible_chain
+scene = flexible_chain(3, 2, "full")
+assert fm.compile(scene).kernels == "general"
+"""
+
+
+def compiled(folder: Path, program: str) -> list[str]:
+    """Names of the kernels that a process compiles."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder), "PYTHONPATH": str(ROOT), "FLEXMB_KERNELS": "auto"}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return sorted(file.name for file in folder.rglob(KERNELS))
+
+
+@at_hand
+@pytest.mark.parametrize("what", PROGRAMS)
+def test_a_first_use_compiles_nothing(what: str, tmp_path: Path) -> None:
+    assert compiled(tmp_path, SCENE + PROGRAMS[what]) == []
+
+
+@at_hand
+def test_what_is_special_is_compiled(tmp_path: Path) -> None:
+    """The test above sees what is compiled."""
+    asked = "fm.compile(scene, kernels='special').accelerations(fm.compile(scene).initial_state)"
+    assert compiled(tmp_path, SCENE + asked) != []
+
+
+def test_uses_have_names_of_their_own() -> None:
+    names = [name for name, _ in uses()]
+    assert len(names) == len(set(names)) > 40
+
+
+@at_hand
+@pytest.mark.slow
+def test_no_use_is_left_to_compile(tmp_path: Path) -> None:
+    program = "from flexmb.ready.uses import uses\nfor name, use in uses():\n    use()"
+    assert compiled(tmp_path, program) == []
+
+
+@at_hand
+@pytest.mark.slow
+def test_making_them_again_keeps_what_is_right_and_nothing_else(tmp_path: Path) -> None:
+    """A kernel that nobody asks for goes; one that is missing, or damaged, is made."""
+    package = tmp_path / "flexmb"
+    shutil.copytree(Path(flexmb.__file__).parent, package)
+    folder = package / "ready" / "kernels"
+    files = sorted(folder.glob(KERNELS), key=lambda file: file.stat().st_size)
+    right = {file.name: file.read_bytes() for file in files}
+    (folder / "unknown-00.kernel").write_bytes(b"of an older state")
+    files[0].unlink()
+    files[1].write_bytes(b"damaged")
+    command = [sys.executable, "-m", "flexmb.ready.make", str(folder)]
+    subprocess.run(command, env=os.environ | {"PYTHONPATH": str(tmp_path)}, check=True, cwd=tmp_path)
+    again = {file.name: file.read_bytes() for file in folder.glob(KERNELS)}
+    assert set(again) == set(right)
+    assert {name for name in right if again[name] != right[name]} <= {files[0].name, files[1].name}
