@@ -87,12 +87,21 @@ def _use(name: str) -> tuple[str, float, str]:
     return name, perf_counter() - start, ""
 
 
+def _at_a_time() -> int:
+    """Processes: one for each core, and for each 2 GiB of memory, of which a compiler comes to need most."""
+    cores = os.cpu_count() or 1
+    if not hasattr(os, "sysconf"):
+        return cores
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return int(max(1, min(cores, memory // 2**31)))
+
+
 def main(words: Sequence[str] | None = None) -> None:
     """The command line."""
     parser = argparse.ArgumentParser(prog="python -m flexmb.ready.make", description=__doc__)
     parser.add_argument("folder", type=Path, help="flexmb/ready/kernels of the installation")
     parser.add_argument("--processor", default="", help="LLVM's name of another one than this")
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--processes", type=int, default=_at_a_time())
     asked = parser.parse_args(words)
     start = perf_counter()
     files = make(asked.folder, asked.processes, asked.processor)
