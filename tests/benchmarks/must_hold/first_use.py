@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from statistics import median
 from typing import Literal
@@ -58,13 +58,18 @@ def _in_processes(case: str, code: str, first: bool) -> Measured:
 
 
 def _cases(statistic: Statistic) -> Measured:
-    """`flexmb simulate` of every case over its own time, charts and files too, each with an empty folder of kernels."""
-    every = {case: _simulated(case) for case in sorted((ROOT / "cases").glob("*/*"))}
+    every = _all_cases()
     spent = {case: seconds for case, seconds in every.items() if seconds is not None}
     worst = max(spent, key=spent.__getitem__)
     value = median(spent.values()) if statistic == "median" else spent[worst]
     detail = f"{len(spent)} of {len(every)} cases finish; worst {worst.parent.name}/{worst.name}, {spent[worst]:.3g} s"
     return Measured(value, min(spent.values()), spent[worst], detail)
+
+
+@cache
+def _all_cases() -> dict[Path, float | None]:
+    """`flexmb simulate` of every case over its own time, charts and files too, each with an empty folder of kernels."""
+    return {case: _simulated(case) for case in sorted((ROOT / "cases").glob("*/*"))}
 
 
 def _simulated(case: Path) -> float | None:
