@@ -31,7 +31,7 @@ def rows() -> list[Row]:
         "satellite_first": (f"{SATELLITE}, 100 s", 6.0, SATELLITE, "fm.simulate(scene, 100.0)"),
         "linearize_first": ("linearize of a new scene", 4.0, BEAM, "fm.linearize(scene)"),
         "campbell_first": ("campbell of a new scene", 6.0, BEAM, "fm.campbell(scene, 'hub', [0.0, 1.0, 2.0])"),
-        "advise_first": ("advise on a new scene", 20.0, BEAM, "fm.advise(scene, t_end=1.0)"),
+        "advise_first": ("advise on a new scene", 20.0, BEAM, "fm.advise(scene, 1e-2, t_end=1.0)"),
     }
     found = [
         Row(name, GROUP, what, goal, partial(_in_processes, case, code, True), "at most", "s")

@@ -14,6 +14,16 @@ class Reason(NamedTuple):
 
 REASONS = (
     Reason(
+        ("canonical_cold", "canonical"),
+        "nobody has profiled the session since kernels come with the installation. First uses of native compile "
+        "nothing; what is left is the runs of peers and of native, judging, pictures and the report.",
+    ),
+    Reason(
+        ("cases_worst",),
+        "a thousand rods write loads, markers and charts of a thousand hinges, and a beam bent by its length runs for "
+        "seconds; no kernel is compiled in any case.",
+    ),
+    Reason(
         ("batch_flexible",),
         "one copy alone became faster by more than eight at once. Sums over modes and their elimination fill "
         "vector instructions in both now: alone by eight modes of a body, in lanes by eight bodies. A sample in "
