@@ -108,7 +108,7 @@ def delete_unused(directory: Path) -> None:
     """Delete, once in a process, kernels that nobody has used for two months, and what their writers left behind."""
     oldest = time.time() - _UNUSED
     with suppress(OSError):
-        for file in directory.glob("*.kernel*"):
+        for file in (*directory.glob("*.kernel*"), *directory.glob("*.special")):
             with suppress(OSError):
                 if file.stat().st_mtime < oldest:
                     file.unlink()

@@ -36,12 +36,12 @@ def unfit() -> str:
         made = json.loads((folder / MADE_BY).read_text(encoding="utf-8")) if folder else None
     except (OSError, ValueError):
         made = None
-    if not isinstance(made, dict):
+    if not (isinstance(made, dict) and isinstance(made.get("versions"), dict)):
         return "no kernels came with the installation"
     now = _maker()
     for name, version in now["versions"].items():
-        if made.get("versions", {}).get(name) != version:
-            before = made.get("versions", {}).get(name, "(unknown)")
+        if made["versions"].get(name) != version:
+            before = made["versions"].get(name, "(unknown)")
             return f"those that came with the installation are for {name} {before}, and this is {version}"
     if made.get("processor") not in map(list, running(_codegen())):
         return "those that came with the installation are for another processor"

@@ -1,8 +1,8 @@
 """A compiled kernel as bytes: its machine code, the symbols in it, and what numba has to know to call it.
 
 Numba keeps beside the machine code the same once more as bitcode of LLVM, for functions that it will be compiled into,
-and the type of every variable as text. Nobody compiles kernels into anything, nor reads the text: without them a file
-has a tenth of the size, and is loaded in a third of the time.
+and the type of every variable as text. Nobody compiles kernels into anything, nor reads the text. For the right-hand
+side of all scenes they make 1.2 MB of what is 0.2 MB without them; to read the bitcode took half the time of loading.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from llvmlite import binding
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-_LEVEL = 6  # of compression: nine takes four times as long, for 2 %
+_LEVEL = 6  # of compression: nine takes twice as long, for 1 %
 
 
 def packed(compiled: Any) -> bytes:

@@ -125,7 +125,7 @@ REASONS = {
     "Python": (lambda made: made["versions"].update(Python="2.7"), "for Python 2.7, and this is"),
     "processor": (lambda made: made.update(processor=["arm", "m1", ""]), "for another processor"),
     "compiler": (lambda made: made.update(compiler="00"), "flexmb/jit has changed"),
-    "nothing": (lambda made: made.clear(), "for Python (unknown)"),
+    "nothing": (lambda made: made["versions"].clear(), "for Python (unknown)"),
 }
 
 
@@ -148,7 +148,7 @@ def test_why_they_do_not_fit_is_said(change, manifest):
     assert words in unfit()
 
 
-@pytest.mark.parametrize("text", ["", "[]", "null", "{", "\x00"])
+@pytest.mark.parametrize("text", ["", "[]", "null", "{", "{}", '{"versions": []}', "\x00"])
 def test_a_damaged_description_is_none(text, manifest):
     manifest.write_text(text)
     assert unfit() == "no kernels came with the installation"
