@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from types import TracebackType
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import TaskID
 from rich.text import Text
 
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.expected import Remaining
 from crosscheck.running.plan import Job
 from crosscheck.running.scheduler import Event
+from crosscheck.terminal.bars import bars
 from crosscheck.terminal.time_left import TimeLeft
 from crosscheck.terminal.verbosity import Verbosity
 from flexmb.output.printable import printable
@@ -37,17 +38,7 @@ class LiveProgress:
 
     def __init__(self, console: Console, verbosity: Verbosity = Verbosity.VERBOSE) -> None:
         self._lasting = verbosity is Verbosity.VERBOSE
-        self._progress = Progress(
-            SpinnerColumn(),
-            TextColumn("{task.description}", markup=False),  # names stand in it
-            BarColumn(bar_width=24),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TimeLeft(),
-            console=console,
-            transient=True,
-            disable=verbosity is Verbosity.QUIET,
-        )
+        self._progress = bars(console, TimeLeft(), quiet=verbosity is Verbosity.QUIET)
         self._overall: TaskID | None = None
         self._remaining = Remaining()
         self._begin = 0.0

@@ -6,15 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import TimeRemainingColumn
 from rich.text import Text
 
 from crosscheck.running.scheduler import Limits, Scheduler
@@ -22,6 +14,7 @@ from crosscheck.stability.map import StabilityMap
 from crosscheck.stability.picture import draw
 from crosscheck.stability.run import Finished, run_map
 from crosscheck.stability.verdict_file import VERDICTS, take_away_verdicts, write_verdicts
+from crosscheck.terminal.bars import bars
 from crosscheck.terminal.text import marked, words
 from flexmb.output.whole import take_away
 from flexmb.output.writing import folder
@@ -52,10 +45,7 @@ def run_and_draw(
 def _run(
     console: Console, name: str, records: Path, depth: int | None, fresh: bool, limits: Limits, scheduler: Scheduler
 ) -> Finished:
-    with Progress(
-        SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), MofNCompleteColumn(),
-        TimeElapsedColumn(), TimeRemainingColumn(), console=console, transient=True,
-    ) as progress:  # fmt: skip
+    with bars(console, TimeRemainingColumn()) as progress:
         task = progress.add_task(name, total=None)
 
         def hear(what: StabilityMap, done: int, known: int) -> None:

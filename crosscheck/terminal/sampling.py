@@ -7,17 +7,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import TimeRemainingColumn
 
 from crosscheck.sampling.statistics import Distribution, Estimated, SweepSummary
+from crosscheck.terminal.bars import bars
 from crosscheck.terminal.text import marked, words
 from flexmb.output.listing import Listing, figures, names
 
@@ -28,10 +21,7 @@ SHOWN = 5  # failures; summary.json has all
 @contextmanager
 def sampling_bar(console: Console) -> Iterator[Callable[[int, int, int], None]]:
     """A listener that moves a bar."""
-    with Progress(
-        SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), MofNCompleteColumn(),
-        TimeElapsedColumn(), TimeRemainingColumn(), console=console, transient=True,
-    ) as progress:  # fmt: skip
+    with bars(console, TimeRemainingColumn()) as progress:
         task = progress.add_task("samples", total=None)
 
         def hear(done: int, known: int, lost: int) -> None:

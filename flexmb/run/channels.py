@@ -113,7 +113,8 @@ def unit(channel: str) -> str:
 def distance(channel: str, a: Real, b: Real) -> Real:
     """Distance of two signals at each time, (T,): the Euclidean norm of a - b, for orientations the angle between them.
 
-    Quaternions q and -q are one orientation; the angle is 4 asin(|q_a - q_b| / 2), accurate for small angles.
+    Quaternions q and -q are one orientation; the angle is 4 asin(|q_a - q_b| / 2), accurate for small angles. What is
+    not finite has no finite distance.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         return _distance(channel, a, b)
@@ -122,7 +123,7 @@ def distance(channel: str, a: Real, b: Real) -> Real:
 def _distance(channel: str, a: Real, b: Real) -> Real:
     if channel.endswith(".orientation"):
         chord = np.minimum(norms(a - b), norms(a + b))
-        return 4.0 * np.arcsin(np.minimum(chord / 2.0, 1.0))
+        return np.where(np.isfinite(chord), 4.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)), chord)
     return norms(a - b)
 
 

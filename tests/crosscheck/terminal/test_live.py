@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import re
 
 import numpy as np
+import pytest
 from rich.console import Console
 
 from crosscheck.records.kinds import RunRecord
@@ -25,6 +27,18 @@ def lasting_line(message: str) -> str:
         for event in (Event(0, "started"), Event(0, "emitted", record), Event(0, "ended")):
             live.hear([job], event)
     return screen.getvalue()
+
+
+@pytest.mark.parametrize("columns", [40, 100])
+def test_what_runs_is_named_in_full_on_every_terminal(columns: int) -> None:
+    job = Job("a_family_of_cases/a_case", "rigid", MAIN, "absent", None, "", np.zeros(2), "module:engines")
+    screen = io.StringIO()
+    with LiveProgress(Console(file=screen, width=columns, force_terminal=True)) as live:
+        live.hear([job], Event(0, "started"))
+        live.hear([job], Event(0, "emitted", "the finest effort"))
+    shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
+    assert "…" not in shown and "finest" in shown
+    assert ("━" in shown) is (columns == 100)
 
 
 def test_brackets_in_a_remedy_are_text_not_markup() -> None:

@@ -61,6 +61,17 @@ def test_orientation_distance_is_the_angle_whatever_the_sign() -> None:
         assert distance("marker:a.orientation", sign * turned, identity) == pytest.approx(angles, rel=1e-7)
 
 
+@pytest.mark.parametrize("number", [np.inf, -np.inf, np.nan])
+def test_what_is_not_finite_has_no_finite_distance(number: float) -> None:
+    """A quaternion of infinities is no turn by a full angle."""
+    sound = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+    broken = sound.copy()
+    broken[1, 2] = number
+    for channel in ("marker:a.orientation", "marker:a.position"):
+        there, not_there = distance(channel, broken, sound)
+        assert there == 0.0 and not np.isfinite(not_there)
+
+
 def test_range_of_a_position_does_not_depend_on_the_origin() -> None:
     path = np.column_stack([np.linspace(0.0, 3.0, T), np.zeros(T), np.zeros(T)])
     assert signal_range("marker:a.position", path + 1e6) == pytest.approx(3.0)
