@@ -11,7 +11,7 @@ closed configuration what is left of a redundant row is round-off and the residu
 from math import sqrt
 
 from flexmb.closure.clusters import factorise_shared, subtract_shared
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 
 DEPENDENT = 1e-9
 
@@ -55,7 +55,7 @@ def entry(cc, g, a, b):
     return cc.group[g].factor + a * rows(cc, g) + b
 
 
-@helper
+@sweep
 def choose_rows(cc, cw):
     """Order the rows of every group by pivot and count the independent ones, at most cw.rank if that is not negative.
 
@@ -116,7 +116,7 @@ def _orthogonalise(basis, x, along, extent, squared):
     return total
 
 
-@helper
+@sweep
 def factorise(cc, cw):
     """R of the chosen rows; returns -1, or the row that depends on those before it."""
     for g in range(cc.group.shape[0]):
@@ -145,7 +145,7 @@ def _orthonormalise(cc, cw, g, a, row):
     return length
 
 
-@helper
+@sweep
 def solve(cc, cw):
     """Loads f of the chosen rows, Lambda^-1 f = cw.scratch (by place in cw.chosen), into cw.row.load; others are 0."""
     for r in range(cw.row.shape[0]):

@@ -15,7 +15,7 @@ from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.loads import drive_loads, hinge_loads
 from flexmb.jain.response import clear, read_speeds, write_speeds
 from flexmb.jain.sweeps import forward_dynamics, outward
-from flexmb.jit.kernel import by_bundle, helper
+from flexmb.jit.kernel import by_bundle, helper, sweep
 from flexmb.motion.coordinates import load_state
 from flexmb.spatial.spatial_vector import add6, vec6
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_SINGULAR, OK
@@ -39,7 +39,7 @@ def _pass_load(route, s, i, x, at):
     pass_inward(s.c, s.w, s.cc, s.cw, i, x, at)
 
 
-@helper
+@sweep
 def _pass_outward(route, s, x, v):
     read_speeds(s.cw.response, x)
     innovations.respond(s.c, s.w, s.cw.response)
@@ -67,7 +67,7 @@ def _hinge_loads(route, s):
     hinge_loads(s.c, s.w)
 
 
-@helper
+@sweep
 def _locate(route, t, y, s):
     load_state(t, y, s.c, s.w)
     velocity_sweep(s.c, s.w, False, False)

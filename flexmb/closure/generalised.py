@@ -20,7 +20,7 @@ from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.places import Matrices
 from flexmb.jain.response import clear, clear_body, read_speeds, write_speeds
 from flexmb.jain.sweeps import forward_dynamics
-from flexmb.jit.kernel import by_bundle, helper
+from flexmb.jit.kernel import by_bundle, helper, sweep
 from flexmb.motion.coordinates import load_state
 from flexmb.spatial.spatial_vector import add6, times6, vec6
 from flexmb.spatial.vector import mat3, matmul, transpose
@@ -129,7 +129,7 @@ def _half_solve(s):
             pass_load(s.route, s, i, cw.half, row_place(cc, cc.closure[i].group, r))
 
 
-@helper
+@sweep
 def pass_load(route, s, i, x, at):
     """F^-1 of the generalised forces of the forces in cw.response on the path of closure i; by column from x[at] on."""
     for j in range(s.cc.closure[i].path_start, s.cc.closure[i].path_stop):
@@ -137,7 +137,7 @@ def pass_load(route, s, i, x, at):
     _half(s.route, s, i, x, at)
 
 
-@helper
+@sweep
 def respond(route, s, y, v):
     """v = F'^-1 y: the change of all speeds; prescribed ones do not change."""
     _rest(s.route, s.c, s.w, y, v)
@@ -178,7 +178,7 @@ def hinge_and_drive_loads(route, s):
     pose_sweep(c, w)
 
 
-@helper
+@sweep
 def locate(route, t, y, s):
     """Rows' values and rates at y; the factors of M stay."""
     load_state(t, y, s.c, s.seen)

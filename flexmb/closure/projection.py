@@ -10,7 +10,7 @@ from flexmb.closure.branch import has_started, is_further, leave, notice, recall
 from flexmb.closure.factor import solve, sum_rows
 from flexmb.closure.forces import choose, factorised, free_tree, locate, on_branch, respond
 from flexmb.closure.rows import fastest_opening, largest_gap
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.motion.coordinates import configuration_rate, load_state, normalise_quaternions, put_back
 from flexmb.tables.status import CLOSURE_OPEN, OK
 
@@ -81,7 +81,7 @@ def _open(s, closure):
     return CLOSURE_OPEN
 
 
-@helper
+@sweep
 def close(t, y, closed, s):
     """Close positions up to gaps of `closed` sizes, then speeds, with the factors that were found last."""
     cc, cw = s.cc, s.cw
@@ -103,7 +103,7 @@ def close(t, y, closed, s):
         locate(s.route, t, y, s)
 
 
-@helper
+@sweep
 def _response(s):
     """cw.step = M^-1 J' (J M^-1 J')^-1 cw.scratch, with the factors of the last forward dynamics."""
     solve(s.cc, s.cw)
@@ -111,7 +111,7 @@ def _response(s):
     respond(s.route, s, s.cw.coefficient, s.cw.step)
 
 
-@helper
+@sweep
 def displace(t, y, s):
     """y moves by the displacement cw.step for a unit of time."""
     c, w = s.c, s.w

@@ -12,7 +12,7 @@ R_AB b x a.
 
 from flexmb.closure.tables import ON_GROUND, ROTATION
 from flexmb.jain.ports import port_acceleration, port_velocity
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.spatial_vector import ZERO6, sub6, times6, times6_t
 from flexmb.spatial.vector import (
     add,
@@ -62,7 +62,7 @@ def norm1(x):
     return abs(x[0]) + abs(x[1]) + abs(x[2])
 
 
-@helper
+@sweep
 def evaluate_rows(c, w, cc, cw, accelerated):
     """Fill cw.closure and cw.row; row accelerations only where `accelerated`, which needs those of the bodies.
 

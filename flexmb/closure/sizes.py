@@ -21,7 +21,7 @@ from flexmb.closure.factor import norm, own_columns
 from flexmb.closure.forces import pass_load
 from flexmb.closure.unit_loads import at_port, clear_path
 from flexmb.jain.ports import mode_motion
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.spatial_vector import dot6
 
 _ZERO = (0.0, 0.0, 0.0)
@@ -63,7 +63,7 @@ def _reaction(s, i, k, F):
     return _passed(s, i)
 
 
-@helper
+@sweep
 def _passed(s, i):
     """|x|, in the columns that rows are judged by, of the forces in cw.response, which are on the path of closure i."""
     pass_load(s.route, s, i, s.cw.coefficient, 0)

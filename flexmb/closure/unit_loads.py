@@ -10,7 +10,7 @@ from flexmb.closure.factor import row_place
 from flexmb.closure.tables import ON_GROUND, ROTATION
 from flexmb.jain.innovations import innovate
 from flexmb.jain.response import clear_body, push
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.spatial_vector import scale6, shift_force, times6, times6_t
 from flexmb.spatial.vector import mat3, vec3
 
@@ -24,7 +24,7 @@ def half_solve(c, w, cc, cw):
             pass_inward(c, w, cc, cw, i, cw.half, row_place(cc, cc.closure[i].group, r))
 
 
-@helper
+@sweep
 def pass_inward(c, w, cc, cw, i, x, at):
     """x of the forces in cw.response on the bodies that loads on closure i pass; from x[at] on, by column."""
     for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):

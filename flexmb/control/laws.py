@@ -7,7 +7,7 @@ import math
 
 from flexmb.control.tables import CALLED, CLAMP, COMPILED, LINEAR, LOOKUP, PID
 from flexmb.jit.direct import nothing_at, status_at
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.tables.status import OK
 
 # Numbers of a PID controller.
@@ -15,7 +15,7 @@ KP, KI, KD, FILTER, LOWER, UPPER, TRACKING, SETPOINT, PERIOD, PID_NUMBERS = rang
 INTEGRAL, FILTERED, BEGUN = range(3)  # its states; of a sampled one whether it has acted, too
 
 
-@helper
+@sweep
 def act(t, i, s):
     """Controller i on s.input and s.state: s.output and s.change; returns a status code."""
     law = s.controller[i].law

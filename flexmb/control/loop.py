@@ -12,7 +12,7 @@ from flexmb.control import tables as a
 from flexmb.control.laws import FILTERED, act, pid_error
 from flexmb.control.measuring import measure_at_once, measure_motion
 from flexmb.jit.direct import nothing_at, real_at, status_at
-from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.tables.status import CLOSURE_SINGULAR, OK
 
 
@@ -140,7 +140,7 @@ def _set(t, s):
     return status
 
 
-@helper
+@sweep
 def take(y, s):
     """s.y = [q, u, work] and the continuous controllers' states from y = [q, u, x, work]."""
     n = s.y.shape[0] - 1
@@ -154,7 +154,7 @@ def take(y, s):
                 s.state[o.state + j] = y[n + o.x + j]
 
 
-@helper
+@sweep
 def give(of_mechanics, of_controllers, s, y):
     """The other way round, for states or their rates."""
     n = s.y.shape[0] - 1
@@ -246,7 +246,7 @@ def _gather(i, s):
         s.input[o.input + j] = s.signal[s.wire[o.input + j]]
 
 
-@helper
+@sweep
 def steer(t, s):
     """Sensors, continuous controllers, and what they drive; returns a status code.
 

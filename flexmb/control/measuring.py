@@ -2,7 +2,7 @@
 
 from flexmb.control import tables as a
 from flexmb.jit.direct import nothing_at, status_at
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.vector import dot, mat3, store3, sub, times_t, vec3
 from flexmb.tables.functions import evaluate
@@ -20,7 +20,7 @@ def measure_motion(t, s):
             _measure(t, i, s)
 
 
-@helper
+@sweep
 def measure_at_once(t, s):
     """All others, where the equations of motion were just evaluated: s.dy, and the mechanics' workspace."""
     first = s.y.shape[0] - 1 - s.rates.shape[0]

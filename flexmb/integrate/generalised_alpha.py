@@ -33,7 +33,7 @@ from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import DONE, FACTORED, FRESH, STRETCH, TAKEN_UP, begin, keep_place
 from flexmb.integrate.watch import Ends, pause
-from flexmb.jit.kernel import handed_on, helper, kernel
+from flexmb.jit.kernel import handed_on, helper, kernel, sweep
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
 _ITERATIONS = 12  # of Newton's method, at most
@@ -146,7 +146,7 @@ def newton(problem, t_new, y, h, s, accuracy, counts):
     return NOT_CONVERGED, _ITERATIONS
 
 
-@helper
+@sweep
 def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
     """One step of size h from y to y_new, with a new Jacobian where the old one does not do.
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 
 LEVELS = 36
 QUARTER = 2  # level of tau = 1/4, the coarsest one kept
@@ -39,7 +39,7 @@ class Flow(NamedTuple):
     finest: np.ndarray
 
 
-@helper
+@sweep
 def multiply(A, B, C):
     """C = A B, square, C neither of them: four rows of B at a time onto each row of C."""
     n = A.shape[0]
@@ -71,7 +71,7 @@ def add_product(A, x, y):
         y[i] += total
 
 
-@helper
+@sweep
 def balance(Z, scale):
     """Similarity by powers of two that brings rows and columns of Z to like sums; returns the norm that is left."""
     n = Z.shape[0]
@@ -105,7 +105,7 @@ def balance(Z, scale):
     return norm
 
 
-@helper
+@sweep
 def taylor(Z, tau, powers, P, E):
     """E = exp(tau Z) - 1 and P[k-1] = tau^k phi_k(tau Z), k to 5: the response to the powers of time.
 
@@ -169,7 +169,7 @@ def prepare(flow, A, h):
     return True
 
 
-@helper
+@sweep
 def series(Z, tau, v, x, term, product):
     """x += flow from x over the short time tau under sum over l of v[l] t^l / l!, by its Taylor series."""
     n = x.shape[0]
@@ -187,7 +187,7 @@ def series(Z, tau, v, x, term, product):
             x[i] += term[i]
 
 
-@helper
+@sweep
 def respond(flow, v, terms, X):
     """X[level, m] for the polynomial sum over l < terms of v[l] t^l / l!, at all levels kept."""
     finest = flow.finest[0]
@@ -207,7 +207,7 @@ def respond(flow, v, terms, X):
                 X[level - 1, m, i] = 0.0
 
 
-@helper
+@sweep
 def advance(E, x, X, m, t, result):
     """result = (1 + E) x + sum over l >= m of t^(l-m)/(l-m)! X[l]: from time t on by the time of E and X."""
     n = x.shape[0]
@@ -230,7 +230,7 @@ def at_quarters(flow, X, x):
         advance(flow.E[QUARTER], x[k - 1], X[QUARTER], 0, 0.25 * k, x[k])
 
 
-@helper
+@sweep
 def at_fraction(flow, v, X, x, theta, result, term, product):
     """result (n,): the solution from zero at any fraction theta of the step; x (4,n) of `at_quarters`."""
     n = result.shape[0]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import sweep
 
 
-@helper
+@sweep
 def lu_factorise(A, pivots):
     """Replace A (n,n) by its factors, P A = L U with L of unit diagonal; `pivots` (n,) are the rows exchanged.
 
@@ -36,7 +36,7 @@ def lu_factorise(A, pivots):
     return True
 
 
-@helper
+@sweep
 def lu_solve(A, pivots, x):
     """Solve with the factors of `lu_factorise`; x (n,) holds the right side and receives the solution."""
     n = A.shape[0]

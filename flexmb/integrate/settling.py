@@ -13,10 +13,10 @@ for its rate. Then little is left to project.
 
 from flexmb.integrate.control import copy
 from flexmb.integrate.lu import lu_factorise, lu_solve
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 
 
-@helper
+@sweep
 def settle(problem, t, rate, y, s, accuracy):
     """Put y on its manifold at time t; s: J (n,n), factors `real` and `real_pivots` of rate - J, and `change` (n,)."""
     if problem.settles:

@@ -62,7 +62,7 @@ def handed_on(function: Callable[..., Any]) -> Any:
     It is handed on by its type alone, and chosen by that while its caller is compiled, like `by_bundle`. A plain helper
     is a value too, its address in this process: a kernel that hands one on to what is not written out cannot be kept.
     """
-    part = helper(function)
+    part = sweep(function)
 
     def choose(*args: Any) -> Any:
         return function(*args)
