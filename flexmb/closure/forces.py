@@ -15,7 +15,7 @@ from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.loads import drive_loads, hinge_loads
 from flexmb.jain.response import clear, read_speeds, write_speeds
 from flexmb.jain.sweeps import forward_dynamics, outward
-from flexmb.jit.kernel import by_bundle, helper, sweep
+from flexmb.jit.kernel import by_bundle, helper, kernel, sweep
 from flexmb.motion.coordinates import load_state
 from flexmb.spatial.spatial_vector import add6, vec6
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_SINGULAR, OK
@@ -23,7 +23,7 @@ from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_SINGULAR, OK
 DELICATE = 2.0**-10  # pivots, as part of their ports' responses, of bodies a million times lighter than others
 
 
-@helper
+@kernel
 def _tree_and_rows(route, s):
     status = forward_dynamics(s.c, s.w)
     if status != OK:

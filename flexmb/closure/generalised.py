@@ -20,7 +20,7 @@ from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.places import Matrices
 from flexmb.jain.response import clear, clear_body, read_speeds, write_speeds
 from flexmb.jain.sweeps import forward_dynamics
-from flexmb.jit.kernel import by_bundle, helper, sweep
+from flexmb.jit.kernel import by_bundle, helper, kernel, sweep
 from flexmb.motion.coordinates import load_state
 from flexmb.spatial.spatial_vector import add6, times6, vec6
 from flexmb.spatial.vector import mat3, matmul, transpose
@@ -99,7 +99,7 @@ _half = by_bundle(Matrices, _half_by_composite_bodies, _half_by_recursion)
 _rest = by_bundle(Matrices, _rest_by_composite_bodies, _rest_by_recursion)
 
 
-@helper
+@kernel
 def tree_and_rows(route, s):
     """Accelerations of the tree without closure loads, the rows, and F^-1 J' of every row; a status code."""
     status = _tree(s.route, s.c, s.w)

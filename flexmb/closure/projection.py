@@ -10,7 +10,7 @@ from flexmb.closure.branch import has_started, is_further, leave, notice, recall
 from flexmb.closure.factor import solve, sum_rows
 from flexmb.closure.forces import choose, factorised, free_tree, locate, on_branch, respond
 from flexmb.closure.rows import fastest_opening, largest_gap
-from flexmb.jit.kernel import helper, sweep
+from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.motion.coordinates import configuration_rate, load_state, normalise_quaternions, put_back
 from flexmb.tables.status import CLOSURE_OPEN, OK
 
@@ -81,7 +81,7 @@ def _open(s, closure):
     return CLOSURE_OPEN
 
 
-@sweep
+@kernel
 def close(t, y, closed, s):
     """Close positions up to gaps of `closed` sizes, then speeds, with the factors that were found last."""
     cc, cw = s.cc, s.cw

@@ -21,7 +21,7 @@ from flexmb.tables.status import CONNECTOR_OVERTURNED, OK, OUT_OF_RANGE
 @kernel
 def rhs(t, y, dy, c, w):
     """dy/dt of y = [q, u, work] at time t; returns a status code. `work` collects the non-conservative power."""
-    status = _solution(t, y, c, w)
+    status = accelerations(t, y, c, w)
     if status != OK:
         return status
     store_slope(c, w, _power(c, w), dy)
@@ -31,34 +31,11 @@ def rhs(t, y, dy, c, w):
 @kernel
 def accelerations(t, y, c, w):
     """udot into w.speed.acceleration, drive loads into w.speed.drive; returns a status code."""
-    return _solution(t, y, c, w)
-
-
-@kernel
-def loads(t, y, c, w):
-    """Accelerations, and the loads of hinges and wheels into w.nest.load and w.wheel.torque; returns a status code."""
-    status = _solution(t, y, c, w)
-    if status == OK:
-        constraint_loads(c, w)
-    return status
-
-
-@kernel
-def assemble(t, y, c, w):
-    """Partitions and right sides of (111), the transformation and the reduced equations, without solving them."""
-    _kinematics(t, y, c, w)
-    _equations(c, w)
-
-
-@helper
-def _solution(t, y, c, w):
-    """Equations and their solution; a status code."""
-    _kinematics(t, y, c, w)
+    assemble(t, y, c, w)
     for k in range(c.body.shape[0]):
         if is_out_of_range(c, w.modal[k], k):
             w.fault[0] = k
             return OUT_OF_RANGE
-    _equations(c, w)
     if has(c, BUSHINGS):
         i = overturned(c, w)
         if i >= 0:
@@ -67,15 +44,21 @@ def _solution(t, y, c, w):
     return solve(c, w)
 
 
-@helper
-def _kinematics(t, y, c, w):
+@kernel
+def loads(t, y, c, w):
+    """Accelerations, and the loads of hinges and wheels into w.nest.load and w.wheel.torque; returns a status code."""
+    status = accelerations(t, y, c, w)
+    if status == OK:
+        constraint_loads(c, w)
+    return status
+
+
+@kernel
+def assemble(t, y, c, w):
+    """Partitions and right sides of (111), the transformation and the reduced equations, without solving them."""
     load_state(t, y, c, w)
     hinge_forces(c, w)
     relative_motion(c, w)
-
-
-@helper
-def _equations(c, w):
     nest_sums(c, w)
     coefficient_matrix(c, w)
     reduce(c, w)

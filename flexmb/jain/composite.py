@@ -14,7 +14,7 @@ from flexmb.jain.explicit import inertia_to_parent, refer_to_hinge
 from flexmb.jain.kinematics import motion_column, velocity_sweep
 from flexmb.jain.ports import mode_motion
 from flexmb.jain.wheels import spin_axis
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, kernel
 from flexmb.levels.body import body_inertia
 from flexmb.levels.range import is_out_of_range
 from flexmb.motion.coordinates import hinge_forces
@@ -40,7 +40,7 @@ def mass_matrix(c, w, m):
     composite_bodies(c, w, m)
 
 
-@helper
+@kernel
 def forward_dynamics(c, w, m):
     """Accelerations into w.speed.acceleration by (46), drive loads into w.speed.drive; returns a status code.
 
@@ -102,7 +102,7 @@ def _reverse(m, n):
                     m.U[a, b] = row[m.order[a]]
 
 
-@helper
+@kernel
 def composite_bodies(c, w, m):
     """R(k) = Phi R(k-1) Phi' + M_m (47), X(k) = R(k) H' and the rows of M that body k has (50), tips to base.
 

@@ -12,7 +12,7 @@ from flexmb.jain.kinematics import motion_column, pose_sweep, velocity_sweep
 from flexmb.jain.ports import mode_motion, port_acceleration
 from flexmb.jain.wheels import gyroscopic_torque, spin_axis
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, kernel
 from flexmb.levels.body import body_inertia
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, plus6, shift_force, store6, vec6
@@ -21,7 +21,7 @@ from flexmb.tables.features import CONNECTORS
 from flexmb.tables.status import OK
 
 
-@helper
+@kernel
 def inverse_dynamics(c, w, tau):
     """tau (nu,) for the state in w.q, w.u and the rates in w.speed.acceleration; w.body.load receives the loads.
 

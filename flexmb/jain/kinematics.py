@@ -8,7 +8,7 @@ from flexmb.hinges import catalogue
 from flexmb.jain import axis
 from flexmb.jain.ports import move_port, port_bias, port_velocity
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper, sweep
+from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.jit.strips import part, put, width
 from flexmb.levels.body import is_at_rest
 from flexmb.spatial.spatial_vector import (
@@ -39,7 +39,7 @@ from flexmb.spatial.vector import (
 from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
 
-@sweep
+@kernel
 def velocity_sweep(c, w, shape, rates):
     """Poses, velocities and bias accelerations of all bodies and ports, base to tip (10), (11).
 

@@ -14,7 +14,7 @@ from flexmb.jain.kinematics import move_body, pose_body
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations
 from flexmb.jain.wheels import wheel_acceleration, wheel_forces
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper, sweep
+from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.jit.prefetch import prefetch
 from flexmb.levels import rigid
 from flexmb.levels.body import RIGID
@@ -38,7 +38,7 @@ def forward_dynamics(c, w):
     return OK
 
 
-@sweep
+@kernel
 def bodies(c, w):
     """Motion, inertia and forces of all bodies by themselves, before any is eliminated; returns a status code."""
     hinge_forces(c, w)
@@ -67,7 +67,7 @@ def bodies(c, w):
     return OK
 
 
-@sweep
+@kernel
 def inward(c, w):
     """The inward half of (63), (64); False where a D is not positive definite, w.fault names the body.
 

@@ -15,6 +15,7 @@ direct.py       kernels called by address, from Python and from kernels
 prefetch.py     records asked for ahead of their turn, in sweeps over many bodies
 objects.py      kernels as functions of the interpreter: what they read of Python's objects
 parts.py        helpers are compiled into their callers only
+linking.py      kernels that call kernels, by a symbol
 cache.py        compiled kernels on disk
 stored.py       a compiled kernel as bytes
 processors.py   which processors a kernel runs on
@@ -33,7 +34,8 @@ Numba documents as its extension API, and we take for granted: `njit`, `cfunc`, 
 `WrapperAddressProtocol`, and compilers with other passes.
 
 Internal to numba, with something in their place (see hooks.py), are: that the code of a function can be left
-unoptimised (`JITCodeLibrary` and `NativeLowering`, in parts.py); how a dispatcher asks its cache, what a compiled
+unoptimised, and that a kernel that is called stays where it is (`JITCodeLibrary`, which knows the addresses of what it
+defines, and `NativeLowering`, in parts.py and linking.py); how a dispatcher asks its cache, what a compiled
 version is as bytes, and what it needs to run (`NullCache`, `CompileResult`, `rtsys`, `global_compiler_lock`,
 `normalize_signature`, in cache.py); and the address of a compiled version (`CompileResultWAP`, in hooks.py).
 

@@ -34,6 +34,7 @@ from flexmb.jit.collector import no_searches
 from flexmb.jit.fingerprint import fingerprint
 from flexmb.jit.folder import delete_unused, mark_used, warn_once
 from flexmb.jit.installed import installed_directory
+from flexmb.jit.linking import offer
 from flexmb.jit.once import compiled_once
 from flexmb.jit.processors import compiled_for, running
 from flexmb.jit.progress import announced
@@ -63,8 +64,10 @@ class KernelCache(NullCache):
         rtsys.initialize(target_context)  # no more: numba's registries, which only its compiler needs, take 0.4 s
         for file in self._places(sig, target_context.codegen()):
             contents = self._contents(file)
-            if contents is not None:
-                return unpacked(target_context, contents)
+            compiled = None if contents is None else unpacked(target_context, contents)
+            if compiled is not None:
+                offer(compiled, self._function, self._key(sig))
+                return compiled
         return None
 
     def _contents(self, file: Path) -> memoryview | None:
@@ -103,6 +106,7 @@ class KernelCache(NullCache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a version; a warning where that cannot be done."""
+        offer(data, self._function, self._key(sig))
         if self._folder is None:
             return
         if data.library.has_dynamic_globals:
@@ -143,8 +147,12 @@ class KernelCache(NullCache):
         return folder / self._name(sig, compiled_for(codegen))
 
     def _name(self, sig: Any, processor: tuple[str, ...]) -> str:
-        key = repr((self._fingerprint, str(sig), processor))
-        return f"{self._function.__name__}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.kernel"
+        return f"{self._key(sig, processor)}.kernel"
+
+    def _key(self, sig: Any, *more: tuple[str, ...]) -> str:
+        """A name for all that the code of a version depends on."""
+        key = repr((self._fingerprint, str(sig), *more))
+        return f"{self._function.__name__}-{hashlib.sha256(key.encode()).hexdigest()[:32]}"
 
     def _discard(self, file: Path) -> None:
         if file.parent != self._folder:

@@ -1,6 +1,7 @@
 """Compilation of kernels.
 
-`kernel` marks an entry point: compiled for the argument types of its first call, callable from Python, cached on disk.
+`kernel` marks an entry point: compiled for the argument types of its first call, callable from Python and from other
+kernels (see `linking.py`), cached on disk.
 `helper` marks a function that is called from kernels only: it is compiled into its callers, has no Python wrapper, no
 machine code and no cache entry of its own (see `parts.py`). From Python, call its `.py_func`. `handed_on` marks one
 that kernels take as an argument.
@@ -40,9 +41,10 @@ def helper(function: Callable[..., Any]) -> Any:
 
 
 def sweep(function: Callable[..., Any]) -> Any:
-    """A helper over all bodies: part of the kernels that call it, but called there, not written out at every call.
+    """A helper that is part of the kernels that call it, but called there, not inlined at every call.
 
-    Its arguments are few and a call costs nothing beside it; kernels that sweep several times are smaller.
+    For loops over all bodies or over matrices, beside which a call costs nothing: kernels that have several are smaller
+    and compiled in less time. What most kernels need is better a `kernel` of its own, whose code is there once for all.
     """
     return njit(**(AS_PART | {"forceinline": False}))(function)
 

@@ -8,8 +8,7 @@ hinges and levels is compiled in 20 s of processor time instead of 36 s, and run
 Helpers are written out where they are called, whatever their size: that makes a kernel for one kind of scene nearly
 twice as fast, and a general one by a third, for a sixth more of compiling.
 
-A kernel calls no other kernel. What would be linked of one that was loaded from disk is not there: machine code alone
-is kept (stored.py).
+A kernel that calls another kernel has a symbol in its place and nothing of its code (linking.py).
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRew
 from numba.core.untyped_passes import InlineClosureLikes, RewriteSemanticConstants
 
 from flexmb.jit.features import KnownFeatures
+from flexmb.jit.linking import Callee, refer
 
 
 class _NoMachineCode:
@@ -55,8 +55,10 @@ class _PartLibrary(JITCodeLibrary):
         return whole
 
 
-class _KernelLibrary(JITCodeLibrary):
-    """A kernel, into which every part of it is linked once, however many others call it."""
+class KernelLibrary(JITCodeLibrary):
+    """A kernel, into which every part of it is linked once, however many others call it; `callees` are kernels."""
+
+    callees: tuple[Callee, ...] = ()
 
     def finalize(self) -> None:
         """With all that it calls, directly or not."""
@@ -64,10 +66,11 @@ class _KernelLibrary(JITCodeLibrary):
         for part in called:
             if isinstance(part, _PartLibrary):
                 self._final_module.link_in(part.alone(), preserve=True)
-        self._linking_libraries = [library for library in called if not isinstance(library, _PartLibrary)]
-        for library in self._linking_libraries:
-            if isinstance(library, _KernelLibrary) or library._disable_inspection:
-                raise TypeError(f"{self.name} calls the kernel {library.name}: let both call a helper")
+        others = [library for library in called if not isinstance(library, _PartLibrary)]
+        referred = {library: refer(self._final_module, library) for library in others}
+        self.callees = tuple(callee for callee in referred.values() if callee is not None)
+        self._held = tuple(library for library, callee in referred.items() if callee is not None)
+        self._linking_libraries = [library for library, callee in referred.items() if callee is None]
         super().finalize()
 
 
@@ -101,7 +104,7 @@ class _KernelLowering(NativeLowering):
     _name = "kernel_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        state.library = _KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return bool(super().run_pass(state))
 

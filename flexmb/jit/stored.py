@@ -1,4 +1,4 @@
-"""A compiled kernel as bytes: its machine code, the symbols in it, and what numba has to know to call it.
+"""A compiled kernel as bytes: its machine code, the symbols in it, the kernels it calls, what numba needs to call it.
 
 Numba keeps beside the machine code the same once more as bitcode of LLVM, for functions that it will be compiled into,
 and the type of every variable as text. Nobody compiles kernels into anything, nor reads the text. For the right-hand
@@ -16,6 +16,8 @@ from llvmlite import binding
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+from flexmb.jit.linking import resolve
+
 _LEVEL = 6  # of compression: nine takes twice as long, for 1 %
 
 
@@ -26,14 +28,19 @@ def packed(compiled: Any) -> bytes:
     module = compiled.library._final_module
     symbols = [each.name for each in (*module.functions, *module.global_variables) if not each.is_declaration]
     state = library, fndesc, environment, signature, objectmode, lifted, "", *rest
-    return zlib.compress(dumps((symbols, state)), _LEVEL)
+    return zlib.compress(dumps((symbols, compiled.library.callees, state)), _LEVEL)
 
 
 def unpacked(context: Any, contents: Any) -> Any:
-    """The compiled version again, in this process."""
-    symbols, state = pickle.loads(zlib.decompress(contents))
+    """The compiled version again, in this process, and all kernels that it calls; None where one is not what it was."""
+    symbols, callees, state = pickle.loads(zlib.decompress(contents))
+    held = resolve(callees)
+    if held is None:
+        return None
     context.codegen()._engine._defined_symbols.update(symbols)
-    return CompileResult._rebuild(context, *state)
+    compiled = CompileResult._rebuild(context, *state)
+    compiled.library._held = held
+    return compiled
 
 
 @cache

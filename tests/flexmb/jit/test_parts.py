@@ -85,16 +85,6 @@ def test_helpers_are_written_out(fresh, kind):
         assert "alwaysinline" in text
 
 
-def test_a_kernel_that_calls_a_kernel_is_refused(fresh):
-    """Whether it was compiled in this process or before: of one from disk there is nothing to link."""
-
-    def outer(b):
-        return fresh(b)
-
-    with pytest.raises(TypeError, match="let both call a helper"):
-        kernel(outer)(Few(np.ones(1)))
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_callers_come_before_what_they_call(seed):
     """A linker that meets a function before it is asked for leaves it out."""
