@@ -15,6 +15,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -101,14 +102,24 @@ def measure(scene: Scene) -> Budget:
     y = np.concatenate([state.q, state.u, [0.0]])
     arguments = 0.0, y, np.empty_like(y), c, w
     helpers = compiled_helpers(lambda: rhs(*arguments))
-    ((signature, version),) = rhs.overloads.items()
-    module = rhs.inspect_llvm(signature)
+    ((signature, _),) = rhs.overloads.items()
     operations = count(rhs, *arguments).operations
     return Budget(
         {name: getattr(operations, name) for name in operations.__dataclass_fields__},
-        sum(calls(module, version.fndesc.mangled_name).values()),
+        sum(
+            sum(calls(kernel.inspect_llvm(types), kernel.overloads[types].fndesc.mangled_name).values())
+            for kernel, types in reached(rhs, signature)
+        ),
         helpers,
     )
+
+
+def reached(kernel: Any, types: tuple[Any, ...]) -> set[tuple[Any, tuple[Any, ...]]]:
+    """A version of a kernel, and those of all kernels that it calls, directly or not."""
+    found = {(kernel, types)}
+    for callee in kernel.overloads[types].library.callees:
+        found |= reached(getattr(import_module(callee.module), callee.name), callee.arguments)
+    return found
 
 
 def compiled_helpers(call: Callable[[], Any]) -> int:
