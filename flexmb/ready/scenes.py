@@ -39,6 +39,12 @@ def looped() -> SceneBuilder:
     return builder.closure("loop", "spherical", "coupler", "rocker", **at)
 
 
+def looped_at_rest_shape() -> SceneBuilder:
+    """The same with a beam whose inertia is that of its rest shape: its closures are solved for in another way."""
+    builder = looped().beam("panel", length=1.0, elements=8, modes=2, level="ruthless", section=SECTION)
+    return builder.weld("root", "bob", "panel").marker("tip", "panel", node="tip")
+
+
 def with_events(builder: SceneBuilder, coordinate: str) -> s.Scene:
     """The scene with events that watch a rate, time and a signal: a coordinate strikes, then is latched."""
     builder.sense_marker("place", "centre", "position")

@@ -33,6 +33,7 @@ Use = Callable[[], object]
 BODIES: tuple[tuple[int, Level, Elimination], ...] = (
     (2, "full", "explicit"), (2, "ruthless", "woodbury"), (18, "ruthless", "fastest"),
 )  # fmt: skip
+LOOPS = {"loop": scenes.looped, "loop at rest shape": scenes.looped_at_rest_shape}  # the second has no Jacobians
 T_END, STEP = 1e-3, 2.5e-4  # s
 BATCHED: tuple[Method, ...] = ("rk4", "dop853")
 
@@ -42,13 +43,14 @@ def uses() -> Iterator[tuple[str, Use]]:
     yield "linear models", _linear_models
     yield "laws that a scene may name", _laws
     yield "batches", _batches
-    yield "single states of a loop", _single_states_of_a_loop
+    for name, builder in LOOPS.items():
+        yield f"single states of a {name}", partial(_single_states_of_a_loop, builder)
     yield "single states", _single_states
     for method in sorted(INTEGRATORS, key=lambda name: not INTEGRATORS[name].linearises):
-        yield f"{method}, loop, feedback", partial(_regulated, scenes.looped, method)
-        yield f"{method}, tree, feedback", partial(_regulated, scenes.pendulum, method)
-        yield f"{method}, loop, events", partial(_eventful, scenes.looped, method)
-        yield f"{method}, tree, events", partial(_eventful, scenes.pendulum, method)
+        loops = {"loop": scenes.looped} if INTEGRATORS[method].linearises else LOOPS
+        for name, builder in {"tree": scenes.pendulum, **loops}.items():
+            yield f"{method}, {name}, feedback", partial(_regulated, builder, method)
+            yield f"{method}, {name}, events", partial(_eventful, builder, method)
         for algorithm in RUNNING:
             if algorithm in WITH_JACOBIAN or not INTEGRATORS[method].linearises:
                 yield f"{method}, tree, {algorithm}", partial(_run, scenes.pendulum().scene(), method, algorithm)
@@ -118,8 +120,8 @@ def _laws() -> None:
     _run(scenes.slewed(), "dop853")
 
 
-def _single_states_of_a_loop() -> None:
-    system = compile(scenes.looped().scene())
+def _single_states_of_a_loop(builder: Callable[[], SceneBuilder]) -> None:
+    system = compile(builder().scene())
     state = system.initial_state
     for algorithm in ON_CHAINS:
         system.accelerations(state, algorithm)
