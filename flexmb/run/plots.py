@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _SIZE = (9.0, 5.5)  # inches
 _RESOLUTION = 120  # dots per inch
+_MOST = 10  # curves of a panel: matplotlib has ten colours, and more names do not fit beside them
 
 
 def write_plots(trajectory: Trajectory, folder: Path) -> list[Path]:
@@ -54,11 +55,21 @@ def _rows(figure: Figure, *labels: str) -> list[Axes]:
     return panels
 
 
+def _draw(panel: Axes, t: Real, curves: dict[str, Real], size: Callable[[Real], Any]) -> None:
+    """Curves by name; of more than `_MOST`, those of the largest `size`, and the panel says so."""
+    sizes = {name: np.nan_to_num(size(values)) for name, values in curves.items()}
+    shown = set(sorted(sizes, key=lambda name: -sizes[name])[:_MOST])
+    for name, values in curves.items():
+        if name in shown:
+            panel.plot(t, values, label=chart_text(name))
+    if len(shown) < len(curves):
+        panel.set_title(f"the {_MOST} largest of {len(curves)}", fontsize="small")
+
+
 def _markers(trajectory: Trajectory, figure: Figure) -> None:
-    panels = _rows(figure, "x (m)", "y (m)", "z (m)")
-    for name, path in trajectory.markers.items():
-        for axis, panel in enumerate(panels):
-            panel.plot(trajectory.t, path.position[:, axis], label=chart_text(name))
+    for axis, panel in enumerate(_rows(figure, "x (m)", "y (m)", "z (m)")):
+        curves = {name: path.position[:, axis] for name, path in trajectory.markers.items()}
+        _draw(panel, trajectory.t, curves, np.ptp)  # how far each moves, wherever it is
 
 
 def _energy(trajectory: Trajectory, figure: Figure) -> None:
@@ -80,17 +91,20 @@ def _momentum(trajectory: Trajectory, figure: Figure) -> None:
 
 def _loads(trajectory: Trajectory, figure: Figure) -> None:
     """Magnitudes: components of many hinges in one chart are not legible; the CSV has them."""
-    torque, force = _rows(figure, "|torque| (N m)", "|force| (N)")
-    for name, load in (trajectory.loads | trajectory.wheel_loads).items():
-        torque.plot(trajectory.t, _magnitude(load[:, :3]), label=chart_text(name))
-        force.plot(trajectory.t, _magnitude(load[:, 3:]), label=chart_text(name))
+    loads = trajectory.loads | trajectory.wheel_loads
+    for part, panel in enumerate(_rows(figure, "|torque| (N m)", "|force| (N)")):
+        curves = {name: _magnitude(load[:, 3 * part : 3 * part + 3]) for name, load in loads.items()}
+        _draw(panel, trajectory.t, curves, np.max)
 
 
 def _drives(trajectory: Trajectory, figure: Figure) -> None:
     (panel,) = _rows(figure, "drive load (N or N m)")
-    for name, drive in trajectory.drives.items():
-        for i in range(drive.shape[1]):
-            panel.plot(trajectory.t, drive[:, i], label=chart_text(name if drive.shape[1] == 1 else f"{name}[{i}]"))
+    curves = {
+        name if drive.shape[1] == 1 else f"{name}[{i}]": drive[:, i]
+        for name, drive in trajectory.drives.items()
+        for i in range(drive.shape[1])
+    }
+    _draw(panel, trajectory.t, curves, lambda values: np.max(np.abs(values)))
 
 
 def _magnitude(vectors: Real) -> Real:

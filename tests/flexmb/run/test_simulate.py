@@ -7,12 +7,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import flexmb as fm
 from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.run import plots
 from flexmb.run.samples import sample_bytes
 from flexmb.run.switching import timing
 from flexmb.tables.status import Status
+from tests.benchmarks.rivals import rigid_chain
 from tests.trees import random_scene
 
 EPS = np.finfo(float).eps
@@ -243,6 +246,17 @@ def test_csv_names_units_and_reads_back_exactly(tmp_path):
     values = np.array(rows, float)
     assert np.array_equal(values[:, header.index("end.position.z [m]")], run.markers["end"].position[:, 2])
     assert np.array_equal(values[:, header.index("energy.total [J]")], run.total_energy)
+
+
+def test_of_many_curves_a_chart_has_the_largest_and_says_so():
+    """A thousand of them, with their names, would take eight seconds to draw, and could not be read."""
+    run = fm.simulate(rigid_chain(12), 0.01, samples=3)
+    figure = Figure()
+    plots._loads(run, figure)
+    _, force = figure.axes
+    largest = sorted(run.loads, key=lambda name: -np.max(np.linalg.norm(run.loads[name][:, 3:], axis=1)))[:10]
+    assert sorted(line.get_label() for line in force.lines) == sorted(largest)
+    assert force.get_title() == "the 10 largest of 12"
 
 
 def test_plots_are_written(tmp_path):
