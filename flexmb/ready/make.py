@@ -20,10 +20,11 @@ from pathlib import Path
 from time import perf_counter
 
 from flexmb.jit.installed import MADE_BY, description
+from flexmb.jit.once import compiled_once
 from flexmb.output.whole import whole_file
 
 KERNELS = "*.kernel"
-BEGUN = "begun"  # a file whose age tells which kernels were used since
+UNUSED = 0  # the time of files that no use has asked for: those that it reads the cache gives another, whatever the clock
 
 
 def make(folder: Path, processes: int, processor: str = "") -> list[Path]:
@@ -31,10 +32,15 @@ def make(folder: Path, processes: int, processor: str = "") -> list[Path]:
 
     RuntimeError where a use failed, when all others are through and what they compiled is in the folder.
     """
-    failed = []
     folder.mkdir(parents=True, exist_ok=True)
-    begun = folder / BEGUN
-    begun.touch()
+    with compiled_once(folder / MADE_BY):  # of two installations at once, the second finds what the first has made
+        return _made(folder, processes, processor)
+
+
+def _made(folder: Path, processes: int, processor: str) -> list[Path]:
+    failed = []
+    for file in folder.glob(KERNELS):
+        os.utime(file, (UNUSED, UNUSED))
     with tempfile.TemporaryDirectory() as made, _environment(Path(made), processor):
         names = list(_uses())
         with multiprocessing.get_context("spawn").Pool(processes) as pool:
@@ -48,9 +54,8 @@ def make(folder: Path, processes: int, processor: str = "") -> list[Path]:
     with whole_file(folder / MADE_BY) as place:
         place.write_text(text, encoding="utf-8")
     for file in folder.glob(KERNELS):
-        if file.stat().st_mtime_ns < begun.stat().st_mtime_ns:
+        if file.stat().st_mtime == UNUSED:
             file.unlink()
-    begun.unlink()
     if failed:
         raise RuntimeError(f"uses that failed, whose kernels may be missing: {'; '.join(failed)}")
     return sorted(folder.glob(KERNELS))
