@@ -24,7 +24,7 @@ from flexmb.jit.once import compiled_once
 from flexmb.output.whole import whole_file
 
 KERNELS = "*.kernel"
-UNUSED = 0  # the time of files that no use has asked for: those that it reads the cache gives another, whatever the clock
+UNUSED = 0  # the time of files that no use has asked for; those that are read get another, whatever the clock says
 
 
 def make(folder: Path, processes: int, processor: str = "") -> list[Path]:
