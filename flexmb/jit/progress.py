@@ -1,7 +1,8 @@
 """A line for who waits: what is being compiled, when it takes longer than two seconds, and that it is once.
 
 A kernel is compiled once for each kind of arguments, as an integrator is for runs that watch for events and for those
-that do not. So lines about one kernel say which version it is, and no line comes twice.
+that do not. So lines about one kernel say which version it is, and no line comes twice. Of kernels that it calls, which
+are compiled on the way, nothing is said.
 
 It is a warning of the logger `flexmb.jit`, which Python shows on stderr unless the program has set up its logging:
 `logging.getLogger("flexmb.jit").setLevel(logging.ERROR)` silences it.
@@ -24,17 +25,23 @@ AFTER = 2.0  # s
 _LOGGER = logging.getLogger("flexmb.jit")
 _versions = Counter[str]()  # that were announced, by the name of the kernel
 _counting = threading.Lock()
+_thread = threading.local()  # `announcing`: there while this thread compiles
 
 
 @contextmanager
 def announced(function: FunctionType, folder: Path | None) -> Iterator[None]:
     """Say after a while that a kernel is being compiled, and why it has to be."""
+    if hasattr(_thread, "announcing"):
+        yield
+        return
     timer = threading.Timer(AFTER, _announce, (function, folder))
     timer.daemon = True
     timer.start()
+    _thread.announcing = True
     try:
         yield
     finally:
+        del _thread.announcing
         timer.cancel()
 
 

@@ -102,3 +102,15 @@ def test_an_error_ends_the_watch(monkeypatch, caplog):
         with announced(lines, None):
             time.sleep(0.4)
     assert len(caplog.records) == 1
+
+
+def test_of_what_is_compiled_on_the_way_nothing_is_said(monkeypatch, caplog):
+    """A kernel that a kernel calls; in another thread there may be one that somebody waits for."""
+    monkeypatch.setattr(progress, "AFTER", 0.01)
+    with caplog.at_level(logging.WARNING, "flexmb.jit"), announced(lines, None), announced(announced, None):
+        time.sleep(0.3)
+    [record] = caplog.records
+    assert "test_progress.lines" in record.getMessage()
+    with caplog.at_level(logging.WARNING, "flexmb.jit"), announced(announced, None):
+        time.sleep(0.3)
+    assert "progress.announced" in caplog.records[-1].getMessage()
