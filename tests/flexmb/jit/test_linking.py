@@ -59,6 +59,7 @@ class Project:
         """What a process prints: results; and how many kernels it has found: mean, spread, total."""
         path = os.pathsep.join([str(self._folder), str(ROOT)])
         environment = os.environ | {"PYTHONPATH": path, "NUMBA_CACHE_DIR": str(self._folder / "cache")}
+        environment["PYTHONDONTWRITEBYTECODE"] = "1"  # Python does not see an edit within a second, of the same length
         command = [sys.executable, "-W", "ignore", "-c", USE]
         done = subprocess.run(command, env=environment, cwd=self._folder, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
