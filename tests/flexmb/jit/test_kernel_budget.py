@@ -1,6 +1,6 @@
 """Kernels do not grow unnoticed: no clock, so no noise. If growth is meant: python -m tests.flexmb.jit.kernel_budget.
 
-Every scene is compiled anew in a process of its own, 8 to 13 s of processor time each, the one with everything 40 s.
+Every scene is compiled anew in a process of its own, all four in a minute of processor time.
 """
 
 from __future__ import annotations
