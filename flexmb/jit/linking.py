@@ -49,10 +49,15 @@ def offer(compiled: Any, function: FunctionType, key: str) -> None:
 
 
 def refer(module: Any, library: Any) -> Callee | None:
-    """Name in a module of LLVM what it calls of a library by its symbol; None where that is no kernel's."""
+    """Name in a module of LLVM what it calls of a library by its symbol; None where that is no kernel's.
+
+    TypeError for a kernel that was made in a function: another process could not find it, nor load who calls it.
+    """
     code = _codes.get(library)
     if code is None:
         return None
+    if "<locals>" in code.callee.name:
+        raise TypeError(f"{code.callee.name} is called by a kernel: define it at the top of its module")
     binding.add_symbol(code.callee.symbol, code.address)
     module.get_function(code.own_symbol).name = code.callee.symbol
     return code.callee

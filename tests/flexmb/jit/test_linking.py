@@ -124,6 +124,21 @@ def test_the_caller_has_a_symbol_and_nothing_of_the_code(tmp_path: Path, monkeyp
     assert [(kind, name.strip('"')) for kind, name in met if "inner" in name] == [("declare", callee.symbol)]
 
 
+def test_a_kernel_that_others_could_not_find_is_not_called(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hooks, "cache_directory", lambda: tmp_path)
+
+    @kernel
+    def hidden(x):
+        return 2.0 * x[0]
+
+    @kernel
+    def calling(x):
+        return hidden(x) + 1.0
+
+    with pytest.raises(TypeError, match="hidden is called by a kernel: define it at the top of its module"):
+        calling(np.array([3.0]))
+
+
 @pytest.mark.parametrize(
     "change", [{"symbol": "flexmb.other"}, {"name": "no_such_kernel"}, {"module": "no.such.module"}, {"name": "ROOT"}]
 )
