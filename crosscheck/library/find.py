@@ -79,9 +79,11 @@ def _resolve_one(word: str) -> tuple[Case, ...]:
     folder = Path(word)
     if os.path.isfile(folder / "run.toml"):  # False for whatever cannot even be a path
         return (load_case(folder),)
+    named = [name for name in shipped_names() if word in (name, name.partition("/")[2])]
+    if named:  # no other case is read for it
+        return tuple(load_case(shipped_folder() / name) for name in named)
     cases = shipped_cases()
-    named = tuple(case for case in cases if word in (case.name, case.name.partition("/")[2]))
-    chosen = named or tuple(case for case in cases if word == "all" or word in case.run.tags)
+    chosen = tuple(case for case in cases if word == "all" or word in case.run.tags)
     if not chosen:
         known = {name for case in cases for name in (case.name, case.name.partition("/")[2], *case.run.tags)}
         raise CaseError(

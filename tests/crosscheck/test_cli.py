@@ -270,9 +270,10 @@ def test_a_coarse_csv_has_every_channel(runner: CliRunner, tmp_path: Path) -> No
     "command", [("regenerate", "pendulums/point_mass"), ("verify", "pendulums/point_mass", "my.csv")]
 )
 def test_a_scheduler_that_does_not_answer_ends_the_command_before_anything_runs(
-    runner: CliRunner, command: tuple[str, ...]
+    runner: CliRunner, command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("distributed")
+    monkeypatch.setattr("crosscheck.running.dask_cluster.ANSWER_S", 0.5)
     result = runner.invoke(cli.app, [*command, "--scheduler", "tcp://127.0.0.1:1"])
     assert result.exit_code == 2
     assert "no Dask scheduler answers at tcp://127.0.0.1:1" in " ".join(result.output.split())

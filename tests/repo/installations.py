@@ -39,8 +39,8 @@ def install(commands: Path, archive: Path) -> None:
 
 
 def called(commands: Path, folder: Path, *words: str, path: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """An installed command, run in a folder; `path` stands before what is installed."""
-    clean = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
+    """An installed command, run in a folder as a user runs it; `path` stands before what is installed."""
+    clean = {name: text for name, text in os.environ.items() if name not in ("PYTHONPATH", "FLEXMB_KERNELS")}
     clean |= {} if path is None else {"PYTHONPATH": str(path)}
     return subprocess.run(
         [str(commands / words[0]), *words[1:]], cwd=folder, env=clean, capture_output=True, text=True, check=False

@@ -72,21 +72,24 @@ def test_addresses_of_a_bundle_are_loaded_once(compiled):
     assert "!invariant.load" in text
 
 
-PROBE = """
+WHICH = """
 import warnings
 import numba
 numba.njit(lambda x: x)(1.0)  # numba itself has all it needs
 {hidden}
 with warnings.catch_warnings(record=True) as warned:
     warnings.simplefilter("always")
+    import flexmb.run.simulate
     from flexmb.jit.hooks import HOOKS, Hooks
-    from flexmb.integrate.rk4 import rk4
-    from flexmb.tables.soundness import unsound
-    from tests.flexmb.integrate.integration_problems import HARMONIC, solve
-    from tests.flexmb.jit.test_bundle import choose, fill_inner, Nested, pair
-    import numpy as np
     told = [each.message for each in warned if each.category is RuntimeWarning]
     print("plain" if HOOKS == Hooks() else "hooks", *told)
+"""
+NUMBERS = """
+import numpy as np
+from flexmb.integrate.rk4 import rk4
+from flexmb.tables.soundness import unsound
+from tests.flexmb.integrate.integration_problems import HARMONIC, solve
+from tests.flexmb.jit.test_bundle import choose, fill_inner, Nested, pair
 print(fill_inner(Nested(pair(), np.array([1.0, 3.0])), 2.0), choose(pair()), unsound(np.ones(2), np.zeros(0, np.int64)))
 print(solve(HARMONIC, [0.0, 1.0], step=1e-2).last.tolist())
 """
@@ -98,25 +101,22 @@ HIDDEN = {
 }
 
 
-def probe(hidden: str) -> tuple[str, list[str]]:
-    """The first line and all others."""
+def probe(program: str, hidden: str = "") -> list[str]:
+    """What it prints."""
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-c", PROBE.format(hidden=hidden)]
+    command = [sys.executable, "-c", program.format(hidden=hidden)]
     done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    first, *others = done.stdout.splitlines()
-    return first, others
-
-
-@pytest.fixture(scope="module")
-def by_hooks():
-    first, others = probe("")
-    assert first == "hooks"
-    return others
+    return done.stdout.splitlines()
 
 
 @pytest.mark.parametrize("hidden", HIDDEN)
-def test_without_the_hooks_results_are_the_same_and_one_warning_says_so(hidden, by_hooks):
-    first, others = probe(HIDDEN[hidden])
-    assert first.startswith("plain numba ") and first.count("is not one that flexmb knows from inside") == 1
-    assert others == by_hooks
+def test_one_warning_says_that_the_hooks_are_not_used(hidden):
+    [line] = probe(WHICH, HIDDEN[hidden])
+    assert line.startswith("plain numba ") and line.count("is not one that flexmb knows from inside") == 1
+
+
+def test_without_the_hooks_results_are_the_same():
+    first, *others = probe(WHICH + NUMBERS)
+    plain, *same = probe(WHICH + NUMBERS, HIDDEN["another version"])
+    assert first == "hooks" and plain.startswith("plain") and same == others
