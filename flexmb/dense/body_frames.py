@@ -97,11 +97,13 @@ def on_body(seat: Seat, eta: Jet) -> MovingFrame:
     """
     node = seat.node
     moved = eta.map(lambda x: x @ node.translation.T)
-    turned = eta.map(lambda x: x @ node.rotation_modes.T)
-    if node.second is not None:
-        moved = moved + quadratic(node.second.translation, eta[..., None, :])
-        turned = turned + quadratic(node.second.rotation, eta[..., None, :])
-    rotation = rotation_exponential(turned) @ constant(node.rotation)
+    rotation = constant(node.rotation[None, None])
+    if eta.value.shape[-1]:  # rigid bodies are many, and the exponential is dear
+        turned = eta.map(lambda x: x @ node.rotation_modes.T)
+        if node.second is not None:
+            moved = moved + quadratic(node.second.translation, eta[..., None, :])
+            turned = turned + quadratic(node.second.rotation, eta[..., None, :])
+        rotation = rotation_exponential(turned) @ rotation
     fixed = MovingFrame(constant(seat.offset), constant(seat.rotation))
     return MovingFrame(constant(node.position) + moved, rotation).carry(fixed)
 

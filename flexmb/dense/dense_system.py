@@ -354,5 +354,5 @@ def _turned(chosen: InertiaPoints, frames: MovingFrame) -> Real:
 
 def _columns(frames: MovingFrame) -> Jacobian:
     """Column j is the velocity of the K frames for u = e_j."""
-    rates = np.broadcast_to(frames.position.rate, frames.angular_velocity().shape)
-    return Jacobian(np.moveaxis(frames.angular_velocity(), 0, -1), np.moveaxis(rates, 0, -1))
+    turning, moving = np.broadcast_arrays(frames.angular_velocity(), frames.position.rate)
+    return Jacobian(np.moveaxis(turning, 0, -1), np.moveaxis(moving, 0, -1))

@@ -13,13 +13,18 @@ from types import EllipsisType
 
 import numpy as np
 from numpy.polynomial import Polynomial
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
 from flexmb.typing import Real
 
-# sin(x)/x and (1 - cos(x))/x^2 as power series in x^2; 24 terms are exact to round-off for |x| <= 2 pi.
-SINE = Polynomial([(-1.0) ** k / factorial(2 * k + 1) for k in range(24)])
-VERSINE = Polynomial([(-1.0) ** k / factorial(2 * k + 2) for k in range(24)])
+TERMS = 24  # of power series, which are exact to round-off for |x| <= 2 pi
+SERIES = np.zeros((TERMS, 2, 3))
+"""sin(x)/x and (1 - cos(x))/x^2 as power series in x^2, and their first and second derivatives by x^2."""
+for _i in range(2):
+    _series = Polynomial([(-1.0) ** k / factorial(2 * k + 1 + _i) for k in range(TERMS)])
+    for _order in range(3):
+        SERIES[: TERMS - _order, _i, _order] = _series.deriv(_order).coef
 
 
 @dataclass(frozen=True)
@@ -132,9 +137,10 @@ def polynomial(p: Polynomial, x: Jet) -> Jet:
 
 def skew(v: Real) -> Real:
     """v~ with v~ a = v x a, (...,3) -> (...,3,3)."""
-    x, y, z = np.moveaxis(v, -1, 0)
-    zero = np.zeros_like(x)
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*v.shape, 3)
+    A = np.zeros((*v.shape, 3), v.dtype)
+    A[..., 2, 1], A[..., 0, 2], A[..., 1, 0] = v[..., 0], v[..., 1], v[..., 2]
+    A[..., 1, 2], A[..., 2, 0], A[..., 0, 1] = -v[..., 0], -v[..., 1], -v[..., 2]
+    return A
 
 
 def vector(A: Real) -> Real:
@@ -148,8 +154,8 @@ def rotation_exponential(theta: Jet) -> Jet:
     """exp(theta~) of rotation vectors (...,3): Rodrigues, 1 + sin(x)/x theta~ + (1 - cos(x))/x^2 theta~^2."""
     squared = product(lambda a, b: np.einsum("...i,...i->...", a, b), theta, theta)
     cross = theta.map(skew)
-    one = constant(np.broadcast_to(np.eye(3), cross.value.shape))
-    return one + scale(polynomial(SINE, squared), cross) + scale(polynomial(VERSINE, squared), cross @ cross)
+    sine, versine = (chain(*each, squared) for each in polyval(squared.value, SERIES))
+    return constant(np.eye(3)) + scale(sine, cross) + scale(versine, cross @ cross)
 
 
 def rotation_about(axis: ArrayLike, angle: Jet) -> Jet:
