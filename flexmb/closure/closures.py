@@ -318,6 +318,12 @@ class Closures:
         return int(np.sum(ranks)) if np.all(ranks >= 0) else -1
 
     @property
+    def counted(self) -> tuple[bytes, bytes]:
+        """What chains are made from that counting anew changes."""
+        ranks, size = self._counted[0]
+        return ranks.tobytes(), size.tobytes()
+
+    @property
     def independent(self) -> int:
         """Independent rows at the state evaluated last."""
         return int(np.sum(self._own.rank))

@@ -94,11 +94,17 @@ class Integration:
             moving = route.rhs, constants, self._workspace
             self.batch = batch(system, moving, algorithm.observing, system.nq + system.nu + 1)
         self._enter: dict[bool, Any] = {}  # by whether levels are watched
+        self._at_first = [(array, array.copy()) for array in route.remembered(constants)]
 
     def __call__(self, *given: Any) -> tuple[int, float]:
         """Integrate: (y, clock, accuracy, out, counts, memory, watch) of `Integrator`, all arrays in C order."""
         self.compile(*given)
         return self._enter[given[-1] is not None](self._problem, *given)
+
+    def forget(self) -> None:
+        """Be as it was made: closed chains remember the branch that they are on."""
+        for array, at_first in self._at_first:
+            array[...] = at_first
 
     def compile(self, *given: Any) -> None:
         """For a call with these, unless that is done."""
@@ -149,22 +155,22 @@ class Integration:
 def integration(
     system: System, algorithm: Algorithm, stabilise: float, integrator: Integrator
 ) -> Iterator[Integration]:
-    """One that nobody else uses meanwhile; kept for the next run, but of closed chains, which remember their branch.
+    """One that nobody else uses meanwhile; kept for the next run.
 
     ValueError and others for what does not go together: see `System.route`.
     """
     route = system.route(algorithm, stabilise)
-    spare: list[Integration] = system.kept.setdefault((Integration, algorithm, integrator.name), [])
+    spare: list[Integration] = system.kept.setdefault((Integration, algorithm, integrator.name, route.beginning), [])
     try:
         found = spare.pop()
+        found.forget()
     except IndexError:
         if system.scene.controllers:  # they write into functions of time: of a system that nobody else has
             system = system._anew()
             route = system.route(algorithm, stabilise)
         found = Integration(system, algorithms.chosen(algorithm), route, integrator)
     yield found
-    if not system.scene.closures:
-        spare.append(found)
+    spare.append(found)
 
 
 def integrate(

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Set
+from collections.abc import Callable, Hashable, Sequence, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from flexmb.frisch.errata import Erratum
 from flexmb.integrate.problem import Leaping, Linear
 from flexmb.system.mechanics import Mechanics
-from flexmb.typing import Real
+from flexmb.typing import Index, Real, Record
 
 if TYPE_CHECKING:
     from flexmb.closure.closures import ClosedMotion, Closures
@@ -22,6 +22,8 @@ class Route(NamedTuple):
     """An algorithm as runs see it: a maker of constants and workspace, kernels of the motion and of its manifold.
 
     leaping: how runs go on where a step fails, if they can. linear: for these tables, what methods need that linearise.
+    remembered: of tables that have seen a motion, what the next would go on from, and must not. beginning: what tables
+    are made from that may change.
     """
 
     tables: Callable[[], tuple[Any, Any]]
@@ -29,6 +31,8 @@ class Route(NamedTuple):
     project: Any
     leaping: Leaping | None = None
     linear: Callable[[Any, Any], Linear] | None = None
+    remembered: Callable[[Any], Sequence[Real | Index | Record]] = lambda _: ()
+    beginning: Hashable = None
 
 
 @dataclass(frozen=True)

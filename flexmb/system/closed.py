@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, assert_never
 
 import numpy as np
@@ -38,7 +38,7 @@ from flexmb.tables.features import asking
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, finite_result, pack
 from flexmb.tables.status import Status
-from flexmb.typing import Real
+from flexmb.typing import Index, Real, Record
 
 if TYPE_CHECKING:
     from flexmb.frisch.nested_system import NestedSystem
@@ -337,7 +337,10 @@ class ClosedSystem(System):
             return chain, chain
 
         leaping = Leaping(back, leap, beside, watch_steps, noticed)
-        return Route(tables, closed_dynamics.rhs, closed_dynamics.project, leaping, self._linear)
+        beginning = stabilise, *self.closures.counted
+        return Route(
+            tables, closed_dynamics.rhs, closed_dynamics.project, leaping, self._linear, _remembered, beginning
+        )
 
     def _linear(self, chain: Closed, _: Closed) -> Linear:
         tangent = chain_tangent(chain.c, chain.cc, self.nq, self.nu)
@@ -370,6 +373,11 @@ class ClosedSystem(System):
         if status in (Status.CLOSURE_SINGULAR, Status.CLOSURE_OPEN, Status.BRANCH_UNKNOWN):
             return self.scene.closures[fault].name
         return super().fault_name(status, fault)
+
+
+def _remembered(chain: Closed) -> list[Record | Real | Index]:
+    """Where closures note the branch that a motion is on."""
+    return [array for field in fields(chain.cw) if isinstance(array := getattr(chain.cw, field.name), np.ndarray)]
 
 
 def _of_both(one: Spread | None, other: Spread | None) -> Spread | None:
