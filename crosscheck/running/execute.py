@@ -28,7 +28,7 @@ from crosscheck.engines.trajectories import determined_channels
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.made_by import made_by
 from crosscheck.records.packing import pack
-from crosscheck.running.plan import Done, Job
+from crosscheck.running.plan import MAIN, Done, Job
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -153,7 +153,7 @@ def _run(
         took_s = time.perf_counter() - before  # by this process' clock: an engine may say of itself what it likes
         wall = run.wall_s
         if run.status == "finished" and not job.lean:
-            times = solves(min(took_s, wall))
+            times = solves(min(took_s, wall)) if job.role == MAIN else 1  # no chart shows the time of another
             for _ in range(times - 1):
                 again = _solved(model, job.times, scene, effort)
                 _require_the_same(run, again)
