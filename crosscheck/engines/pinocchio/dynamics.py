@@ -88,8 +88,10 @@ class Dynamics:
 
         With driven coordinates, their rows of the inverse dynamics are the drives.
         """
-        lost = self.forces.dampers_and_motors(t, state.v)
-        tau = self.forces.springs(state.q) + lost
+        tau, power = self.forces.springs(state.q), 0.0
+        if self.forces.loses:
+            lost = self.forces.dampers_and_motors(t, state.v)
+            tau, power = tau + lost, lost @ state.v
         held = self.connections.along(t, state.q, state.v).values()
         for speed, each in held:
             tau[speed] += each.load
@@ -100,7 +102,8 @@ class Dynamics:
         else:
             a = self._hybrid(state, tau, wrenches)
             drive = self.inverse(state, a, wrenches)[D] - tau[D] if self.driven else self._undriven
-        power = lost @ state.v + drive @ state.v[D]
+        if self.driven:
+            power += drive @ state.v[D]
         if self.loads:
             power += self.loads.power(t, self.data)
         for _, each in held:

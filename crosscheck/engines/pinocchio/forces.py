@@ -32,6 +32,7 @@ class JointForces:
             for slot in tree.slots
             if isinstance(slot.freedom, Ball) and (slot.freedom.stiffness or slot.freedom.damping)
         ]
+        self.loses = bool(damped or self._motors or self._balls)  # else dampers and motors give nothing
 
     def springs(self, q: Real) -> Real:
         tau = np.zeros(self._nv)
