@@ -3,6 +3,8 @@
 What a command does is imported when it runs: `--help`, completion and a mistyped word load neither cases nor NumPy.
 """
 
+import os
+
 from crosscheck.cli import (  # noqa: F401, I001 - each adds its commands, in this order
     run, bench, chart, compare, listing, verify, regenerate, contract, mutate, invariance, stability, sweep,
 )  # fmt: skip
@@ -13,4 +15,5 @@ from flexmb.output.readers import outlive_readers
 def main() -> None:
     """Entry point of the console script."""
     outlive_readers()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: planning takes twice the CPU with threads
     app()

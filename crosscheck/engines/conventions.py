@@ -16,14 +16,17 @@ from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
 
+_LAST, _FIRST = np.array([1, 2, 3, 0]), np.array([3, 0, 1, 2])  # arrays, as a list takes longer than its use
+
+
 def scalar_last(quaternion: ArrayLike) -> Real:
     """wxyz (..., 4) to xyzw (Pinocchio, SciPy)."""
-    return np.asarray(quaternion, dtype=float)[..., [1, 2, 3, 0]]
+    return np.asarray(quaternion, dtype=float).take(_LAST, axis=-1)
 
 
 def scalar_first(quaternion: ArrayLike) -> Real:
     """xyzw (..., 4) to wxyz (this project, MuJoCo, Exudyn)."""
-    return np.asarray(quaternion, dtype=float)[..., [3, 0, 1, 2]]
+    return np.asarray(quaternion, dtype=float).take(_FIRST, axis=-1)
 
 
 def angular_first(spatial: ArrayLike) -> Real:

@@ -29,8 +29,8 @@ BUILT_IN = {
     "basilisk": "crosscheck.engines.basilisk:BasiliskEngine",
 }
 OWN_CODE = tuple(name for name, place in BUILT_IN.items() if place.startswith("crosscheck.engines.native:"))
-# Engines whose compiled code is another's: what that one leaves in caches on disk serves them too.
-COMPILED_LIKE = {"native-frisch-as-printed": "native-frisch"}
+# Engines by the one whose library or compiled code they share: a process that serves it serves them, too.
+SERVED_WITH = dict.fromkeys(OWN_CODE, "native") | {"exudyn-beam": "exudyn"}
 
 
 class Engines(Mapping[str, Engine]):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from functools import cached_property
 
 from crosscheck.engines.registry import BUILT_IN
 from crosscheck.judging.applicable import Inapplicable, set_apart
@@ -69,7 +70,7 @@ class SessionOutcome:
         judged = {engine for verdict in self.all if verdict.kind != "control" for _, engine in verdict.sides}
         return [engine for engine in self.asked if engine not in judged]
 
-    @property
+    @cached_property
     def never_applicable(self) -> dict[str, list[str]]:
         """By engine the cases of which it can represent nothing that it was asked for."""
         judged = {(verdict.case, engine) for verdict in self.all for _, engine in verdict.sides}
@@ -104,7 +105,7 @@ class SessionOutcome:
         """Verdicts as expected between the library's own engines, for which no figures were accepted yet."""
         return [each for each in self.all if each.ok and each.accepted is None and recordable(each, BUILT_IN)]
 
-    @property
+    @cached_property
     def lost(self) -> list[Absence]:
         """Runs that were asked for and did not happen, or failed where no verdict shows it.
 

@@ -11,6 +11,7 @@ import numpy as np
 from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import RUNGS, RungSignal, Uncertainty, estimate, spatial, unknown
 from crosscheck.judging.verdict import Ending, Signal
+from crosscheck.records.drawing import FILM
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record, RunRecord, RunStatus
 from crosscheck.records.packing import Packed, unpack
 from flexmb.typing import Real
@@ -208,7 +209,7 @@ def _case_results(case: CaseRecord, runs: Iterable[RunRecord]) -> CaseResults:
             ladders.setdefault((variant.name, item.engine), []).extend(prescribed)
     for run in runs:
         ladder = ladders.get((run.variant, run.engine))
-        if not run.effort or ladder is None or _on(ladder, run):
+        if not run.effort or ladder is None or run.role == FILM or _on(ladder, run):  # a film climbs no ladder
             groups.setdefault((run.variant, run.engine, run.role), []).append(run)
     results = {key: _result(key, group) for key, group in groups.items()}
     for variant in case.run.variants:

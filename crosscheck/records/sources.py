@@ -42,7 +42,7 @@ def sources(modules: Iterable[str], alone: Iterable[str] = ()) -> Sources:
     found = Sources()
     waiting = list(dict.fromkeys(modules))
     own = {*OURS, *(_top(module) for module in waiting)}
-    seen = set[str]()
+    seen, read = set[str](), set[str]()
     for module in alone:
         found.files.update(_with_parents(module))
     while waiting:
@@ -63,7 +63,8 @@ def sources(modules: Iterable[str], alone: Iterable[str] = ()) -> Sources:
             continue
         found.files.update(files)
         for name, file in files.items():
-            if name != "flexmb" or module == "flexmb":  # what flexmb/__init__.py imports is for its users alone
+            if name not in read and (name != "flexmb" or module == "flexmb"):  # flexmb/__init__.py is for its users
+                read.add(name)
                 waiting.extend(imported(name, file))
     return found
 

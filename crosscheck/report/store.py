@@ -53,7 +53,7 @@ class Store:
             return {"shapes": [], "data": ""}
         differences = np.concatenate([_differences(column) for column in self._columns])
         planes = differences.view(np.uint8).reshape(-1, 4).T
-        data = zlib.compress(np.ascontiguousarray(planes).tobytes(), 9)
+        data = zlib.compress(np.ascontiguousarray(planes).tobytes(), 6)  # 9 takes seven times as long for a hundredth
         return {"shapes": self._shapes, "data": base64.b64encode(data).decode()}
 
     def _add(self, values: Real) -> int:

@@ -7,6 +7,7 @@ import time
 import traceback
 from collections.abc import Callable, Mapping
 from importlib import import_module
+from math import ceil
 from pathlib import Path
 
 import msgspec
@@ -27,14 +28,15 @@ from crosscheck.engines.trajectories import determined_channels
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.made_by import made_by
 from crosscheck.records.packing import pack
-from crosscheck.running.plan import Done, Job
+from crosscheck.running.plan import MAIN, Done, Job
 from flexmb.scene.schema import Scene
+from flexmb.typing import Real
 
 Emit = Callable[[RunRecord | Confirmed | str], None]
 FULLY_STORED = 4  # the finest efforts, which the uncertainty needs in every channel
-SHORT_S = 0.1  # a shorter solve is repeated, as the clock and the caches disturb it
-REPEATS = 3
-COARSEST = 0  # the rung whose run, the cheapest, is always made twice: a longer one may be another every time, too
+SOLVES = ((0.03, 3), (0.1, 2))  # a shorter solve (s) is made so many times, as the clock and the caches disturb it
+COARSEST = 0  # the rung whose run, the cheapest, is always held against another: a longer one may differ, too
+BEGINNING = 0.1  # of the samples: what is run before and after a coarsest run that takes long, to be the same twice
 
 
 def execute(job: Job, emit: Emit) -> None:
@@ -144,16 +146,20 @@ def _run(
 ) -> RunRecord:
     """One effort; `kept` names the channels to store, None for all."""
     try:
+        proves = record.rung == COARSEST and not job.lean
+        begun = _solved(model, _beginning(job.times), scene, effort) if proves else None
         before = time.perf_counter()
-        run = _solved(model, job, scene, effort)
+        run = _solved(model, job.times, scene, effort)
         took_s = time.perf_counter() - before  # by this process' clock: an engine may say of itself what it likes
         wall = run.wall_s
         if run.status == "finished" and not job.lean:
-            short = min(took_s, wall) < SHORT_S
-            for _ in range(REPEATS - 1 if short else int(record.rung == COARSEST)):
-                again = _solved(model, job, scene, effort)
+            times = solves(min(took_s, wall)) if job.role == MAIN else 1  # no chart shows the time of another
+            for _ in range(times - 1):
+                again = _solved(model, job.times, scene, effort)
                 _require_the_same(run, again)
                 wall = min(wall, again.wall_s)
+            if begun is not None and times == 1:
+                _require_the_same(begun, _solved(model, _beginning(job.times), scene, effort))
         channels = determined_channels(run) if len(run.times) else {}
     except KeyboardInterrupt:
         raise
@@ -171,9 +177,19 @@ def _run(
     )
 
 
-def _solved(model: Model, job: Job, scene: Scene, effort: Effort) -> Trajectory:
+def solves(seconds: float) -> int:
+    """How many times a run is made that takes so long."""
+    return next((times for below, times in SOLVES if seconds < below), 1)
+
+
+def _beginning(times: Real) -> Real:
+    """The first of the sample times, two at least."""
+    return times[: max(2, ceil(BEGINNING * len(times)))]
+
+
+def _solved(model: Model, times: Real, scene: Scene, effort: Effort) -> Trajectory:
     """One solve; the engine gets sample times of its own, which it may do with as it likes."""
-    return checked_run(model.simulate(Run(times=job.times.copy()), effort), job.times, scene)
+    return checked_run(model.simulate(Run(times=times.copy()), effort), times, scene)
 
 
 def _require_the_same(first: Trajectory, again: Trajectory) -> None:

@@ -1,7 +1,8 @@
 """The run that an animation is made from: the scene with markers on every body, and more of them along bent ones.
 
 The markers that a case records are those it judges, and many bodies have none. A film is a run of its own, by the
-library's own engine, so that what is judged stays as the case says; it is drawn and never judged.
+library's own engine, so that what is judged stays as the case says; it is drawn and never judged. Where a case has
+efforts of its own, finer ones take long: the coarsest is off by a thousandth of the motion at most.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from crosscheck.engines.contract import Effort
 from crosscheck.records.drawing import Drawing
 from crosscheck.running.draw import draw
 from flexmb.interchange.sid.blocks import SidError
@@ -22,6 +24,7 @@ from flexmb.scene.tree import coordinates, rest_frames
 
 ENGINE = "native"
 FRAMES = 161
+EFFORT = Effort("tolerance", 1e-10, "dop853")  # unless the case has its own: then their coarsest
 PIECES = 6  # of a beam, between the nodes that are filmed
 ADDED = "drawn"
 NO_INERTIA = ((0.0,) * 3,) * 3

@@ -20,6 +20,7 @@ from crosscheck.library.selection import alone, joining, select
 from crosscheck.records.drawing import FILM, Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
 from crosscheck.running.draw import draw
+from crosscheck.running.film import EFFORT as FILM_EFFORT
 from crosscheck.running.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.running.held import held_reference
 from crosscheck.running.scheduler import TIME_LIMIT_S
@@ -237,7 +238,7 @@ def _film(case: Case, run: RunFile, variant: Variant, provider: str) -> tuple[Jo
         scene_id=scene_identity(filmed, times),
         times=times,
         provider=provider,
-        efforts=prescribed(variant, ENGINE),
+        efforts=prescribed(variant, ENGINE)[:1] or (FILM_EFFORT,),
         finest_only=True,
         kept=film_channels(drawing),
         lean=True,

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from crosscheck.engines.answers import clean
-from crosscheck.engines.registry import COMPILED_LIKE
+from crosscheck.engines.registry import SERVED_WITH
 from crosscheck.library.find import Case
 from crosscheck.records.archive import Archive, read
 from crosscheck.records.kinds import CaseRecord, Confirmed, Record, RunRecord
@@ -85,8 +85,8 @@ def run_planned(
 
 
 def _engine(job: Job) -> str:
-    """The kind of a job: a worker stays with one engine, so that it loads its library or compiles its kernels once."""
-    return COMPILED_LIKE.get(job.engine, job.engine)
+    """The kind of a job: a worker stays with one library, so that it loads it or compiles its kernels once."""
+    return SERVED_WITH.get(job.engine, job.engine)
 
 
 def _time_limit(job: Job) -> float:

@@ -1,7 +1,7 @@
 """A worker: a process that does one job after the other, told over a pipe, and watched from outside.
 
-It is a fresh process in a session of its own. It serves one kind of jobs, so that nothing which an engine
-leaves behind in its process (folder, environment, warnings, threads) reaches another engine. A job that exceeds its
+It is a fresh process in a session of its own. It serves one kind of jobs, so that nothing which a library
+leaves behind in its process (folder, environment, warnings, threads) reaches another one. A job that exceeds its
 time or its worker its memory is stopped, and whatever the worker started ends with it.
 """
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from crosscheck.engines.answers import clean
 from crosscheck.engines.contract import Effort
-from crosscheck.engines.registry import COMPILED_LIKE
+from crosscheck.engines.registry import SERVED_WITH
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import resolve
 from crosscheck.records.archive import Archive, decoded_lines
@@ -190,8 +190,8 @@ def _outcome(
 
 
 def _kind(job: SampleJob) -> str:
-    """A worker stays with one engine."""
-    return COMPILED_LIKE.get(job.job.engine, job.job.engine)
+    """A worker stays with one library."""
+    return SERVED_WITH.get(job.job.engine, job.job.engine)
 
 
 def _time_limit(job: SampleJob) -> float:

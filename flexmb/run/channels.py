@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -46,6 +47,7 @@ class Recorded(Protocol):
     def work(self) -> Real | None: ...
 
 
+_SAFE = (1e-100, 1e100)  # squares of numbers in between are neither lost nor infinite
 UNITS = {
     ".position": "m",
     ".orientation": "rad",
@@ -88,6 +90,7 @@ def channels_of(trajectory: Recorded) -> dict[str, Real]:
     return found
 
 
+@lru_cache(maxsize=2**16)  # a session asks a million times for some thousands of answers
 def matches(pattern: str, channel: str) -> bool:
     """Whether `pattern` names the channel: itself, a shell pattern of it, or its beginning up to a "." or ":"."""
     return any(fnmatchcase(channel, form) for form in (pattern, f"{pattern}.*", f"{pattern}:*"))
@@ -133,6 +136,8 @@ def norms(rows: Real) -> Real:
     Rows are scaled by powers of two, which rounds nothing. What is not finite stays so.
     """
     largest = np.max(np.abs(rows), axis=1, initial=0.0)
+    if _SAFE[0] < np.min(largest, where=largest > 0.0, initial=1.0) and np.max(largest, initial=0.0) < _SAFE[1]:
+        return np.linalg.norm(rows, axis=1)  # the same digits in half the time
     exponent = np.where(np.isfinite(largest), np.frexp(largest)[1], 0)
     with np.errstate(over="ignore", invalid="ignore"):
         return np.ldexp(np.linalg.norm(np.ldexp(rows, -exponent[:, None]), axis=1), exponent)

@@ -181,7 +181,7 @@ class Raiser(Fake):
 
 class DivergingPendulum(Pendulum):
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
-        half = Run(run.times[: len(run.times) // 2])
+        half = Run(run.times[: max(2, len(run.times) // 2)])
         good = super().simulate(half, effort)
         return Trajectory("diverged", "the step fell below 1e-12 s", good.times, good.markers, energy=good.energy)
 

@@ -12,6 +12,7 @@ from crosscheck.engines.conventions import Frame, frame, rotation_matrix
 from crosscheck.engines.exudyn import joints, springs
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
 from crosscheck.engines.exudyn.joints import ExudynLink, HingePort
+from crosscheck.engines.exudyn.loads import along_axis
 from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
 from crosscheck.engines.exudyn.motion import AT_REST, FrameMotion, across_quaternion
 from crosscheck.engines.functions_of_time import Profile, profile
@@ -351,7 +352,7 @@ def _load(shop: Workshop, parent: Placed, load: Load) -> None:
     shop.mbs.AddLoad(
         kind(
             markerNumber=marker, loadVector=list(along), bodyFixed=turning,
-            loadVectorUserFunction=lambda mbs, t, unit: f(t).value * along,
+            loadVectorUserFunction=along_axis(f, along),
         )
     )  # fmt: skip
 

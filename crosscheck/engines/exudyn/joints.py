@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
+from crosscheck.engines.exudyn.loads import along_axis
 from crosscheck.engines.exudyn.motion import FrameMotion, across, across_quaternion, initial
 from crosscheck.engines.functions_of_time import Profile, profile
 from flexmb.scene.hinges import AngularCoordinate, LinearCoordinate, Spherical
@@ -193,13 +194,10 @@ def _motor(shop: Workshop, markers: list[int], coordinate: Coordinate) -> Callab
     load = shop.items.LoadTorqueVector if angular else shop.items.LoadForceVector
     f, axis = profile(function), np.eye(3)[2 if angular else 0]
     for marker, sign in zip(markers, (-1.0, 1.0), strict=True):
-        along = sign * axis
+        along = (sign * axis).tolist()
         shop.mbs.AddLoad(
-            load(
-                markerNumber=marker, loadVector=list(along), bodyFixed=True,
-                loadVectorUserFunction=lambda mbs, t, unit, along=along: f(t).value * along,
-            )
-        )  # fmt: skip
+            load(markerNumber=marker, loadVector=along, bodyFixed=True, loadVectorUserFunction=along_axis(f, along))
+        )
     return f
 
 

@@ -30,8 +30,10 @@ class Forces:
         self._tree = tree
         self._motions = [(slot.q, slot.v, profile(slot.freedom.prescribed)) for slot in self.driven]
         self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
+        self._pushed: tuple[float, list[tuple[int, float]]] = np.nan, []  # what `_pushes` has found last, and when
         self._loads = [_BodyWrench(tree, attachment(scene, tree.links, load), load) for load in scene.loads]
         self.connections = MujocoConnections(tree, scene)
+        self._connected = bool(self.connections)
         self.before_end = np.inf
 
     @contextmanager
@@ -63,17 +65,24 @@ class Forces:
 
     def _apply(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         t = min(data.time, self.before_end)
-        if self.connections:
+        if self._connected:
             data.qfrc_applied[:] = 0.0
-        for index, motor in self._motors:
-            data.qfrc_applied[index] = motor(t).value
-        for _, v, motion in self._motions:
-            data.qfrc_applied[v] = ARMATURE * motion(t).acceleration
-        if self._loads or self.connections:
+        applied = data.qfrc_applied
+        for index, push in self._pushes(t):
+            applied[index] = push
+        if self._loads or self._connected:
             data.xfrc_applied[:] = 0.0
             for load in self._loads:
                 load.add(t, data)
             self.connections.add(t, data)
+
+    def _pushes(self, t: float) -> list[tuple[int, float]]:
+        """Speeds with what their motors give or what makes them follow; stages of a step share their times."""
+        if t != self._pushed[0]:
+            efforts = [(index, motor(t).value) for index, motor in self._motors]
+            following = [(v, ARMATURE * motion(t).acceleration) for _, v, motion in self._motions]
+            self._pushed = t, efforts + following
+        return self._pushed[1]
 
 
 class _BodyWrench:

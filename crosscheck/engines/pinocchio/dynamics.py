@@ -18,7 +18,7 @@ from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.closures import PinocchioClosures
 from crosscheck.engines.pinocchio.connections import PinocchioConnections
 from crosscheck.engines.pinocchio.forces import JointForces, PlacedLoads
-from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, initial_state
+from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, initial_state, places
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -52,17 +52,19 @@ class Dynamics:
         self.connections = PinocchioConnections(tree, scene)
         self.driven: list[PinocchioSlot] = [slot for slot in tree.slots if _is_driven(slot)]
         self._motions = [profile(slot.freedom.prescribed) for slot in self.driven]
-        self._driven_q = np.array([slot.q for slot in self.driven], dtype=np.intp)
-        self._driven_v = np.array([slot.v for slot in self.driven], dtype=np.intp)
-        self._free_q = np.setdiff1d(np.arange(tree.model.nq), self._driven_q)
-        self._free_v = np.setdiff1d(np.arange(tree.model.nv), self._driven_v)
+        driven_q, driven_v = [slot.q for slot in self.driven], [slot.v for slot in self.driven]
+        free_q = np.setdiff1d(np.arange(tree.model.nq), driven_q)
+        self._free_count = len(free_q)
+        self._driven_q, self._driven_v = places(driven_q), places(driven_v)
+        self._free_q, self._free_v = places(free_q), places(np.setdiff1d(np.arange(tree.model.nv), driven_v))
         self._ballasted = tree.model.copy()
         self._ballasted.armature[self._driven_v] = BALLAST
         self._ballasted_data = self._ballasted.createData()
         scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
-        self._scalar_q = np.array([slot.q for slot in scalars], dtype=np.intp)
-        self._scalar_v = np.array([slot.v for slot in scalars], dtype=np.intp)
-        self._turning = [slot for slot in tree.slots if not isinstance(slot.freedom, Scalar)]
+        self._scalar_q, self._scalar_v = places([slot.q for slot in scalars]), places([slot.v for slot in scalars])
+        turning = [slot for slot in tree.slots if not isinstance(slot.freedom, Scalar)]
+        self._turning = [(slot, int(np.searchsorted(free_q, _quaternion_start(slot)))) for slot in turning]
+        self._undriven = np.zeros(0)
 
     def initial(self) -> Real:
         q, v = initial_state(self.tree)
@@ -70,22 +72,26 @@ class Dynamics:
 
     def state(self, t: float, y: Real) -> PinocchioState:
         q, v = np.empty(self.tree.model.nq), np.empty(self.tree.model.nv)
-        split = len(self._free_q)
+        split = self._free_count
         q[self._free_q], v[self._free_v] = y[:split], y[split:-1]
-        motion = np.array([each(t) for each in self._motions]).reshape(-1, 3)
-        q[self._driven_q], v[self._driven_v] = motion[:, 0], motion[:, 1]
-        for slot in self._turning:
+        driven = self._undriven
+        if self._motions:
+            motion = np.array([each(t) for each in self._motions])
+            q[self._driven_q], v[self._driven_v], driven = motion[:, 0], motion[:, 1], motion[:, 2]
+        for slot, _ in self._turning:
             quaternion = q[(start := _quaternion_start(slot)) : start + 4]
             quaternion /= np.sqrt(quaternion @ quaternion)
-        return PinocchioState(q, v, motion[:, 2])
+        return PinocchioState(q, v, driven)
 
     def solve(self, t: float, state: PinocchioState) -> PinocchioSolution:
         """Articulated-body accelerations, or constrained ones where loops are closed, and drive loads.
 
         With driven coordinates, their rows of the inverse dynamics are the drives.
         """
-        lost = self.forces.dampers_and_motors(t, state.v)
-        tau = self.forces.springs(state.q) + lost
+        tau, power = self.forces.springs(state.q), 0.0
+        if self.forces.loses:
+            lost = self.forces.dampers_and_motors(t, state.v)
+            tau, power = tau + lost, lost @ state.v
         held = self.connections.along(t, state.q, state.v).values()
         for speed, each in held:
             tau[speed] += each.load
@@ -95,11 +101,13 @@ class Dynamics:
             a, drive = self.closures.solve(state.q, state.v, tau + self._generalised(state, wrenches)), np.zeros(0)
         else:
             a = self._hybrid(state, tau, wrenches)
-            drive = self.inverse(state, a, wrenches)[D] - tau[D] if len(D) else np.zeros(0)
-        power = lost @ state.v + drive @ state.v[D]
+            drive = self.inverse(state, a, wrenches)[D] - tau[D] if self.driven else self._undriven
+        if self.driven:
+            power += drive @ state.v[D]
         if self.loads:
             power += self.loads.power(t, self.data)
-        power += sum(each.power for _, each in held)
+        for _, each in held:
+            power += each.power
         if self.connections:
             power += self.connections.power(t, self.data)
         return PinocchioSolution(a, drive, float(power))
@@ -144,20 +152,19 @@ class Dynamics:
         solution = self.solve(t, state)
         qdot = np.empty(self.tree.model.nq)
         qdot[self._scalar_q] = state.v[self._scalar_v]
-        for slot in self._turning:
-            self._turning_rate(slot, y, state, qdot)
+        for slot, first in self._turning:
+            self._turning_rate(slot, y[first : first + 4], state, qdot)
         return np.concatenate([qdot[self._free_q], solution.acceleration[self._free_v], [solution.power]])
 
-    def _turning_rate(self, slot: PinocchioSlot, y: Real, state: PinocchioState, qdot: Real) -> None:
-        """Rates of ball and free-flyer coordinates; the quaternion's own (not normalised) value enters its rate."""
+    def _turning_rate(self, slot: PinocchioSlot, own: Real, state: PinocchioState, qdot: Real) -> None:
+        """Rates of ball and free-flyer coordinates; the quaternion's `own` (not normalised) value enters its rate."""
         start = _quaternion_start(slot)
-        own = y[np.searchsorted(self._free_q, start) :][:4]
         if isinstance(slot.freedom, Floating):
             linear, omega = state.v[slot.v : slot.v + 3], state.v[slot.v + 3 : slot.v + 6]
             qdot[slot.q : slot.q + 3] = pin.Quaternion(state.q[start : start + 4]).toRotationMatrix() @ linear
         else:
             omega = state.v[slot.v : slot.v + 3]
-        qdot[start : start + 4] = scalar_last(quaternion_rate(scalar_first(own), omega))
+        qdot[start : start + 4] = scalar_last(quaternion_rate(scalar_first(own).tolist(), omega.tolist()))
 
     def _wrenches(self, t: float, state: PinocchioState) -> pin.StdVec_Force | None:
         if not (self.loads or self.connections):

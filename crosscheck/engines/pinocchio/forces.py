@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import rotation_vector, scalar_first
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Scalar, attachment
-from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree
+from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, Places, places
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -33,6 +32,7 @@ class JointForces:
             for slot in tree.slots
             if isinstance(slot.freedom, Ball) and (slot.freedom.stiffness or slot.freedom.damping)
         ]
+        self.loses = bool(damped or self._motors or self._balls)  # else dampers and motors give nothing
 
     def springs(self, q: Real) -> Real:
         tau = np.zeros(self._nv)
@@ -98,8 +98,8 @@ class _JointWrench:
         return pin.Force(np.zeros(3), vector)
 
 
-def _indices(slots: list[PinocchioSlot]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    return np.array([slot.q for slot in slots], dtype=np.intp), np.array([slot.v for slot in slots], dtype=np.intp)
+def _indices(slots: list[PinocchioSlot]) -> tuple[Places, Places]:
+    return places([slot.q for slot in slots]), places([slot.v for slot in slots])
 
 
 def _turn(slot: PinocchioSlot, q: Real) -> Real:

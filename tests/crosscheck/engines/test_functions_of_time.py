@@ -58,3 +58,12 @@ def test_fastest_rate_bounds_the_sampled_rate(function):
     f = profile(function)
     sampled = max(abs(f(t).rate) for t in np.linspace(0.0, 4.0, 801))
     assert sampled <= fastest_rate(function) * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("function", _SMOOTH, ids=lambda f: type(f).__name__)
+def test_what_is_kept_for_a_time_is_of_that_time(function):
+    """Engines go back in time when they begin again, and ask twice at the same time."""
+    f = profile(function)
+    for t in (0.3, 0.3, 1.1, 0.3, 0.0, 1.1):
+        assert f(t) == profile(function)(t)
+    assert f(0.3) is f(0.3)

@@ -234,10 +234,10 @@ def test_a_run_is_recorded_in_every_field(monkeypatch: pytest.MonkeyPatch) -> No
     found = emitted(actor, efforts=ladder, role="control:mass")
     assert found[0] == "compiling"
     assert found[1::2] == LABELS[:3]
-    runs = [f"simulate {each}" for each in (LABELS[0], *LABELS[:3])]  # the coarsest is run again
+    runs = [f"simulate {each}" for each in (*[LABELS[0]] * 3, *LABELS[1:3])]  # before and after it, its beginning
     assert actor.heard == ["version", "supports", "compile", "warm_up", *runs]
     key = found[2].made_by
-    for rung, count, record, effort in zip(range(3), (0, 2, 3), found[2::2], ladder, strict=True):
+    for rung, count, record, effort in zip(range(3), (1, 3, 4), found[2::2], ladder, strict=True):
         assert msgspec.structs.replace(record, times=None, channels={}) == the(
             "finished", "fine", role="control:mass", version="1.0", support="rigid for flexible", made_by=key,
             effort=effort.label, effort_kind="step", effort_method="rk4", effort_value=effort.value, rung=rung,
@@ -318,7 +318,7 @@ def test_a_diverged_run_keeps_its_good_part_and_is_not_repeated() -> None:
     assert (found.status, found.message, found.wall_s, found.evaluations) == ("diverged", "at 0.05 s", 0.001, 7)
     assert np.array_equal(unpack(found.times), TIMES[:2])
     assert len(unpack(found.channels[TIP])) == 2
-    assert len(actor.heard) == 5 + len(LADDER)
+    assert len(actor.heard) == 5 + 1 + len(LADDER)  # the beginning of the coarsest was run before it
 
 
 def test_a_run_that_ended_at_once_has_no_times() -> None:
@@ -327,20 +327,38 @@ def test_a_run_that_ended_at_once_has_no_times() -> None:
     assert (found.wall_s, found.evaluations) == (0.001, 7)
 
 
-def test_a_short_run_is_repeated_and_its_shortest_time_counts() -> None:
+def test_a_short_run_is_repeated_and_its_shortest_time_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     times = (0.03, 0.01, 0.02)
     actor = Actor(play=lambda run, count: slow(run, times[count % 3]))
     assert [each.wall_s for each in records(actor)] == [0.01] * 5
-    assert len(actor.heard) == 5 + 3 * 5
+    assert len(actor.heard) == 5 + 1 + 3 * 5
+    less_short = Actor(play=lambda run, count: slow(run, 0.05 + 0.01 * (count % 2)))
+    on_a_clock(monkeypatch, 0.06)
+    assert [each.wall_s for each in records(less_short)] == [0.05] * 5
+    assert len(less_short.heard) == 5 + 1 + 2 * 5
 
 
-def test_of_long_runs_the_coarsest_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_the_coarsest_of_long_runs_the_beginning_is_run_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     on_a_clock(monkeypatch, 0.125)
-    actor = Actor(play=lambda run, count: slow(run, 0.1))
-    assert [each.wall_s for each in records(actor)] == [0.1] * 5
-    assert len(actor.heard) == 5 + 5 + 1
-    noisy = Actor(play=lambda run, count: replace(run, momentum=run.momentum * (1 + 1e-9 * count)))
-    assert [each.status for each in records(noisy)] == ["failed", *["finished"] * 4]
+    lengths: list[int] = []
+
+    def play(run: Trajectory, count: int) -> Trajectory:
+        lengths.append(len(run.times))
+        return slow(run, 0.1)
+
+    actor = Actor(play=play)
+    assert [each.wall_s for each in records(actor, times=np.linspace(0.0, 0.2, 31))] == [0.1] * 5
+    assert lengths == [4, 31, 4, 31, 31, 31, 31]
+
+
+@pytest.mark.parametrize("noise", [lambda count: count, lambda count: count == 0, lambda count: count > 0])
+def test_a_long_run_that_is_another_each_time_is_a_failure(monkeypatch: pytest.MonkeyPatch, noise: Callable) -> None:
+    """Also where only the first call of all differs, as of an engine that keeps what it had found."""
+    on_a_clock(monkeypatch, 0.125)
+    noisy = Actor(play=lambda run, count: replace(run, momentum=run.momentum * (1 + 1e-9 * noise(count))))
+    found = records(noisy)
+    assert [each.status for each in found] == ["failed", *["finished"] * 4]
+    assert "not reproducible: momentum.angular is another when the same effort is run again" in found[0].message
 
 
 def test_a_run_is_as_short_as_the_worker_says_whatever_the_engine_claims() -> None:
@@ -363,7 +381,7 @@ def test_a_run_is_as_short_as_the_worker_says_whatever_the_engine_claims() -> No
         ),
     ],
 )
-@pytest.mark.parametrize("at", [1, 2])
+@pytest.mark.parametrize("at", [2, 3])
 def test_a_run_that_is_another_each_time_is_a_failure(other: Callable, text: str, at: int) -> None:
     def play(run: Trajectory, count: int) -> Trajectory:
         run = slow(run, 0.01)
@@ -389,5 +407,6 @@ def test_a_run_against_the_contract_is_a_failure_and_times_are_the_engines_own()
 
     found = records(Actor(play=shifted))
     assert [each.status for each in found] == ["failed"] * 5
-    assert all("times[4] is 7 s where 0.2" in each.message for each in found)
+    assert "times[1] is 7 s where 0.05" in found[0].message  # of its beginning
+    assert all("times[4] is 7 s where 0.2" in each.message for each in found[1:])
     assert TIMES[-1] == 0.2
