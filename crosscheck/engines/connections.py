@@ -11,7 +11,6 @@ from math import hypot, inf, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from crosscheck.engines.conventions import Frame, cross, cross_matrix, frame, quaternion_of, rotation_vector
 from crosscheck.engines.functions_of_time import profile
@@ -119,7 +118,7 @@ def _attached(scene: Scene, chain: tuple[Link, ...], connector: BetweenNodes, si
 def law_of(stems: dict[str, Any]) -> Law:
     """The law of a spring by its keys without units."""
     if stems["table"]:
-        return _by_table(PchipInterpolator(stems["table"], stems["loads"]))
+        return _by_table(stems["table"], stems["loads"])
     powers = [stems["preload"], stems["stiffness"], *stems["stiffening"]]
 
     def by_powers(x: float) -> tuple[float, float]:
@@ -129,8 +128,11 @@ def law_of(stems: dict[str, Any]) -> Law:
     return by_powers
 
 
-def _by_table(spline: PchipInterpolator) -> Law:
+def _by_table(places: tuple[float, ...], given: tuple[float, ...]) -> Law:
     """Between the knots its cubics, beyond them straight lines; in plain numbers, for a spline's call takes long."""
+    from scipy.interpolate import PchipInterpolator  # few springs have a table, and it takes a fifth of a second
+
+    spline = PchipInterpolator(places, given)
     knots, pieces = spline.x.tolist(), spline.c.T.tolist()
     levels, slopes = spline.antiderivative()(spline.x).tolist(), spline.derivative()(spline.x).tolist()
     loads = spline(spline.x).tolist()

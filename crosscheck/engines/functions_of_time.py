@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from msgspec import Struct
-from scipy.interpolate import make_interp_spline
 
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene
@@ -179,6 +178,8 @@ def _spin_up(rate: float, T: float) -> Callable[[float], Profile]:
 
 
 def _table(times: tuple[float, ...], values: tuple[float, ...]) -> Callable[[float], Profile]:
+    from scipy.interpolate import make_interp_spline  # few scenes have a table, and it takes a fifth of a second
+
     spline = make_interp_spline(times, values, k=5)
     derivatives = (spline, spline.derivative(1), spline.derivative(2))
     for each in derivatives:

@@ -22,7 +22,8 @@ from crosscheck.library.find import Case
 from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
-from crosscheck.running.plan import MAIN, plan
+from crosscheck.running.job import MAIN
+from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import Listener, run_planned
 from flexmb.run.channels import family, magnitude

@@ -28,7 +28,7 @@ from crosscheck.engines.trajectories import determined_channels
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.made_by import made_by
 from crosscheck.records.packing import pack
-from crosscheck.running.plan import MAIN, Done, Job
+from crosscheck.running.job import MAIN, Done, Job
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 

@@ -15,7 +15,8 @@ from crosscheck.records.kinds import CaseRecord, Confirmed, Record, RunRecord
 from crosscheck.records.machine import environment
 from crosscheck.running.execute import execute
 from crosscheck.running.expected import expected_seconds
-from crosscheck.running.plan import Done, Job, plan
+from crosscheck.running.job import Done, Job
+from crosscheck.running.plan import plan
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import BY_DEFAULT, Event, Limits, Scheduler
 

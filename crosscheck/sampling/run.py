@@ -20,7 +20,8 @@ from crosscheck.records.archive import Archive, decoded_lines
 from crosscheck.records.kinds import Confirmed
 from crosscheck.records.machine import environment
 from crosscheck.records.made_by import made_by
-from crosscheck.running.plan import MAIN, Done, Job, sample_times, scene_identity
+from crosscheck.running.job import MAIN, Done, Job
+from crosscheck.running.plan import sample_times, scene_identity
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler
 from crosscheck.running.sweep import PROVIDER

@@ -12,7 +12,8 @@ from crosscheck.library.case import Variant
 from crosscheck.records.kinds import BrokenLine, Confirmed, Environment, RunRecord, RunStatus
 from crosscheck.records.packing import unpack
 from crosscheck.running.execute import execute
-from crosscheck.running.plan import Job, variant_scene
+from crosscheck.running.job import Job
+from crosscheck.running.plan import variant_scene
 from crosscheck.sampling.file import SweepFile
 from crosscheck.sampling.quantities import reduce
 from crosscheck.sampling.scenes import with_values

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.expected import Remaining
-from crosscheck.running.plan import Job
+from crosscheck.running.job import Job
 from crosscheck.running.scheduler import Event
 from crosscheck.terminal.bars import bars
 from crosscheck.terminal.time_left import TimeLeft

@@ -25,7 +25,8 @@ from crosscheck.records.archive import read
 from crosscheck.records.held import Asked, RecordedReference
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.held import held_reference
-from crosscheck.running.plan import Job, plan
+from crosscheck.running.job import Job
+from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import PROVIDER, Listener, run_planned
 from flexmb.run.channels import distance

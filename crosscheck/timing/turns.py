@@ -20,7 +20,7 @@ from typing import Any
 from crosscheck.engines.answers import BrokenContract, checked_model, checked_run
 from crosscheck.engines.contract import Effort, Model, Run
 from crosscheck.running.execute import describe, find_engine
-from crosscheck.running.plan import Job
+from crosscheck.running.job import Job
 from crosscheck.running.worker import TICK_S, Worker
 from flexmb.run.channels import channels_of
 from flexmb.typing import Real

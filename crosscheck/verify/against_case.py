@@ -26,7 +26,8 @@ from crosscheck.library.find import Case
 from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import current_reference, has_reference
 from crosscheck.records.archive import read
-from crosscheck.running.plan import MAIN, plan, sample_times, variant_scene
+from crosscheck.running.job import MAIN
+from crosscheck.running.plan import plan, sample_times, variant_scene
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import PROVIDER, run_planned

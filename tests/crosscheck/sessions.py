@@ -15,7 +15,8 @@ from crosscheck.records.kinds import CaseRecord, RunRecord
 from crosscheck.records.machine import environment
 from crosscheck.records.session import last_session
 from crosscheck.running.execute import execute
-from crosscheck.running.plan import Job, plan
+from crosscheck.running.job import Job
+from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
 

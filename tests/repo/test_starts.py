@@ -152,6 +152,17 @@ def test_the_list_of_cases_reads_cases_and_loads_no_mechanics() -> None:
     assert not libraries(modules, OF_CASES) and not compiled(modules)
 
 
+def test_a_worker_loads_what_its_engine_needs() -> None:
+    """A session starts one for every engine: none of them plans, draws or judges, and only our own brings the compiler.
+
+    The parts of scipy that are named here take longer to load than all of ours.
+    """
+    worker = loaded("import crosscheck.running.execute")
+    assert not libraries(worker, {"numpy", "msgspec"}) and not compiled(worker)
+    native = loaded("import crosscheck.running.execute, crosscheck.engines.native")
+    assert compiled(native) and not {"scipy.interpolate", "scipy.optimize", "scipy.spatial"} & native
+
+
 def test_a_pytest_session_without_our_options_loads_the_plug_in_alone(tmp_path: Path) -> None:
     """Collected and run to its end, with the hooks of the plug-in called."""
     (tmp_path / "conftest.py").write_text(f"def pytest_unconfigure():\n    exec({TOLD!r})\n", encoding="utf-8")

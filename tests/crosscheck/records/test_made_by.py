@@ -37,6 +37,7 @@ WITHOUT_PART = {
     "crosscheck.engines.exudyn": "another engine",
     "crosscheck.library": "reads cases and makes scenes, as plan",
     "crosscheck.running.plan": "makes the scene, which is in the record's own key",
+    "crosscheck.running.job": "says what is in the record's own key: scene, sample times, effort",
     "crosscheck.records.machine": "tells the reader of a report about the machine",
     "crosscheck.running.draw": "draws",
     "crosscheck.running.film": "makes a scene too",

@@ -20,7 +20,7 @@ from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.packing import unpack
 from crosscheck.running import execute as module
 from crosscheck.running.execute import describe, execute, find_engine
-from crosscheck.running.plan import Done, Job
+from crosscheck.running.job import Done, Job
 from flexmb.run.channels import channels_of
 from tests.crosscheck.fake_engines import Fake, Pendulum
 from tests.crosscheck.sessions import CASE

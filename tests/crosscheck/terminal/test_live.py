@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from crosscheck.records.kinds import RunRecord
-from crosscheck.running.plan import MAIN, Job
+from crosscheck.running.job import MAIN, Job
 from crosscheck.running.scheduler import Event
 from crosscheck.terminal.live import LiveProgress
 

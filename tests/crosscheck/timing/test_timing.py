@@ -19,7 +19,8 @@ from crosscheck.engines.contract import Effort
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import Case, load_case, resolve
 from crosscheck.references.regenerate import regenerate
-from crosscheck.running.plan import Job, plan
+from crosscheck.running.job import Job
+from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.timings import seconds
 from crosscheck.timing import turns
