@@ -6,7 +6,18 @@ What a command does is imported when it runs: `--help`, completion and a mistype
 import os
 
 from crosscheck.cli import (  # noqa: F401, I001 - each adds its commands, in this order
-    run, bench, chart, compare, listing, verify, regenerate, contract, mutate, invariance, stability, sweep,
+    bench,
+    chart,
+    compare,
+    contract,
+    invariance,
+    listing,
+    mutate,
+    regenerate,
+    run,
+    stability,
+    sweep,
+    verify,
 )  # fmt: skip
 from crosscheck.cli.common import app
 from flexmb.output.readers import outlive_readers
