@@ -3,9 +3,9 @@
 What a command does is imported when it runs: `--help`, completion and a mistyped word load neither cases nor NumPy.
 """
 
-import os
+import os  # noqa: I001
 
-from crosscheck.cli import (  # noqa: F401, I001 - each adds its commands, in this order
+from crosscheck.cli import (  # noqa: F401 - each adds its commands, in this order
     run, bench, chart, compare, listing, verify, regenerate, contract, mutate, invariance, stability, sweep,
 )  # fmt: skip
 from crosscheck.cli.common import app

@@ -15,7 +15,6 @@ from flexmb.scene.schema import Body, Hinge
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
-
 _LAST, _FIRST = np.array([1, 2, 3, 0]), np.array([3, 0, 1, 2])  # arrays, as a list takes longer than its use
 
 
