@@ -202,13 +202,14 @@ def _leave(engine: Engine) -> None:
 
 @contextmanager
 def _only_new_garbage() -> Iterator[None]:
-    """`gc.collect` passes over the million objects that are there already, which would take it half a second."""
-    gc.collect()
+    """`gc.collect` passes over the million objects that are there already, which would take it half a second each time."""
+    was_frozen = gc.get_freeze_count() > 0  # by who knows best what it wants to keep
     gc.freeze()
     try:
         yield
     finally:
-        gc.unfreeze()
+        if not was_frozen:
+            gc.unfreeze()
 
 
 def _holdings() -> dict[str, int]:

@@ -154,7 +154,7 @@ def rotation_exponential(theta: Jet) -> Jet:
     """exp(theta~) of rotation vectors (...,3): Rodrigues, 1 + sin(x)/x theta~ + (1 - cos(x))/x^2 theta~^2."""
     squared = product(lambda a, b: np.einsum("...i,...i->...", a, b), theta, theta)
     cross = theta.map(skew)
-    sine, versine = (chain(*each, squared) for each in polyval(squared.value, SERIES))
+    sine, versine = (chain(f, df, d2f, squared) for f, df, d2f in polyval(squared.value, SERIES))
     return constant(np.eye(3)) + scale(sine, cross) + scale(versine, cross @ cross)
 
 

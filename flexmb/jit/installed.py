@@ -24,8 +24,9 @@ MADE_BY = "made.json"
 @cache
 def installed_directory() -> Path | None:
     """Where they are; None where there are none."""
-    folder = Path(__file__).parents[1] / "ready" / "kernels"
-    return folder if folder.is_dir() else None
+    here = globals().get("__file__")  # what a frozen program loads out of its archive has none
+    folder = Path(here).parents[1] / "ready" / "kernels" if here else None
+    return folder if folder and folder.is_dir() else None
 
 
 @cache

@@ -36,7 +36,7 @@ def lossless(tension: Callable) -> Callable:
 
 def straight(law: Callable) -> Callable:
     """Straight lines between the samples of a table, beyond them its last loads."""
-    return lambda spline: lambda x: (float(np.interp(x, spline.x, spline(spline.x))), 0.0)
+    return lambda places, loads: lambda x: (float(np.interp(x, places, loads)), 0.0)
 
 
 def acting_on_a(load: Callable[[Exerted], Any]) -> Callable[[Callable], Callable]:
