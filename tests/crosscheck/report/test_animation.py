@@ -185,7 +185,8 @@ def test_a_film_climbs_no_ladder_and_is_found_all_the_same() -> None:
     """Where the case prescribes efforts, the coarsest of them is enough for a drawing."""
     (case,) = resolve(("deploying_boom/flexible",))
     record, jobs = plan(case, ("native",), PROVIDER, films=True)
-    main, film_job = (job for job in jobs if job.variant == "segments" and job.role in ("main", FILM))
+    own = (job for job in jobs if job.engine == "native" and job.variant == "segments")
+    main, film_job = (job for job in own if job.role in ("main", FILM))
     assert film_job.role == FILM and film_job.efforts == main.efforts[:1] != ()
     records: list[object] = [record]
     execute(film_job, lambda each: records.append(each) if isinstance(each, RunRecord) else None)
