@@ -200,8 +200,8 @@ def test_under_xdist_an_engine_runs_once(pytester: pytest.Pytester, project: Pat
     result = pytester.runpytest_subprocess(*words, timeout=120)
     result.assert_outcomes(passed=len(CHANNELS))
     written = diary.read_text(encoding="utf-8").splitlines()
-    repeats, beginning = 3, 1  # of short runs, and of the coarsest: to see whether they give the same
-    assert len(written) == repeats * len(set(written)) + beginning
+    repeats, beginning = 3, 1  # of runs as short as these are on an idle machine, and of the coarsest
+    assert len(set(written)) <= len(written) <= repeats * len(set(written)) + beginning
 
 
 def tried_here(name: str, provider: str) -> Iterator[trial.ClauseOutcome]:

