@@ -202,7 +202,7 @@ def _leave(engine: Engine) -> None:
 
 @contextmanager
 def _only_new_garbage() -> Iterator[None]:
-    """`gc.collect` passes over the million objects that are there already, which would take it half a second each time."""
+    """`gc.collect` passes over the million objects that are there already, which would take half a second each time."""
     was_frozen = gc.get_freeze_count() > 0  # by who knows best what it wants to keep
     gc.freeze()
     try:
