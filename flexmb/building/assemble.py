@@ -269,12 +269,8 @@ def _speeds(
         if stiffness or damping:
             body["ball_spring"][k], out["damping"][u : u + 3] = stiffness, damping
         for n, (_, c) in enumerate(link.scalar):
-            if isinstance(c, s.AngularCoordinate):
-                law, load, motion = (c.stiffness_Nm_rad, c.damping_Nms_rad, c.rest_rad), c.torque_Nm, c.prescribed_rad
-            else:
-                law, load, motion = (c.stiffness_N_m, c.damping_Ns_m, c.rest_m), c.force_N, c.prescribed_m
             at.append(u + n)
-            rows.append((q + n, functions.number(load), functions.number(motion), *law))
+            rows.append((q + n, functions.number(c.effort), functions.number(c.prescribed), *c.spring))
     for wheel in wheels:
         at.append(numbering.u[wheel.name].start)
         motor, motion = functions.number(wheel.torque_Nm), functions.number(wheel.prescribed_rad)

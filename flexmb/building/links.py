@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 
@@ -86,9 +86,15 @@ class BodyLink:
     @property
     def mass_properties(self) -> tuple[float, s.Vector, s.Matrix3]:
         """Mass, mass centre and inertia about it of a rigid link without its wheels, in the body's own frame."""
-        if isinstance(self.body, s.RigidBody):
-            return self.body.mass_kg, self.body.com_m, self.body.inertia_kg_m2
-        return self.body.mass_kg, ZERO, (ZERO, ZERO, ZERO)
+        match self.body:
+            case s.RigidBody(mass_kg=mass, com_m=com, inertia_kg_m2=inertia):
+                return mass, com, inertia
+            case s.PointMass(mass_kg=mass):
+                return mass, ZERO, (ZERO, ZERO, ZERO)
+            case s.BeamBody() | s.ModalBody() | s.SidBody():
+                raise ValueError(f'"{self.name}" is no rigid link')
+            case _:
+                assert_never(self.body)
 
     @property
     def wheels(self) -> int:

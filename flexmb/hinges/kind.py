@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flexmb.jit.kernel import helper
-from flexmb.scene.hinges import AngularCoordinate
 from flexmb.scene.schema import Hinge, PointMass, Vector
 from flexmb.scene.tree import coordinates
 from flexmb.tables.arrays import NO_AXIS
@@ -32,16 +31,13 @@ class Reduced(NamedTuple):
 
 def scalar_state(item: Item) -> tuple[list[float], list[float]]:
     """Initial values and rates of scalar coordinates (rad or m, per second)."""
-    found = [
-        (c.angle_rad, c.rate_rad_s) if isinstance(c, AngularCoordinate) else (c.position_m, c.rate_m_s)
-        for _, c in coordinates(item)
-    ]
-    return [value for value, _ in found], [rate for _, rate in found]
+    found = [c for _, c in coordinates(item)]
+    return [c.value for c in found], [c.rate for c in found]
 
 
 def scalar_names(item: Item) -> tuple[Names, Names]:
     """(name, unit) of scalar coordinates and of their rates, by their keys in the scene."""
-    units = [(name, "rad" if isinstance(c, AngularCoordinate) else "m") for name, c in coordinates(item)]
+    units = [(name, c.UNIT) for name, c in coordinates(item)]
     return units, [(f"{name}.rate", f"{unit}/s") for name, unit in units]
 
 
