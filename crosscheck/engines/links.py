@@ -19,10 +19,9 @@ from crosscheck.engines.conventions import (
     offset_frame,
     outboard_frame,
 )
-from flexmb.scene import freedoms as described
 from flexmb.scene.bodies import ZERO
 from flexmb.scene.connectors import Connector
-from flexmb.scene.freedoms import Ball, Floating
+from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.schema import (
     Body,
@@ -137,7 +136,7 @@ def obstacle(
 def first_screw(scene: Scene) -> str:
     """The first hinge that turns and shifts by one coordinate, "" where there is none."""
     for hinge in scene.hinges:
-        if any(isinstance(each, described.Scalar) and each.motion == "screw" for each in hinge.freedoms):
+        if any(isinstance(each, ScalarFreedom) and each.motion == "screw" for each in hinge.freedoms):
             return hinge.name
     return ""
 
@@ -189,10 +188,10 @@ def _closed_frame(scene: Scene, chain: tuple[Link, ...], body: str, node: str, o
 
 def freedoms(item: Hinge | PointMass | Wheel) -> tuple[Freedom, ...]:
     """The elementary joints of a hinge, a point mass or a wheel, base to tip; none for a weld."""
-    return tuple(_scalar(each) if isinstance(each, described.Scalar) else each for each in item.freedoms)
+    return tuple(_scalar(each) if isinstance(each, ScalarFreedom) else each for each in item.freedoms)
 
 
-def _scalar(freedom: described.Scalar) -> Scalar:
+def _scalar(freedom: ScalarFreedom) -> Scalar:
     pitch = freedom.shifts if freedom.motion == "screw" else 0.0
     c = freedom.coordinate
     return Scalar(

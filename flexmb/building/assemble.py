@@ -133,7 +133,8 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     body["level"] = [LEVELS.index(link.level) for link in chain]
     body["hinge_kind"] = [KINDS.index(link.kind) for link in chain]
     body["axis"] = [link.kind.axis for link in chain]
-    body["sequence"] = [(*link.sequence, 0, 0, 0)[:3] for link in chain]
+    body["sequence"] = [(*link.axes.sequence, 0, 0, 0)[:3] for link in chain]
+    body["parameters"] = [(*link.axes.parameters, 0.0, 0.0, 0.0)[:3] for link in chain]
     body["q_index"], body["u_index"] = np.array(numbering.hinges).reshape(-1, 2).T
     body["quaternion"] = [
         -1 if link.kind.quaternion < 0 else q + link.kind.quaternion

@@ -14,7 +14,7 @@ import numpy as np
 
 from flexmb.building.models import ORIGIN, Models, level_of, one_point
 from flexmb.hinges.catalogue import kind_of
-from flexmb.hinges.kind import HingeKind, z_to
+from flexmb.hinges.kind import HingeKind, Reduced, z_to
 from flexmb.levels.body import BY_NAME
 from flexmb.levels.level import FidelityLevel
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
@@ -62,7 +62,7 @@ class End(NamedTuple):
 class BodyLink:
     """One body as the dynamics sees it, and the hinge that holds it.
 
-    `turn` (3,3) turns both frames of the hinge. The last `wheels` points of its model are the despun wheels of the
+    `axes`: the hinge as its kernels take it. The last `wheels` points of its model are the despun wheels of the
     body. Models and ports are made when first asked for: those of rigid bodies rarely are.
     """
 
@@ -71,12 +71,16 @@ class BodyLink:
     parent: str
     level: FidelityLevel
     kind: HingeKind
-    sequence: tuple[int, ...]
-    turn: Real
+    axes: Reduced
     inboard_end: End
     outboard_end: End
     body: s.Body | s.PointMass
     models: Models
+
+    @property
+    def turn(self) -> Real:
+        """(3,3) What turns both frames of the hinge."""
+        return self.axes.turn
 
     @property
     def is_rigid(self) -> bool:
@@ -164,21 +168,21 @@ def links(scene: s.Scene) -> list[BodyLink]:
     models = Models(scene)
     found = []
     for body, hinge in ordered(scene):
-        kind, (sequence, turn) = kind_of(hinge)
+        kind, axes = kind_of(hinge)
         inboard = End(hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
         outboard = End(hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
         level, parent = level_of(body), hinge.parent
         if isinstance(body, s.SidBody):
             models[body.name]  # says that they are not supported
-        found.append(BodyLink(body.name, hinge, parent, level, kind, sequence, turn, inboard, outboard, body, models))
+        found.append(BodyLink(body.name, hinge, parent, level, kind, axes, inboard, outboard, body, models))
     return found + [_point_mass(mass, models) for mass in scene.point_masses]
 
 
 def _point_mass(mass: s.PointMass, models: Models) -> BodyLink:
     """A point mass as a body without rotary inertia on translations along its directions."""
-    kind, (sequence, turn) = kind_of(mass)
+    kind, axes = kind_of(mass)
     inboard, outboard = End(mass.node, mass.offset_m, IDENTITY), End("origin", ZERO, IDENTITY)
-    return BodyLink(mass.name, mass, mass.body, BY_NAME["rigid"], kind, sequence, turn, inboard, outboard, mass, models)
+    return BodyLink(mass.name, mass, mass.body, BY_NAME["rigid"], kind, axes, inboard, outboard, mass, models)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from flexmb.dense.jets import Jet, MovingFrame, constant, product, rotation_about, skew
 from flexmb.scene import schema as s
-from flexmb.scene.freedoms import Ball, Floating, Freedom, Scalar
+from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.typing import Real
 
 Item = s.Hinge | s.PointMass
@@ -38,7 +38,7 @@ def hinge_frame(hinge: Item, c: Jet) -> MovingFrame:
 def _across(freedom: Freedom, c: Jet) -> MovingFrame:
     """The frame beyond one freedom."""
     match freedom:
-        case Scalar(axis=axis, turns=turns, shifts=shifts):
+        case ScalarFreedom(axis=axis, turns=turns, shifts=shifts):
             along = moved((axis, c[..., 0].map(lambda x: shifts * x))) if shifts else moved()
             turned = rotated((axis, c[..., 0].map(lambda x: turns * x))) if turns else rotated()
             return MovingFrame(along.position, turned.rotation)
@@ -101,7 +101,7 @@ def coordinate_rates(hinge: Item, q: Real, u: Real) -> Real:
 
 def _rates(freedom: Freedom, q: Real, u: Real) -> Real:
     match freedom:
-        case Scalar():
+        case ScalarFreedom():
             return u
         case Ball():
             return _quaternion_rate(q, u)

@@ -22,11 +22,13 @@ Names = list[tuple[str, str]]
 class Reduced(NamedTuple):
     """A hinge of a scene as its kernels take it.
 
-    `sequence` holds the axis numbers of a gimbal; `turn` (3,3) turns both hinge frames, so that a single axis is z.
+    `sequence` holds the axis numbers of a gimbal, `parameters` the kind's real numbers, at most three of each; `turn`
+    (3,3) turns both hinge frames, so that a single axis is z.
     """
 
     sequence: tuple[int, ...] = ()
     turn: Real = np.eye(3)
+    parameters: tuple[float, ...] = ()
 
 
 def scalar_state(item: Item) -> tuple[list[float], list[float]]:
@@ -83,7 +85,7 @@ def scalar_hinge(
     """A kind all of whose speeds are the rates of its coordinates."""
 
     @helper
-    def rate(q, i, u, j, sequence, dq):
+    def rate(q, i, u, j, dq):
         for n in range(freedoms):
             dq[i + n] = u[j + n]
 

@@ -106,7 +106,7 @@ class LinearCoordinate(_ScalarCoordinate, frozen=True, kw_only=True):
 Coordinate = AngularCoordinate | LinearCoordinate
 
 
-class Scalar(NamedTuple):
+class ScalarFreedom(NamedTuple):
     """One coordinate, called `name`: a turn by `turns` times it about `axis`, a shift by `shifts` times it along it.
 
     rad and m per unit of the coordinate. A turn alone is (1, 0), a shift alone (0, 1).
@@ -159,14 +159,14 @@ class Floating(NamedTuple):
         return 7, 6
 
 
-Freedom = Scalar | Ball | Floating
+Freedom = ScalarFreedom | Ball | Floating
 
 
-def turn(name: str, axis: Vector, coordinate: AngularCoordinate) -> Scalar:
+def turn(name: str, axis: Vector, coordinate: AngularCoordinate) -> ScalarFreedom:
     """A rotation by a coordinate."""
-    return Scalar(name, axis, 1.0, 0.0, coordinate)
+    return ScalarFreedom(name, axis, 1.0, 0.0, coordinate)
 
 
-def slide(name: str, axis: Vector, coordinate: LinearCoordinate) -> Scalar:
+def slide(name: str, axis: Vector, coordinate: LinearCoordinate) -> ScalarFreedom:
     """A translation by a coordinate."""
-    return Scalar(name, axis, 0.0, 1.0, coordinate)
+    return ScalarFreedom(name, axis, 0.0, 1.0, coordinate)

@@ -19,6 +19,7 @@ from flexmb.scene.freedoms import (
     Floating,
     Freedom,
     LinearCoordinate,
+    ScalarFreedom,
     slide,
     turn,
 )
@@ -63,6 +64,22 @@ class Revolute(_Hinge, frozen=True, kw_only=True, tag="revolute"):
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
         return (turn("rotation", self.axis, self.rotation),)
+
+
+class Screw(_Hinge, frozen=True, kw_only=True, tag="screw"):
+    """One rotation about `axis`, with a translation along it of `pitch_m_rad` times the angle.
+
+    A positive pitch is a right-handed screw; one that advances by h (m) a turn has the pitch h / (2 pi). The spring,
+    damper and motor act on the angle: its torque does the work of the force along the axis too.
+    """
+
+    axis: Vector = Z_AXIS
+    pitch_m_rad: float
+    rotation: AngularCoordinate = AngularCoordinate()
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return (ScalarFreedom("rotation", self.axis, 1.0, self.pitch_m_rad, self.rotation),)
 
 
 class Prismatic(_Hinge, frozen=True, kw_only=True, tag="prismatic"):
@@ -165,7 +182,7 @@ class Free(_Hinge, frozen=True, kw_only=True, tag="free"):
         return (Floating(self.position_m, self.quaternion, self.angular_velocity_rad_s, self.velocity_m_s),)
 
 
-Hinge = Weld | Revolute | Prismatic | Cylindrical | Universal | Gimbal | Spherical | Planar | Free
+Hinge = Weld | Revolute | Prismatic | Cylindrical | Universal | Gimbal | Spherical | Planar | Free | Screw
 WITH_AXIS = tuple(
     struct.__struct_config__.tag for struct in get_args(Hinge) if "axis" in struct.__struct_fields__
 )

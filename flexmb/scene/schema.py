@@ -66,6 +66,7 @@ from flexmb.scene.hinges import (
     Planar,
     Prismatic,
     Revolute,
+    Screw,
     Spherical,
     Universal,
     Weld,
@@ -215,7 +216,7 @@ __all__ = [
     "Impact", "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load",
     "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid",
     "Planar", "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute",
-    "RigidBody", "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical",
+    "RigidBody", "Saturation", "Scene", "SceneEvent", "Screw", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical",
     "SpinUp", "SpringDamper", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector",
     "Waiver", "Weld", "Wheel",
 ]  # fmt: skip

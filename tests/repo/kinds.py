@@ -9,13 +9,14 @@ import ast
 from collections.abc import Iterator
 from typing import NamedTuple, get_args
 
+from crosscheck.engines.links import Freedom as Joint
 from flexmb.scene import schema as s
-from flexmb.scene.freedoms import Ball, Coordinate, Floating, Scalar
+from flexmb.scene.freedoms import Coordinate, Freedom
 
 UNIONS = {
     "hinges": s.Hinge, "connectors": s.Connector, "bodies": s.Body, "functions of time": s.Function,
     "actions of events": s.Action, "sensors": s.Sensor, "controllers": s.Controller, "coordinates": Coordinate,
-    "items with freedoms": s.PointMass | s.Wheel, "freedoms": Scalar | Ball | Floating,
+    "items with freedoms": s.PointMass | s.Wheel, "freedoms": Freedom, "joints of peers": Joint,
 }  # fmt: skip
 UNION_OF = {kind.__name__: union for union, kinds in UNIONS.items() for kind in get_args(kinds)}
 

@@ -23,7 +23,7 @@ from crosscheck.biting.invariances.counterpart import (
 from crosscheck.library.time_functions import scaled
 from flexmb.scene.bodies import ModalBody, ModalNode, SidBody
 from flexmb.scene.connectors import BetweenNodes, Bushing
-from flexmb.scene.freedoms import Coordinate, Scalar
+from flexmb.scene.freedoms import Coordinate, ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import WITH_AXIS, Closure, Hinge
 from flexmb.scene.schema import Load, PointMass, Scene, Wheel
@@ -109,7 +109,7 @@ def _reflected(item: Any) -> Any:
 def _with_axes(item: M) -> M:
     """An item with its own axes as the mirror shows them: polar where something slides along them, axial where it only
     turns. A right-handed screw is a left-handed one."""
-    slides = any(isinstance(each, Scalar) and each.motion == "slide" for each in item.freedoms)
+    slides = any(isinstance(each, ScalarFreedom) and each.motion == "slide" for each in item.freedoms)
     changes: dict[str, Any] = {}
     for key in item.__struct_fields__:
         value = getattr(item, key)
@@ -129,7 +129,7 @@ def _signs(item: Hinge | PointMass | Wheel) -> list[float]:
     """
     found = []
     for own, image in zip(item.freedoms, _with_axes(item).freedoms, strict=True):
-        if isinstance(own, Scalar) and isinstance(image, Scalar):
+        if isinstance(own, ScalarFreedom) and isinstance(image, ScalarFreedom):
             if own.motion == "screw" and image.shifts != -own.shifts:
                 raise NotApplicable(f'hinge "{item.name}" has a hand, and no key that changes it')
             seen = _signed(own.axis, POLAR_SIGNS if own.motion == "slide" else AXIAL_SIGNS)

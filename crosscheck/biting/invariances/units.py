@@ -72,7 +72,7 @@ OF_UNIT = {
     "N": FORCE, "N m": ENERGY, "N m²": Dimension(3, 1, -2), "m/s": Dimension(1, 0, -1),
     "m/s²": Dimension(1, 0, -2), "rad/s": Dimension(time=-1), "kg/m": Dimension(-1, 1), "kg m": Dimension(1, 1),
     "kg m²": Dimension(2, 1), "N/m": Dimension(0, 1, -2), "N s/m": Dimension(0, 1, -1), "N m/rad": ENERGY,
-    "N m s/rad": Dimension(2, 1, -1), "s/rad": Dimension(time=1), "s/m": Dimension(-1, 0, 1),
+    "N m s/rad": Dimension(2, 1, -1), "m/rad": Dimension(1), "s/rad": Dimension(time=1), "s/m": Dimension(-1, 0, 1),
 }  # fmt: skip
 # Of bushings: the first three rows and columns are of turns, the others of displacements.
 OF_BUSHING = {

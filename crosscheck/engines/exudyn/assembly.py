@@ -19,7 +19,7 @@ from crosscheck.engines.exudyn.motion import AT_REST, FrameMotion, across_quater
 from crosscheck.engines.functions_of_time import Profile, profile
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.connectors import BetweenNodes
-from flexmb.scene.freedoms import Ball, Floating, Scalar
+from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.hinges import Free, Hinge
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
@@ -183,7 +183,7 @@ def _attach(
             link, _ = joints.weld(shop, hinge.name, port, make, point)
         case Ball():
             link, _ = joints.spherical(shop, hinge.name, first, port, make, point)
-        case Scalar():
+        case ScalarFreedom():
             link, _ = joints.chain(shop, hinge.name, port, _steps(hinge), make, point)
         case _:
             assert_never(first)
@@ -192,7 +192,7 @@ def _attach(
 
 def _steps(item: Hinge | Wheel | PointMass) -> list[tuple[Real, joints.Coordinate]]:
     """(axis in the carried hinge frame, coordinate) of every freedom, from the inboard side."""
-    return [(_unit(each.axis), each.coordinate) for each in item.freedoms if isinstance(each, Scalar)]
+    return [(_unit(each.axis), each.coordinate) for each in item.freedoms if isinstance(each, ScalarFreedom)]
 
 
 def _place(

@@ -17,7 +17,7 @@ from crosscheck.engines.conventions import Frame, frame
 from crosscheck.engines.exudyn.carriers import Workshop
 from crosscheck.engines.exudyn.motion import initial
 from crosscheck.engines.functions_of_time import Profile, breaks, profile
-from flexmb.scene.freedoms import Scalar
+from flexmb.scene.freedoms import ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import Hinge, Planar, Revolute
 from flexmb.scene.schema import BeamBody, Load, Scene
@@ -111,7 +111,7 @@ def _root(beam: BeamBody, hinge: Hinge) -> _Root:
 
 def axis_sign(hinge: Hinge) -> float:
     """+1 where the hinge axis is World +z, or there is none, -1 where it is -z."""
-    axes = [freedom.axis for freedom in hinge.freedoms if isinstance(freedom, Scalar) and freedom.turns]
+    axes = [freedom.axis for freedom in hinge.freedoms if isinstance(freedom, ScalarFreedom) and freedom.turns]
     return float(np.sign(axes[0][2])) if axes else 1.0
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import assert_never
 
 from flexmb.scene.bodies import BeamBody, Body, Matrix3, ModalBody, Quaternion, RigidBody, SidBody, Vector
-from flexmb.scene.freedoms import Ball, Floating, Freedom, Scalar
+from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.schema import Load, Scene, Wheel
 
@@ -92,7 +92,7 @@ def _hinge(hinge: Hinge, axis: int) -> bool:
 def _freedom(freedom: Freedom, axis: int) -> bool:
     """Turns about the mirror's normal and shifts across it stay in the plane; no screw does both."""
     match freedom:
-        case Scalar():
+        case ScalarFreedom():
             turns = not freedom.turns or along(freedom.axis, axis)
             return turns and (not freedom.shifts or within(freedom.axis, axis))
         case Ball():

@@ -8,7 +8,7 @@ import numpy as np
 
 from crosscheck.library.mutations.mirror import only_known
 from flexmb.scene.bodies import IDENTITY, BeamBody, Body, RigidBody, SidBody
-from flexmb.scene.freedoms import Ball, Floating, Freedom, Scalar
+from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.scene.hinges import Free, Hinge, Weld
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene
@@ -54,14 +54,14 @@ def _held(body: Body, hinge: Hinge) -> bool:
     node = node_frame(body, hinge.child_node)
     turned = rotation_matrix(node.quaternion)
     arm = np.asarray(body.com_m) - np.asarray(node.position) - turned @ np.asarray(hinge.child_position_m)
-    if len(freedoms) == 1 and isinstance(freedoms[0], Scalar):
+    if len(freedoms) == 1 and isinstance(freedoms[0], ScalarFreedom):
         arm = np.cross(turned @ rotation_matrix(hinge.child_quaternion) @ np.asarray(freedoms[0].axis), arm)
     return bool(np.max(np.abs(arm)) <= EPS)
 
 
 def _only_turns(freedom: Freedom) -> bool:
     match freedom:
-        case Scalar():
+        case ScalarFreedom():
             return not freedom.shifts
         case Ball():
             return True

@@ -10,7 +10,7 @@ import numpy as np
 
 from crosscheck.library.mutations.mirror import mirrors
 from flexmb.scene.bodies import Body, RigidBody
-from flexmb.scene.freedoms import Scalar
+from flexmb.scene.freedoms import ScalarFreedom
 from flexmb.scene.hinges import Hinge
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene
@@ -59,7 +59,7 @@ def _axis(parent: Body | None, carried: Real | None, body: Body, hinge: Hinge) -
 
 def _own(hinge: Hinge) -> Real | None:
     """The axis of a hinge in its own axes, zero where it does not turn, None where it turns otherwise."""
-    lines = [each for each in hinge.freedoms if isinstance(each, Scalar)]
+    lines = [each for each in hinge.freedoms if isinstance(each, ScalarFreedom)]
     turning = [np.asarray(each.axis) / np.linalg.norm(each.axis) for each in lines if each.turns]
     if len(lines) < len(hinge.freedoms) or len(turning) > 1:
         return None

@@ -17,7 +17,7 @@ from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody, Vector
 from flexmb.scene.check.profiles import start_of
 from flexmb.scene.check.walk import entries
 from flexmb.scene.columns import column
-from flexmb.scene.freedoms import Ball, Coordinate, Floating, Freedom, Scalar
+from flexmb.scene.freedoms import Ball, Coordinate, Floating, Freedom, ScalarFreedom
 from flexmb.scene.hinges import Hinge
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Defect
@@ -241,7 +241,7 @@ def _free_directions(hinges: Sequence[Hinge]) -> list[Real]:
     """By hinge, free rows (n,6) of its map at the start, outboard hinge axes; prescribed coordinates are left out."""
     freedoms = [hinge.freedoms for hinge in hinges]
     single = [i for i, own in enumerate(freedoms) if len(own) == 1 and _moves_freely(own[0])]
-    lines = [own for i in single for own in freedoms[i] if isinstance(own, Scalar)]
+    lines = [own for i in single for own in freedoms[i] if isinstance(own, ScalarFreedom)]
     axis = column(lines, "axis", 3)
     rows = np.concatenate([column(lines, size)[:, None] * axis for size in ("turns", "shifts")], axis=1)
     by_number = dict(zip(single, rows[:, None], strict=True))
@@ -250,7 +250,7 @@ def _free_directions(hinges: Sequence[Hinge]) -> list[Real]:
 
 def _moves_freely(freedom: Freedom) -> bool:
     """Whether it is a single direction that no later freedom carries: that of most hinges."""
-    return isinstance(freedom, Scalar) and freedom.coordinate.prescribed is None
+    return isinstance(freedom, ScalarFreedom) and freedom.coordinate.prescribed is None
 
 
 def _directions_of(freedoms: Sequence[Freedom]) -> Real:
@@ -267,7 +267,7 @@ def _directions_of(freedoms: Sequence[Freedom]) -> Real:
 def _across(freedom: Freedom) -> tuple[Real, Real, Real]:
     """Free rows (n,6) of one freedom at the start, in the axes to which it leads; their rotation and position."""
     match freedom:
-        case Scalar(axis=axis, turns=turns, shifts=shifts, coordinate=coordinate):
+        case ScalarFreedom(axis=axis, turns=turns, shifts=shifts, coordinate=coordinate):
             row, start = np.outer((turns, shifts), axis).reshape(1, 6), _start(coordinate)
             free = row if coordinate.prescribed is None else row[:0]
             return free, rotation_by(start * row[0, :3]), start * row[0, 3:]

@@ -18,7 +18,7 @@ from flexmb.levels.body import LEVELS
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import Level
 from flexmb.scene.build import angular
-from flexmb.scene.freedoms import Scalar
+from flexmb.scene.freedoms import ScalarFreedom
 from flexmb.scene.hinges import Z_AXIS, _Hinge
 from flexmb.scene.tree import coordinates
 from flexmb.spatial.rotation import rotation_z
@@ -34,7 +34,7 @@ POINTS = [
 ]
 ENDS = {"name": "h", "parent": "ground", "child": "b"}
 TWO_AXES = s.Gimbal(**ENDS, sequence="zy", rotations=(angular(), angular()))
-ITEMS = [*(struct(**ENDS) for struct in get_args(s.Hinge)), TWO_AXES, *POINTS]
+ITEMS = [*(trees.bare(struct, **ENDS) for struct in get_args(s.Hinge)), TWO_AXES, *POINTS]
 
 
 @pytest.mark.parametrize("item", ITEMS, ids=lambda item: type(item).__name__)
@@ -57,8 +57,9 @@ def test_what_a_kind_says_of_its_speeds_is_true(kind):
     item = next(item for item in ITEMS if catalogue.kind_of(item)[0] is kind)
     units = [unit for _, unit in kind.names(item)[1]]
     assert [n for n, unit in enumerate(units) if unit == "m/s"] == list(kind.displacements)
-    state = np.ones(8)
-    H = count(kind.motion, state, 0, state, 0, np.array([0, 1, 2]), np.zeros((6, 6))).arguments[-1].astype(float)
+    state, parameters = np.ones(8), np.full(3, 0.3)
+    counted = count(kind.motion, state, 0, state, 0, np.array([0, 1, 2]), parameters, np.zeros((6, 6)))
+    H = counted.arguments[-1].astype(float)
     rows = [row for row in (ANGULAR_Z, LINEAR_Z) if kind.speeds == 1 and np.array_equal(H[:, 0], np.eye(6)[row])]
     assert rows == ([kind.axis] if kind.axis >= 0 else [])
     assert (kind.quaternion >= 0) == (kind.coordinates == kind.speeds + 1)
@@ -70,7 +71,7 @@ def test_freedoms_have_the_coordinates_of_the_kind(item):
     kind = catalogue.kind_of(item)[0]
     sizes = [freedom.sizes for freedom in item.freedoms]
     assert (sum(q for q, _ in sizes), sum(u for _, u in sizes)) == (kind.coordinates, kind.speeds)
-    scalars = [(each.name, each.coordinate) for each in item.freedoms if isinstance(each, Scalar)]
+    scalars = [(each.name, each.coordinate) for each in item.freedoms if isinstance(each, ScalarFreedom)]
     assert scalars == list(coordinates(item))
 
 
@@ -93,17 +94,17 @@ class Drill(_Hinge, frozen=True, kw_only=True, tag="drill"):
     rotation: s.AngularCoordinate = s.AngularCoordinate()
 
     @property
-    def freedoms(self) -> tuple[Scalar, ...]:
-        return (Scalar("rotation", self.axis, 1.0, PITCH, self.rotation),)
+    def freedoms(self) -> tuple[ScalarFreedom, ...]:
+        return (ScalarFreedom("rotation", self.axis, 1.0, PITCH, self.rotation),)
 
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     return rotation_z(q[i]), (0.0, 0.0, PITCH * q[i])
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     H[2, 0] = 1.0
     H[5, 0] = PITCH
     zero = (0.0, 0.0, 0.0)
