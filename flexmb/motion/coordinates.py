@@ -13,8 +13,8 @@ from flexmb.spatial.rotation import rotation_vector
 from flexmb.spatial.scalar import sqrt
 from flexmb.tables.features import (
     BALL_SPRINGS,
+    COORDINATE_LAWS,
     DAMPERS,
-    FRICTION,
     FUNCTIONS,
     HINGE_SPRINGS,
     MODES,
@@ -130,7 +130,7 @@ def hinge_forces(c, w):
     """Springs, dampers, friction and motors of scalar coordinates, and of spherical hinges, into w.speed.applied."""
     if not (
         has(c, DAMPERS) or has(c, SPRINGS) or has(c, MOTORS) or has(c, BALL_SPRINGS)
-        or has(c, HINGE_SPRINGS) or has(c, FRICTION)
+        or has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS)
     ):  # fmt: skip
         return  # they are zero from the start
     for j in range(w.u.shape[0]):
@@ -148,7 +148,7 @@ def hinge_forces(c, w):
         w.speed[j].applied = force
     if has(c, BALL_SPRINGS):
         _ball_springs(c, w)
-    if has(c, HINGE_SPRINGS) or has(c, FRICTION):
+    if has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS):
         add_loads_along_hinges(c, w)
 
 
@@ -177,6 +177,6 @@ def speed_power(c, w):
                 total += w.function[f, 0] * rate
         if has(c, PRESCRIBED) and c.speed[j].prescribed >= 0:
             total += w.speed[j].drive * rate
-    if has(c, HINGE_SPRINGS) or has(c, FRICTION):
+    if has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS):
         total += power_along_hinges(c, w)
     return total

@@ -27,7 +27,7 @@ from flexmb.entry.observation import Outputs
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
-from flexmb.scene.connectors import HingeFriction, HingeSpring
+from flexmb.scene.connectors import AlongHinge, HingeSpring
 from flexmb.system import algorithms, labels
 from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.evaluator import Evaluator
@@ -427,9 +427,10 @@ def copied(kind: type[System], kernels: Kernels, *given: Any) -> System:
 
 
 def _along_hinges(scene: s.Scene) -> Iterator[str]:
-    """Springs along hinges, then friction, as the tables have them."""
-    for kind in (HingeSpring, HingeFriction):
-        yield from (each.name for each in scene.connectors if isinstance(each, kind))
+    """Springs along hinges, then other laws, as the tables have them."""
+    along = [each for each in scene.connectors if isinstance(each, AlongHinge)]
+    yield from (each.name for each in along if isinstance(each, HingeSpring))
+    yield from (each.name for each in along if not isinstance(each, HingeSpring))
 
 
 def _find(places: dict[str, slice], name: str) -> slice:
