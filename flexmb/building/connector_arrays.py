@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, assert_never
 
 import numpy as np
@@ -131,7 +131,7 @@ def _hinge_springs(
     return out
 
 
-def _coordinate_laws(scene: s.Scene, connectors: list[AlongHinge], numbering: Numbering) -> a.Record:
+def _coordinate_laws(scene: s.Scene, connectors: Sequence[AlongHinge], numbering: Numbering) -> a.Record:
     out = np.zeros(len(connectors), a.COORDINATE_LAW)
     for row, connector in zip(out, connectors, strict=True):
         row["speed"], (row["kind"], numbers) = _speed(scene, connector, numbering), law_of(connector)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, EngineMissing, Support
 from crosscheck.engines.links import Link, links, obstacle
-from flexmb.scene.schema import Connector, Scene
+from flexmb.scene.schema import Scene
 
 if TYPE_CHECKING:
     from crosscheck.engines.drake.model import DrakeModel
@@ -30,7 +31,7 @@ class DrakeEngine:
         return version("drake")
 
     def supports(self, scene: Scene) -> Support:
-        reason = _open_loops_only(scene) or obstacle(scene, "Drake", (), get_args(Connector))
+        reason = _open_loops_only(scene) or obstacle(scene, "Drake", (), KNOWN)
         if not reason:
             reason = next(filter(None, map(_refusal, links(scene))), "")
         return Support("no", reason) if reason else Support("exact")

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, EngineMissing, Support
 from crosscheck.engines.links import Link, links, obstacle
 from crosscheck.engines.pace import pace
 from crosscheck.engines.steps import USUAL_S, ladder
-from flexmb.scene.schema import Connector, Scene
+from flexmb.scene.schema import Scene
 
 if TYPE_CHECKING:
     from crosscheck.engines.mujoco.model import MujocoModel
@@ -40,7 +41,7 @@ class MujocoEngine:
         return mujoco.__version__
 
     def supports(self, scene: Scene) -> Support:
-        reason = obstacle(scene, "MuJoCo", ("spherical",), get_args(Connector))
+        reason = obstacle(scene, "MuJoCo", ("spherical",), KNOWN)
         if not reason:
             reason = next(filter(None, map(_refusal, links(scene))), "")
         if reason:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
+from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, EngineMissing, Support
 from crosscheck.engines.links import Scalar, links, obstacle
-from flexmb.scene.schema import Connector, Scene
+from flexmb.scene.schema import Scene
 
 if TYPE_CHECKING:
     from crosscheck.engines.pinocchio.model import PinocchioModel
@@ -38,7 +39,7 @@ class PinocchioEngine:
     def supports(self, scene: Scene) -> Support:
         if len(scene.hinges) > MOST_JOINTS:
             return Support("no", f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}")
-        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), get_args(Connector), screws=True)
+        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), KNOWN, screws=True)
         reason = reason or (scene.closures and _beside_closures(scene))
         return Support("no", reason) if reason else Support("exact")
 

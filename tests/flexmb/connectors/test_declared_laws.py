@@ -90,7 +90,7 @@ def knows_how(parameters, q, v):
 @pytest.mark.parametrize(
     ("kernel", "said"),
     [
-        (compares, r"is compared: compare x.real, and take select\(\)\n  .*test_declared_laws.py, line \d+: if v > 0.0"),
+        (compares, r"is compared: compare x.real, and take select\(\)\n  .*_laws.py, line \d+: if v > 0.0"),
         (takes_an_exponential, r"derivatives are not carried through math.exp\(\)\n  .*line \d+: return -exp"),
         (reaches_into_a_module, r"its load has lost the derivatives: take functions from flexmb.spatial.scalar"),
         (stores_nothing, r"its energy has lost the derivatives: .*0.0 \* v"),
