@@ -19,7 +19,7 @@ from flexmb.scene.connectors import AlongHinge
 MOST = 6
 """Parameters that the tables have room for."""
 _DIFFERENTIATED = (math.sin, math.cos, math.atan2)  # beside square roots
-_TRIED = ((0.3, 0.7), (-0.3, -0.7), (0.0, 0.0))  # values and rates on both sides of zero, and there
+_TRIED = ((0.3, 0.7), (-0.3, -0.7))  # values and rates on both sides of zero
 
 
 class LawError(TypeError):
@@ -57,11 +57,15 @@ class CoordinateLaw:
                     raise LawError(f'law "{self.name}": its {what} has lost the derivatives: {remedy}')
 
 
-def _refused(what: str) -> Callable[..., NoReturn]:
+def _refused(what: str) -> Any:
     def method(*operands: Any) -> NoReturn:
         raise LawError(what)
 
     return method
+
+
+def _carried(operation: Callable[..., float]) -> Any:
+    return lambda *operands: _Differentiated(operation(*operands))
 
 
 _COMPARED = "a number that carries derivatives, or is one of several, is compared: compare x.real, and take select()"
@@ -71,49 +75,27 @@ class _Differentiated(float):
     """A number as lanes and duals have it: arithmetic, square roots and a few functions, but no truth."""
 
     __slots__ = ()
-    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = _refused(_COMPARED)  # type: ignore[assignment]
-    __abs__ = _refused("abs() has no derivative at zero: take select(x.real < 0.0, -x, x)")  # type: ignore[assignment]
+    __add__, __radd__ = _carried(float.__add__), _carried(float.__radd__)
+    __sub__, __rsub__ = _carried(float.__sub__), _carried(float.__rsub__)
+    __mul__, __rmul__ = _carried(float.__mul__), _carried(float.__rmul__)
+    __truediv__, __rtruediv__ = _carried(float.__truediv__), _carried(float.__rtruediv__)
+    __neg__, square_root = _carried(float.__neg__), staticmethod(_carried(math.sqrt))
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = _refused(_COMPARED)
+    __abs__ = _refused("abs() has no derivative at zero: take select(x.real < 0.0, -x, x)")
     __hash__ = float.__hash__
 
     @property
     def real(self) -> float:
         return float.__add__(self, 0.0)
 
-    def __add__(self, other: float) -> float:
-        return _Differentiated(float.__add__(self, other))
-
-    def __sub__(self, other: float) -> float:
-        return _Differentiated(float.__sub__(self, other))
-
-    def __rsub__(self, other: float) -> float:
-        return _Differentiated(float.__rsub__(self, other))
-
-    def __mul__(self, other: float) -> float:
-        return _Differentiated(float.__mul__(self, other))
-
-    def __truediv__(self, other: float) -> float:
-        return _Differentiated(float.__truediv__(self, other))
-
-    def __rtruediv__(self, other: float) -> float:
-        return _Differentiated(float.__rtruediv__(self, other))
-
-    def __neg__(self) -> float:
-        return _Differentiated(float.__neg__(self))
-
-    def __pow__(self, exponent: float) -> float:  # type: ignore[override]
+    def __pow__(self, exponent: float) -> Any:
         if exponent != 2:
             raise LawError("only squares are powers that derivatives are carried through: multiply, or take sqrt()")
         return self * self
 
-    __radd__, __rmul__ = __add__, __mul__
-
     @staticmethod
-    def square_root(x: float) -> float:
-        return _Differentiated(math.sqrt(x))
-
-    @staticmethod
-    def elementary(function: Callable[..., float]) -> Callable[..., float]:
+    def elementary(function: Callable[..., float]) -> Any:
         """What the function of `math` is here."""
         if function in _DIFFERENTIATED:
-            return lambda *operands: _Differentiated(function(*operands))
+            return _carried(function)
         return _refused(f"derivatives are not carried through math.{function.__name__}()")

@@ -6,7 +6,7 @@ import ast
 import subprocess
 import sys
 from pathlib import Path
-from typing import assert_never, get_args
+from typing import get_args
 
 import pytest
 
