@@ -12,7 +12,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import flexmb as fm
-from crosscheck.engines.contract import Effort, MarkerPath, Run, Support, Trajectory
+from crosscheck.engines.contract import Effort, Engine, MarkerPath, Run, Support, Trajectory
 from crosscheck.engines.native import NativeEngine
 
 
@@ -20,6 +20,9 @@ class MyEngine:
     """One body that hangs from a hinge about y, with its marker at the mass centre."""
 
     name = "mine"
+
+    def version(self):
+        return "1.0"
 
     def supports(self, scene):
         known = len(scene.bodies) == 1 and isinstance(scene.hinges[0], fm.Revolute)
@@ -78,6 +81,6 @@ axes.legend(ncols=4, loc="lower right", fontsize=8)
 figure.savefig("10_own_engine.svg")
 
 # Each tolerance is a hundredth of the one before, and so is nearly the distance: both codes solve the same equations.
-assert engine.supports(scene).kind == "exact"
+assert isinstance(engine, Engine) and engine.supports(scene).kind == "exact"
 distances = np.array(list(apart.values()))
 assert distances[-1] < 1e-6 and np.all(distances[:-1] > 20.0 * distances[1:])

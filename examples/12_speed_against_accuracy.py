@@ -5,6 +5,8 @@ Explicit methods need short steps for that, even where the spring is at rest; im
 Which is cheapest depends on the accuracy.
 """
 
+from time import process_time
+
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -24,7 +26,7 @@ scene = (
 system, times = fm.compile(scene), np.linspace(0.0, 5.0, 51)
 exact = fm.simulate(system, 5.0, samples=times, rtol=1e-13, atol=1e-15).markers["bob"].position
 
-tolerances = {"rtol": (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)}
+tolerances = {"rtol": (1e-3, 1e-5, 1e-7, 1e-9)}
 settings = {
     "dop853": tolerances, "radau5": tolerances, "exponential": tolerances,
     "rk4": {"step": (1e-3, 5e-4, 2.5e-4)}, "generalised_alpha": {"step": (2e-2, 1e-2, 5e-3, 2.5e-3)},
@@ -36,11 +38,16 @@ for method, choices in settings.items():
     seconds, errors[method] = [], []
     for value in values:
         accuracy = {name: value} | ({"atol": 1e-2 * value} if name == "rtol" else {})
-        runs = [fm.simulate(system, 5.0, method, samples=times, **accuracy) for _ in range(3)]
-        seconds.append(min(run.statistics.run_s for run in runs))
-        errors[method].append(np.abs(runs[0].markers["bob"].position - exact).max())
+        spent = []
+        for _ in range(4):  # the fastest of four: the first may have to load or compile something
+            before = process_time()
+            run = fm.simulate(system, 5.0, method, samples=times, **accuracy)
+            spent.append(process_time() - before)
+        seconds.append(min(spent))
+        errors[method].append(np.abs(run.markers["bob"].position - exact).max())
     axes.loglog(errors[method], 1e3 * np.array(seconds), "o-", ms=4, label=method)
-axes.set(xlabel="largest error of the position (m)", ylabel="time of the run (ms)", title="A stiff pendulum for 5 s")
+axes.set(xlabel="largest error of the position (m)", ylabel="processor time of a run (ms)")
+axes.set_title("A stiff pendulum for 5 s")
 axes.invert_xaxis()
 axes.legend(fontsize=8)
 figure.savefig("12_speed_against_accuracy.svg")
