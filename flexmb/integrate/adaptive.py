@@ -30,13 +30,13 @@ from flexmb.integrate.dense_output import store_samples
 from flexmb.integrate.leap import leap_over, may_leap
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
 from flexmb.integrate.watch import keep_sides, pause
-from flexmb.jit.kernel import handed_on, helper
+from flexmb.jit.kernel import handed_in, helper
 from flexmb.tables.status import OK, STEP_TOO_SMALL
 
 
 class Method(NamedTuple):
     """What a method brings to the loop. `known` (NUMBERS,) are the numbers of `flexmb.integrate.memory.Memory` as they
-    are before a step, s are arrays of the method, and all functions are marked by `handed_on`:
+    are before a step, s are arrays of the method, and all functions but `state_at` are marked by `handed_in`:
 
     attempt(problem, step, ends, s, known, accuracy, counts) -> (status code, verdict) tries a step: its end, projected,
     goes into ends.y_new and, where the step is accepted, the slope there into ends.dy_new. verdict: a tuple whose first
@@ -124,7 +124,7 @@ def adaptive(method, problem, s, ends, clock, accuracy, out, counts, memory, wat
     return OK, t
 
 
-@handed_on
+@handed_in
 def accept_by_error(step, cut, verdict, s, known, exponent):
     """The next step by the error of this one and of the one before, for methods that know nothing else."""
     length, error = step.end - step.start, verdict[0]
@@ -133,7 +133,7 @@ def accept_by_error(step, cut, verdict, s, known, exponent):
     known[ERROR_BEFORE], known[RETRIED] = error, 0.0
 
 
-@handed_on
+@handed_in
 def reject_by_error(step, status, verdict, s, known, exponent):
     """The next trial after a step that failed, or whose error was too large."""
     length = step.end - step.start
@@ -141,7 +141,7 @@ def reject_by_error(step, status, verdict, s, known, exponent):
     known[RETRIED] = 1.0
 
 
-@handed_on
+@handed_in
 def after_leap_by_error(length, cut, known, exponent):
     """The next step after a leap, as after a step of the same length with a small error."""
     factor = step_factor(CALM, known[ERROR_BEFORE], exponent, known[RETRIED] != 0.0)
@@ -149,17 +149,17 @@ def after_leap_by_error(length, cut, known, exponent):
     known[ERROR_BEFORE], known[RETRIED] = CALM, 0.0
 
 
-@handed_on
+@handed_in
 def enter_afresh(known):
     """A new segment: no step of it has been rejected."""
     known[RETRIED] = 0.0
 
 
-@handed_on
+@handed_in
 def recall_nothing(memory, s, known, counts):
     """Of a method that keeps nothing but the numbers of a `Memory`."""
 
 
-@handed_on
+@handed_in
 def keep_nothing(memory, s):
     """Likewise."""

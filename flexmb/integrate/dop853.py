@@ -35,7 +35,7 @@ from flexmb.integrate.dop853_formulas import (
 from flexmb.integrate.dop853_tableau import STAGES, STAGES_DENSE, A, C
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.watch import Ends
-from flexmb.jit.kernel import handed_on, helper, kernel
+from flexmb.jit.kernel import handed_in, handed_on, helper, kernel
 from flexmb.tables.status import NONFINITE, OK
 
 
@@ -61,7 +61,7 @@ def stages(problem, step, y, k, trial, counts):
     return OK if all_finite(trial) else NONFINITE
 
 
-@handed_on
+@handed_in
 def attempt(problem, step, ends, s, known, accuracy, counts):
     """See `Method`."""
     h = step.end - step.start

@@ -34,7 +34,7 @@ from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.integrate.settling import prepare_settling, settle
 from flexmb.integrate.watch import Ends
-from flexmb.jit.kernel import handed_on, helper, kernel
+from flexmb.jit.kernel import handed_in, handed_on, helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
 NODES = np.array([0.25, 0.5, 0.75, 1.0])
@@ -169,7 +169,7 @@ def estimate(y, s, accuracy):
     return norm
 
 
-@handed_on
+@handed_in
 def attempt(problem, step, ends, s, known, accuracy, counts):
     """See `flexmb.integrate.adaptive.Method`."""
     h = step.end - step.start

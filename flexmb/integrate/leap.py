@@ -9,7 +9,7 @@ from __future__ import annotations
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, Interval, copy
 from flexmb.integrate.dense_output import store_samples
 from flexmb.integrate.watch import CROSSED, pause
-from flexmb.jit.kernel import handed_on, helper, sweep
+from flexmb.jit.kernel import handed_on, helper
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR, OK
 
 EVALUATED = 8  # about as often a leap evaluates equations of motion
@@ -39,7 +39,7 @@ def in_leap(problem, step, ends, s, t, result, run):
     return OK
 
 
-@sweep
+@helper
 def leap_over(problem, watch, t, farthest, ends, samples, run):
     """Leap from the last good state, ends.y at t (s), over the place where steps fail, not beyond `farthest` (s).
 

@@ -19,7 +19,7 @@ from flexmb.integrate.radau5_stages import ITERATIONS, evaluate_polynomial, fact
 from flexmb.integrate.radau5_tableau import REAL, E
 from flexmb.integrate.settling import settle
 from flexmb.integrate.watch import Ends
-from flexmb.jit.kernel import handed_on, helper, kernel
+from flexmb.jit.kernel import handed_in, handed_on, helper, kernel
 from flexmb.tables.status import NOT_CONVERGED, OK
 
 _GROW = 8.0  # strongest growth of a step
@@ -77,7 +77,7 @@ def try_step(problem, step, ends, s, filter_again, accuracy, counts):
     return status, (error, iterations, rate)
 
 
-@handed_on
+@handed_in
 def attempt(problem, step, ends, s, known, accuracy, counts):
     """See `flexmb.integrate.adaptive.Method`; verdict: error norm, iterations, contraction of Newton's method."""
     length, nothing = step.end - step.start, (math.inf, 0, 0.0)
@@ -107,7 +107,7 @@ def state_at(problem, step, ends, s, t, result, run):
     return OK
 
 
-@handed_on
+@handed_in
 def keep(memory, s):
     """The Jacobian, and stages of the step before."""
     n = s.f.shape[0]
@@ -117,7 +117,7 @@ def keep(memory, s):
         copy(s.Z_before[stage], memory.rows[n + stage])
 
 
-@handed_on
+@handed_in
 def recall(memory, s, known, counts):
     """The same of a run that is taken up, with factors made again; of another one that there is nothing."""
     n = s.f.shape[0]
@@ -169,7 +169,7 @@ def by_trend(length, verdict, known):
     return caution * new_over_old(length, known[STEP_BEFORE], error, known[ERROR_BEFORE])
 
 
-@handed_on
+@handed_in
 def accept(step, cut, verdict, s, known, exponent):
     """See `flexmb.integrate.adaptive.Method`."""
     length, (error, iterations, rate) = step.end - step.start, verdict
@@ -182,7 +182,7 @@ def accept(step, cut, verdict, s, known, exponent):
         copy(s.Z[stage], s.Z_before[stage])
 
 
-@handed_on
+@handed_in
 def reject(step, status, verdict, s, known, exponent):
     """See `flexmb.integrate.adaptive.Method`."""
     length, rate = step.end - step.start, verdict[2]
@@ -193,14 +193,14 @@ def reject(step, status, verdict, s, known, exponent):
         known[RETRIED] = 1.0
 
 
-@handed_on
+@handed_in
 def after_leap(length, cut, known, exponent):
     """See `flexmb.integrate.adaptive.Method`."""
     known[STEP] = length
     enter(known)
 
 
-@handed_on
+@handed_in
 def enter(known):
     """Nothing is known across the end of a segment, or beyond a leap."""
     known[FACTORED], known[STEP_BEFORE], known[ERROR_BEFORE] = 0.0, 0.0, 0.0

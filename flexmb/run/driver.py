@@ -22,6 +22,7 @@ from flexmb.run.chattering import FEW, Chattering
 from flexmb.run.event_memory import EventMemory
 from flexmb.run.event_record import EventRecord
 from flexmb.run.joining import joined
+from flexmb.run.making import Making
 from flexmb.run.origin import Beginning
 from flexmb.run.propagate import Raw, unmoved
 from flexmb.run.restart import Restart
@@ -57,10 +58,10 @@ class Driver:
 
     def __init__(
         self, system: System, times: Real, settings: Settings, algorithm: Algorithm, stabilise: float,
-        taken_up: EventMemory | None = None,
+        taken_up: EventMemory | None = None, made_by: Making | None = None,
     ) -> None:  # fmt: skip
-        """times (T,) s of the output; taken_up: what events were known of where the run that is taken up ended."""
-        self._times, self._settings, self._taken_up = times, settings, taken_up
+        """times (T,) s of the output; taken_up: what was known of events where the run ended that is taken up."""
+        self._times, self._settings, self._taken_up, self._made_by = times, settings, taken_up, made_by
         given = None if taken_up is None else taken_up.given
         self._situation = Situation(_with_stops(system), settings, given)
         self._solver = Solver(self._situation, settings, algorithm, stabilise)
@@ -233,6 +234,7 @@ class Driver:
             self._whole,
             events=tuple(self._happened[shown:]),
             restart=self._restart_of(raw, raw.memory, ends, anew) if can_go_on else None,
+            made_by=self._made_by,
         )
 
     def _restart_of(self, raw: Raw, memory: Memory, ends: bool, anew: bool) -> Restart:

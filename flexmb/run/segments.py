@@ -23,7 +23,7 @@ from flexmb.run.within_leaps import placed, too_near
 from flexmb.scene.events import EndRun
 from flexmb.scene.schema import SceneEvent
 from flexmb.tables.status import Status
-from flexmb.typing import Real
+from flexmb.typing import Flags, Real
 
 
 class SegmentEnd(Enum):
@@ -85,10 +85,8 @@ class Segments:
 
     def _to(self, stop: float, begin: Beginning, due: Sequence[SceneEvent]) -> Segment:
         """Run to the next level that is watched, or to `stop` (s), where these events are due."""
-        t, is_last = begin.state.t, stop == self._times[-1]
-        start = t if begin.memory is None else max(t, self._times[0])
-        wanted = self._times[(self._times >= start) & ((self._times < stop) | is_last)]
-        times, early = np.unique([start, *wanted, stop]), 0.0
+        times, shown = self._output(begin, stop)
+        early, is_last = 0.0, stop == self._times[-1]
         with self._solver.integration() as solve:
             levels = self._sides.watching(self._agenda.watched, solve)
             goes_on = not is_last or bool(due)
@@ -99,14 +97,25 @@ class Segments:
                     raw, early = placed(self._situation, raw, levels, times, self._further)
                 elif levels.leap[0] < raw.t < levels.leap[1]:
                     raw = raw._replace(memory=None)  # nothing goes on from there
-            kept = np.isin(times[: len(raw.states)], wanted)
-            part = self._solver.observed(raw._replace(states=raw.states[kept]), times[: len(raw.states)][kept], solve)
+            kept = shown[: len(raw.states)]
+            part = self._solver.observed(raw._replace(states=raw.states[kept]), times[: len(kept)][kept], solve)
         if part.status is not Status.OK or raw.interrupted:
             return Segment(SegmentEnd.FAILURE, raw, levels, part, [], early)
         if found:
             return Segment(SegmentEnd.EVENT, raw, levels, part, found, early)
         end = SegmentEnd.TIME if raw.t == self._times[-1] else SegmentEnd.LEAP
         return Segment(end, raw, levels, part, found, early)
+
+    def _output(self, begin: Beginning, stop: float) -> tuple[Real, Flags]:
+        """Times (K,) s from the start of a segment to its stop, and which of them are output times of the run."""
+        start, is_last = begin.state.t, stop == self._times[-1]
+        if begin.memory is not None:
+            start = max(start, self._times[0])
+        if is_last and start == self._times[0]:
+            return self._times, np.ones(len(self._times), bool)
+        wanted = self._times[(self._times >= start) & ((self._times < stop) | is_last)]
+        times = np.unique([start, *wanted, stop])
+        return times, np.isin(times, wanted)
 
     def _further(self, raw: Raw, t: float) -> Raw:
         """On to a time (s), whatever comes to its level."""

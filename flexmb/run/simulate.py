@@ -111,14 +111,13 @@ def simulate(
         raw = unmoved(begin, Status(start.status), start.fault)
         with integration(system, algorithm, stabilise, chosen.integrator) as solve:
             return observed(system, times, raw, algorithm, solve)
-    driver = Driver(system, times, chosen, algorithm, stabilise, begin.events)
+    same: dict[str, Any] = {"t_start": t, "state": state, "algorithm": algorithm, "stabilise": stabilise}
+    again = partial(_again, system, t_end, samples=times, **same)
+    made_by = None if system.scene.events else Making(system, times, chosen, again)
+    driver = Driver(system, times, chosen, algorithm, stabilise, begin.events, made_by)
     trajectory = driver(begin)
     for doubt in driver.doubts:
         warnings.warn(doubt, SceneWarning, stacklevel=2)
-    if not system.scene.events:
-        same: dict[str, Any] = {"t_start": t, "state": state, "algorithm": algorithm, "stabilise": stabilise}
-        again = partial(_again, system, t_end, samples=times, **same)
-        trajectory = replace(trajectory, made_by=Making(system, times, chosen, again))
     if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
