@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from flexmb.linear.linearize import linearize
     from flexmb.linear.spin import SteadySpin, steady_spin
     from flexmb.run.batch_trajectory import BatchTrajectory
+    from flexmb.run.event_record import EventRecord
     from flexmb.run.interruption import Interrupted
     from flexmb.run.restart import Restart
     from flexmb.run.simulate import simulate
     from flexmb.run.simulate_batch import simulate_batch
-    from flexmb.run.situation import EventRecord
     from flexmb.run.stages import RunStage, simulate_stages
     from flexmb.run.trajectory import Trajectory
     from flexmb.scene import schema as schema

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from flexmb.output.whole import whole_file
 from flexmb.run import exports
+from flexmb.run.event_record import EventRecord
 from flexmb.run.joining import joined
 from flexmb.run.making import Making, error_estimate
 from flexmb.run.restart import Restart
-from flexmb.run.situation import EventRecord
 from flexmb.run.trajectory_form import refuse_torn, refuse_torn_path
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.open_loop import refuse_feedback

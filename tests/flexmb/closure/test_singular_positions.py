@@ -11,6 +11,7 @@ import pytest
 import flexmb
 from flexmb.closure import branch
 from flexmb.closure.tables import GROUP
+from flexmb.run import segments
 from flexmb.scene import build
 from flexmb.scene import schema as s
 from flexmb.tables.status import Status
@@ -108,6 +109,22 @@ def test_samples_and_ends_may_lie_at_singular_positions(settings):
     known = max(1e-3, gamma(32) / distance)
     assert run.finished and np.max(np.abs(there - 0.5 * (before + after))) < known * np.linalg.norm(there)
     assert np.array_equal(run.undetermined["window 0"], [True, True, False, False, False, True])
+
+
+@pytest.mark.parametrize("t_end", [4.5, 4.5 - 1e-4, 4.5 + 1e-4])
+def test_a_run_that_ends_within_a_leap_is_integrated_once(t_end, monkeypatch):
+    """The leap goes on beyond the end of the run, whose last sample lies within it: such a run cannot be taken up."""
+    calls, whole = [], segments.integrate
+
+    def counted(*given, **settings):
+        calls.append(given)
+        return whole(*given, **settings)
+
+    monkeypatch.setattr(segments, "integrate", counted)
+    run = flexmb.simulate(m.windows(1, np.pi, gravity=0.0), t_end)
+    assert run.finished and len(calls) == 1, run.message
+    assert (run.restart is None) == (t_end >= 4.5)  # before it the position is not reached
+    assert np.max(np.abs(run.q[:, 0] - 0.5 * np.pi + np.pi * run.t)) < 1e-7
 
 
 @pytest.mark.parametrize("settings", ["dop853", "rk4"])
