@@ -92,7 +92,7 @@ _OF_SCHEMA = (  # a test holds them to `schema.__all__`, which is not read befor
     "Impact", "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load",
     "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid",
     "Planar", "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute",
-    "RigidBody", "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical",
+    "RigidBody", "Saturation", "Scene", "SceneEvent", "Screw", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical",
     "SpinUp", "SpringDamper", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector",
     "Waiver", "Weld", "Wheel",
 )  # fmt: skip

@@ -6,7 +6,7 @@ here.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, assert_never
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from flexmb.dense.function_jets import profile
 from flexmb.dense.jets import MovingFrame, skew
 from flexmb.dense.members import DenseTree
 from flexmb.scene import schema as s
-from flexmb.scene.connectors import AlongHinge, BetweenNodes, HingeFriction, actuator, by_stem
+from flexmb.scene.connectors import AlongHinge, BetweenNodes, actuator, by_stem
 from flexmb.scene.tree import coordinate_of
 from flexmb.typing import Real
 
@@ -38,7 +38,13 @@ class Hold(NamedTuple):
 def grip(connector: BetweenNodes, a: MovingFrame, b: MovingFrame, t: float) -> Grip:
     """Of a connector between two frames in World, at time t."""
     arm = b.position.value - a.position.value
-    on_b, energy = _line(connector, a, b, t) if isinstance(connector, s.SpringDamper) else _bushing(connector, a, b)
+    match connector:
+        case s.SpringDamper():
+            on_b, energy = _line(connector, a, b, t)
+        case s.Bushing():
+            on_b, energy = _bushing(connector, a, b)
+        case _:
+            assert_never(connector)
     on_a = -np.concatenate([on_b[:3] + np.cross(arm, on_b[3:]), on_b[3:]])
     return Grip(on_a, on_b, energy)
 
@@ -47,20 +53,33 @@ def hold(scene: s.Scene, tree: DenseTree, connector: AlongHinge, q: Real, u: Rea
     """Of a connector along a coordinate of a hinge, point mass or wheel, at time t."""
     item, number = coordinate_of(scene, connector)
     x = [scalar for scalar in tree.scalars if scalar.owner == item.name][number]
-    law, rate = by_stem(connector), u[x.u]
-    if isinstance(connector, HingeFriction):
-        rising = 0.0 if law["static"] is None else law["static"] - law["sliding"]
-        level = law["sliding"] + rising / (1.0 + (rate / (law["stribeck"] or 1.0)) ** 2)
-        return Hold(x.u, -level * rate / np.hypot(rate, law["smoothing"]), 0.0)
-    load, energy = resistance(law, q[x.q] - law["rest"])
+    match connector:
+        case s.AngularFriction() | s.LinearFriction():
+            return Hold(x.u, _friction(by_stem(connector), u[x.u]), 0.0)
+        case s.AngularSpring() | s.LinearSpring():
+            load, energy = _spring(by_stem(connector), q[x.q], u[x.u])
+            push = actuator(connector)
+            return Hold(x.u, (0.0 if push is None else float(profile(push, t).value)) - load, energy)
+        case _:
+            assert_never(connector)
+
+
+def _friction(law: dict[str, Any], rate: float) -> float:
+    rising = 0.0 if law["static"] is None else law["static"] - law["sliding"]
+    level = law["sliding"] + rising / (1.0 + (rate / (law["stribeck"] or 1.0)) ** 2)
+    return -level * rate / float(np.hypot(rate, law["smoothing"]))
+
+
+def _spring(law: dict[str, Any], value: float, rate: float) -> tuple[float, float]:
+    """What resists, and the energy stored, of a spring along a coordinate with its damper and stops."""
+    load, energy = resistance(law, value - law["rest"])
     load += law["damping"] * rate
     for stop, side in ((law["lower"], -1.0), (law["upper"], 1.0)):
-        depth = 0.0 if stop is None else max(0.0, side * (q[x.q] - stop))
+        depth = 0.0 if stop is None else max(0.0, side * (value - stop))
         pressed = max(0.0, 1.0 + law["stop_dissipation"] * side * rate)
         load += side * law["stop_stiffness"] * depth * pressed
         energy += 0.5 * law["stop_stiffness"] * depth**2
-    push = actuator(connector)
-    return Hold(x.u, (0.0 if push is None else float(profile(push, t).value)) - load, energy)
+    return load, energy
 
 
 def resistance(law: dict[str, Any], x: float) -> tuple[float, float]:

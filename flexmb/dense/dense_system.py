@@ -22,7 +22,7 @@ from flexmb.dense.hinge_frames import ball_energy, ball_torque
 from flexmb.dense.jets import MovingFrame
 from flexmb.dense.members import DenseTree, ScalarSpeed, Seat, build
 from flexmb.scene import schema as s
-from flexmb.scene.connectors import BetweenNodes
+from flexmb.scene.connectors import AlongHinge, BetweenNodes
 from flexmb.typing import Real
 
 
@@ -142,7 +142,7 @@ class DenseSystem:
         for member in self.tree.members:
             tau[member.u_hinge] += ball_torque(member.hinge, q[member.q_hinge], u[member.u_hinge])
         for connector in self.scene.connectors:
-            if not isinstance(connector, BetweenNodes):
+            if isinstance(connector, AlongHinge):
                 held = hold(self.scene, self.tree, connector, q, u, t)
                 tau[held.u] += held.load
         return tau
@@ -251,7 +251,7 @@ class DenseSystem:
             spring += ball_energy(member.hinge, q[member.q_hinge])
         spring += sum(gripped.energy for gripped in self.grips(q, u).values())
         for connector in self.scene.connectors:
-            if not isinstance(connector, BetweenNodes):
+            if isinstance(connector, AlongHinge):
                 spring += hold(self.scene, self.tree, connector, q, u, 0.0).energy
         return {
             "kinetic": kinetic + sum(body.kinetic for body in bodies),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import assert_never
+
 import numpy as np
 from numpy.polynomial import Polynomial
 
@@ -43,3 +45,5 @@ def profile(function: Function, t: float) -> Jet:
 
             spline = make_interp_spline(times, values, k=5)
             return Jet(spline(t), spline(t, 1), spline(t, 2))
+        case _:
+            assert_never(function)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import assert_never
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -111,8 +112,7 @@ def build(scene: s.Scene, folder: Path | None = None) -> DenseTree:
     for body, hinge in ordered(scene):
         inboard = _seat(models[hinge.parent], hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
         outboard = _seat(models[body.name], hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
-        level: s.Level = "rigid" if isinstance(body, s.RigidBody) else body.level
-        tree = _append(tree, body.name, hinge.parent, hinge, inboard, outboard, models[body.name], level)
+        tree = _append(tree, body.name, hinge.parent, hinge, inboard, outboard, models[body.name], body.level)
         for wheel in scene.wheels:
             if wheel.body == body.name:
                 tree = _append_wheel(tree, wheel, _seat(models[body.name], wheel.node, wheel.offset_m))
@@ -158,11 +158,7 @@ def _append_wheel(tree: DenseTree, wheel: s.Wheel, seat: Seat) -> DenseTree:
 
 
 def _scalar(owner: str, q: int, u: int, c: Coordinate) -> ScalarSpeed:
-    if isinstance(c, s.AngularCoordinate):
-        spring, drive = (c.stiffness_Nm_rad, c.damping_Nms_rad, c.rest_rad), (c.torque_Nm, c.prescribed_rad)
-    else:
-        spring, drive = (c.stiffness_N_m, c.damping_Ns_m, c.rest_m), (c.force_N, c.prescribed_m)
-    return ScalarSpeed(owner, q, u, *spring, *drive)
+    return ScalarSpeed(owner, q, u, *c.spring, c.effort, c.prescribed)
 
 
 def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY) -> Seat:
@@ -170,13 +166,17 @@ def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion:
 
 
 def _model(body: s.Body, folder: Path | None) -> FlexibleModel:
-    if isinstance(body, s.RigidBody):
-        frames = {name: (frame.position, frame.quaternion) for name, frame in rest_frames(body).items()}
-        return rigid_model(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2), frames)
-    if isinstance(body, s.SidBody) or body.level not in LEVELS:
-        raise NotImplementedError(f'body "{body.name}": the dense route knows levels {", ".join(LEVELS)}')
-    model = flexible_model(body, folder)
-    return _stiff(model) if body.level == "rigid" else model
+    match body:
+        case s.RigidBody():
+            frames = {name: (frame.position, frame.quaternion) for name, frame in rest_frames(body).items()}
+            return rigid_model(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2), frames)
+        case (s.BeamBody() | s.ModalBody()) if body.level in LEVELS:
+            model = flexible_model(body, folder)
+            return _stiff(model) if body.level == "rigid" else model
+        case s.BeamBody() | s.ModalBody() | s.SidBody():
+            raise NotImplementedError(f'body "{body.name}": the dense route knows levels {", ".join(LEVELS)}')
+        case _:
+            assert_never(body)
 
 
 def rigid_model(

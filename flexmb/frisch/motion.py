@@ -101,10 +101,11 @@ def _across_hinge(c, w, k):
     if p >= 0:
         R_parent, omega = mat3(w.nest[p].rotation, 0), vec3(w.nest[p].omega, 0)
     r, R, V_node, A_node = _inboard_node(c, w, k, R_parent)
-    kind, at_q, at_u, sequence = c.body[k].hinge_kind, c.body[k].q_index, c.body[k].u_index, c.body[k].sequence
-    R_hinge, translation = catalogue.pose(c, kind, w.q, at_q, sequence)
+    kind, at_q, at_u = c.body[k].hinge_kind, c.body[k].q_index, c.body[k].u_index
+    sequence, parameters = c.body[k].sequence, c.body[k].parameters
+    R_hinge, translation = catalogue.pose(c, kind, w.q, at_q, sequence, parameters)
     (w_hinge, v_hinge), (alpha_hinge, a_hinge) = catalogue.motion(
-        c, kind, w.q, at_q, w.u, at_u, sequence, w.nest[k].hinge_map
+        c, kind, w.q, at_q, w.u, at_u, sequence, parameters, w.nest[k].hinge_map
     )
     arm = times(R, translation)
     R = matmul(R, R_hinge)

@@ -86,9 +86,10 @@ def _cross_hinge(c, w, k):
         V, A = _carried(c, w, k, R, arm)
         V, A = axis.cross_hinge(c, w, k, V, A)
     else:
-        i, j, kind, sequence = c.body[k].q_index, c.body[k].u_index, c.body[k].hinge_kind, c.body[k].sequence
-        R_hinge, p_hinge = catalogue.pose(c, kind, w.q, i, sequence)
-        V_rel, A_rel = catalogue.motion(c, kind, w.q, i, w.u, j, sequence, w.hinge[k].map)
+        i, j, kind = c.body[k].q_index, c.body[k].u_index, c.body[k].hinge_kind
+        sequence, parameters = c.body[k].sequence, c.body[k].parameters
+        R_hinge, p_hinge = catalogue.pose(c, kind, w.q, i, sequence, parameters)
+        V_rel, A_rel = catalogue.motion(c, kind, w.q, i, w.u, j, sequence, parameters, w.hinge[k].map)
         R, arm = matmul(R, R_hinge), add(arm, times(R, p_hinge))
         V, A = _carried(c, w, k, R, arm)
         coriolis = cross(V[0], V_rel[0]), scale(2.0, cross(V[0], V_rel[1]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
+from typing import assert_never
 
 import numpy as np
 from msgspec.structs import replace
@@ -29,12 +30,16 @@ def flexible_model(body: BeamBody | ModalBody, folder: Path | None = None) -> Fl
     (`flexmb.modal.equivalent`). Equal beams share one model, so its arrays must not be written to. Raises ValueError
     for data of which no model can be made.
     """
-    if isinstance(body, ModalBody):
-        return with_equivalent_masses(raw_model(body, folder))
-    try:
-        return _beam(replace(body, name="beam"))
-    except ValueError:
-        return _beam(body)  # raises again, now with the name of the body
+    match body:
+        case ModalBody():
+            return with_equivalent_masses(raw_model(body, folder))
+        case BeamBody():
+            try:
+                return _beam(replace(body, name="beam"))
+            except ValueError:
+                return _beam(body)  # raises again, now with the name of the body
+        case _:
+            assert_never(body)
 
 
 @lru_cache(maxsize=128)

@@ -106,9 +106,7 @@ def _prescribe(t, y, c):
 def configuration_rate(c, w, rate):
     """qdot(q, u) into `rate`; quaternions are taken raw, so that their norm is an invariant of the flow."""
     for k in range(c.body.shape[0]):
-        catalogue.rate(
-            c, c.body[k].hinge_kind, w.raw, c.body[k].q_index, w.u, c.body[k].u_index, c.body[k].sequence, rate
-        )
+        catalogue.rate(c, c.body[k].hinge_kind, w.raw, c.body[k].q_index, w.u, c.body[k].u_index, rate)
         if has(c, MODES):
             for n in range(c.body[k].modes):
                 rate[c.body[k].eta_index + n] = w.u[c.body[k].etad_index + n]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
+from typing import assert_never
 
 import numpy as np
 from msgspec.structs import replace
@@ -16,7 +17,6 @@ from flexmb.run.propagate import Raw
 from flexmb.run.resting import off_stop, on_stop
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release
 from flexmb.scene.functions import Constant
-from flexmb.scene.hinges import LinearCoordinate
 from flexmb.scene.schema import Scene, SceneEvent, Wheel
 from flexmb.scene.tree import Coordinate, rate_name, scalar_paths
 from flexmb.scene.values import changed_at
@@ -158,6 +158,8 @@ class Situation:
                 y[-1] += self._energy(t, y) - energy
             case EndRun():
                 pass
+            case _:
+                assert_never(action)
 
     def _strike(
         self, t: float, y: Real, name: str, factor: float, impulses: dict[str, float], closures: dict[str, Real]
@@ -176,17 +178,17 @@ class Situation:
 
     def _held(self, value: float, keeps_motor: bool = False):  # type: ignore[no-untyped-def]  # of a coordinate or a wheel
         def held(item: Coordinate | Wheel) -> Coordinate | Wheel:
-            value_key, rate_key, motor, motion = _keys(item)
-            kept = {motor: getattr(item, motor) if keeps_motor else None}
-            return replace(item, **{value_key: 0.0, rate_key: 0.0, motion: Constant(value=float(value)), **kept})
+            keys = item.KEYS
+            kept = {keys.effort: getattr(item, keys.effort) if keeps_motor else None}
+            still = {keys.value: 0.0, keys.rate: 0.0, keys.prescribed: Constant(value=float(value))}
+            return replace(item, **still, **kept)
 
         return held
 
     def _freed(self, name: str):  # type: ignore[no-untyped-def]
         found: list[Coordinate | Wheel] = []
         changed_at(self.given, self._paths[name], lambda item: found.append(item) or item)
-        motion = _keys(found[0])[3]
-        return lambda _: replace(found[0], **{motion: None})
+        return lambda _: replace(found[0], **{found[0].KEYS.prescribed: None})
 
     def _become(self, scene: Scene, t: float, y: Real) -> None:
         if scene == self.system.scene:
@@ -210,11 +212,3 @@ class Situation:
 
     def _energy(self, t: float, y: Real) -> float:
         return float(np.sum(list(self.system.energy(self._state(t, y)).values())))
-
-
-def _keys(item: Coordinate | Wheel) -> tuple[str, str, str, str]:
-    """Keys of initial value, initial rate, motor and prescribed motion."""
-    if isinstance(item, LinearCoordinate):
-        return "position_m", "rate_m_s", "force_N", "prescribed_m"
-    rate = "speed_rad_s" if isinstance(item, Wheel) else "rate_rad_s"
-    return "angle_rad", rate, "torque_Nm", "prescribed_rad"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from flexmb.integrate.problem import Clock
 from flexmb.scene.check import check_run
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
-from flexmb.scene.functions import Pulse, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import watches_signals
 from flexmb.system.tree_system import System
@@ -51,6 +51,8 @@ def timing(scene: Scene) -> Timing:
     switches, start, end = set[float](), -inf, inf
     sines, knots = list[Sine](), set[float]()
     for _, _, function in values(ROOT, scene):
+        if not isinstance(function, Function):
+            continue
         match function:
             case Pulse(start_s=start, duration_s=duration) | SmoothStep(start_s=start, duration_s=duration):
                 switches |= {start, start + duration}
@@ -59,8 +61,13 @@ def timing(scene: Scene) -> Timing:
             case Table(times_s=times):
                 start, end = max(start, times[0]), min(end, times[-1])
                 knots.update(times)
-            case Sine(amplitude=amplitude, angular_frequency_rad_s=frequency) if amplitude and frequency:
-                sines.append(function)
+            case Sine(amplitude=amplitude, angular_frequency_rad_s=frequency):
+                if amplitude and frequency:
+                    sines.append(function)
+            case Constant() | Ramp() | ControlSignal():
+                pass  # these have no switches
+            case _:
+                assert_never(function)
     return Timing(tuple(sorted(switches)), start, end, tuple(sines), tuple(knots))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import msgspec
 
@@ -40,6 +40,8 @@ class RigidBody(SceneStruct, frozen=True, kw_only=True, tag="rigid", tag_field="
     com_m: Vector = ZERO
     inertia_kg_m2: Matrix3
     nodes: tuple[Node, ...] = ()
+
+    level: ClassVar[Level] = "rigid"
 
 
 class BeamStation(SceneStruct, frozen=True, kw_only=True):

@@ -174,6 +174,22 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
             s.Prismatic, name=name, parent=parent, child=child, axis=axis, translation=translation, **placement
         )
 
+    def screw(
+        self, name: str, parent: str, child: str, *, pitch: float, axis: ArrayLike = Z_AXIS,
+        **options: Unpack[TurningHinge],
+    ) -> Self:  # fmt: skip
+        """One rotation about the unit vector `axis`, with `pitch` (m/rad) times as much translation along it.
+
+        A screw that advances by h (m) a turn has the pitch h / (2 pi), a left-handed one a negative pitch. The angle is
+        as of a `revolute`.
+        """
+        refuse_others("a Screw", options, TurningHinge)
+        angle, placement = _divided(options, Angle)
+        rotation = make(s.AngularCoordinate, **angle)
+        return self._append(
+            s.Screw, name=name, parent=parent, child=child, axis=axis, pitch=pitch, rotation=rotation, **placement
+        )
+
     def cylindrical(
         self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, rotation: s.AngularCoordinate = AT_REST,
         translation: s.LinearCoordinate = IN_PLACE, **placement: Unpack[Placement],

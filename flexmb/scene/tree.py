@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple, TypeVar, assert_never
 
-from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
+from msgspec.structs import replace
+
+from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, SidBody, Vector
 from flexmb.scene.columns import struct_keys
-from flexmb.scene.connectors import AlongHinge, AngularFriction, AngularSpring
-from flexmb.scene.control import CoordinateSensor, TimeSensor
+from flexmb.scene.connectors import AlongHinge, AngularFriction
+from flexmb.scene.control import (
+    CoordinateSensor,
+    DistanceSensor,
+    DriveSensor,
+    LoadSensor,
+    MarkerSensor,
+    ProfileSensor,
+    TimeSensor,
+)
 from flexmb.scene.events import Impact
-from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate
+from flexmb.scene.freedoms import AngularCoordinate, Coordinate, LinearCoordinate
+from flexmb.scene.hinges import Hinge
 from flexmb.scene.schema import PointMass, Scene, Wheel
 
 GROUND = "ground"
-
-Coordinate = AngularCoordinate | LinearCoordinate
+Item = TypeVar("Item", bound=Hinge | PointMass)
 
 
 class Branch(NamedTuple):
@@ -78,7 +89,11 @@ def rest_frames(body: Body) -> dict[str, NodeFrame]:
         case ModalBody():
             listed = {node.name: NodeFrame(node.position_m, node.quaternion) for node in body.nodes}
             return (origin if body.boundary == "clamped-free" else {}) | listed
-    raise ValueError(f'the nodes of body "{body.name}" are in the SID file "{body.file}": convert it by flexmb import')
+        case SidBody():
+            what = f'the nodes of body "{body.name}" are in the SID file "{body.file}"'
+            raise ValueError(f"{what}: convert it by flexmb import")
+        case _:
+            assert_never(body)
 
 
 def node_frame(body: Body, node: str) -> NodeFrame:
@@ -106,6 +121,15 @@ def coordinates(item: Hinge | PointMass) -> tuple[NamedCoordinate, ...]:
     return tuple(found)
 
 
+def with_coordinates(item: Item, changed: Iterable[Coordinate]) -> Item:
+    """A hinge or point mass with other scalar coordinates, in the order of `coordinates`."""
+    found: dict[str, Any] = {}
+    for (name, _), coordinate in zip(coordinates(item), changed, strict=True):
+        key, bracket, _ = name.partition("[")
+        found[key] = (*found.get(key, ()), coordinate) if bracket else coordinate
+    return replace(item, **found)
+
+
 def scalar_paths(scene: Scene) -> dict[str, str]:
     """Scalar coordinates as states name them, "<hinge>.<key>" and "<wheel>.angle", and the paths of their structs.
 
@@ -125,14 +149,15 @@ def rate_name(coordinate: str, path: str) -> str:
     if path.startswith("wheels."):
         return f"{coordinate.removesuffix('.angle')}.speed"
     return f"{coordinate}.rate"
+
+
 def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMass | Wheel, int]:
     """The item along whose coordinate a connector acts, and the number of the coordinate among its scalar ones.
 
     ValueError where there is none, or where the connector does not say which.
     """
     items = {item.name: item for item in (*scene.hinges, *scene.point_masses, *scene.wheels)}
-    angular = isinstance(connector, AngularSpring | AngularFriction)
-    sort = "angle" if angular else "displacement"
+    sort = "angle" if connector.ANGULAR else "displacement"
     item = items.get(connector.hinge)
     if item is None:
         raise ValueError(f'there is no hinge, point mass or wheel "{connector.hinge}"')
@@ -143,7 +168,7 @@ def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMas
     names = {
         name: n
         for n, (name, each) in enumerate(coordinates(item))
-        if isinstance(each, AngularCoordinate) == angular and connector.coordinate in ("", name)
+        if each.ANGULAR == connector.ANGULAR and connector.coordinate in ("", name)
     }
     if len(names) == 1:
         return item, next(iter(names.values()))
@@ -169,10 +194,15 @@ def watchable(scene: Scene) -> dict[str, str]:
     found = {"time": "time"} | {name: name for name in paths}
     found |= {rate: rate for rate in (rate_name(name, path) for name, path in paths.items())}
     for sensor in scene.sensors:
-        if isinstance(sensor, TimeSensor):
-            found[sensor.name] = "time"
-        elif isinstance(sensor, CoordinateSensor):
-            own = [name for name in paths if name.startswith(f"{sensor.of}.")]
-            if len(own) == 1:
-                found[sensor.name] = own[0] if sensor.quantity == "value" else rate_name(own[0], paths[own[0]])
+        match sensor:
+            case TimeSensor():
+                found[sensor.name] = "time"
+            case CoordinateSensor():
+                own = [name for name in paths if name.startswith(f"{sensor.of}.")]
+                if len(own) == 1:
+                    found[sensor.name] = own[0] if sensor.quantity == "value" else rate_name(own[0], paths[own[0]])
+            case MarkerSensor() | DistanceSensor() | LoadSensor() | DriveSensor() | ProfileSensor():
+                pass  # these are known from a look at them alone
+            case _:
+                assert_never(sensor)
     return found

@@ -6,6 +6,7 @@ UNITS = {
     "s": "s", "m": "m", "kg": "kg", "rad": "rad", "N": "N", "Nm": "N m", "Nm2": "N m²",
     "m_s": "m/s", "m_s2": "m/s²", "rad_s": "rad/s", "kg_m": "kg/m", "kg_m2": "kg m²",
     "N_m": "N/m", "Ns_m": "N s/m", "Nm_rad": "N m/rad", "Nms_rad": "N m s/rad", "s_m": "s/m", "s_rad": "s/rad",
+    "m_rad": "m/rad",
 }  # fmt: skip
 
 # The suffix cannot tell kg/m from kg m: a mass moment of inertia per length is kg m²/m.

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import assert_never
 
 import numpy as np
 
 from flexmb.scene.modal_data import modal_arrays
-from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, TipMass, Vector
+from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, SidBody, TipMass, Vector
 from flexmb.scene.tree import rest_frames
 from flexmb.typing import Real
 
@@ -107,6 +108,10 @@ def rigid_equivalent(body: Body) -> RigidBody:
             arrays = modal_arrays(body)
             parts = zip(arrays.mass, arrays.position + arrays.com_offset, arrays.inertia, strict=True)
             inertia = combine([Inertia(*part) for part in parts])
+        case SidBody():
+            raise ValueError(f'the mass of body "{body.name}" is in its SID file: convert it by flexmb import')
+        case _:
+            assert_never(body)
     frames = {name: frame for name, frame in rest_frames(body).items() if name != "origin"}
     nodes = tuple(Node(name=name, position_m=at.position, quaternion=at.quaternion) for name, at in frames.items())
     return rigid_body(body.name, inertia, nodes)

@@ -73,6 +73,7 @@ BODY = _record(  # what rigid trees need comes first, so that it lies together
     ("wheel_stop", _I),
     ("load_start", _I),
     ("load_stop", _I),
+    ("parameters", _F, (3,)),  # real numbers of its hinge, such as the pitch of a screw (m/rad)
 )
 SLOPE = _record(  # level linear: mode n of a body by eta_k
     ("mfr", _F, (6,)),  # d mfr_n / deta_k = [C1_kn; L1_kn]

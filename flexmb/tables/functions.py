@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import pi
+from typing import assert_never
 
 import numpy as np
 
@@ -47,6 +48,8 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
                 ends = zip(spline.x[:-1], spline.x[1:], strict=True)
                 # the spline's end knots repeat: their intervals have no length
                 pieces += [(left, *spline.c[:, i]) for i, (left, right) in enumerate(ends) if right > left]
+            case _:
+                assert_never(function)
         row["stop"] = len(pieces)
     return out, np.array(pieces, dtype=float).reshape(-1, 7)
 

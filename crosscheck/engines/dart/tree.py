@@ -9,13 +9,14 @@ springs and dampers are part of an implicit step, and are not used.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import assert_never
 
 import dartpy
 import numpy as np
 
 from crosscheck.engines.conventions import Frame
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
+from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar, by_motion
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -94,27 +95,35 @@ def initial_state(tree: DartTree) -> tuple[Real, Real]:
             case Floating() as freedom:
                 q[slot.q : slot.q + 7] = [*freedom.position, *freedom.quaternion]
                 v[slot.v : slot.v + 6] = [*freedom.angular_velocity, *freedom.velocity]
+            case _:
+                assert_never(slot.freedom)
     return q, v
 
 
 def _coordinates(freedom: Freedom) -> int:
-    return {Scalar: 1, Ball: 4, Floating: 7}[type(freedom)]
+    match freedom:
+        case Scalar():
+            return 1
+        case Ball() | Floating():
+            return freedom.sizes[0]
+        case _:
+            assert_never(freedom)
 
 
 def _joint(
     skeleton: dartpy.dynamics.Skeleton, parent: dartpy.dynamics.BodyNode | None, freedom: Freedom
 ) -> tuple[dartpy.dynamics.Joint, dartpy.dynamics.BodyNode]:
     match freedom:
-        case Scalar(angular=True, axis=axis):
-            joint, body = skeleton.createRevoluteJointAndBodyNodePair(parent)
-            joint.setAxis(axis)
         case Scalar(axis=axis):
-            joint, body = skeleton.createPrismaticJointAndBodyNodePair(parent)
+            turns, slides = skeleton.createRevoluteJointAndBodyNodePair, skeleton.createPrismaticJointAndBodyNodePair
+            joint, body = by_motion(freedom, turns, slides)(parent)
             joint.setAxis(axis)
         case Ball():
             joint, body = skeleton.createBallJointAndBodyNodePair(parent)
         case Floating():
             joint, body = skeleton.createFreeJointAndBodyNodePair(parent)
+        case _:
+            assert_never(freedom)
     return joint, body
 
 

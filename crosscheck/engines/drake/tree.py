@@ -14,7 +14,7 @@ begin again at zero, whenever the pitch has grown large.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -37,7 +37,7 @@ from pydrake.systems.framework import Context
 
 from crosscheck.engines.conventions import Frame, rotation_matrix
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
+from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar, by_motion
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -134,6 +134,8 @@ def initial_state(tree: DrakeTree) -> DrakeState:
                 R = rotation_matrix(freedom.quaternion)
                 q[slot.q : slot.q + 7] = [*freedom.quaternion, *freedom.position]
                 v[slot.v : slot.v + 6] = [*(R @ freedom.angular_velocity), *(R @ freedom.velocity)]
+            case _:
+                assert_never(slot.freedom)
     return DrakeState(q, v, tuple(turned))
 
 
@@ -170,20 +172,22 @@ def _orthogonal(rotation: Real) -> RotationMatrix:
 
 def _joint(name: str, freedom: Freedom, inboard: object, outboard: object) -> Joint:
     match freedom:
-        case Scalar(angular=angular, axis=axis, damping=damping):
-            kind = RevoluteJoint if angular else PrismaticJoint
+        case Scalar(axis=axis, damping=damping):
+            kind = by_motion(freedom, RevoluteJoint, PrismaticJoint)
             return kind(name, inboard, outboard, axis, damping=max(damping, 0.0))
         case Ball(damping=damping):
             return BallRpyJoint(name, inboard, outboard, damping=max(damping, 0.0))
         case Floating():
             return QuaternionFloatingJoint(name, inboard, outboard)
+        case _:
+            assert_never(freedom)
 
 
 def _equip(plant: MultibodyPlant, joint: Joint, freedom: Freedom, ballasted: bool) -> None:
     if not isinstance(freedom, Scalar):
         return
     if freedom.stiffness > 0.0:
-        spring = RevoluteSpring if freedom.angular else PrismaticSpring
+        spring = by_motion(freedom, RevoluteSpring, PrismaticSpring)
         plant.AddForceElement(spring(joint, freedom.rest, freedom.stiffness))
     if ballasted and freedom.prescribed is not None:
         rotor = plant.AddJointActuator(joint.name(), joint)

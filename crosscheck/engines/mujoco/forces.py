@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import assert_never
 
 import mujoco
 import numpy as np
 
 from crosscheck.engines.conventions import cross, rotation_vector
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Attachment, Ball, Scalar, attachment
+from crosscheck.engines.links import Attachment, Ball, Floating, Scalar, attachment
 from crosscheck.engines.mujoco.connections import MujocoConnections
 from crosscheck.engines.mujoco.tree import ARMATURE, MujocoSlot, MujocoTree
 from flexmb.scene.schema import Load, Scene
@@ -61,6 +62,10 @@ class Forces:
                 case Ball(stiffness=k):
                     turn = rotation_vector(q[slot.q : slot.q + 4] / np.linalg.norm(q[slot.q : slot.q + 4]))
                     energy += 0.5 * k * (turn @ turn)
+                case Floating():
+                    pass  # free flight has no spring
+                case _:
+                    assert_never(slot.freedom)
         return float(energy)
 
     def _apply(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import cross, quaternion_of, shift_wrench
-from crosscheck.engines.links import Attachment, attachment
+from crosscheck.engines.links import Attachment, attachment, by_motion
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.tree import MujocoClosure, MujocoTree
 from flexmb.scene.schema import Scene
@@ -112,7 +112,7 @@ class MujocoObserver:
         for slot in self._forces.driven:
             load = loads[slot.link.kind, slot.link.joint]
             about_axis = shift_wrench(load, data.xpos[slot.body] - data.xanchor[slot.joint])
-            half = about_axis[:3] if slot.freedom.angular else about_axis[3:]
+            half = by_motion(slot.freedom, about_axis[:3], about_axis[3:])
             freedom = slot.freedom
             passive = freedom.stiffness * (freedom.rest - data.qpos[slot.q]) - freedom.damping * data.qvel[slot.v]
             along = self._forces.connections.along(data.time, data).values()

@@ -7,7 +7,7 @@ held for a weld) follow their functions of time.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 import pinocchio as pin
@@ -159,11 +159,16 @@ class Dynamics:
     def _turning_rate(self, slot: PinocchioSlot, own: Real, state: PinocchioState, qdot: Real) -> None:
         """Rates of ball and free-flyer coordinates; the quaternion's `own` (not normalised) value enters its rate."""
         start = _quaternion_start(slot)
-        if isinstance(slot.freedom, Floating):
-            linear, omega = state.v[slot.v : slot.v + 3], state.v[slot.v + 3 : slot.v + 6]
-            qdot[slot.q : slot.q + 3] = pin.Quaternion(state.q[start : start + 4]).toRotationMatrix() @ linear
-        else:
-            omega = state.v[slot.v : slot.v + 3]
+        match slot.freedom:
+            case Ball():
+                omega = state.v[slot.v : slot.v + 3]
+            case Floating():
+                linear, omega = state.v[slot.v : slot.v + 3], state.v[slot.v + 3 : slot.v + 6]
+                qdot[slot.q : slot.q + 3] = pin.Quaternion(state.q[start : start + 4]).toRotationMatrix() @ linear
+            case Scalar():
+                return  # without a quaternion the rates are the speeds
+            case _:
+                assert_never(slot.freedom)
         qdot[start : start + 4] = scalar_last(quaternion_rate(scalar_first(own).tolist(), omega.tolist()))
 
     def _wrenches(self, t: float, state: PinocchioState) -> pin.StdVec_Force | None:
@@ -180,4 +185,12 @@ def _is_driven(slot: PinocchioSlot) -> bool:
 
 
 def _quaternion_start(slot: PinocchioSlot) -> int:
-    return slot.q if isinstance(slot.freedom, Ball) else slot.q + 3
+    match slot.freedom:
+        case Ball():
+            return slot.q
+        case Floating():
+            return slot.q + 3
+        case Scalar():
+            raise ValueError(f'"{slot.link.joint}" has no quaternion')
+        case _:
+            assert_never(slot.freedom)

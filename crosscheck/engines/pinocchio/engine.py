@@ -38,7 +38,7 @@ class PinocchioEngine:
     def supports(self, scene: Scene) -> Support:
         if len(scene.hinges) > MOST_JOINTS:
             return Support("no", f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}")
-        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), get_args(Connector))
+        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), get_args(Connector), screws=True)
         reason = reason or (scene.closures and _beside_closures(scene))
         return Support("no", reason) if reason else Support("exact")
 

@@ -7,6 +7,7 @@ joints in outboard axes. A weld is a revolute joint held at zero, so that its lo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import assert_never
 
 import numpy as np
 import pinocchio as pin
@@ -18,7 +19,7 @@ from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
 from flexmb.scene.functions import Constant
 from flexmb.typing import Real
 
-_HELD = Scalar(True, np.array([0.0, 0.0, 1.0]), 0.0, 0.0, 0.0, 0.0, 0.0, None, Constant(value=0.0))
+_HELD = Scalar("turn", np.array([0.0, 0.0, 1.0]), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, None, Constant(value=0.0))
 
 
 Places = slice | NDArray[np.intp]
@@ -94,16 +95,30 @@ def initial_state(tree: PinocchioTree) -> tuple[Real, Real]:
             case Floating() as freedom:
                 q[slot.q : slot.q + 7] = [*freedom.position, *scalar_last(freedom.quaternion)]
                 v[slot.v : slot.v + 6] = [*freedom.velocity, *freedom.angular_velocity]
+            case _:
+                assert_never(slot.freedom)
     return q, v
 
 
 def _joint(freedom: Freedom) -> pin.JointModel:
     match freedom:
-        case Scalar(angular=True, axis=axis):
-            return pin.JointModelRevoluteUnaligned(axis)
-        case Scalar(axis=axis):
-            return pin.JointModelPrismaticUnaligned(axis)
+        case Scalar():
+            return _along_axis(freedom)
         case Ball():
             return pin.JointModelSpherical()
         case Floating():
             return pin.JointModelFreeFlyer()
+        case _:
+            assert_never(freedom)
+
+
+def _along_axis(joint: Scalar) -> pin.JointModel:
+    match joint.motion:
+        case "turn":
+            return pin.JointModelRevoluteUnaligned(joint.axis)
+        case "slide":
+            return pin.JointModelPrismaticUnaligned(joint.axis)
+        case "screw":
+            return pin.JointModelHelicalUnaligned(joint.axis, joint.pitch)
+        case _:
+            assert_never(joint.motion)

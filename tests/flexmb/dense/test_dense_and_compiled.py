@@ -21,7 +21,7 @@ from tests.bounds import algebra, backward_error, gamma
 RECIPES = {
     "rigid": trees.RIGID, "full": trees.FULL, "ruthless": trees.RUTHLESS, "mixed": trees.MIXED,
     "linear": trees.LINEAR, "stiffened": trees.STIFFENED, "every level": trees.EVERY_LEVEL,
-    "free-flying": trees.FREE_FLYING, "conservative": trees.CONSERVATIVE,
+    "free-flying": trees.FREE_FLYING, "conservative": trees.CONSERVATIVE, "later kinds": trees.LATER,
 }  # fmt: skip
 SEEDS = range(2)
 
