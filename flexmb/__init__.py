@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from flexmb.scene.open_loop import open_loop
     from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of this API)
     from flexmb.scene.user_code import no_user_code
-    from flexmb.system.batch import Batch, compile_batch
-    from flexmb.system.compile import compile
+    from flexmb.system.batch import Batch
+    from flexmb.system.compile import compile, compile_batch
     from flexmb.system.observables import Evaluation
     from flexmb.system.tree_system import System
     from flexmb.tables.state import DynamicsError, PrecisionWarning, State
@@ -73,7 +73,7 @@ _LATER = {
     "open_loop": "flexmb.scene.open_loop",
     "no_user_code": "flexmb.scene.user_code",
     "Batch": "flexmb.system.batch",
-    "compile_batch": "flexmb.system.batch",
+    "compile_batch": "flexmb.system.compile",
     "Status": "flexmb.tables.status",
     "DynamicsError": "flexmb.tables.state",
     "Evaluation": "flexmb.system.observables",

@@ -42,7 +42,7 @@ def resting(system: System, guess: State) -> State:
     t, y = system.layout.entering(guess)
     start = replace(guess, u=np.zeros_like(guess.u))
     if isinstance(system, ClosedSystem):
-        start = system._admissible(t, np.r_[start.q, start.u, 0.0])
+        start = system.admissible(start)
     equations = equations_of(system).held(t)
     loop = ClosedLoop(system, start)
     try:

@@ -206,9 +206,9 @@ def entering(system: System | Scene, state: State | None) -> tuple[Equations, St
     equations = equations_of(system if isinstance(system, System) else compile(system))
     if state is None:
         return equations, equations.system.initial_state
-    t, y = equations.system.layout.entering(state)
+    equations.system.layout.entering(state)
     if isinstance(equations.system, ClosedSystem):
-        return equations, equations.system._admissible(t, y, "state")
+        return equations, equations.system.admissible(state, "state")
     return equations, state
 
 

@@ -47,7 +47,7 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve:
         u=states[:, system.nq : system.nq + system.nu],
         q_names=q_names,
         u_names=u_names,
-        **gathered(system._observation, rows),
+        **gathered(system.observation, rows),
         work=states[:, -1],
         signals=signals,
         power=power,

@@ -111,7 +111,7 @@ def simulate(
     made_by = Making(system, times, chosen, partial(_again, system, t_end, samples=times, **same))
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
         begin = origin(system, t, state, method)
-        start = system.start_precision if state is None and t == 0.0 else system._precision_if_doubtful(begin.state)
+        start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)
         if start is not None and start.status != Status.OK:
             return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve)
         if not system.scene.events:

@@ -149,17 +149,11 @@ class Trajectory:
         NaN what the motion does not determine in these axes. See `System.hinge_loads`.
         """
         system, found = self._making("a hinge's frame").system, {name: load.copy() for name, load in self.loads.items()}
-        for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
-            loads = {name: load[i] for name, load in self.loads.items()}
-            at = system._loads_in(*system.layout.whole(float(t), y), loads, axes, about)
+        for i, state in enumerate(map(State, self.q, self.u, self.t.tolist())):
+            at = system.referred_loads(state, {name: load[i] for name, load in self.loads.items()}, axes, about)
             for name, load in at.items():
                 found[name][i] = load
         return found
-
-    @property
-    def _states(self) -> Real:
-        """(T,nq+nu+1) [q, u, 0]."""
-        return np.column_stack([self.q, self.u, np.zeros(len(self.t))])
 
     def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
         """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).
@@ -171,8 +165,8 @@ class Trajectory:
         refuse_feedback(system.scene, "a section's load")
         balance = SectionBalance(system, body, x)
         loads = np.zeros((len(self.t), len(balance.x), 6))
-        for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
-            loads[i] = balance.at(*system.layout.whole(float(t), y))
+        for i, state in enumerate(map(State, self.q, self.u, self.t.tolist())):
+            loads[i] = balance.at(system.all_loads(state))
         return balance.loads(loads)
 
     def _making(self, wanted: str) -> Making:

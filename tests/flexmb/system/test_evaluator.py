@@ -342,7 +342,7 @@ def test_copies_have_addresses_of_their_own(system, copied):
     found = other.accelerations(state), other.mass_matrix(state), fm.simulate(other, 1e-3, samples=3).q
     assert all(np.array_equal(a, b) for a, b in zip(found, expected, strict=True))
     assert np.array_equal(evaluator(state.t, state.q, state.u), system.accelerations(state, "composite"))
-    other._w.body["velocity"][:] = np.nan
+    other.own_workspace.body["velocity"][:] = np.nan
     assert np.array_equal(system.mass_matrix(state), expected[1])
     with pytest.raises(TypeError, match="cannot be copied"):
         copied(system._invert)

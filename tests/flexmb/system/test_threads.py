@@ -34,6 +34,7 @@ from flexmb.tables.features import asking
 from flexmb.tables.per_thread import per_thread
 from tests.benchmarks.rivals import rigid_chain
 from tests.flexmb.system.argument_kinds import W
+from tests.flexmb.system.public_calls import INSIDE
 from tests.flexmb.system.shared_calls import questions
 
 ROOT = Path(__file__).parents[3]
@@ -98,6 +99,7 @@ def test_a_thread_that_forbids_what_another_compiles_is_noticed():
 
 # What threads do not ask of a shared system, and why.
 NOT_ASKED = {
+    *(f"System.{name}" for name in INSIDE),  # by the others
     "System.state", "System.coordinate", "System.speed", "System.fault_name", "System.route",  # they compute nothing
     "System.workspace", "System.recursion_workspace", "System.composite_workspace",  # new ones
     "System.nested",  # `reduced`
@@ -223,7 +225,8 @@ def test_what_a_thread_has_goes_with_it():
 
     def work() -> None:
         system.energy(state), system.accelerations(state), system.nested().reduced(0.0, state.y)
-        kept.extend(map(weakref.ref, (system._w, system._recursion_w, system.nested()._w)))
+        own = system.own_workspace, system.own_recursion_workspace, system.nested().own_workspace
+        kept.extend(map(weakref.ref, own))
         kept.append(weakref.ref(evaluator(state.t, state.q, state.u)))
 
     thread = threading.Thread(target=work)
