@@ -18,9 +18,10 @@ if TYPE_CHECKING:
     from flexmb.closure.closures import ClosureError
     from flexmb.control.user import user_function
     from flexmb.linear.campbell import Campbell, campbell
-    from flexmb.linear.equilibrium import EquilibriumError, equilibrium
+    from flexmb.linear.equilibrium import equilibrium
     from flexmb.linear.linear_model import LinearModel
     from flexmb.linear.linearize import linearize
+    from flexmb.linear.newton import EquilibriumError
     from flexmb.linear.spin import SteadySpin, steady_spin
     from flexmb.run.batch_trajectory import BatchTrajectory
     from flexmb.run.interruption import Interrupted
@@ -51,7 +52,7 @@ _LATER = {
     "campbell": "flexmb.linear.campbell",
     "ClosureError": "flexmb.closure.closures",
     "equilibrium": "flexmb.linear.equilibrium",
-    "EquilibriumError": "flexmb.linear.equilibrium",
+    "EquilibriumError": "flexmb.linear.newton",
     "linearize": "flexmb.linear.linearize",
     "Interrupted": "flexmb.run.interruption",
     "LinearModel": "flexmb.linear.linear_model",

@@ -22,10 +22,11 @@ import numpy as np
 from flexmb.control.feedback import Feedback
 from flexmb.control.loop import look, project, respond
 from flexmb.integrate.problem import Accuracy, Clock
+from flexmb.linear.equations import equations_of
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.observed import values
 from flexmb.linear.sensed import ChangedRow, sensed
-from flexmb.linear.variations import Equations, equations_of
+from flexmb.linear.variations import Equations
 from flexmb.scene.functions import Constant
 from flexmb.system import algorithms
 from flexmb.system.closed import ClosedSystem
