@@ -8,7 +8,8 @@ from time import perf_counter
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED
 from flexmb.run.observing import observe
 from flexmb.run.propagate import Integration, Raw
-from flexmb.run.trajectory import Statistics, Trajectory, gathered
+from flexmb.run.run_arrays import Statistics
+from flexmb.run.trajectory import Trajectory, gathered
 from flexmb.scene.problems import SceneWarning
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
