@@ -61,7 +61,7 @@ class ClosedSystem(System):
         own = closure_constants(scene, self.constants, self.closure_ports)
         slowest = slowest_mode(self.links)
         tree = scene.closures, self.constants, own, self.layout, self.workspace, slowest
-        self._closures = self._own.closures = Closures(*tree, self.check_status)  # this thread's own
+        self._closures = self.own.closures = Closures(*tree, self.check_status)  # this thread's own
         self._start: State | None = None
 
     @per_thread

@@ -86,10 +86,10 @@ class FreeMotion(Mechanics):
         if type(state) is not State or state.layout is not self.layout:
             state = self.layout.owning(state)
         try:
-            evaluator = self._own._evaluators[algorithm]  # not by way of the property, which costs as much as the call
+            evaluator = self.own._evaluators[algorithm]  # not by way of the property, which costs as much as the call
         except (AttributeError, KeyError):
             evaluator = self._evaluator(algorithms.chosen(algorithm))
-        return evaluator(state.t, state._q, state._u).copy()
+        return evaluator(state.t, state.kernel_q, state.kernel_u).copy()
 
     def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
         """`accelerations` for a loop: `udot = evaluator(t, q, u)` writes into one array, by a workspace of its own.

@@ -87,7 +87,7 @@ class Mechanics(SceneArrays):
 
     def __init__(self, scene: s.Scene, elimination: Elimination) -> None:
         super().__init__(scene, elimination)
-        self._own = Own()
+        self.own = Own()
         self._nested: dict[Set[Erratum], NestedSystem] = {}
 
     def nested_system(self, errata: Set[Erratum]) -> NestedSystem:

@@ -258,9 +258,9 @@ def test_nothing_that_calls_write_into_is_kept_for_all_threads(made):
         ask(system, system.initial_state)
     factors = system.factorise(system.initial_state)
     for each in (system, factors) if system.scene.closures else (system, system.nested(), factors):
-        shared = {name: value for name, value in vars(each).items() if name not in ("_own", "kept")}
+        shared = {name: value for name, value in vars(each).items() if name not in ("own", "kept")}
         assert not [name for name, value in shared.items() if written(value)], each
-        assert written(vars(each._own))  # negative control: it is there, for this thread
+        assert written(vars(each.own))  # negative control: it is there, for this thread
 
 
 def test_closures_count_their_rows_for_all_threads():
