@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from flexmb.entry.gate import NOBODY, GateNotes, gate
+from flexmb.entry.object_access import may_read_objects
 from flexmb.jit.direct import Direct, addresses, direct
-from flexmb.jit.objects import readable
 from flexmb.jit.pointer import REAL, STATUS, VECTOR
 from flexmb.system import algorithms
 from flexmb.system.algorithm import DynamicsAlgorithm
@@ -36,7 +36,7 @@ class Evaluator(partial):  # a partial, so that a call takes no way through Pyth
         """tables: what the algorithm's kernel takes after t and y, the workspace second."""
         careful, w = _Careful(system, algorithm, tables), tables[1]
         call: Any = careful
-        if readable():
+        if may_read_objects():
             behind = addresses(algorithm.kernel(), STATUS, REAL, VECTOR, *tables)
             call = gate(
                 system.layout.quaternions, careful.rates, system.nq, w.speed, w.doubt, behind, careful.notes, careful

@@ -173,7 +173,7 @@ def strided(array: np.ndarray) -> None:
 @pytest.mark.parametrize("spoil", [reshaped, retyped, cut_into_columns, strided])
 def test_what_somebody_makes_of_the_array_harms_no_later_call(spoil, readable, monkeypatch):
     if not readable:
-        monkeypatch.setattr("flexmb.system.evaluator.readable", lambda: False)
+        monkeypatch.setenv("FLEXMB_READ_OBJECTS", "off")
     evaluator = W.tree.evaluator()
     expected = W.tree.accelerations(W.state)
     spoil(evaluator(W.state.t, W.state.q, W.state.u))
