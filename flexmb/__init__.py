@@ -18,9 +18,10 @@ if TYPE_CHECKING:
     from flexmb.closure.closures import ClosureError
     from flexmb.control.user import user_function
     from flexmb.linear.campbell import Campbell, campbell
-    from flexmb.linear.equilibrium import EquilibriumError, equilibrium
+    from flexmb.linear.equilibrium import equilibrium
     from flexmb.linear.linear_model import LinearModel
     from flexmb.linear.linearize import linearize
+    from flexmb.linear.newton import EquilibriumError
     from flexmb.linear.spin import SteadySpin, steady_spin
     from flexmb.run.batch_trajectory import BatchTrajectory
     from flexmb.run.event_record import EventRecord
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
     from flexmb.scene.open_loop import open_loop
     from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of this API)
     from flexmb.scene.user_code import no_user_code
-    from flexmb.system.batch import Batch, compile_batch
-    from flexmb.system.compile import compile
+    from flexmb.system.batch import Batch
+    from flexmb.system.compile import compile, compile_batch
     from flexmb.system.observables import Evaluation
     from flexmb.system.tree_system import System
     from flexmb.tables.state import DynamicsError, PrecisionWarning, State
@@ -51,7 +52,7 @@ _LATER = {
     "campbell": "flexmb.linear.campbell",
     "ClosureError": "flexmb.closure.closures",
     "equilibrium": "flexmb.linear.equilibrium",
-    "EquilibriumError": "flexmb.linear.equilibrium",
+    "EquilibriumError": "flexmb.linear.newton",
     "linearize": "flexmb.linear.linearize",
     "Interrupted": "flexmb.run.interruption",
     "LinearModel": "flexmb.linear.linear_model",
@@ -73,7 +74,7 @@ _LATER = {
     "open_loop": "flexmb.scene.open_loop",
     "no_user_code": "flexmb.scene.user_code",
     "Batch": "flexmb.system.batch",
-    "compile_batch": "flexmb.system.batch",
+    "compile_batch": "flexmb.system.compile",
     "Status": "flexmb.tables.status",
     "DynamicsError": "flexmb.tables.state",
     "Evaluation": "flexmb.system.observables",

@@ -55,9 +55,10 @@ def linearize(
     **Exit code**: 0 linearised, 1 no equilibrium was found, 2 the scene or an option is wrong.
     """
     with no_traceback():
-        from flexmb.linear.equilibrium import EquilibriumError, equilibrium
+        from flexmb.linear.equilibrium import equilibrium
         from flexmb.linear.linear_tables import modes_table
         from flexmb.linear.linearize import linearize as linearized
+        from flexmb.linear.newton import EquilibriumError
         from flexmb.linear.spin import steady_spin
         from flexmb.linear.truncation import truncation
         from flexmb.scene.bodies import BeamBody
@@ -121,9 +122,8 @@ def campbell(
     """
     with no_traceback():
         from flexmb.linear.campbell import campbell as diagram
-        from flexmb.linear.campbell_picture import write_campbell_plot
-        from flexmb.linear.equilibrium import EquilibriumError
         from flexmb.linear.linear_tables import campbell_table
+        from flexmb.linear.newton import EquilibriumError
         from flexmb.scene.files import load_scene
 
         loaded, values = load_scene(scene), range_of("rates", rates)
@@ -136,7 +136,7 @@ def campbell(
             errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
             raise typer.Exit(EXIT_STOPPED) from None
         console.print(campbell_table(result))
-        written = [write_campbell_plot(result, picture, modes)]
+        written = [result.plot(picture, modes)]
         if csv is not None:
             written.append(result.to_csv(csv))
     console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)

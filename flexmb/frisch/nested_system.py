@@ -10,7 +10,7 @@ import numpy as np
 
 from flexmb.building.assemble import assemble
 from flexmb.building.links import BodyLink, links
-from flexmb.building.numbering import Numbering, wheels_by_body
+from flexmb.building.numbering import Numbering
 from flexmb.frisch import evaluation
 from flexmb.frisch.constants import nested_constants
 from flexmb.frisch.errata import CORRECTED, Erratum
@@ -93,7 +93,7 @@ def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partition
     price of not having the paper's logic flags.
     """
     chain = links(scene)
-    numbering = Numbering(chain, wheels_by_body(scene))
+    numbering = Numbering(chain, scene)
     constants = assemble(scene, chain, numbering, null_partitions).constants
     return NestedSystem(constants, chain, numbering.layout, errata, null_partitions)
 
@@ -117,7 +117,7 @@ class NestedSystem:
         self._layout = layout
 
     @per_thread
-    def _w(self) -> NestedWorkspace:
+    def own_workspace(self) -> NestedWorkspace:
         """The one that all questions of this thread write."""
         return self.workspace()
 
@@ -125,19 +125,14 @@ class NestedSystem:
         """A fresh workspace for the right-hand side; one per thread."""
         return workspace(self.constants, self._layout.nq)
 
-    @property
-    def own_workspace(self) -> NestedWorkspace:
-        """The one that all questions of this thread write."""
-        return self._w
-
     def accelerations(self, t: float, y: Real) -> tuple[int, Real]:
         """Status code and udot (nu,) at y = [q, u, work]."""
-        status = evaluation.accelerations(*self._layout.whole(t, y), self.constants, self._w)
-        return status, self._w.speed["acceleration"].copy()
+        status = evaluation.accelerations(*self._layout.whole(t, y), self.constants, self.own_workspace)
+        return status, self.own_workspace.speed["acceleration"].copy()
 
     def motion(self, t: float, y: Real) -> tuple[int, NestedMotion]:
         """Status code, and accelerations with everything the suppressed rows give."""
-        w = self._w
+        w = self.own_workspace
         status = evaluation.loads(*self._layout.whole(t, y), self.constants, w)
         drives = np.where(self.constants.speed["prescribed"] >= 0, w.speed["drive"], 0.0)
         rates, loads, torques = w.speed["acceleration"].copy(), w.nest["load"].copy(), w.wheel["torque"].copy()
@@ -146,26 +141,26 @@ class NestedSystem:
     @property
     def doubt(self) -> Index:
         """(1,) whether the last evaluation met a pivot that may be rounding."""
-        return self._w.doubt
+        return self.own_workspace.doubt
 
     @property
     def fault(self) -> int:
         """Body at which the last evaluation failed."""
-        return int(self._w.fault[0])
+        return int(self.own_workspace.fault[0])
 
     def reduced(self, t: float, y: Real) -> tuple[Real, Real]:
         """Matrix (nu,nu) and right side (nu,) of (136)."""
         t, y = self._layout.whole(t, y)
-        evaluation.assemble(t, y, self.constants, self._w)
-        return finite_result(self._w.M.copy(), t), finite_result(self._w.right.copy(), t)
+        evaluation.assemble(t, y, self.constants, self.own_workspace)
+        return finite_result(self.own_workspace.M.copy(), t), finite_result(self.own_workspace.right.copy(), t)
 
     def partitions(self, t: float, y: Real) -> Partitions:
         """The named blocks of (111) at y."""
         motion = self.relative_motion(t, y)
-        finite_result(self._w.Z, t), finite_result(self._w.eta, t)
+        finite_result(self.own_workspace.Z, t), finite_result(self.own_workspace.eta, t)
         first, wheels, modes, last = self._rows()
         rows = np.concatenate([first, wheels, modes, last])
-        Z, eta = self._w.Z, self._w.eta
+        Z, eta = self.own_workspace.Z, self.own_workspace.eta
         return Partitions(
             X=Z[np.ix_(first, first)],
             I_c=Z[np.ix_(first, wheels)],
@@ -182,7 +177,7 @@ class NestedSystem:
 
     def relative_motion(self, t: float, y: Real) -> RelativeMotion:
         """NestedMotion of contiguous bodies at y, every row of it, those without inertia of their own too (117)."""
-        w, c = self._w, self.constants
+        w, c = self.own_workspace, self.constants
         t, y = self._layout.whole(t, y)
         evaluation.assemble(t, y, c, w)
         finite_result(w.x, t)
@@ -194,7 +189,7 @@ class NestedSystem:
 
     def _rows(self) -> tuple[Index, Index, Index, Index]:
         """Expanded rows of the four partitions."""
-        c, w = self.constants, self._w
+        c, w = self.constants, self.own_workspace
         bodies, nx = len(c.body), len(w.x)
         rows = np.arange(nx)
         rotation = rows[: 3 * bodies].reshape(-1, 3)[np.any(c.element["Phi"], axis=1)]

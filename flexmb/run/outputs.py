@@ -7,7 +7,8 @@ from time import perf_counter
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED
 from flexmb.run.observing import observe
 from flexmb.run.propagate import Integration, Raw
-from flexmb.run.trajectory import Statistics, Trajectory, gathered
+from flexmb.run.run_arrays import Statistics
+from flexmb.run.trajectory import Trajectory, gathered
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, NotFiniteError
@@ -41,7 +42,7 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve:
         u=states[:, system.nq : system.nq + system.nu],
         q_names=q_names,
         u_names=u_names,
-        **gathered(system._observation, rows),
+        **gathered(system.observation, rows),
         work=states[:, -1],
         signals=signals,
         power=power,

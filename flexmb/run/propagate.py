@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from copy import copy
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -166,7 +167,7 @@ def integration(
         found.forget()
     except IndexError:
         if system.scene.controllers:  # they write into functions of time: of a system that nobody else has
-            system = system._anew()
+            system = copy(system)
             route = system.route(algorithm, stabilise)
         found = Integration(system, algorithms.chosen(algorithm), route, integrator)
     yield found

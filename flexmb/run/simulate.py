@@ -106,7 +106,7 @@ def simulate(
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
     begin = origin(system, t, state, method)
-    start = system.start_precision if state is None and t == 0.0 else system._precision_if_doubtful(begin.state)
+    start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)
     if start is not None and start.status != Status.OK:
         raw = unmoved(begin, Status(start.status), start.fault)
         with integration(system, algorithm, stabilise, chosen.integrator) as solve:

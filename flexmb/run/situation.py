@@ -205,7 +205,7 @@ class Situation:
             from flexmb.system.closed import ClosedSystem  # a tree needs none of it
 
             assert isinstance(self.system, ClosedSystem) and isinstance(before, ClosedSystem)
-            self.system._begin_at(t, y, before)
+            self.system.closures.begin_at(t, y, before.closures)
 
     def _state(self, t: float, y: Real) -> State:
         return self.system.state(y[: self.system.nq].copy(), y[self.system.nq : -1].copy(), t)

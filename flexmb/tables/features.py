@@ -14,17 +14,14 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 
 from flexmb.jit.features import GENERAL
 from flexmb.jit.installed import unfit
 from flexmb.jit.warmed import is_warm
-from flexmb.typing import Flags, Index, Record
-
-if TYPE_CHECKING:
-    from flexmb.tables.arrays import Constants
+from flexmb.typing import Flags, Index, Real, Record
 
 Kernels = Literal["auto", "general", "special"]
 _VARIABLE = "FLEXMB_KERNELS"  # of the environment: what is asked for where nobody says otherwise
@@ -59,6 +56,23 @@ DAMPERS = "dampers"
 MODAL_DAMPING = "modal damping"
 
 
+class SceneTables(Protocol):
+    """What of `flexmb.tables.arrays.Constants` says what a scene contains; this module stands below that one."""
+
+    kernels: Index
+    body: Record
+    speed: Record
+    second_shape: Real
+    wheel: Record
+    load: Record
+    connector: Record
+    bushing: Record
+    hinge_spring: Record
+    friction: Record
+    function: Record
+    damping: Real
+
+
 @contextmanager
 def asking(kernels: Kernels | None) -> Iterator[None]:
     """For the tables that this thread makes meanwhile, whatever the environment says; None: what it says."""
@@ -87,7 +101,7 @@ def as_asked() -> Index:
     return np.array([{"auto": UNDECIDED, "general": EVERYTHING, "special": ITS_OWN}[asked()]])
 
 
-def features(c: Constants) -> frozenset[str]:
+def features(c: SceneTables) -> frozenset[str]:
     """What kernels for these tables contain: GENERAL alone, or what is in them.
 
     Undecided tables are run by general kernels where these came with the installation, unless the special ones were
@@ -102,7 +116,7 @@ def features(c: Constants) -> frozenset[str]:
     return found
 
 
-def contained(c: Constants) -> frozenset[str]:
+def contained(c: SceneTables) -> frozenset[str]:
     """What is in the tables of a scene."""
     body, speed = c.body, c.speed
     found = {

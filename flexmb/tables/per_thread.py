@@ -28,7 +28,7 @@ class Own(local):
 class per_thread(Generic[Value]):  # noqa: N801  (used as `functools.cached_property` is)
     """A property that each thread finds once, when it first asks, and keeps.
 
-    The object keeps them in its attribute `_own`. A value that is set on the object itself is there for all threads.
+    The object keeps them in its attribute `own`. A value that is set on the object itself is there for all threads.
     """
 
     def __init__(self, find: Callable[[Any], Value]) -> None:
@@ -46,10 +46,10 @@ class per_thread(Generic[Value]):  # noqa: N801  (used as `functools.cached_prop
         if instance is None:
             return self
         try:
-            return getattr(instance._own, self._name)  # type: ignore[no-any-return]
+            return getattr(instance.own, self._name)  # type: ignore[no-any-return]
         except AttributeError:
             pass
-        own: Own = instance.__dict__.setdefault("_own", Own())  # of two threads at once, both get the one that is kept
+        own: Own = instance.__dict__.setdefault("own", Own())  # of two threads at once, both get the one that is kept
         found = self._find(instance)
         setattr(own, self._name, found)
         return found

@@ -44,7 +44,7 @@ class _StateRow:
     """
 
     def __set_name__(self, owner: type, name: str) -> None:
-        self._kept = "_" + name
+        self._kept = "kernel_" + name
 
     def __get__(self, state: State | None, owner: type) -> Real:
         if state is None:
@@ -57,21 +57,21 @@ class _StateRow:
 
 
 class _KernelArrays:
-    """The arrays of a state as kernels take them, which nobody else holds."""
+    """The arrays of a state as kernels take them, of which nobody makes another shape: users see views of them."""
 
-    _y: Real
-    _q: Real
-    _u: Real
+    kernel_y: Real
+    kernel_q: Real
+    kernel_u: Real
 
     def _keep(self, y: Real, nq: int, t: float) -> None:
         """y (nq+nu+1,) = [q, u, 0], which is not copied."""
         y = y[:]  # the `base` of what users see is its owner, not this
-        self.__dict__.update(_y=y, _q=y[:nq], _u=y[nq:-1], t=t)
+        self.__dict__.update(kernel_y=y, kernel_q=y[:nq], kernel_u=y[nq:-1], t=t)
 
     @property
     def y(self) -> Real:
         """[q, u, 0] (nq+nu+1,), of which q and u are parts."""
-        return self._y[:]
+        return self.kernel_y[:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class State(_KernelArrays):
     layout: Layout | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        q, u = arguments.array("q", self._q), arguments.array("u", self._u)
+        q, u = arguments.array("q", self.kernel_q), arguments.array("u", self.kernel_u)
         if q.ndim != 1 or u.ndim != 1:
             raise ValueError(f"q and u are rows of numbers, got arrays of shapes {q.shape} and {u.shape}")
         if self.layout is not None:
@@ -143,9 +143,9 @@ class Layout:
         """
         if type(state) is not State or state.layout is not self:
             state = self.owning(state)
-        if unsound(state._y, self.quaternions):
-            self._examine(state._y)
-        return state.t, state._y
+        if unsound(state.kernel_y, self.quaternions):
+            self._examine(state.kernel_y)
+        return state.t, state.kernel_y
 
     def owning(self, state: Any) -> State:
         """A state that belongs here; ValueError or TypeError for others. Its numbers are not looked at.
@@ -158,7 +158,7 @@ class Layout:
             raise TypeError(f"a State is needed, not {type(state).__name__}: make one by system.state(q, u, t)")
         if type(state) is not State:
             state = State(state.q, state.u, state.t, state.layout)  # what others have made of it is not known
-        self.fitting(len(state._q), len(state._u))
+        self.fitting(len(state.kernel_q), len(state.kernel_u))
         if state.layout is not None and state.layout != self:
             strange = [repr(name) for name, place in state.layout.q.items() if self.q.get(name) != place]
             raise ValueError(
@@ -212,4 +212,4 @@ def finite_result(result: Real, t: float) -> Real:
 
 def pack(state: State) -> Real:
     """y = [q, u, work], a copy."""
-    return state._y.copy()
+    return state.kernel_y.copy()

@@ -13,6 +13,7 @@ import numpy as np
 from flexmb.interchange.imported import MAGNITUDE, usable
 from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor, node_shapes, shapes
 from flexmb.scene.reading import MIB, Unreadable, read_text
+from flexmb.typing import Real
 
 LIMIT = 256 * MIB
 LARGEST = 2**26  # numbers in one block
@@ -115,7 +116,29 @@ class _Reader:
 
     def _taylor(self, name: str, expected: dict[str, tuple[int, int]]) -> Taylor:
         """A block, with what its structure leaves out."""
-        start, head, elements = self.line.number, {}, []
+        start = self.line.number
+        head, elements = self._block(name)
+        shape = self._shape(name, expected[name], head, start)
+        structure = head.get("structure", GENERAL)
+        zero = np.eye(*shape) if structure == UNIT else np.zeros(shape)
+        first = None
+        if head.get("order", 0) == 1 or any(line.key == "m1" for line, _ in elements):
+            if zero.size * self.modes > LARGEST:
+                self._fail(f"{name} would not fit into memory", "correct nelastq")
+            first = np.zeros((shape[0], self.modes, shape[1]))
+        for line, value in elements:
+            self._put(name, line, value, zero if line.key == "m0" else first)
+        if structure == SYMMETRIC:
+            zero = _mirrored(zero)
+            if first is not None:
+                first = np.stack([_mirrored(each) for each in np.moveaxis(first, 1, 0)], axis=1)
+        return Taylor(
+            zero.reshape(expected[name]), first if first is None else first.reshape(expected[name][0], self.modes, -1)
+        )
+
+    def _block(self, name: str) -> tuple[dict[str, int], list[tuple[SidLine, float]]]:
+        """The whole numbers at the head of a block, and its elements."""
+        head, elements = dict[str, int](), list[tuple[SidLine, float]]()
         while (line := self._next(f"end {name}")).key != "end":
             if line.key in ("m0", "m1"):
                 elements.append((line, self._real(line.value)))
@@ -125,41 +148,32 @@ class _Reader:
                 self._fail(
                     f'"{line.word}" does not belong into {name}', "it holds order, nrow, ..., m0(i,j), m1(i,k,j)"
                 )
-        rows, columns = expected[name]
-        structure, order = head.get("structure", GENERAL), head.get("order", 0)
+        return head, elements
+
+    def _shape(self, name: str, expected: tuple[int, int], head: dict[str, int], start: int) -> tuple[int, int]:
+        """Rows and columns as a block is written that starts in that line: stresses may be a row."""
+        rows, columns = expected
         if name == "ksigma" and head.get("ncol") == self.modes and head.get("nrow") == 1:
             rows, columns = columns, rows
         given = (head.get("nrow", rows), head.get("ncol", columns))
+        structure, order = head.get("structure", GENERAL), head.get("order", 0)
         if structure != ZEROS and given != (rows, columns) or structure not in range(5) or order not in (0, 1):
             self.line = self.line._replace(number=start)
             what = f"{name} is {given[0]} x {given[1]} of structure {structure}, order {order}"
             self._fail(what, f"it has to be {rows} x {columns}, of structure 0 to 4, order 0 or 1")
-        zero = np.eye(rows, columns) if structure == UNIT else np.zeros((rows, columns))
-        has_first = order == 1 or any(line.key == "m1" for line, _ in elements)
-        if has_first and rows * columns * self.modes > LARGEST:
-            self._fail(f"{name} would not fit into memory", "correct nelastq")
-        first = np.zeros((rows, self.modes, columns)) if has_first else None
-        for line, value in elements:
-            target = zero if line.key == "m0" else first
-            assert target is not None
-            if len(line.indices) != target.ndim or not all(
-                1 <= i <= n for i, n in zip(line.indices, target.shape, strict=True)
-            ):
-                self.line = line
-                size = " x ".join(map(str, target.shape))
-                self._fail(f"{line.key}{line.indices} is no element of {name} ({size})", "correct its indices")
-            place = tuple(i - 1 for i in line.indices)
-            target[place] = value
-        if structure == SYMMETRIC:
-            zero = _mirrored(zero)
-            first = (
-                None
-                if first is None
-                else np.moveaxis(np.array([_mirrored(each) for each in np.moveaxis(first, 1, 0)]), 0, 1)
-            )
-        return Taylor(
-            zero.reshape(expected[name]), first if first is None else first.reshape(expected[name][0], self.modes, -1)
+        return rows, columns
+
+    def _put(self, name: str, line: SidLine, value: float, target: Real | None) -> None:
+        """An element into m0, or into m1, which is there where the block has an element of it."""
+        assert target is not None
+        is_inside = len(line.indices) == target.ndim and all(
+            1 <= i <= n for i, n in zip(line.indices, target.shape, strict=True)
         )
+        if not is_inside:
+            self.line = line
+            size = " x ".join(map(str, target.shape))
+            self._fail(f"{line.key}{line.indices} is no element of {name} ({size})", "correct its indices")
+        target[tuple(i - 1 for i in line.indices)] = value
 
     def _complete(self, found: dict[str, Taylor], expected: dict[str, tuple[int, int]], of: str) -> dict[str, Taylor]:
         for name, shape in expected.items():

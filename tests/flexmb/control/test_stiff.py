@@ -54,7 +54,7 @@ class Posed(NamedTuple):
 
 
 def posed(scene: fm.Scene) -> Posed:
-    plant = fm.compile(scene)._anew()
+    plant = fm.compile(scene)
     chosen = algorithms.chosen("articulated")
     route = plant.route()
     tables = route.tables()

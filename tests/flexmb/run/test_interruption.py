@@ -86,7 +86,7 @@ def test_the_command_line_writes_what_was_reached_and_says_130(tmp_path):
 def test_outputs_that_are_evaluated_are_kept_too(algorithm, monkeypatch):
     """By the compiled loop, which Python calls again and again, and by single states."""
     system, seen = fm.compile(pendulum()), 0
-    whole = type(system)._observe_row
+    whole = type(system).observe_row
 
     def observe_row(self, *given):
         nonlocal seen
@@ -98,7 +98,7 @@ def test_outputs_that_are_evaluated_are_kept_too(algorithm, monkeypatch):
     def nothing_at_once(times, states, rows):
         return 0
 
-    monkeypatch.setattr(type(system), "_observe_row", observe_row)
+    monkeypatch.setattr(type(system), "observe_row", observe_row)
     monkeypatch.setattr(propagation, "batch", lambda *given: nothing_at_once)
     with pytest.raises(fm.Interrupted) as stopped:
         fm.simulate(system, 1.0, samples=11, algorithm=algorithm)
