@@ -17,9 +17,9 @@ from typing import Literal, NamedTuple
 from crosscheck.conformance.catalogue import CLAUSES, SHOWN
 from crosscheck.conformance.clause import Clause, ClauseBroken, NotOffered
 from crosscheck.conformance.limit import CLAUSE_LIMIT_S
-from crosscheck.engines.answers import BrokenContract, clean
+from crosscheck.engines.answers import BrokenContract, clean, describe
 from crosscheck.engines.contract import Engine, EngineMissing
-from crosscheck.running.execute import describe, find_engine
+from crosscheck.running.execute import NoSuchEngine, find_engine
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.sweep import PROVIDER
 from crosscheck.running.worker import SPAWN, Method
@@ -89,11 +89,12 @@ def try_engine(
 def attempt(trial: ClauseTrial, emit: Callable[[ClauseOutcome], None]) -> None:
     """What a worker does with a trial."""
     clause = CLAUSES[trial.clause]
-    found = find_engine(trial.provider, trial.engine)
-    if isinstance(found, str):
-        emit(ClauseOutcome(clause.name, clause.sentence, "missing", found))
+    try:
+        engine = find_engine(trial.provider, trial.engine)
+    except NoSuchEngine as error:
+        emit(ClauseOutcome(clause.name, clause.sentence, "missing", str(error)))
     else:
-        emit(try_clause(found, clause))
+        emit(try_clause(engine, clause))
 
 
 @dataclass(frozen=True)

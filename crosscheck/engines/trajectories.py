@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.contract import OUTPUTS, MarkerPath, Snapshot, Status, Trajectory
-from flexmb.run.channels import channels_of
 from flexmb.typing import Real
 
 
@@ -50,11 +49,6 @@ def _stacked(values: Sequence[Any]) -> Any:
     if isinstance(first, dict):
         return {name: np.array([value[name] for value in values]) for name in first}
     return None if first is None else np.array(values)
-
-
-def determined_channels(run: Trajectory) -> dict[str, Real]:
-    """All signals (T,k) of a run but those that the motion leaves open."""
-    return {name: values for name, values in channels_of(run).items() if name not in run.undetermined}
 
 
 def first_samples(run: Trajectory, count: int) -> Trajectory:

@@ -7,10 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from crosscheck.engines.answers import checked_version, clean
+from crosscheck.engines.answers import checked_version, clean, describe
 from crosscheck.engines.contract import EngineMissing
 from crosscheck.engines.registry import BUILT_IN, BrokenPlugIn, engine, plug_ins
-from crosscheck.running.execute import describe
 from crosscheck.running.pool import run_jobs
 
 ANSWER_LIMIT_S = 60.0

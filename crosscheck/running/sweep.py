@@ -7,6 +7,8 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
+
 from crosscheck.engines.answers import clean
 from crosscheck.engines.registry import SERVED_WITH
 from crosscheck.library.find import Case
@@ -112,13 +114,5 @@ def _done(known: Sequence[Record], job: Job) -> frozenset[Done]:
 
 
 def _cut_short(job: Job, event: Event) -> RunRecord:
-    return RunRecord(
-        case=job.case,
-        variant=job.variant,
-        role=job.role,
-        engine=job.engine,
-        version="",
-        scene=job.scene_id,
-        status="crashed" if event.kind == "crashed" else "did not finish",
-        message=clean(event.content),
-    )
+    status = "crashed" if event.kind == "crashed" else "did not finish"
+    return msgspec.structs.replace(job.blank, status=status, message=clean(event.content))

@@ -13,7 +13,7 @@ import numpy as np
 
 from crosscheck.engines.answers import clean
 from crosscheck.engines.contract import Effort
-from crosscheck.engines.registry import SERVED_WITH
+from crosscheck.engines.registry import SERVED_WITH, home
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import resolve
 from crosscheck.records.archive import Archive, decoded_lines
@@ -148,8 +148,8 @@ def _jobs(
             done = known.get((engine, scene_id, asked))
             job = Job(
                 case=sweep.title, variant=subject.variant.name, role=MAIN, engine=engine, scene=None, scene_id=scene_id,
-                times=subject.times, provider=provider, efforts=_effort(sweep, engine), finest_only=True,
-                kept=tuple(quantity.channel for quantity in sweep.quantities), done=_done(done),
+                times=subject.times, provider=provider, maker=home(engine), efforts=_effort(sweep, engine),
+                finest_only=True, kept=tuple(quantity.channel for quantity in sweep.quantities), done=_done(done),
                 time_limit_s=time_limit_s, lean=True,
             )  # fmt: skip
             found.append(SampleJob(job, sample, tuple(row.tolist()), sweep, subject.base, subject.variant, asked))
