@@ -14,20 +14,15 @@ LATER = ("connectors", "controllers", "events")
 NO_START = "begins all runs at t = 0"
 
 
-@dataclass(frozen=True)
 class CheckedEngine:
     """Asks an engine about runs that start at `t_start` and last `duration_s` (s).
 
     An answer that the contract does not allow raises `BrokenContract`; what the engine itself raises passes through.
     """
 
-    engine: Engine
-    t_start: float = 0.0
-    duration_s: float = USUAL_S
-
-    @property
-    def name(self) -> str:
-        return self.engine.name
+    def __init__(self, engine: Engine, t_start: float = 0.0, duration_s: float = USUAL_S) -> None:
+        self.engine, self.name = engine, engine.name
+        self.t_start, self.duration_s = t_start, duration_s
 
     def version(self) -> str:
         return checked_version(self.engine.version())

@@ -1,4 +1,4 @@
-"""Assembling an engine's samples to the trajectory that engines exchange."""
+"""Putting an engine's samples together into the trajectory that engines exchange."""
 
 from __future__ import annotations
 
@@ -8,24 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.contract import OUTPUTS, MarkerPath, Snapshot, Status, Trajectory
+from crosscheck.engines.contract import OUTPUTS, MarkerPath, Snapshot, Trajectory
 from flexmb.typing import Real
 
 
 def stack(
-    times: Real,
-    samples: Sequence[Snapshot],
-    *,
-    status: Status,
-    message: str,
-    wall_s: float,
-    evaluations: int,
-    work: Real | None = None,
+    asked: Real, samples: Sequence[Snapshot], *, message: str, wall_s: float, evaluations: int, work: Real | None = None
 ) -> Trajectory:
-    """One trajectory from the snapshot of each sample time reached; never empty, since t = 0 is always reached."""
-    first = samples[0]
+    """One trajectory from the snapshot of each sample time reached; diverged unless all of `asked` (T,) were reached.
+
+    There is at least one snapshot, since the initial state is always reached.
+    """
+    first, times = samples[0], asked[: len(samples)]
     return Trajectory(
-        status=status,
+        status="finished" if len(samples) == len(asked) else "diverged",
         message=message,
         times=np.asarray(times, dtype=float),
         markers={
