@@ -9,6 +9,9 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from crosscheck.drawing.draw import draw
+from crosscheck.drawing.film import EFFORT as FILM_EFFORT
+from crosscheck.drawing.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.engines.contract import Effort
 from crosscheck.engines.registry import home
 from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, RunFile, Variant
@@ -19,9 +22,6 @@ from crosscheck.library.reference import has_reference, scene_digest
 from crosscheck.library.selection import alone, joining, select
 from crosscheck.records.drawing import FILM, Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
-from crosscheck.running.draw import draw
-from crosscheck.running.film import EFFORT as FILM_EFFORT
-from crosscheck.running.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.running.held import held_reference
 from crosscheck.running.job import MAIN, REFINED, Job
 from crosscheck.running.scheduler import TIME_LIMIT_S
