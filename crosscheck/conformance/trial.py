@@ -21,6 +21,7 @@ from crosscheck.engines.answers import BrokenContract, clean, describe
 from crosscheck.engines.contract import Engine, EngineMissing
 from crosscheck.running.execute import NoSuchEngine, find_engine
 from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import Work
 from crosscheck.running.sweep import PROVIDER
 from crosscheck.running.worker import SPAWN, Method
 
@@ -76,9 +77,7 @@ def try_engine(
     trials = [ClauseTrial(provider, name, clause) for clause in clauses]
     with tempfile.TemporaryDirectory() as folder:
         log = str(Path(folder) / "log")
-        for event in run_jobs(
-            attempt, trials, 1, log, kind=_clause, time_limit_s=lambda trial: limit_s, method=_start_method()
-        ):
+        for event in run_jobs(Work(attempt, trials, log, 1, _clause, lambda trial: limit_s), _start_method()):
             if event.kind == "emitted":
                 yield event.content
             elif event.kind in ("crashed", "stopped"):

@@ -23,7 +23,7 @@ from crosscheck.records.made_by import made_by
 from crosscheck.running.job import MAIN, Done, Job
 from crosscheck.running.plan import sample_times, scene_identity
 from crosscheck.running.pool import run_jobs
-from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler
+from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler, Work
 from crosscheck.running.sweep import PROVIDER
 from crosscheck.sampling.file import SweepFile, load_sweep
 from crosscheck.sampling.points import sample_values
@@ -91,15 +91,13 @@ def run_sweep(
         records.unlink(missing_ok=True)
     known = _known(records)
     jobs = _jobs(sweep, subject, values, known, provider, limits.time_s or TIME_LIMIT_S)
+    log = str(out / "samples.log")
+    work = Work(run_sample, jobs, log, limits.workers, _kind, _time_limit, limits.memory_bytes)
     used: dict[int, SampleRecord] = {}
     with (
         closing(Archive(records, Written)) as archive,
         SamplesTable(out / TABLE, sweep) as table,
-        closing(
-            scheduler(
-                run_sample, jobs, limits.workers, str(out / "samples.log"), _kind, _time_limit, limits.memory_bytes
-            )
-        ) as events,
+        closing(scheduler(work)) as events,
     ):
         archive.write(environment())
         for event in events:
