@@ -14,8 +14,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.engines.conventions import Frame, scalar_last
-from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
+from crosscheck.engines.rigid_tree import Slot, scalar_start
 from flexmb.scene.functions import Constant
 from flexmb.typing import Real
 
@@ -26,13 +26,9 @@ Places = slice | NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class PinocchioSlot:
-    """A freedom and where its coordinates `q` and speeds `v` start; `held`: it stands for a weld."""
+class PinocchioSlot(Slot):
+    """A freedom; if it is `held` it stands for a weld."""
 
-    freedom: Freedom
-    link: Link
-    q: int
-    v: int
     held: bool
 
 
@@ -85,10 +81,8 @@ def initial_state(tree: PinocchioTree) -> tuple[Real, Real]:
     q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
     for slot in tree.slots:
         match slot.freedom:
-            case Scalar(prescribed=None) as freedom:
-                q[slot.q], v[slot.v] = freedom.value, freedom.rate
             case Scalar() as freedom:
-                q[slot.q], v[slot.v], _ = profile(freedom.prescribed)(0.0)
+                q[slot.q], v[slot.v] = scalar_start(freedom)
             case Ball() as freedom:
                 q[slot.q : slot.q + 4] = scalar_last(freedom.quaternion)
                 v[slot.v : slot.v + 3] = freedom.angular_velocity

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import psutil
 import pytest
@@ -15,7 +13,7 @@ from crosscheck import cli
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.installed import describe_engines
-from crosscheck.running.scheduler import Event, Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
 from tests.crosscheck.engines.bad_engines import (
     ANSWERS,
@@ -28,6 +26,7 @@ from tests.crosscheck.engines.bad_engines import (
     TIDY,
     UNTIDY,
 )
+from tests.crosscheck.here import run_here
 from tests.crosscheck.sessions import copy_case
 
 SOUND = ("fine", "stepper")
@@ -93,21 +92,11 @@ def alone(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -
     return Ran(tmp_path_factory.mktemp("alone"), (), patch)
 
 
-def here(function: Callable[..., None], jobs: Sequence[Any], *_: object) -> Iterator[Event]:
-    """A scheduler without processes."""
-    for number, job in enumerate(jobs):
-        found: list[Any] = []
-        yield Event(number, "started")
-        function(job, found.append)
-        yield from (Event(number, "emitted", content) for content in found)
-        yield Event(number, "ended")
-
-
 @pytest.fixture(scope="module")
 def mild(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
     """What does no harm to its process, all in this one, which is quicker."""
     with patch.context() as inner:
-        inner.setattr(cli.run, "scheduler_at", lambda address: here)
+        inner.setattr(cli.run, "scheduler_at", lambda address: run_here)
         return Ran(tmp_path_factory.mktemp("mild"), MILD, inner)
 
 

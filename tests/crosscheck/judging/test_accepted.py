@@ -18,7 +18,7 @@ import pytest
 from typer.testing import CliRunner
 
 from crosscheck import cli
-from crosscheck.engines.answers import efforts_of
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import Effort
 from crosscheck.engines.registry import BUILT_IN, engines
 from crosscheck.judging import accept, sizes, uncertainty
@@ -249,7 +249,8 @@ def ladder_of(case: Case, engine: str, name: str) -> list[tuple[str, str, str]]:
     efforts: Sequence[Effort] = prescribed(variant, engine)
     if not efforts:
         scene = variant_scene(case.scene(variant), variant)
-        efforts = efforts_of(engines()[engine], scene, float(np.ptp(sample_times(case.run, variant))))
+        duration_s = float(np.ptp(sample_times(case.run, variant)))
+        efforts = CheckedEngine(engines()[engine], duration_s=duration_s).efforts(scene)
     return [(effort.kind, effort.method, f"{effort.value:.6g}") for effort in efforts]
 
 

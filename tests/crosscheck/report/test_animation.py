@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from crosscheck.drawing.film import film
 from crosscheck.engines.native import NativeEngine
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.library.find import Case, load_case, resolve, shipped_cases
@@ -18,7 +19,6 @@ from crosscheck.records.packing import pack
 from crosscheck.report.animation import animations, wheel_angle
 from crosscheck.report.store import Store
 from crosscheck.running.execute import execute
-from crosscheck.running.film import film
 from crosscheck.running.plan import plan, variant_scene
 from crosscheck.running.sweep import PROVIDER
 from flexmb.interchange.sid import sid_of, write_sid

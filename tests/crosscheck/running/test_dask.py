@@ -19,9 +19,10 @@ from distributed import LocalCluster
 
 from crosscheck.running import dask_cluster
 from crosscheck.running.dask_cluster import ClusterError, DaskCluster
-from crosscheck.running.scheduler import Event
+from crosscheck.running.scheduler import Event, Work
 from crosscheck.sampling.run import run_sweep
-from crosscheck.stability.run import run_here, run_map
+from crosscheck.stability.run import run_map
+from tests.crosscheck.here import run_here
 from tests.crosscheck.running.interrupted import install_plugs, interrupt_and_go_on
 from tests.crosscheck.sampling.test_sweeps import write as write_sweep
 from tests.crosscheck.sessions import PROVIDER as ENGINES
@@ -85,7 +86,7 @@ def work(job: tuple[str, str], emit: Callable[[object], None]) -> None:
 def run(address: str, folder: Path, whats: list[str], **options: object) -> dict[str, list[Event]]:
     jobs = [(what, str(folder)) for what in whats]
     found: dict[str, list[Event]] = {what: [] for what in whats}
-    for event in DaskCluster(address)(work, jobs, None, "", **options):
+    for event in DaskCluster(address)(Work(work, jobs, "", **options)):
         found[whats[event.job]].append(event)
     return found
 

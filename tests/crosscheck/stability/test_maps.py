@@ -15,9 +15,10 @@ from crosscheck.stability.catalogue import stability_maps
 from crosscheck.stability.flow import flow
 from crosscheck.stability.map import Axis, StabilityMap
 from crosscheck.stability.maps import free_spin, integrators, spinning_beam, vibrating_hinge
-from crosscheck.stability.run import Finished, run_here, run_map
+from crosscheck.stability.run import Finished, run_map
 from flexmb.system.compile import compile
 from flexmb.tables.state import pack
+from tests.crosscheck.here import run_here
 
 PROVIDER = "tests.crosscheck.stability.test_maps:coarse_maps"
 DECADES = {"gimbal_lock": 1.0}  # of a cell, where classes are narrower than two

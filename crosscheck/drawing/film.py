@@ -12,9 +12,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from crosscheck.drawing.draw import draw
 from crosscheck.engines.contract import Effort
 from crosscheck.records.drawing import Drawing
-from crosscheck.running.draw import draw
 from flexmb.interchange.sid.blocks import SidError
 from flexmb.interchange.sid.to_body import with_sid_bodies
 from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
