@@ -20,12 +20,9 @@ from crosscheck.running.scheduler import (
     BY_DEFAULT,
     TIME_LIMIT_S,
     Event,
-    Events,
-    Function,
     Limits,
     Scheduler,
     one_kind,
-    usual_limit,
 )
 from crosscheck.stability.boundary import MapVerdict, judge, label
 from crosscheck.stability.map import Measurement, StabilityMap
@@ -151,22 +148,3 @@ def _cut_short(job: CellJob, event: Event) -> CellRecord:
         identity=job.identity, level=job.cell.level, i=job.cell.i, j=job.cell.j, x=job.x, y=job.y,
         status="did not run", message=event.content,
     )  # fmt: skip
-
-
-def run_here(
-    function: Function,
-    jobs: Sequence[Any],
-    workers: int | None,
-    log: str,
-    kind: Callable[[Any], str] = one_kind,
-    time_limit_s: Callable[[Any], float] = usual_limit,
-    memory_limit_bytes: float | None = None,
-) -> Events:
-    """A scheduler without processes and limits: one job after the other, here."""
-    number = 0
-    while number < len(jobs):
-        found: list[Any] = []
-        function(jobs[number], found.append)
-        yield from (Event(number, "emitted", content) for content in found)
-        yield Event(number, "ended")
-        number += 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import re
 import tomllib
@@ -35,9 +34,8 @@ from crosscheck.records.kinds import RunRecord
 from crosscheck.report import ci
 from crosscheck.report.ci import write_junit, write_summary
 from crosscheck.running.plan import prescribed, sample_times, scene_basis, variant_scene
-from crosscheck.running.sweep import sweep
 from tests.crosscheck.made_records import ONE_PAIR, TIP, judged, ladder, single, way
-from tests.crosscheck.sessions import PROVIDER, copy_case
+from tests.crosscheck.sessions import copy_case, sweep_here
 
 PLACE = key(TIP, ("one", "rigid"), ("two", "rigid"))
 WIDE = {"COLUMNS": "200"}
@@ -277,7 +275,7 @@ def test_accepting_and_being_strict_on_the_command_line(
     own: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Accept, pass strictly; loosen an effort by three digits, warn, fail strictly; break a thing, accept nothing."""
-    monkeypatch.setattr("crosscheck.running.sweep.sweep", functools.partial(sweep, provider=PROVIDER))
+    monkeypatch.setattr("crosscheck.running.sweep.sweep", sweep_here)
     monkeypatch.setattr(cli.common.console, "_width", 200)
     folder = copy_case(tmp_path)
     file, run = folder / "accepted.toml", folder / "run.toml"
