@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
-from crosscheck.library.find import Case, load_case
+from crosscheck.library.find import Case, load_case, shipped_cases
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord
 from crosscheck.records.session import last_session
@@ -25,6 +26,12 @@ title = "Single pendulum"
 duration_s = 2.0
 samples = 21
 """
+
+
+@cache
+def shipped() -> tuple[Case, ...]:
+    """All cases of the library: to read them takes two seconds."""
+    return shipped_cases()
 
 
 def here(function: Function, jobs: Sequence[Any], *_: object) -> Events:

@@ -27,7 +27,7 @@ PARENTS = {
     "star": lambda k: min(k, 1) - 1,
     "binary tree": lambda k: (k - 1) // 2 if k else -1,
 }
-FEW = 104  # a multiple of what some tables are rounded up to
+FEW = 48  # a multiple of what some tables are rounded up to
 
 
 def tree(shape: str, bodies: int) -> SceneBuilder:
