@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import msgspec
@@ -225,6 +226,8 @@ def test_a_key_holds_libraries_platform_and_compiler(monkeypatch: pytest.MonkeyP
     assert {"numpy", "scipy", "numba", "llvmlite"} <= sources(native).libraries
     assert sources(["crosscheck.engines.pinocchio"]).libraries >= {"pinocchio", "numpy"}
     assert "numba" not in sources(["crosscheck.engines.mujoco"]).libraries
+
+    monkeypatch.setattr(keys, "sources", cache(sources))  # to parse them all takes a second, and nobody edits them
 
     def key() -> str:
         keys._key.cache_clear()

@@ -22,13 +22,13 @@ from crosscheck.stability.picture import STATUSES, draw
 from crosscheck.stability.run import Finished, run_map
 from crosscheck.stability.verdict_file import read_verdicts
 from crosscheck.terminal import map_runs
-from tests.crosscheck.here import run_here
+from tests.crosscheck.sessions import here
 from tests.crosscheck.stability import synthetic
 from tests.crosscheck.stability.synthetic import CIRCLE, PROVIDER, shifted
 
 
 def run_it(name: str, folder: Path, **options: object) -> Finished:
-    return run_map(name, folder / f"{name}.jsonl", provider=PROVIDER, **{"scheduler": run_here, **options})
+    return run_map(name, folder / f"{name}.jsonl", provider=PROVIDER, **{"scheduler": here, **options})
 
 
 def test_a_true_overlay_is_met_and_a_wrong_one_is_noticed(tmp_path: Path) -> None:
@@ -131,7 +131,7 @@ def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path: Path, monkeypatch:
         run.run_cell(job, emit)
 
     def scheduler(work: Work):
-        return run_here(replace(work, function=counting))
+        return here(replace(work, function=counting))
 
     again = run_map("circle", tmp_path / "cut.jsonl", provider=PROVIDER, scheduler=scheduler)
     assert len(seen) == len(whole.records) - known > 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -52,17 +53,24 @@ class Found:
         return body["nodes"][body["elimination"] > 0]
 
 
+@cache
+def dense_equations(name: str, seed: int) -> tuple[schema.Scene, flexmb.System, np.ndarray, np.ndarray, float]:
+    """A random scene, its system in explicit form, M and bias at the initial state, and the bound of two routes."""
+    scene = trees.random_scene(seed, RECIPES[name])
+    explicit, dense = flexmb.compile(scene, "explicit"), DenseSystem(scene)
+    state = explicit.initial_state
+    bound = algebra(dense.nu, len(dense.tree.members), max(len(member.model.mass) for member in dense.tree.members))
+    return scene, explicit, dense.mass_matrix(state.q), dense.bias(state.q, state.u), bound
+
+
 @pytest.fixture(
     scope="module", ids=str, params=[(name, seed, form) for name in RECIPES for seed in SEEDS for form in ELIMINATIONS]
 )
 def found(request) -> Found:
     name, seed, elimination = request.param
-    scene = trees.random_scene(seed, RECIPES[name])
-    system, dense = flexmb.compile(scene, elimination), DenseSystem(scene)
-    state = system.initial_state
-    bound = algebra(dense.nu, len(dense.tree.members), max(len(member.model.mass) for member in dense.tree.members))
-    explicit = flexmb.compile(scene, "explicit")
-    return Found(system, explicit, state, dense.mass_matrix(state.q), dense.bias(state.q, state.u), bound)
+    scene, explicit, M, bias, bound = dense_equations(name, seed)
+    system = flexmb.compile(scene, elimination)
+    return Found(system, explicit, system.initial_state, M, bias, bound)
 
 
 def test_accelerations_solve_the_dense_equations(found):
