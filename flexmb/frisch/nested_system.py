@@ -1,4 +1,4 @@
-"""Frisch's route to a system's accelerations and loads, and its matrices by the names of the paper."""
+"""Accelerations and loads of a system by Frisch's equations, and their matrices by the names of the paper."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from flexmb.typing import Index, Real
 class Partitions:
     """The equations of motion (111), partition by partition, all vectors in World axes.
 
-    First rows: rotation of every nest of a body, then translation of those nests whose hinge translates: point masses
-    and the base of the paper, here prismatic hinges and their like too. Second: wheels. Third: modes. Last: translation
-    of the remaining nests, whose hinges suppress it. `bodies` numbers the body of each block of three.
+    First rows: rotation of the nests of all bodies, then translation of those nests whose hinges translate (in the
+    paper point masses and the base, here also prismatic hinges, for example). Second: wheels. Third: modes. Last:
+    translation of the remaining nests, which their hinges suppress.
 
     X, I_c, F, Gamma, I_s, M1, A, M2   as in (111)
-    eta                                right sides eta_1 .. eta_4 with external loads, without those of hinges
+    eta                                right-hand sides eta_1 .. eta_4 with external loads, without those of hinges
     S                                  (126) times (133), rows as above, a column for each speed
     bias                               expanded accelerations at udot = 0: second terms of (127), (134)
     """
@@ -87,10 +87,10 @@ class NestedMotion(NamedTuple):
 
 
 def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partitions: bool = False) -> NestedSystem:
-    """Frisch's equations of a checked scene with any of the print's defects kept.
+    """Frisch's equations of a checked scene; `errata` are the defects of the print to keep.
 
-    `null_partitions` computes the partitions of (126) that vanish instead of skipping them: the difference is the
-    price of not having the paper's logic flags.
+    `null_partitions` also computes those partitions of (126) that vanish. The difference in time is what the paper's
+    logic flags save.
     """
     chain = links(scene)
     numbering = Numbering(chain, wheels_by_body(scene))
@@ -101,7 +101,8 @@ def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partition
 class NestedSystem:
     """The equations of one scene. Threads may share them: each has a workspace of its own.
 
-    y = [q, u, work]: ValueError or TypeError for what does not fit, DynamicsError where numbers overflow.
+    All methods take y = [q, u, work]. They raise ValueError or TypeError for arrays that do not fit, DynamicsError
+    where numbers overflow.
     """
 
     def __init__(
@@ -118,7 +119,7 @@ class NestedSystem:
 
     @per_thread
     def _w(self) -> NestedWorkspace:
-        """The one that all questions of this thread write."""
+        """The workspace of the calling thread."""
         return self.workspace()
 
     def workspace(self) -> NestedWorkspace:
@@ -127,7 +128,7 @@ class NestedSystem:
 
     @property
     def own_workspace(self) -> NestedWorkspace:
-        """The one that all questions of this thread write."""
+        """The workspace of the calling thread, overwritten by every method."""
         return self._w
 
     def accelerations(self, t: float, y: Real) -> tuple[int, Real]:
@@ -136,7 +137,7 @@ class NestedSystem:
         return status, self._w.speed["acceleration"].copy()
 
     def motion(self, t: float, y: Real) -> tuple[int, NestedMotion]:
-        """Status code, and accelerations with everything the suppressed rows give."""
+        """Status code, accelerations, and the loads from the suppressed rows."""
         w = self._w
         status = evaluation.loads(*self._layout.whole(t, y), self.constants, w)
         drives = np.where(self.constants.speed["prescribed"] >= 0, w.speed["drive"], 0.0)
@@ -145,7 +146,7 @@ class NestedSystem:
 
     @property
     def doubt(self) -> Index:
-        """(1,) whether the last evaluation met a pivot that may be rounding."""
+        """(1,) whether the last evaluation met a pivot that may consist of rounding errors."""
         return self._w.doubt
 
     @property
@@ -154,7 +155,7 @@ class NestedSystem:
         return int(self._w.fault[0])
 
     def reduced(self, t: float, y: Real) -> tuple[Real, Real]:
-        """Matrix (nu,nu) and right side (nu,) of (136)."""
+        """Matrix (nu,nu) and right-hand side (nu,) of (136)."""
         t, y = self._layout.whole(t, y)
         evaluation.assemble(t, y, self.constants, self._w)
         return finite_result(self._w.M.copy(), t), finite_result(self._w.right.copy(), t)
@@ -181,7 +182,7 @@ class NestedSystem:
         )
 
     def relative_motion(self, t: float, y: Real) -> RelativeMotion:
-        """NestedMotion of contiguous bodies at y, every row of it, those without inertia of their own too (117)."""
+        """Relative motion of contiguous bodies at y (117), with the rows of bodies without inertia of their own."""
         w, c = self._w, self.constants
         t, y = self._layout.whole(t, y)
         evaluation.assemble(t, y, c, w)
