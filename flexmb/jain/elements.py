@@ -23,7 +23,7 @@ from flexmb.scene import schema as s
 from flexmb.typing import Real
 
 Complex = NDArray[np.complex128]
-STEP = 2.0**-200  # h of the complex step: a rate has no truncation error if h^2 underflows beside the value
+STEP = 2.0**-200  # h: h^2 is lost beside the value, so that rates have no truncation error
 
 
 def value(x: Complex) -> Real:
