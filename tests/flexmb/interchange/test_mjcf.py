@@ -134,7 +134,7 @@ def test_numbers_that_are_none_are_seen_before_mujoco_takes_them_for_defaults(fa
 def test_an_included_file_that_is_none_is_refused(make, tmp_path):
     """MuJoCo would wait for a pipe for ever."""
     make(tmp_path / "more.xml")
-    with pytest.raises(OSError, match="no regular file"):
+    with pytest.raises(OSError, match="name a regular file"):
         read(MJCF.replace("<worldbody>", '<include file="more.xml"/><worldbody>'), tmp_path)
 
 
