@@ -167,7 +167,7 @@ def test_an_interrupted_sweep_leaves_a_table_of_what_was_done_by_a_name_that_say
         (("angle_rad", "angel_rad"), 'there is no "angel_rad": did you mean "angle_rad"?'),
         (("hinges.pivot", "hinges.pivto"), 'did you mean "pivot"?'),
         (("angle_rad", "angle_rad.x"), "end the path before it"),
-        (("hinges.pivot.rotation.angle_rad", "hinges.pivot.rotation"), "lead the path to a number"),
+        (("hinges.pivot.rotation.angle_rad", "hinges.pivot.rotation"), "give the path of a number"),
         (("marker:tip.position", "marker:tap.position"), 'no marker "tap": did you mean "tip"?'),
         (("marker:tip.position", "speed"), 'no channel "speed"'),
         (("sd = 0.1", "sd = -0.1"), "sd positive"),
@@ -214,7 +214,7 @@ def test_a_count_takes_whole_numbers_in_every_sample(tmp_path: Path) -> None:
     parameter = f'[[parameter]]\npath = "bodies.boom.elements"\n{count}'
     quantity = HEIGHT.replace("marker:tip.position", "energy.total").replace('component = "y"\n', "")
     file = write(tmp_path, "fine", head=head, parameter=parameter, quantity=quantity)
-    with pytest.raises(CaseError, match=r"sweep\.toml: .* counts something: 4\.5 is no whole number"):
+    with pytest.raises(CaseError, match=r"sweep\.toml: .* is a count: 4\.5 is not a whole number"):
         run(file, tmp_path / "out")
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -16,6 +17,7 @@ from flexmb.scene import schema
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.shapes import beam_section
+from flexmb.tables.features import SEVERAL, contained
 from tests import trees
 from tests.benchmarks.rivals import flexible_chain
 from tests.bounds import UNIT_ROUNDOFF, algebra, backward_error, gamma
@@ -175,6 +177,7 @@ def arm(masses: np.ndarray, hinge_node: str = "origin", level: str = "ruthless",
 
 
 MASSES = np.array([1.0, 2.0, 3.0])
+TURN = schema.Constant(value=1.0)
 
 
 @pytest.mark.parametrize(
@@ -198,6 +201,24 @@ def test_the_woodbury_form_is_for_constant_tables():
     """(B3) belongs to Appendix B."""
     assert flexmb.compile(arm(MASSES), "woodbury").elimination == {"arm": "woodbury"}
     assert flexmb.compile(arm(MASSES, level="full"), "woodbury").elimination == {"arm": "explicit"}
+
+
+@pytest.mark.parametrize(
+    ("hinge", "node", "general"),
+    [
+        (schema.Revolute, "origin", False),
+        (schema.Prismatic, "origin", False),
+        (schema.Spherical, "origin", True),
+        (schema.Weld, "origin", True),
+        (partial(schema.Revolute, rotation=schema.AngularCoordinate(prescribed_rad=TURN)), "origin", True),
+        (schema.Revolute, "tip", True),
+    ],
+)
+def test_which_hinges_need_a_matrix(hinge, node, general):
+    """The table in `flexmb.jain`: D_R of a single axis is a number, of all other hinges a matrix."""
+    hinges = (hinge(name="root", parent="ground", child="arm", child_node=node),)
+    system = flexmb.compile(msgspec.structs.replace(arm(MASSES), hinges=hinges))
+    assert (SEVERAL in contained(system.constants)) == general
 
 
 def test_an_unknown_form_is_refused():
