@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Integrator
+from flexmb.run.run_arrays import Statistics
 from flexmb.run.simulate import simulate
-from flexmb.run.trajectory import Statistics, Trajectory
+from flexmb.run.trajectory import Trajectory
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
 

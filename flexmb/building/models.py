@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import assert_never
 
 import numpy as np
 
-from flexmb.building.numbering import wheels_by_body
 from flexmb.levels.body import BY_NAME
 from flexmb.levels.level import FidelityLevel
 from flexmb.modal.flexible import flexible_model
@@ -54,14 +54,18 @@ class Models:
         if name == GROUND:
             return one_point(0.0, ZERO, (ZERO, ZERO, ZERO), {"origin": ORIGIN})
         body = self.body[name]
-        if isinstance(body, s.RigidBody):
-            nodes = {node: self.node(name, node) for node in rest_frames(body)}
-            return self._with_wheels(name, one_point(body.mass_kg, body.com_m, body.inertia_kg_m2, nodes))
-        if isinstance(body, s.SidBody):
-            raise NotImplementedError(f'body "{name}": SID files are not supported yet; use kind = "modal"')
-        assert isinstance(body, s.BeamBody | s.ModalBody)
-        model = flexible_model(body)
-        return self._with_wheels(name, model if level_of(body).flexible else _without_modes(model))
+        match body:
+            case s.RigidBody():
+                nodes = {node: self.node(name, node) for node in rest_frames(body)}
+                model = one_point(body.mass_kg, body.com_m, body.inertia_kg_m2, nodes)
+            case s.BeamBody() | s.ModalBody():
+                model = flexible_model(body)
+                model = model if level_of(body).flexible else _without_modes(model)
+            case s.SidBody():
+                raise NotImplementedError(f'body "{name}": SID files are not supported yet; use kind = "modal"')
+            case _:
+                assert_never(body)
+        return self._with_wheels(name, model)
 
     def _with_wheels(self, name: str, model: FlexibleModel) -> FlexibleModel:
         for wheel in self.wheels.get(name, ()):
@@ -69,9 +73,17 @@ class Models:
         return model
 
 
+def wheels_by_body(scene: s.Scene) -> dict[str, list[s.Wheel]]:
+    """Wheels of every body that has some, in the scene's order."""
+    found: dict[str, list[s.Wheel]] = {}
+    for wheel in scene.wheels:
+        found.setdefault(wheel.body, []).append(wheel)
+    return found
+
+
 def level_of(body: s.Body) -> FidelityLevel:
     """The fidelity level of a body."""
-    return BY_NAME["rigid" if isinstance(body, s.RigidBody) else body.level]
+    return BY_NAME[body.level]
 
 
 def one_point(mass: float, com: s.Vector, inertia: s.Matrix3, nodes: dict[str, FlexibleNode]) -> FlexibleModel:

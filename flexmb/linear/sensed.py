@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -73,12 +73,15 @@ def _units(system: System, sensor: Sensor) -> list[str]:
             return ["N" if names[coordinate] == "m" else "N m"]
         case ProfileSensor():
             return ["1", "1/s"]
-    return ["s"]
+        case TimeSensor():
+            return ["s"]
+        case _:
+            assert_never(sensor)
 
 
 def _change(system: System, sensor: Sensor, at: ChangedRow) -> Real:
     """(width,k) of one sensor."""
-    names, k = system._observation.names, at.change.shape[1]
+    names, k = system.observation.names, at.change.shape[1]
     match sensor:
         case CoordinateSensor(of=of, quantity="value"):
             return at.of_state[system.coordinate(of)]
@@ -98,12 +101,15 @@ def _change(system: System, sensor: Sensor, at: ChangedRow) -> Real:
             return np.zeros((1, k)) if speed < 0 else _part(system, at, "drives", speed)[1].reshape(1, k)
         case TimeSensor():
             return np.zeros((1, k))
-    return np.zeros((2, k))
+        case ProfileSensor():
+            return np.zeros((2, k))
+        case _:
+            assert_never(sensor)
 
 
 def _part(system: System, at: ChangedRow, name: str, i: int) -> tuple[Real, Real]:
     """Value and change of item i of a part of the row."""
-    place, shape = system._observation.columns[name]
+    place, shape = system.observation.columns[name]
     return at.value[place].reshape(shape)[i], at.change[place].reshape(*shape, at.change.shape[1])[i]
 
 

@@ -26,8 +26,7 @@ from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS, ON_CHAINS, RUNNING, WITH_JACOBIAN
-from flexmb.system.batch import compile_batch
-from flexmb.system.compile import compile
+from flexmb.system.compile import compile, compile_batch
 
 Use = Callable[[], object]
 BODIES: tuple[tuple[int, Level, Elimination], ...] = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import pi
+from typing import assert_never
 
 import numpy as np
 
@@ -26,7 +27,7 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
         match function:
             case Constant(value=value):
                 row["kind"], row["data"] = _CONSTANT, (value, 0.0, 0.0, 0.0)
-            case ControlSignal():  # a run with feedback writes what its controllers say in here
+            case ControlSignal():  # a run with feedback writes the output of its controllers to `data`
                 row["kind"] = _CONSTANT
             case Ramp(value=value, rate=rate, start_s=begin):
                 row["kind"], row["data"] = _RAMP, (value, rate, begin, 0.0)
@@ -39,14 +40,16 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
             case Pulse(value=value, start_s=begin, duration_s=duration):
                 row["kind"], row["data"] = _PULSE, (value, begin, begin + duration, 0.0)
             case Table(times_s=times, values=values):
-                # here, because this import takes longer than everything else a run without tables imports
+                # imported here because it takes longer than all other imports of a run without tables
                 from scipy.interpolate import PPoly, make_interp_spline
 
                 row["kind"] = _TABLE
                 spline = PPoly.from_spline(make_interp_spline(times, values, k=5))
                 ends = zip(spline.x[:-1], spline.x[1:], strict=True)
-                # the spline's end knots repeat: their intervals have no length
+                # the intervals between repeated end knots have no length and are left out
                 pieces += [(left, *spline.c[:, i]) for i, (left, right) in enumerate(ends) if right > left]
+            case _:
+                assert_never(function)
         row["stop"] = len(pieces)
     return out, np.array(pieces, dtype=float).reshape(-1, 7)
 
@@ -90,7 +93,7 @@ def _spin_up(rate, duration, t):
 
 @helper
 def _piece_at(t, table, first, last):
-    """Left end and coefficients of the piece of a spline that time t is in."""
+    """Left end and coefficients of the piece of a spline that contains time t."""
     row = first
     while row + 1 < last and t.real >= table[row + 1, 0]:
         row += 1
@@ -99,7 +102,7 @@ def _piece_at(t, table, first, last):
 
 @helper
 def _pieces_at(t, table, first, last):
-    """The same of lanes, each of which may be in another piece."""
+    """`_piece_at` for lanes, each of which may be in another piece."""
     found = _piece(table, first)
     for row in range(first + 1, last):
         reached, now = t >= table[row, 0], _piece(table, row)
