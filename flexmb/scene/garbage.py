@@ -1,4 +1,4 @@
-"""Python's collector of garbage held back while a large scene is read, checked or assembled."""
+"""Python's collector of garbage held back while many objects are made that stay: large scenes, compiled kernels."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from contextlib import contextmanager
 def collector_paused() -> Iterator[None]:
     """No search for cycles within.
 
-    Every object that is made there stays. Searching all of them for garbage again and again, as their number grows,
-    takes longer than making them: twice the time at 10^5 bodies.
+    Searching all objects for garbage again and again, as their number grows, takes longer than making them: twice the
+    time for a scene of 10^5 bodies. Compiling takes a seventh less time without it.
     """
     was_running = gc.isenabled()
     gc.disable()
