@@ -90,13 +90,19 @@ def observe(c, w, out):
 
     It does not evaluate the right-hand side itself: a run needs that kernel anyway, and most of the code is in it.
     """
+    observe_free_motion(c, w, out)
+    _observe_motion(c, w, out)
+
+
+@helper
+def observe_free_motion(c, w, out):
+    """Accelerations, drives and loads of hinges that the right-hand side of the recursion has left."""
     pose_sweep(c, w)
     hinge_loads(c, w)
     world_loads(c, w, out.loads)
     for j in range(out.rates.shape[0]):
         out.rates[j] = w.speed[j].acceleration
         out.drives[j] = w.speed[j].drive
-    _observe_motion(c, w, out)
 
 
 @kernel
@@ -134,8 +140,7 @@ def sense_markers(t, y, c, w, out):
     velocity_sweep(c, w, True, True)
     pose_sweep(c, w)
     acceleration_sweep(c, w)
-    for i in range(out.marker_port.shape[0]):
-        observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+    _observe_each_marker(c, w, out)
 
 
 @helper
@@ -155,12 +160,17 @@ def _observe_motion(c, w, out):
             store6(out.connectors[i], 0, vec6(w.connector[i].load, 0))
     if has(c, HINGE_SPRINGS) or has(c, FRICTION):
         _observe_along_hinges(c, w, out.hinge_forces)
+    observe_markers(c, w, out)
+
+
+@helper
+def observe_markers(c, w, out):
+    """All markers; bodies of level ruthless are seen deformed."""
     if has(c, AT_REST):
         velocity_sweep(c, w, True, True)
         pose_sweep(c, w)
         acceleration_sweep(c, w)
-    for i in range(out.marker_port.shape[0]):
-        observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+    _observe_each_marker(c, w, out)
 
 
 @helper
@@ -174,7 +184,13 @@ def _observe_along_hinges(c, w, loads):
 
 
 @helper
-def observe_marker(c, w, k, port, row):
+def _observe_each_marker(c, w, out):
+    for i in range(out.marker_port.shape[0]):
+        _observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+
+
+@helper
+def _observe_marker(c, w, k, port, row):
     """The row (24,) of a marker at a port of body k."""
     R = mat3(w.body[k].pose_rotation, 0)
     alpha, a = times6(R, port_acceleration(c, w, k, port))

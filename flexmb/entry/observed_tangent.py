@@ -6,18 +6,13 @@ markers are computed and the others zero, then `drives`.
 
 from __future__ import annotations
 
-from flexmb.entry.articulated import slope, world_loads
-from flexmb.entry.observation import Outputs, observe_marker, places
-from flexmb.jain.accelerations import acceleration_sweep
-from flexmb.jain.kinematics import pose_sweep, velocity_sweep
-from flexmb.jain.loads import hinge_loads
+from flexmb.entry.articulated import slope
+from flexmb.entry.observation import Outputs, observe_free_motion, observe_markers, places
 from flexmb.jit.bundle import bundle
 from flexmb.jit.duals import DUAL, rate, seeded
-from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.lanes import LANES
 from flexmb.jit.wide_arrays import as_duals
-from flexmb.levels.body import AT_REST
 from flexmb.tables.status import OK
 
 
@@ -73,18 +68,8 @@ def observed_jacobian(t, y, J, c, w, out):
 @helper
 def sense(c, w, out):
     """The outputs that sensors use, after an evaluation of the right-hand side of the recursion with status OK."""
-    pose_sweep(c, w)
-    hinge_loads(c, w)
-    world_loads(c, w, out.loads)
-    for j in range(out.rates.shape[0]):
-        out.rates[j] = w.speed[j].acceleration
-        out.drives[j] = w.speed[j].drive
-    if has(c, AT_REST):
-        velocity_sweep(c, w, True, True)
-        pose_sweep(c, w)
-        acceleration_sweep(c, w)
-    for i in range(out.marker_port.shape[0]):
-        observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+    observe_free_motion(c, w, out)
+    observe_markers(c, w, out)
 
 
 @helper

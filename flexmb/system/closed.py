@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Any, assert_never
 
@@ -211,42 +211,32 @@ class ClosedSystem(System):
         """With the loads that may be others; those of `exerted` are the least."""
         t, y = self.layout.entering(state)
         motion = self._motion(t, y, "articulated")
-        self._outputs(t, y, motion)
-        found = self._with_closures(self.observation.evaluation(t), motion.closures, t)
+        found = self._evaluation(t, y, motion._replace(spread=None))
         self._inverse(t, y, found.accelerations)
         spread = motion.spread
         more = () if spread is None else (self._changes(spread), spread.rounding)
         return AllLoads(t, found, self.own_workspace, *more)
 
-    def _with_closures(self, found: Evaluation, closures: Real, t: float) -> Evaluation:
-        loads = zip(self.observation.names.closures, finite_result(closures, t), strict=True)
-        return replace(found, loads=found.loads | dict(loads))
-
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
-        """With the closures' loads too; NaN what the motion does not determine."""
-        motion = self._motion(t, y, algorithm)
-        self._outputs(t, y, motion)
-        found = self._with_closures(self.observation.evaluation(t), motion.closures, t)
-        spread = motion.spread
-        if spread is not None:
-            unknown = self._by_load(spread.leaves_open(spread.hinges), spread.leaves_open(spread.closures))
-            for name, load in found.loads.items():
-                load[unknown[name]] = np.nan
-            driven = spread.leaves_open(spread.drives)
-            for name, places in self.observation.names.driven.items():
-                found.drives[name][driven[places]] = np.nan
-        return found
+        return self._evaluation(t, y, self._motion(t, y, algorithm))
+
+    def _evaluation(self, t: float, y: Real, motion: ClosedMotion) -> Evaluation:
+        row = np.empty(self.observation.width)
+        self._fill(row, t, y, motion)
+        return self.observation.evaluation(row)
 
     def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
-        """As of a tree, with the loads of closures; NaN what the motion does not determine."""
-        motion = self._motion_or_across(t, y, algorithm)
-        self._outputs(t, y, motion)
+        """As of a tree; in a run, at a singular position too."""
+        self._fill(row, t, y, self._motion_or_across(t, y, algorithm))
+
+    def _fill(self, row: Real, t: float, y: Real, motion: ClosedMotion) -> None:
+        """With the loads of closures too; NaN what the motion does not determine."""
+        self.observe_motion(t, y, motion.accelerations, motion.drives, motion.hinges)
         self.observation.fill(row, t, motion.closures)
         if motion.spread is not None:
-            parts = self.observation.columns_of(row[None])
-            parts["loads"][0][motion.spread.leaves_open(motion.spread.hinges)] = np.nan
-            parts["closures"][0][motion.spread.leaves_open(motion.spread.closures)] = np.nan
-            parts["drives"][0][motion.spread.leaves_open(motion.spread.drives)] = np.nan
+            parts, spread = self.observation.columns_of(row[None]), motion.spread
+            for name, changes in (("loads", spread.hinges), ("closures", spread.closures), ("drives", spread.drives)):
+                parts[name][0][spread.leaves_open(changes)] = np.nan
 
     def _motion_or_across(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
         """The motion; in a run through a singular position, where nothing determines it, the mean of those beside."""
@@ -266,10 +256,6 @@ class ClosedSystem(System):
             0.5 * (before.closures + after.closures),
             _of_both(before.spread, after.spread),
         )
-
-    def _outputs(self, t: float, y: Real, motion: ClosedMotion) -> None:
-        """Fills the outputs, all but the loads of closures."""
-        self.observe_motion(t, y, motion.accelerations, motion.drives, motion.hinges)
 
     def determined_loads(self, state: State) -> dict[str, NDArray[np.bool_]]:
         """Which components (6,) of the loads of hinges and closures are determined by the motion; World axes.

@@ -219,8 +219,9 @@ class System(FreeMotion):
         return self._evaluate(*self.layout.packed(t, q, u), algorithm)
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
-        self._observe(t, y, algorithm)
-        return self.observation.evaluation(t)
+        row = np.empty(self.observation.width)
+        self.observe_row(t, y, algorithm, row)
+        return self.observation.evaluation(row)
 
     def _observe(self, t: float, y: Real, algorithm: Algorithm) -> None:
         """Fills the outputs."""

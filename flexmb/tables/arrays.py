@@ -199,7 +199,7 @@ class Constants:
     law: Real
     speed: Record  # (nu,) SPEED
     function: Record  # (F,) FUNCTION
-    table: Real  # (T,7) spline pieces: left end of the interval, then six coefficients, highest power first
+    table: Real  # (T,8) pieces of functions of time, see `flexmb.tables.pieces`
     kernels: Index  # (1,) which kernels run this scene: see `flexmb.tables.features`
 
     def features(self) -> frozenset[str]:

@@ -18,6 +18,7 @@ from flexmb.jit import hooks
 from flexmb.jit.cache import _digest
 from flexmb.jit.folder import cache_directory, delete_unused, warn_once
 from flexmb.jit.kernel import handed_on, helper, kernel, sweep
+from flexmb.scene import garbage as collector
 
 ROOT = Path(__file__).parents[3]
 TINY = """
@@ -291,9 +292,11 @@ def part(x):
 
 
 def test_an_edited_helper_in_another_file_is_compiled_and_edited_words_are_not(tmp_path):
-    """A package of its own: the room jit, a kernel, and a helper in another file."""
+    """A package of its own: the room jit and what it needs of others, a kernel, and a helper in another file."""
     package = tmp_path / "flexmb"
     shutil.copytree(Path(jit.__file__).parent, package / "jit")
+    (package / "scene").mkdir()
+    shutil.copy(collector.__file__, package / "scene")
     (package / "__init__.py").write_text("")
     (package / "entry.py").write_text(ENTRY)
     # Python takes its own compiled text of a file that was edited within a second and is as long as before.
