@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from crosscheck.judging.verdict import GRAVITY, WORSE, Verdict
+from crosscheck.judging.verdict import SEVERITY, WORSE, Verdict
 from crosscheck.library.channels import part_of
 
 SYMBOLS: dict[str, str] = {
@@ -182,7 +182,7 @@ def summary_cell(group: list[Verdict]) -> VerdictCell:
     if not group:
         return EMPTY
     bad = [verdict for verdict in group if not verdict.ok]
-    worst = min(bad or group, key=lambda verdict: (GRAVITY.index(verdict.status), -(verdict.E or 0.0)))
+    worst = min(bad or group, key=lambda verdict: (SEVERITY.index(verdict.status), -(verdict.E or 0.0)))
     good = worst.status == "agree" or worst.kind == "control"
     look = "bad" if bad else "good" if good else "expected"
     text: str = worst.status

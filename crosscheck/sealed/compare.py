@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from crosscheck.judging.figures import worse
-from crosscheck.judging.verdict import GRAVITY
+from crosscheck.judging.verdict import SEVERITY
 from crosscheck.library.accepted import Figure
 from crosscheck.sealed.document import SealedCase, SealedResults, SealedRun, SealedVerdict
 
@@ -119,7 +119,7 @@ def _declined(then: SealedVerdict, now: SealedVerdict) -> str:
         return f"{then.status} -> {now.status}, expected {now.expected}: {now.reason}"
     if then.ok != now.ok:
         return ""
-    if then.kind != "control" and GRAVITY.index(now.status) < GRAVITY.index(then.status):
+    if then.kind != "control" and SEVERITY.index(now.status) < SEVERITY.index(then.status):
         return f"{then.status} -> {now.status}"
     if then.status != now.status or then.kind == "control" or then.E is None:
         return ""
