@@ -1,4 +1,4 @@
-"""What a page shows of verdicts: cells that summarise some, tables of cells, and blocks that fold all lines in."""
+"""Verdicts on a page: cells that summarise some, tables of cells, and blocks that contain all lines."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class VerdictCell:
 
     @property
     def symbol(self) -> str:
-        """A sign that does not rely on colour."""
+        """A sign that can be read without colour."""
         return SYMBOLS.get(self.status, "")
 
 
@@ -42,7 +42,7 @@ INAPPLICABLE = VerdictCell("not applicable", "empty", "not applicable", "")
 
 @dataclass(frozen=True)
 class Row:
-    """A row of cells, one a column of its table."""
+    """A row of cells, one for each column of its table."""
 
     label: str
     cells: tuple[VerdictCell, ...]
@@ -50,7 +50,7 @@ class Row:
 
 @dataclass(frozen=True)
 class VerdictTable:
-    """Summaries of verdicts; a table of one column needs no table."""
+    """A table of summaries of verdicts."""
 
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
@@ -83,7 +83,7 @@ class Block:
 
     @property
     def open(self) -> bool:
-        """Whether it asks for attention."""
+        """Whether it is shown open, as something in it is not as expected."""
         return self.cell.look == "bad"
 
 
@@ -91,7 +91,7 @@ Numbered = tuple[int, Verdict]  # a verdict with its number among those of its c
 
 
 def anchor(number: int) -> str:
-    """Where on its page a verdict stands."""
+    """The anchor of a verdict on its page."""
     return f"verdict-{number}"
 
 
@@ -115,7 +115,7 @@ def conservation_block(verdicts: Iterable[Verdict]) -> Block | None:
 
 
 def control_block(verdicts: Iterable[Verdict]) -> Block | None:
-    """Negative controls: which faults were noticed, by whom."""
+    """Negative controls: which faults were noticed by which engines."""
     group = [(number, verdict) for number, verdict in enumerate(verdicts) if verdict.kind == "control"]
     if not group:
         return None
