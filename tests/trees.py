@@ -7,7 +7,7 @@ code.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import get_args
+from typing import Any, get_args
 
 import msgspec
 import numpy as np
@@ -22,10 +22,13 @@ from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.shapes import beam_section
 
 STRUCTS = {struct.__struct_config__.tag: struct for struct in get_args(s.Hinge)}
-_DRAWN = (  # in an order that keeps the random scenes of a seed what they are
+# A new kind is none of these, so that the random scenes of a seed stay what they are; it is drawn by `LATER_KINDS`.
+KINDS = (
     "revolute", "spherical", "prismatic", "universal", "free", "cylindrical", "gimbal", "planar", "weld", "gimbal2",
 )  # fmt: skip
-KINDS = (*_DRAWN, *(kind for kind in STRUCTS if kind not in _DRAWN))
+LATER_KINDS = tuple(kind for kind in STRUCTS if kind not in KINDS)
+REQUIRED = {"pitch_m_rad": 0.3}
+"""Values of keys that have no default."""
 CARRIERS = ("rigid", "modal", "beam", "floating")
 
 
@@ -61,6 +64,7 @@ LINEAR = Recipe(levels=("linear",))
 STIFFENED = Recipe(levels=("stiffened", "full", "stiffened"))
 MIXED = Recipe(levels=("full", "ruthless", "rigid"))
 EVERY_LEVEL = Recipe(levels=("linear", "full", "linear", "ruthless", "rigid"))
+LATER = Recipe(hinges=(*LATER_KINDS, "spherical", *LATER_KINDS, "prismatic"))
 CONSERVATIVE = Recipe(conservative=True, prescribed=False)
 FREE_FLYING = replace(CONSERVATIVE, grounded=False)
 
@@ -268,7 +272,13 @@ def _hinge(
         case _:
             drawn = {s.AngularCoordinate: angle, s.LinearCoordinate: displacement}
             own = {key: drawn[type(c)]() for key, c in scalar_coordinates(STRUCTS[kind])}
-            scene.add(STRUCTS[kind](**joint, **({"axis": axis} if kind in WITH_AXIS else {}), **own))
+            axes = {"axis": axis} if kind in WITH_AXIS else {}
+            scene.add(bare(STRUCTS[kind], **joint, **axes, **own))
+
+
+def bare(struct: type, **values: Any) -> Any:
+    """A hinge of some kind with nothing but these values, and what it requires."""
+    return struct(**{key: value for key, value in REQUIRED.items() if key in struct.__struct_fields__}, **values)
 
 
 def scalar_coordinates(struct: type) -> list[tuple[str, s.AngularCoordinate | s.LinearCoordinate]]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from crosscheck.biting.invariances import INVARIANCES, Counterpart, NotApplicable
 from crosscheck.biting.subject import JudgedVariant, reduced, subject
-from crosscheck.engines.answers import NO_START
+from crosscheck.engines.checked import NO_START
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
 from crosscheck.judging.verdict import Finding, Signal, Status, compare

@@ -10,7 +10,7 @@ import numpy as np
 
 from crosscheck.conformance.contents import to_offer
 from crosscheck.conformance.scenes import simple_scenes
-from crosscheck.engines.answers import checked_model, checked_run, efforts_of, support_of
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Trajectory
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -88,19 +88,20 @@ def within(what: str, error: float, bound: float) -> None:
 
 def offered(engine: Engine, scene: Scene) -> Model:
     """The compiled scene; NotOffered with the engine's reason where it does not represent the scene exactly."""
-    support = support_of(engine, scene)
+    support = CheckedEngine(engine).supports(scene)
     if support.kind != "exact":
         raise NotOffered(support.reason, to_offer(engine, scene))
-    return checked_model(engine.compile(scene))
+    return CheckedEngine(engine).compile(scene)
 
 
 def simplest(engine: Engine, rate: float = 0.4) -> Scene:
     """The first of the simple scenes that the engine represents in some way: what an answer looks like shows in any."""
     scenes = simple_scenes(rate)
     for scene in scenes:
-        if support_of(engine, scene).kind != "no":
+        if CheckedEngine(engine).supports(scene).kind != "no":
             return scene
-    raise NotOffered(support_of(engine, scenes[0]).reason, f"{to_offer(engine, scenes[0])}, or any other simple scene")
+    reason = CheckedEngine(engine).supports(scenes[0]).reason
+    raise NotOffered(reason, f"{to_offer(engine, scenes[0])}, or any other simple scene")
 
 
 def snapshot(engine: Engine, scene: Scene) -> Snapshot:
@@ -112,19 +113,19 @@ def snapshot(engine: Engine, scene: Scene) -> Snapshot:
 
 def ladder(engine: Engine, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
     """The efforts of the engine for a run of the scene, held against the contract."""
-    return efforts_of(engine, scene, duration_s)
+    return CheckedEngine(engine, duration_s=duration_s).efforts(scene)
 
 
-def simulated(model: Model, scene: Scene, times: Real, effort: Effort) -> Trajectory:
-    """One run, held against the contract; it may end as it likes."""
-    return checked_run(model.simulate(Run(times.copy()), effort), times, scene)
+def simulated(model: Model, times: Real, effort: Effort) -> Trajectory:
+    """One run of a model from `offered`, whatever its status."""
+    return model.simulate(Run(times), effort)
 
 
 def finest_two(engine: Engine, scene: Scene, times: Real) -> tuple[Trajectory, Trajectory]:
     """The runs at the last two efforts, which must finish: their difference says how well the finest is converged."""
     model = offered(engine, scene)
     model.warm_up()
-    coarser, finest = (simulated(model, scene, times, effort) for effort in ladder(engine, scene, times[-1])[-2:])
+    coarser, finest = (simulated(model, times, effort) for effort in ladder(engine, scene, times[-1])[-2:])
     for run in (coarser, finest):
         require(run.status == "finished", f"the run ended as {run.status}: {run.message}")
     return coarser, finest

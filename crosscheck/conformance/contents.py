@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from crosscheck.engines.answers import LATER
+from crosscheck.engines.checked import LATER
 from crosscheck.engines.contract import Engine
 from flexmb.scene.hinges import AngularCoordinate, LinearCoordinate
 from flexmb.scene.schema import RigidBody, Scene

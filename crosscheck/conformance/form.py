@@ -14,7 +14,8 @@ import psutil
 
 from crosscheck.conformance.clause import Chapter, equal, ladder, require, simplest, simulated
 from crosscheck.conformance.scenes import MASS, simple_scenes
-from crosscheck.engines.answers import RUNGS, checked_model, checked_version, support_of
+from crosscheck.engines.answers import RUNGS
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import ENERGIES, Engine, Model, Snapshot, Trajectory
 from flexmb.run.channels import channels_of, distance
 from flexmb.scene.schema import Scene
@@ -29,13 +30,13 @@ PATIENCE_S = 2.0  # for what a run has begun to end
 @FORM.clause("`version` names the version of the library, or raises EngineMissing where it is not installed.")
 def version_is_text(engine: Engine) -> None:
     require(isinstance(engine, Engine), "it lacks a name or a method of the protocol Engine")
-    checked_version(engine.version())
+    CheckedEngine(engine).version()
 
 
 @FORM.clause("`supports` says how exactly a scene can be represented, and gives its reason where it cannot.")
 def a_refusal_has_a_reason(engine: Engine) -> None:
     for scene in simple_scenes():
-        support = support_of(engine, scene)
+        support = CheckedEngine(engine).supports(scene)
         text = f'supports() of the scene "{scene.name}" is "{support.kind}" without a reason'
         require(support.kind == "exact" or bool(support.reason.strip()), text)
 
@@ -44,14 +45,14 @@ def a_refusal_has_a_reason(engine: Engine) -> None:
 def efforts_are_a_ladder(engine: Engine) -> None:
     simplest(engine)
     for scene in simple_scenes():
-        for duration_s in (1e-3, 1.0, 1e3) if support_of(engine, scene).kind != "no" else ():
+        for duration_s in (1e-3, 1.0, 1e3) if CheckedEngine(engine).supports(scene).kind != "no" else ():
             ladder(engine, scene, duration_s)
 
 
 @FORM.clause("Every effort is another run: to ask for more changes the result, and counts no fewer evaluations.")
 def efforts_make_a_difference(engine: Engine) -> None:
     scene, model = _compiled(engine)
-    runs = [simulated(model, scene, TIMES, effort) for effort in ladder(engine, scene, TIMES[-1])]
+    runs = [simulated(model, TIMES, effort) for effort in ladder(engine, scene, TIMES[-1])]
     paths = [run.markers["tip"].position for run in runs if run.status == "finished"]
     require(len(paths) >= RUNGS, f"of {len(runs)} efforts {len(paths)} finish half a second of the simplest scene")
     for i, path in enumerate(paths):
@@ -68,7 +69,7 @@ def a_solve_takes_time(engine: Engine) -> None:
     taken, told = [], []
     for _ in range(3):
         before = perf_counter()
-        told.append(simulated(model, scene, TIMES, finest).wall_s)
+        told.append(simulated(model, TIMES, finest).wall_s)
         taken.append(perf_counter() - before)
     for each, call_s in zip(told, taken, strict=True):
         clocks = f"wall_s is {each:.3g} s of a call that takes {call_s:.3g} s"
@@ -102,9 +103,9 @@ def a_run_is_what_was_asked_for(engine: Engine) -> None:
 def sample_times_do_not_change_the_motion(engine: Engine) -> None:
     scene, model = _compiled(engine)
     coarser, finest = ladder(engine, scene, TIMES[-1])[-2:]
-    few = channels_of(simulated(model, scene, TIMES[::5], finest))
-    many = channels_of(simulated(model, scene, TIMES, finest))
-    rough = channels_of(simulated(model, scene, TIMES, coarser))
+    few = channels_of(simulated(model, TIMES[::5], finest))
+    many = channels_of(simulated(model, TIMES, finest))
+    rough = channels_of(simulated(model, TIMES, coarser))
     require(set(few) == set(many) == set(rough), "it has other channels with fewer sample times, or another effort")
     for name, values in many.items():
         size = max(1.0, float(np.abs(values).max()))
@@ -126,11 +127,11 @@ def a_run_can_be_repeated(engine: Engine) -> None:
 def runs_do_not_disturb_each_other(engine: Engine) -> None:
     scene = simplest(engine)
     before = msgspec.json.encode(scene)
-    model = checked_model(engine.compile(scene))
+    model = CheckedEngine(engine).compile(scene)
     efforts = ladder(engine, scene, TIMES[-1])
-    first = simulated(model, scene, TIMES, efforts[-1]).markers["tip"].position
+    first = simulated(model, TIMES, efforts[-1]).markers["tip"].position
     for effort in (efforts[0], efforts[-1]):
-        last = simulated(model, scene, TIMES, effort).markers["tip"].position
+        last = simulated(model, TIMES, effort).markers["tip"].position
     require(np.array_equal(first, last), "a run at another effort in between changes the result")
     require(msgspec.json.encode(scene) == before, "the scene is another after the runs")
 
@@ -167,15 +168,15 @@ def a_snapshot_names_what_the_scene_has(engine: Engine) -> None:
 def a_violent_run_has_a_status(engine: Engine) -> None:
     scene = simplest(engine, rate=1e6)
     times = np.linspace(0.0, 1e-3, 3)
-    model = checked_model(engine.compile(scene))
-    run = simulated(model, scene, times, ladder(engine, scene, times[-1])[0])  # where it raises, that is told
+    model = CheckedEngine(engine).compile(scene)
+    run = simulated(model, times, ladder(engine, scene, times[-1])[0])  # where it raises, that is told
     require(run.status == "finished" or bool(run.message.strip()), f"it {run.status} without saying why")
 
 
 def _compiled(engine: Engine) -> tuple[Scene, Model]:
     """The simplest scene that the engine represents, and its model, ready to run."""
     scene = simplest(engine)
-    model = checked_model(engine.compile(scene))
+    model = CheckedEngine(engine).compile(scene)
     model.warm_up()
     return scene, model
 
@@ -183,7 +184,7 @@ def _compiled(engine: Engine) -> tuple[Scene, Model]:
 def _run(engine: Engine) -> Trajectory:
     """Half a second at the finest effort."""
     scene, model = _compiled(engine)
-    return simulated(model, scene, TIMES, ladder(engine, scene, TIMES[-1])[-1])
+    return simulated(model, TIMES, ladder(engine, scene, TIMES[-1])[-1])
 
 
 def _start(engine: Engine) -> Snapshot:
@@ -195,7 +196,7 @@ def _start(engine: Engine) -> Snapshot:
 def _leave(engine: Engine) -> None:
     """A run of a model of its own, of which nothing is kept."""
     scene, model = _compiled(engine)
-    simulated(model, scene, TIMES, ladder(engine, scene, TIMES[-1])[0])
+    simulated(model, TIMES, ladder(engine, scene, TIMES[-1])[0])
     del model
     gc.collect()
 

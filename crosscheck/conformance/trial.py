@@ -17,10 +17,11 @@ from typing import Literal, NamedTuple
 from crosscheck.conformance.catalogue import CLAUSES, SHOWN
 from crosscheck.conformance.clause import Clause, ClauseBroken, NotOffered
 from crosscheck.conformance.limit import CLAUSE_LIMIT_S
-from crosscheck.engines.answers import BrokenContract, clean
+from crosscheck.engines.answers import BrokenContract, clean, describe
 from crosscheck.engines.contract import Engine, EngineMissing
-from crosscheck.running.execute import describe, find_engine
+from crosscheck.running.execute import NoSuchEngine, find_engine
 from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import Work
 from crosscheck.running.sweep import PROVIDER
 from crosscheck.running.worker import SPAWN, Method
 
@@ -76,9 +77,7 @@ def try_engine(
     trials = [ClauseTrial(provider, name, clause) for clause in clauses]
     with tempfile.TemporaryDirectory() as folder:
         log = str(Path(folder) / "log")
-        for event in run_jobs(
-            attempt, trials, 1, log, kind=_clause, time_limit_s=lambda trial: limit_s, method=_start_method()
-        ):
+        for event in run_jobs(Work(attempt, trials, log, 1, _clause, lambda trial: limit_s), _start_method()):
             if event.kind == "emitted":
                 yield event.content
             elif event.kind in ("crashed", "stopped"):
@@ -89,11 +88,12 @@ def try_engine(
 def attempt(trial: ClauseTrial, emit: Callable[[ClauseOutcome], None]) -> None:
     """What a worker does with a trial."""
     clause = CLAUSES[trial.clause]
-    found = find_engine(trial.provider, trial.engine)
-    if isinstance(found, str):
-        emit(ClauseOutcome(clause.name, clause.sentence, "missing", found))
+    try:
+        engine = find_engine(trial.provider, trial.engine)
+    except NoSuchEngine as error:
+        emit(ClauseOutcome(clause.name, clause.sentence, "missing", str(error)))
     else:
-        emit(try_clause(found, clause))
+        emit(try_clause(engine, clause))
 
 
 @dataclass(frozen=True)

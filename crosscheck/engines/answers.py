@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 import numbers
+import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields
+from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -18,7 +20,6 @@ from crosscheck.engines.contract import (
     ENERGIES,
     OUTPUTS,
     Effort,
-    Engine,
     MarkerPath,
     Model,
     Status,
@@ -27,13 +28,10 @@ from crosscheck.engines.contract import (
 )
 from crosscheck.engines.trajectories import first_samples
 from flexmb.scene.connectors import BetweenNodes
-from flexmb.scene.schema import Scene, UserLaw
+from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 RUNGS = 3
-LATER = ("connectors", "controllers", "events")
-"""Collections of a scene that came after the first contract: an engine says in `takes` that it knows them."""
-NO_START = "begins all runs at t = 0"
 LOAD_PARTS = {"torque": slice(0, 3), "force": slice(3, 6)}
 LONGEST_TEXT = 4000
 LARGEST_COUNT = 2**63 - 1  # what a record can hold
@@ -52,6 +50,19 @@ def clean(text: str) -> str:
     return cut.encode("utf-8", "backslashreplace").decode() + more
 
 
+def describe(error: BaseException) -> str:
+    """The error and where it was raised."""
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f" ({frames[-1].name}, {Path(frames[-1].filename).name} line {frames[-1].lineno})" if frames else ""
+    try:
+        text = str(error)
+    except Exception:
+        text = "its text cannot be had"
+    if isinstance(error, BrokenContract):
+        return clean(f"broke the contract: {text}")
+    return clean(f"{type(error).__name__}: {text}{place}")
+
+
 def checked_version(found: Any) -> str:
     """What `version` returned: text."""
     text = _text(found, "version()")
@@ -59,38 +70,11 @@ def checked_version(found: Any) -> str:
     return text
 
 
-def support_of(engine: Engine, scene: Scene, t_start: float = 0.0) -> Support:
-    """What `supports` says; "no" where the scene holds what an adapter that does not know of it would leave out, or
-    where the run begins at another time (s) than the adapter's runs do.
-
-    Laws of controllers that are not in this distribution are refused for all: what they do may change, and records
-    would not know.
-    """
-    known = getattr(engine, "takes", ())
-    if t_start != 0.0 and "t_start" not in known:
-        return Support("no", f"the adapter of engine {engine.name} {NO_START}")
-    for collection in LATER:
-        items = getattr(scene, collection)
-        if items and collection not in known:
-            return Support("no", f'"{items[0].name}": the adapter of engine {engine.name} knows no {collection}')
-    for law in scene.controllers:
-        if isinstance(law, UserLaw) and not law.function.startswith("flexmb."):
-            return Support("no", f'the function "{law.function}" is not of flexmb: a record would not know its changes')
-    return checked_support(engine.supports(scene))
-
-
 def checked_support(found: Any) -> Support:
     """What `supports` returned."""
     _instance(found, Support, "supports()")
     _one_of(found.kind, ("exact", "surrogate", "no"), "the kind of supports()")
     return Support(found.kind, _text(found.reason, "the reason of supports()"))
-
-
-def efforts_of(engine: Engine, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
-    """The engine's ladder for a run of this duration: of its `efforts_for` where it has one, else of its `efforts`."""
-    if (by_duration := getattr(engine, "efforts_for", None)) is not None:
-        return checked_ladder(by_duration(scene, duration_s))
-    return checked_ladder(engine.efforts(scene))
 
 
 def checked_ladder(found: Any) -> tuple[Effort, ...]:

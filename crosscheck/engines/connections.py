@@ -8,7 +8,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable
 from math import hypot, inf, sqrt
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, assert_never
 
 import numpy as np
 
@@ -18,10 +18,13 @@ from crosscheck.engines.links import Attachment, Link, attachment
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.connectors import (
     AlongHinge,
+    AngularFriction,
+    AngularSpring,
     BetweenNodes,
     Bushing,
-    HingeFriction,
     HingeSpring,
+    LinearFriction,
+    LinearSpring,
     SpringDamper,
     actuator,
     by_stem,
@@ -80,7 +83,7 @@ class Connection:
 
 def exerts(connector: BetweenNodes) -> Callable[[float, Moving, Moving], Exerted]:
     """What a connector does at time t between frames A and B that move so."""
-    on = _line(connector) if isinstance(connector, SpringDamper) else _bushing(connector)
+    on = _law(connector)
 
     def exerted(t: float, a: Moving, b: Moving) -> Exerted:
         on_b, energy, power = on(t, a, b)
@@ -89,6 +92,16 @@ def exerts(connector: BetweenNodes) -> Callable[[float, Moving, Moving], Exerted
         return Exerted(on_a, on_b, energy, power)
 
     return exerted
+
+
+def _law(connector: BetweenNodes) -> Callable[[float, Moving, Moving], tuple[Real, float, float]]:
+    match connector:
+        case SpringDamper():
+            return _line(connector)
+        case Bushing():
+            return _bushing(connector)
+        case _:
+            assert_never(connector)
 
 
 def connections(scene: Scene, chain: tuple[Link, ...]) -> tuple[Connection, ...]:
@@ -215,10 +228,18 @@ def _inverse_jacobian(theta: Real) -> Real:
 
 
 def _along(connector: AlongHinge) -> Callable[[float, float, float], Along]:
+    match connector:
+        case AngularFriction() | LinearFriction():
+            stems = by_stem(connector)
+            return lambda t, q, v: _friction(stems, v)
+        case AngularSpring() | LinearSpring():
+            return _spring(connector)
+        case _:
+            assert_never(connector)
+
+
+def _spring(connector: HingeSpring) -> Callable[[float, float, float], Along]:
     stems = by_stem(connector)
-    if isinstance(connector, HingeFriction):
-        return lambda t, q, v: _friction(stems, v)
-    assert isinstance(connector, HingeSpring)
     law = law_of(stems)
     lower, upper = (-inf if stems["lower"] is None else stems["lower"]), (
         inf if stems["upper"] is None else stems["upper"]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import cos, inf, nan, pi, sin
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 from msgspec import Struct
@@ -65,6 +65,8 @@ def _evaluated(function: Function) -> Callable[[float], Profile]:
             return _table(times, values)
         case ControlSignal(source=source):
             raise NotImplementedError(f'the signal of controller "{source}" is no function of time')
+        case _:
+            assert_never(function)
 
 
 def breaks(function: Function) -> tuple[float, ...]:
@@ -74,7 +76,10 @@ def breaks(function: Function) -> tuple[float, ...]:
             return (start, start + duration)
         case SpinUp(duration_s=duration):
             return (duration,)
-    return ()
+        case Constant() | Ramp() | Sine() | Table() | ControlSignal():
+            return ()
+        case _:
+            assert_never(function)
 
 
 def breaks_between(functions: list[Function], first: float, last: float) -> list[float]:
@@ -115,6 +120,8 @@ def fastest_rate(function: Function, until: float = inf) -> float:
         case Table(times_s=times):
             f = profile(function)
             return max(abs(f(t).rate) for t in np.linspace(times[0], min(times[-1], until), 20 * len(times)))
+        case _:
+            assert_never(function)
 
 
 def fastest_change(function: Function, until: float = inf) -> float:
@@ -134,6 +141,8 @@ def fastest_change(function: Function, until: float = inf) -> float:
         case Table(values=values):
             half = (max(values) - min(values)) / 2.0
             return fastest_rate(function, until) / half if half > 0.0 else 0.0
+        case _:
+            assert_never(function)
 
 
 def _sine(function: Sine) -> Callable[[float], Profile]:

@@ -7,7 +7,7 @@ A link's frame is the outboard hinge frame of its inboard hinge; wheels and movi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar, assert_never
 
 import numpy as np
 
@@ -21,49 +21,39 @@ from crosscheck.engines.conventions import (
 )
 from flexmb.scene.bodies import ZERO
 from flexmb.scene.connectors import Connector
+from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.schema import (
-    AngularCoordinate,
     Body,
     Closure,
-    Cylindrical,
-    Free,
-    Gimbal,
     Hinge,
-    LinearCoordinate,
     Load,
     Marker,
-    Planar,
     PointMass,
-    Prismatic,
-    Revolute,
-    RigidBody,
     Scene,
     SidBody,
-    Spherical,
-    Universal,
-    Vector,
     Wheel,
 )
-from flexmb.scene.tree import GROUND, coordinates, ordered
+from flexmb.scene.tree import GROUND, ordered
 from flexmb.surrogate.lumping import Inertia, combine, inertia_of, rigid_equivalent
 from flexmb.typing import Real
 
 Kind = Literal["body", "wheel", "point mass"]
-X: Vector = (1.0, 0.0, 0.0)
-Y: Vector = (0.0, 1.0, 0.0)
-Z: Vector = (0.0, 0.0, 1.0)
+JointMotion = Literal["turn", "slide", "screw"]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Scalar:
-    """One turn about (or shift along) `axis`, in the axes that the freedoms before it have carried along.
+    """A joint of one coordinate about or along `axis`, in the axes that the freedoms before it have carried along.
 
-    Units rad or m, Nm or N. `effort` is the motor, `prescribed` the motion of a driven coordinate.
+    Units rad or m, N m or N. A screw turns, and shifts by `pitch` (m/rad) times its angle. `effort` is the motor,
+    `prescribed` the motion of a driven coordinate.
     """
 
-    angular: bool
+    motion: JointMotion
     axis: Real
+    pitch: float
     value: float
     rate: float
     stiffness: float
@@ -73,27 +63,20 @@ class Scalar:
     prescribed: Function | None
 
 
-@dataclass(frozen=True)
-class Ball:
-    """Quaternion wxyz and angular velocity in outboard axes; torque -stiffness * rotation vector - damping * omega."""
-
-    quaternion: Real
-    angular_velocity: Real
-    stiffness: float = 0.0
-    damping: float = 0.0
-
-
-@dataclass(frozen=True)
-class Floating:
-    """Position of the outboard origin in inboard axes, quaternion; both velocities relative, in outboard axes."""
-
-    position: Real
-    quaternion: Real
-    angular_velocity: Real
-    velocity: Real
-
-
 Freedom = Scalar | Ball | Floating
+
+
+def by_motion(joint: Scalar, turn: T, slide: T) -> T:
+    """What an adapter without screws takes for a joint that turns, or slides; NotImplementedError for a screw."""
+    match joint.motion:
+        case "turn":
+            return turn
+        case "slide":
+            return slide
+        case "screw":
+            raise NotImplementedError("a screw joint, which `obstacle` refuses, has reached the adapter")
+        case _:
+            assert_never(joint.motion)
 
 
 @dataclass(frozen=True)
@@ -123,9 +106,13 @@ class Attachment:
 
 
 def obstacle(
-    scene: Scene, engine: str, closed_by: tuple[str, ...], connected_by: tuple[type[Connector], ...] = ()
-) -> str:
-    """Why an engine of rigid trees with some types of closures and connectors cannot represent the scene, or ""."""
+    scene: Scene, engine: str, closed_by: tuple[str, ...], connected_by: tuple[type[Connector], ...] = (),
+    screws: bool = False,
+) -> str:  # fmt: skip
+    """Why an engine of rigid trees with some types of closures and connectors cannot represent the scene, or "".
+
+    `screws`: whether the adapter offers screw joints.
+    """
     for closure in scene.closures:
         if not closed_by:
             return f'closure "{closure.name}": {engine} closes no loops'
@@ -135,11 +122,22 @@ def obstacle(
     for connector in scene.connectors:
         if not isinstance(connector, connected_by):
             return f'connector "{connector.name}": the adapter of {engine} has none of its kind'
+    screw = "" if screws else first_screw(scene)
+    if screw:
+        return f'hinge "{screw}" is a screw: the adapter of {engine} offers no such joint'
     for body in scene.bodies:
         if isinstance(body, SidBody):
             return f'body "{body.name}": its SID file is read by flexmb alone: convert it by flexmb import'
-        if not isinstance(body, RigidBody) and body.level != "rigid":
+        if body.level != "rigid":
             return f'{engine} has no flexible bodies ("{body.name}"): use the finite-segment surrogate'
+    return ""
+
+
+def first_screw(scene: Scene) -> str:
+    """The first hinge that turns and shifts by one coordinate, "" where there is none."""
+    for hinge in scene.hinges:
+        if any(isinstance(each, ScalarFreedom) and each.motion == "screw" for each in hinge.freedoms):
+            return hinge.name
     return ""
 
 
@@ -160,9 +158,9 @@ def links(scene: Scene) -> tuple[Link, ...]:
         index[body.name] = own = len(chain)
         chain.append(Link(body.name, "body", hinge.name, parent, inboard, freedoms(hinge), inertia, in_link))
         for point in moving:
-            chain.append(_leaf(point, "point mass", own, in_link @ _place(point, body), _slides(point), _point(point)))
+            chain.append(_leaf(point, "point mass", own, in_link @ _place(point, body), freedoms(point), _point(point)))
         for wheel in (wheel for wheel in scene.wheels if wheel.body == body.name):
-            chain.append(_leaf(wheel, "wheel", own, in_link @ _place(wheel, body), (_spin(wheel),), _disc(wheel)))
+            chain.append(_leaf(wheel, "wheel", own, in_link @ _place(wheel, body), freedoms(wheel), _disc(wheel)))
     return tuple(chain)
 
 
@@ -188,64 +186,17 @@ def _closed_frame(scene: Scene, chain: tuple[Link, ...], body: str, node: str, o
     return Attachment(at.link, at.frame @ offset)
 
 
-def axes(hinge: Hinge) -> tuple[Vector, ...]:
-    """Axis of every scalar coordinate, in the axes that the coordinates before it have carried along."""
-    match hinge:
-        case Revolute() | Prismatic():
-            return (hinge.axis,)
-        case Cylindrical():
-            return hinge.axis, hinge.axis
-        case Universal():
-            return X, Y
-        case Gimbal():
-            return tuple({"x": X, "y": Y, "z": Z}[letter] for letter in hinge.sequence)
-        case Planar():
-            return X, Y, Z
-    return ()
+def freedoms(item: Hinge | PointMass | Wheel) -> tuple[Freedom, ...]:
+    """The elementary joints of a hinge, a point mass or a wheel, base to tip; none for a weld."""
+    return tuple(_scalar(each) if isinstance(each, ScalarFreedom) else each for each in item.freedoms)
 
 
-def freedoms(hinge: Hinge) -> tuple[Freedom, ...]:
-    """The elementary joints of a hinge, base to tip; none for a weld."""
-    match hinge:
-        case Spherical():
-            return (
-                Ball(
-                    np.array(hinge.quaternion),
-                    np.array(hinge.angular_velocity_rad_s),
-                    hinge.stiffness_Nm_rad,
-                    hinge.damping_Nms_rad,
-                ),
-            )
-        case Free():
-            return (
-                Floating(
-                    np.array(hinge.position_m),
-                    np.array(hinge.quaternion),
-                    np.array(hinge.angular_velocity_rad_s),
-                    np.array(hinge.velocity_m_s),
-                ),
-            )
-    pairs = zip(axes(hinge), coordinates(hinge), strict=True)
-    return tuple(_scalar(isinstance(c, AngularCoordinate), axis, c) for axis, (_, c) in pairs)
-
-
-def _scalar(angular: bool, axis: Vector, coordinate: AngularCoordinate | LinearCoordinate) -> Scalar:
-    match coordinate:
-        case AngularCoordinate():
-            numbers = (coordinate.angle_rad, coordinate.rate_rad_s, coordinate.stiffness_Nm_rad)
-            rest = (coordinate.damping_Nms_rad, coordinate.rest_rad, coordinate.torque_Nm, coordinate.prescribed_rad)
-        case LinearCoordinate():
-            numbers = (coordinate.position_m, coordinate.rate_m_s, coordinate.stiffness_N_m)
-            rest = (coordinate.damping_Ns_m, coordinate.rest_m, coordinate.force_N, coordinate.prescribed_m)
-    return Scalar(angular, np.array(axis, dtype=float), *numbers, *rest)
-
-
-def _spin(wheel: Wheel) -> Scalar:
-    axis = np.array(wheel.axis, dtype=float)
+def _scalar(freedom: ScalarFreedom) -> Scalar:
+    pitch = freedom.shifts if freedom.motion == "screw" else 0.0
+    c = freedom.coordinate
     return Scalar(
-        True, axis, wheel.angle_rad, wheel.speed_rad_s, 0.0, wheel.friction_Nms_rad, 0.0, wheel.torque_Nm,
-        wheel.prescribed_rad,
-    )  # fmt: skip
+        freedom.motion, np.array(freedom.axis, dtype=float), pitch, c.value, c.rate, *c.spring, c.effort, c.prescribed
+    )
 
 
 def _disc(wheel: Wheel) -> Inertia:
@@ -257,11 +208,6 @@ def _disc(wheel: Wheel) -> Inertia:
 
 def _point(point: PointMass) -> Inertia:
     return Inertia(point.mass_kg, np.zeros(3), np.zeros((3, 3)))
-
-
-def _slides(point: PointMass) -> tuple[Scalar, ...]:
-    pairs = zip(point.directions, coordinates(point), strict=True)
-    return tuple(_scalar(False, direction, named.coordinate) for direction, named in pairs)
 
 
 def _leaf(

@@ -37,7 +37,7 @@ from flexmb.modal.flexible import flexible_model
 from flexmb.run.simulate import RunSettings, refuse_without_jacobian, simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.events import EndRun
-from flexmb.scene.schema import BeamBody, ModalBody, RigidBody, Scene
+from flexmb.scene.schema import BeamBody, ModalBody, Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.compile import compile
@@ -240,7 +240,7 @@ def _undetermined(done: NativeTrajectory) -> Iterator[str]:
 
 def _approximation(scene: Scene, algorithm: Algorithm) -> str:
     """What an algorithm leaves out of the scene's levels or does wrong with them, "" if nothing."""
-    flexible = [body for body in scene.bodies if not isinstance(body, RigidBody) and body.level != "rigid"]
+    flexible = [body for body in scene.bodies if body.level != "rigid"]
     full = [f'"{body.name}"' for body in flexible if body.level == "full"]
     first_order = f'level "full" of {", ".join(full)} to first order in the modal coordinates' if full else ""
     declared = ALGORITHMS[algorithm]

@@ -6,7 +6,7 @@ motors bring about later, and what hangs beyond a hinge that is free to move, ma
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, assert_never
 
 import numpy as np
 from scipy.linalg import eigh
@@ -167,13 +167,14 @@ def _fastest(stiffness: Real, mass: Real) -> float:
 def _turning(freedom: Freedom | None, duration_s: float) -> float:
     """Turning rate (rad/s) at the start, or the largest that is prescribed."""
     match freedom:
-        case Scalar(angular=True, prescribed=None):
-            return abs(freedom.rate)
-        case Scalar(angular=True, prescribed=function) if function is not None:
-            return fastest_rate(function, duration_s)
+        case Scalar(motion="slide") | None:
+            return 0.0
+        case Scalar(rate=rate, prescribed=function):
+            return abs(rate) if function is None else fastest_rate(function, duration_s)
         case Ball() | Floating():
             return float(np.linalg.norm(freedom.angular_velocity))
-    return 0.0
+        case _:
+            assert_never(freedom)
 
 
 def _moved(at: Frame, freedom: Freedom) -> tuple[Frame, list[Real]]:
@@ -181,17 +182,26 @@ def _moved(at: Frame, freedom: Freedom) -> tuple[Frame, list[Real]]:
     match freedom:
         case Scalar():
             value = freedom.value if freedom.prescribed is None else profile(freedom.prescribed)(0.0).value
-            axis = at.rotation @ freedom.axis
-            if freedom.angular:
-                turned = Frame(at.position, at.rotation @ axis_rotation(freedom.axis, value))
-                return turned, [np.concatenate([axis, cross(at.position, axis)])]
-            return Frame(at.position + value * axis, at.rotation), [np.concatenate([np.zeros(3), axis])]
+            axis, turned = at.rotation @ freedom.axis, at.rotation @ axis_rotation(freedom.axis, value)
+            turning, sliding = np.concatenate([axis, cross(at.position, axis)]), np.concatenate([np.zeros(3), axis])
+            match freedom.motion:
+                case "turn":
+                    return Frame(at.position, turned), [turning]
+                case "slide":
+                    return Frame(at.position + value * axis, at.rotation), [sliding]
+                case "screw":
+                    moved = at.position + value * freedom.pitch * axis
+                    return Frame(moved, turned), [turning + freedom.pitch * sliding]
+                case _:
+                    assert_never(freedom.motion)
         case Ball():
             at = at @ frame(np.zeros(3), freedom.quaternion)
             return at, _turns(at)
         case Floating():
             at = at @ frame(freedom.position, freedom.quaternion)
             return at, _turns(at) + [np.concatenate([np.zeros(3), axis]) for axis in at.rotation.T]
+        case _:
+            assert_never(freedom)
 
 
 def _turns(at: Frame) -> list[Real]:

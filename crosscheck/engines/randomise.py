@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from typing import assert_never
+
 import numpy as np
 from msgspec.structs import replace
 from numpy.random import Generator
 
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import (
-    AngularCoordinate,
     BeamBody,
     Free,
     Hinge,
-    LinearCoordinate,
     ModalBody,
     ModalState,
     PointMass,
@@ -22,6 +22,7 @@ from flexmb.scene.schema import (
     Vector,
     Wheel,
 )
+from flexmb.scene.tree import Coordinate, coordinates, with_coordinates
 
 _ANGLE = 0.8  # rad: away from the singularity of three-axis gimbals at pi/2
 _SHIFT = 0.2  # m
@@ -32,7 +33,8 @@ _DEFLECTION = 0.03  # of a beam's length
 
 def randomise(scene: Scene, rng: Generator) -> Scene:
     """The same scene at random hinge coordinates and speeds, modal states and wheel speeds; prescribed ones stay."""
-    states = tuple(_modal_state(body, rng) for body in scene.bodies if _is_flexible(body))
+    flexible = [body for body in scene.bodies if isinstance(body, BeamBody | ModalBody) and body.level != "rigid"]
+    states = tuple(_modal_state(body, rng) for body in flexible)
     return replace(
         scene,
         hinges=tuple(_hinge(hinge, rng) for hinge in scene.hinges),
@@ -43,39 +45,25 @@ def randomise(scene: Scene, rng: Generator) -> Scene:
 
 
 def _hinge(hinge: Hinge, rng: Generator) -> Hinge:
-    match hinge:
-        case Spherical():
-            return replace(hinge, quaternion=_quaternion(rng), angular_velocity_rad_s=_vector(rng, _RATE))
-        case Free():
-            return replace(
-                hinge, position_m=_vector(rng, _SHIFT), quaternion=_quaternion(rng),
-                angular_velocity_rad_s=_vector(rng, _RATE), velocity_m_s=_vector(rng, _RATE),
-            )  # fmt: skip
-    changed = {}
-    for key in hinge.__struct_fields__:
-        match getattr(hinge, key):
-            case AngularCoordinate() | LinearCoordinate() as coordinate:
-                changed[key] = _coordinate(coordinate, rng)
-            case (AngularCoordinate(), *_) as rotations:
-                changed[key] = tuple(_coordinate(rotation, rng) for rotation in rotations)
-    return replace(hinge, **changed)
+    if isinstance(hinge, Free):
+        hinge = replace(hinge, position_m=_vector(rng, _SHIFT))
+    if isinstance(hinge, Free | Spherical):
+        hinge = replace(hinge, quaternion=_quaternion(rng), angular_velocity_rad_s=_vector(rng, _RATE))
+    if isinstance(hinge, Free):
+        hinge = replace(hinge, velocity_m_s=_vector(rng, _RATE))
+    return with_coordinates(hinge, [_coordinate(each, rng) for _, each in coordinates(hinge)])
 
 
-def _coordinate(
-    coordinate: AngularCoordinate | LinearCoordinate, rng: Generator
-) -> AngularCoordinate | LinearCoordinate:
+def _coordinate(coordinate: Coordinate, rng: Generator) -> Coordinate:
     value, rate = rng.uniform(-1.0, 1.0), rng.uniform(-_RATE, _RATE)
-    match coordinate:
-        case AngularCoordinate(prescribed_rad=None):
-            return replace(coordinate, angle_rad=_ANGLE * value, rate_rad_s=rate)
-        case LinearCoordinate(prescribed_m=None):
-            return replace(coordinate, position_m=_SHIFT * value, rate_m_s=rate)
-    return coordinate
+    if coordinate.prescribed is not None:
+        return coordinate
+    keys, size = coordinate.KEYS, _ANGLE if coordinate.ANGULAR else _SHIFT
+    return replace(coordinate, **{keys.value: size * value, keys.rate: rate})
 
 
 def _point_mass(point: PointMass, rng: Generator) -> PointMass:
-    still = point.coordinates or tuple(LinearCoordinate() for _ in point.directions)
-    return replace(point, coordinates=tuple(_coordinate(coordinate, rng) for coordinate in still))
+    return with_coordinates(point, [_coordinate(each, rng) for _, each in coordinates(point)])
 
 
 def _wheel(wheel: Wheel, rng: Generator) -> Wheel:
@@ -84,20 +72,19 @@ def _wheel(wheel: Wheel, rng: Generator) -> Wheel:
     return replace(wheel, angle_rad=rng.uniform(-np.pi, np.pi), speed_rad_s=rng.uniform(-_WHEEL_SPEED, _WHEEL_SPEED))
 
 
-def _is_flexible(body: object) -> bool:
-    return isinstance(body, BeamBody | ModalBody) and body.level != "rigid"
-
-
 def _modal_state(body: BeamBody | ModalBody, rng: Generator) -> ModalState:
     """Modal coordinates whose largest displacement is a few per cent of the body's size, rates alike per second."""
-    if isinstance(body, BeamBody):
-        count, scale = _beam_modes(body)
-    else:
-        arrays = modal_arrays(body)
-        modes = arrays.translation_modes
-        count = modes.shape[2]
-        size = np.ptp(arrays.position, axis=0).max()
-        scale = _DEFLECTION * size / np.maximum(np.abs(modes).max(axis=(0, 1)), np.finfo(float).tiny)
+    match body:
+        case BeamBody():
+            count, scale = _beam_modes(body)
+        case ModalBody():
+            arrays = modal_arrays(body)
+            modes = arrays.translation_modes
+            count = modes.shape[2]
+            size = np.ptp(arrays.position, axis=0).max()
+            scale = _DEFLECTION * size / np.maximum(np.abs(modes).max(axis=(0, 1)), np.finfo(float).tiny)
+        case _:
+            assert_never(body)
     coordinates, rates = scale * rng.uniform(-1.0, 1.0, (2, count))
     return ModalState(body=body.name, coordinates=tuple(map(float, coordinates)), rates=tuple(map(float, rates)))
 

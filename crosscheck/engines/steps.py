@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from math import floor, log10
+from typing import TYPE_CHECKING
 
 from crosscheck.engines.contract import Effort
-from crosscheck.engines.pace import Pace
+
+if TYPE_CHECKING:  # it loads scipy, which a worker does without
+    from crosscheck.engines.pace import Pace
 
 USUAL_S = 10.0
 """Duration (s) of a run of which nothing is known."""

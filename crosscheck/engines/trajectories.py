@@ -1,4 +1,4 @@
-"""Assembling an engine's samples to the trajectory that engines exchange."""
+"""Putting an engine's samples together into the trajectory that engines exchange."""
 
 from __future__ import annotations
 
@@ -8,25 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.contract import OUTPUTS, MarkerPath, Snapshot, Status, Trajectory
-from flexmb.run.channels import channels_of
+from crosscheck.engines.contract import OUTPUTS, MarkerPath, Snapshot, Trajectory
 from flexmb.typing import Real
 
 
 def stack(
-    times: Real,
-    samples: Sequence[Snapshot],
-    *,
-    status: Status,
-    message: str,
-    wall_s: float,
-    evaluations: int,
-    work: Real | None = None,
+    asked: Real, samples: Sequence[Snapshot], *, message: str, wall_s: float, evaluations: int, work: Real | None = None
 ) -> Trajectory:
-    """One trajectory from the snapshot of each sample time reached; never empty, since t = 0 is always reached."""
-    first = samples[0]
+    """One trajectory from the snapshot of each sample time reached; diverged unless all of `asked` (T,) were reached.
+
+    There is at least one snapshot, since the initial state is always reached.
+    """
+    first, times = samples[0], asked[: len(samples)]
     return Trajectory(
-        status=status,
+        status="finished" if len(samples) == len(asked) else "diverged",
         message=message,
         times=np.asarray(times, dtype=float),
         markers={
@@ -50,11 +45,6 @@ def _stacked(values: Sequence[Any]) -> Any:
     if isinstance(first, dict):
         return {name: np.array([value[name] for value in values]) for name in first}
     return None if first is None else np.array(values)
-
-
-def determined_channels(run: Trajectory) -> dict[str, Real]:
-    """All signals (T,k) of a run but those that the motion leaves open."""
-    return {name: values for name, values in channels_of(run).items() if name not in run.undetermined}
 
 
 def first_samples(run: Trajectory, count: int) -> Trajectory:

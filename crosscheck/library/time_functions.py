@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, assert_never
 
 import msgspec
 
 from flexmb.scene.columns import struct_keys
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 
+# The keys of every kind of function that are values, times or frequencies.
 VALUES: dict[type, tuple[str, ...]] = {
     Constant: ("value",),
     Ramp: ("value", "rate"),
@@ -21,16 +22,24 @@ VALUES: dict[type, tuple[str, ...]] = {
     ControlSignal: ("gain",),
 }
 TIMES: dict[type, tuple[str, ...]] = {
+    Constant: (),
     Ramp: ("start_s",),
+    Sine: (),
     SmoothStep: ("start_s", "duration_s"),
     SpinUp: ("duration_s",),
     Pulse: ("start_s", "duration_s"),
     Table: ("times_s",),
+    ControlSignal: (),
 }
 FREQUENCIES: dict[type, tuple[str, ...]] = {
+    Constant: (),
     Ramp: ("rate",),
     Sine: ("angular_frequency_rad_s",),
+    SmoothStep: (),
     SpinUp: ("rate",),
+    Pulse: (),
+    Table: (),
+    ControlSignal: (),
 }
 
 
@@ -54,12 +63,15 @@ def delayed(function: Function, delay: float) -> Function:
             return msgspec.structs.replace(function, phase_rad=phase)
         case Table():
             return msgspec.structs.replace(function, times_s=tuple(time + delay for time in function.times_s))
-    return function
+        case Constant() | SpinUp() | ControlSignal():
+            return function
+        case _:
+            assert_never(function)
 
 
 def _multiplied(function: Function, keys: dict[type, tuple[str, ...]], factor: float) -> Function:
     return msgspec.structs.replace(
-        function, **{key: _times(getattr(function, key), factor) for key in keys.get(type(function), ())}
+        function, **{key: _times(getattr(function, key), factor) for key in keys[type(function)]}
     )
 
 

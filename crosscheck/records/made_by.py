@@ -24,6 +24,8 @@ from crosscheck.records.sources import owner, sources
 # The modules of the harness that have a part in the numbers that are recorded. What else they import serves other ends.
 RECORDING = (
     "crosscheck.running.execute",
+    "crosscheck.running.rung",
+    "crosscheck.engines.checked",
     "crosscheck.engines.answers",
     "crosscheck.engines.contract",
     "crosscheck.engines.trajectories",

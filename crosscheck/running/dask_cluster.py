@@ -12,19 +12,18 @@ from __future__ import annotations
 import logging
 import time
 import uuid
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import inf
 from queue import Empty, SimpleQueue
-from typing import Any
 
 from distributed import Client, Future
 from distributed.scheduler import KilledWorker
 
 from crosscheck.running.code_here import code_here
 from crosscheck.running.dask_worker import Crew, do_job
-from crosscheck.running.scheduler import Event, Events, Function, one_kind, usual_limit
+from crosscheck.running.scheduler import Event, Events, Work
 from crosscheck.running.waiting import Waiting
 from crosscheck.running.worker import START_LIMIT_S, TICK_S
 
@@ -47,25 +46,11 @@ class DaskCluster:
         with self._client() as client:
             _require_same_sources(client, self.address)
 
-    def __call__(
-        self,
-        function: Function,
-        jobs: Sequence[Any],
-        workers: int | None,
-        log: str,
-        kind: Callable[[Any], str] = one_kind,
-        time_limit_s: Callable[[Any], float] = usual_limit,
-        memory_limit_bytes: float | None = None,
-    ) -> Events:
-        """Run jobs, `workers` at a time (by default as many as the cluster has threads); see `Scheduler`.
-
-        What jobs print stays with the Dask workers, in a file of their local directories.
-        """
+    def __call__(self, work: Work) -> Events:
+        """Run jobs; see `Work`. What they print stays with the Dask workers, in a file of their local directories."""
         with self._client() as client:
             _require_same_sources(client, self.address)
-            dispatch = _Dispatch(
-                client, self.address, function, jobs, workers or inf, kind, time_limit_s, memory_limit_bytes
-            )
+            dispatch = _Dispatch(client, self.address, work)
             with dispatch.session():
                 yield from dispatch.events()
 
@@ -102,12 +87,7 @@ class _Dispatch:
 
     client: Client
     address: str
-    function: Function
-    jobs: Sequence[Any]
-    at_most: float
-    kind: Callable[[Any], str]
-    time_limit_s: Callable[[Any], float]
-    memory_bytes: float | None
+    work: Work
     name: str = field(default_factory=lambda: f"crosscheck-{uuid.uuid4().hex}")
     known: int = 0
     waiting: Waiting = field(default_factory=Waiting)
@@ -132,7 +112,7 @@ class _Dispatch:
 
     def events(self) -> Iterator[Event]:
         looked, somebody = -inf, time.monotonic()
-        while self.known < len(self.jobs) or self.waiting or self.flights:
+        while self.known < len(self.work.jobs) or self.waiting or self.flights:
             now = time.monotonic()
             if now > looked + TICK_S:
                 looked = now
@@ -153,7 +133,7 @@ class _Dispatch:
                 flight.begun = True
                 yield Event(number, "started")
             if what == "begun":  # perhaps once more, on another worker
-                flight.deadline = time.monotonic() + self.time_limit_s(self.jobs[number]) + PATIENCE_S
+                flight.deadline = time.monotonic() + self.work.time_limit_s(self.work.jobs[number]) + PATIENCE_S
             else:
                 yield from self._landed(number, self.flights.pop(number))
 
@@ -162,9 +142,9 @@ class _Dispatch:
         if self.client.status != "running":
             raise ClusterError(f"the Dask scheduler at {self.address} is gone; what came from it is recorded")
         self.threads = dict(self.client.nthreads())
-        for number in range(self.known, len(self.jobs)):
-            self.waiting.add(number, self.kind(self.jobs[number]))
-        self.known = len(self.jobs)
+        for number in range(self.known, len(self.work.jobs)):
+            self.waiting.add(number, self.work.kind(self.work.jobs[number]))
+        self.known = len(self.work.jobs)
 
     def _send_out(self) -> None:
         """Give every free thread a job. Where there is no worker one task is submitted: that calls for one."""
@@ -172,7 +152,7 @@ class _Dispatch:
         for address, threads in places.items():
             load = sum(flight.address == address for flight in self.flights.values())
             for _ in range(threads - load):
-                if len(self.flights) >= self.at_most or not self._send_to(address):
+                if len(self.flights) >= (self.work.workers or inf) or not self._send_to(address):
                     break
 
     def _send_to(self, address: str) -> bool:
@@ -184,11 +164,11 @@ class _Dispatch:
         if chosen is None:
             return False
         number, kind = chosen
-        job = self.jobs[number]
+        job = self.work.jobs[number]
         future = self.client.submit(
-            do_job, self.name, code_here(), number, self.function, job, kind, self.time_limit_s(job),
-            self.memory_bytes, key=f"{self.name}-{number}", pure=False, workers=[address] if address else None,
-            allow_other_workers=bool(address),
+            do_job, self.name, code_here(), number, self.work.function, job, kind, self.work.time_limit_s(job),
+            self.work.memory_limit_bytes, key=f"{self.name}-{number}", pure=False,
+            workers=[address] if address else None, allow_other_workers=bool(address),
         )  # fmt: skip
         self.flights[number] = _Flight(future, kind, address)
         self.kinds[address] = kind
@@ -200,7 +180,8 @@ class _Dispatch:
         if flight.future.status == "cancelled":
             raise ClusterError(f"the Dask scheduler at {self.address} has dropped a job; what came before is recorded")
         try:
-            found: list[Event] = flight.future.result(timeout=self.time_limit_s(self.jobs[number]) + PATIENCE_S)
+            limit_s = self.work.time_limit_s(self.work.jobs[number])
+            found: list[Event] = flight.future.result(timeout=limit_s + PATIENCE_S)
         except KilledWorker as error:
             times = error.allowed_failures + 1
             found = [Event(number, "crashed", f"the Dask worker died, {times} times when it was tried again")]
@@ -217,7 +198,7 @@ class _Dispatch:
             if time.monotonic() > flight.deadline:
                 self.client.cancel([flight.future])
                 del self.flights[number]
-                limit = self.time_limit_s(self.jobs[number])
+                limit = self.work.time_limit_s(self.work.jobs[number])
                 yield Event(number, "stopped", f"nothing was heard of it long after its limit of {limit:g} s")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from crosscheck.records.kinds import RunRecord
-from crosscheck.running.execute import solves
+from crosscheck.running.rung import repeats_of
 
 BESIDES_S = 0.05  # of a job besides its runs: reading it, packing and sending what it found
 
@@ -16,7 +16,7 @@ def expected_seconds(records: Iterable[object]) -> dict[tuple[str, ...], float]:
     compiling: dict[tuple[str, ...], float] = {}
     running: dict[tuple[str, ...], float] = {}
     for (*work, _), record in latest.items():
-        repeats = solves(record.wall_s) if record.status == "finished" else 1
+        repeats = repeats_of(record.wall_s) if record.status == "finished" else 1
         compiling[tuple(work)] = max(compiling.get(tuple(work), 0.0), record.compile_s)
         running[tuple(work)] = running.get(tuple(work), BESIDES_S) + repeats * record.wall_s
     return {work: compiling[work] + seconds for work, seconds in running.items()}

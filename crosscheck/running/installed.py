@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from crosscheck.engines.answers import checked_version, clean
+from crosscheck.engines.answers import checked_version, clean, describe
 from crosscheck.engines.contract import EngineMissing
 from crosscheck.engines.registry import BUILT_IN, BrokenPlugIn, engine, plug_ins
-from crosscheck.running.execute import describe
 from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import Work
 
 ANSWER_LIMIT_S = 60.0
 
@@ -34,7 +34,7 @@ def describe_engines() -> list[EngineState]:
     found = {name: _useless(name, "it gave no answer") for name in names}
     with tempfile.TemporaryDirectory() as folder:
         log = str(Path(folder) / "log")
-        for event in run_jobs(tell, names, 1, log, kind=str, time_limit_s=lambda name: ANSWER_LIMIT_S):
+        for event in run_jobs(Work(tell, names, log, 1, str, lambda name: ANSWER_LIMIT_S)):
             name = names[event.job]
             if event.kind == "emitted":
                 found[name] = event.content

@@ -9,7 +9,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from crosscheck.drawing.draw import draw
+from crosscheck.drawing.film import EFFORT as FILM_EFFORT
+from crosscheck.drawing.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.engines.contract import Effort
+from crosscheck.engines.registry import home
 from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, RunFile, Variant
 from crosscheck.library.digests import case_digests
 from crosscheck.library.find import Case
@@ -18,9 +22,6 @@ from crosscheck.library.reference import has_reference, scene_digest
 from crosscheck.library.selection import alone, joining, select
 from crosscheck.records.drawing import FILM, Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
-from crosscheck.running.draw import draw
-from crosscheck.running.film import EFFORT as FILM_EFFORT
-from crosscheck.running.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.running.held import held_reference
 from crosscheck.running.job import MAIN, REFINED, Job
 from crosscheck.running.scheduler import TIME_LIMIT_S
@@ -159,6 +160,7 @@ def _job(
         scene_id="" if scene is None else scene_identity(scene, times),
         times=times,
         provider=provider,
+        maker=home(engine),
         efforts=prescribed(variant, engine),
         finest_only=role != MAIN,
         kept=tuple(chart.observable for chart in run.charts),
@@ -187,6 +189,7 @@ def _film(case: Case, run: RunFile, variant: Variant, provider: str) -> tuple[Jo
         scene_id=scene_identity(filmed, times),
         times=times,
         provider=provider,
+        maker=home(ENGINE),
         efforts=prescribed(variant, ENGINE)[:1] or (FILM_EFFORT,),
         finest_only=True,
         kept=film_channels(drawing),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 TIME_LIMIT_S = 1800.0  # of a job, unless it is given; the longest of the shipped cases' takes 14 s, compilation apart
 
@@ -57,22 +57,25 @@ def usual_limit(job: Any) -> float:
 Events = Generator[Event, None, None]
 
 
-class Scheduler(Protocol):
-    """Runs `function(job, emit)` for every job, each in a process where no other job is at work.
+@dataclass(frozen=True)
+class Work:
+    """Jobs, and how they are to be run: `function(job, emit)` for each, where no other job runs in the same process.
 
-    `function` must be importable by name; `jobs` may grow while the events are read, as what one brings to light can
-    ask for more. `kind(job)` names what a process has to load or compile for a job: processes stay with their kind.
-    A job is stopped after `time_limit_s(job)`, or when its process with all that this started exceeds
-    `memory_limit_bytes`. What jobs print on this machine goes to the file `log`. Closing the iterator stops everything.
+    `function` must be importable by name. `jobs` may grow while the events are read, since an outcome can ask for more.
+    What jobs print on this machine goes to the file `log`. `workers` is the number of jobs at a time, by default one
+    per core, or per thread of a cluster. `kind(job)` names what a process has to load or compile for a job: a process
+    serves one kind. A job is stopped after `time_limit_s(job)`, or when its process with all its descendants exceeds
+    `memory_limit_bytes`, by default an equal part of the memory.
     """
 
-    def __call__(
-        self,
-        function: Function,
-        jobs: Sequence[Any],
-        workers: int | None,
-        log: str,
-        kind: Callable[[Any], str] = one_kind,
-        time_limit_s: Callable[[Any], float] = usual_limit,
-        memory_limit_bytes: float | None = None,
-    ) -> Events: ...
+    function: Function
+    jobs: Sequence[Any]
+    log: str
+    workers: int | None = None
+    kind: Callable[[Any], str] = one_kind
+    time_limit_s: Callable[[Any], float] = usual_limit
+    memory_limit_bytes: float | None = None
+
+
+Scheduler = Callable[[Work], Events]
+"""Runs the jobs, and yields what happens to them. Closing the iterator stops everything."""

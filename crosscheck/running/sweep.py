@@ -7,6 +7,8 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
+
 from crosscheck.engines.answers import clean
 from crosscheck.engines.registry import SERVED_WITH
 from crosscheck.library.find import Case
@@ -18,7 +20,7 @@ from crosscheck.running.expected import expected_seconds
 from crosscheck.running.job import Done, Job
 from crosscheck.running.plan import plan
 from crosscheck.running.pool import run_jobs
-from crosscheck.running.scheduler import BY_DEFAULT, Event, Limits, Scheduler
+from crosscheck.running.scheduler import BY_DEFAULT, Event, Limits, Scheduler, Work
 
 PROVIDER = "crosscheck.engines.registry:engines"
 Listener = Callable[[Sequence[Job], Event], None]
@@ -65,11 +67,13 @@ def run_planned(
     jobs = [
         replace(job, done=_done(known, job), expected_s=took.get(job.work)) for _, planned in plans for job in planned
     ]
-    log = str(records.with_suffix(".log"))
+    work = Work(
+        execute, jobs, str(records.with_suffix(".log")), limits.workers, _engine, _time_limit, limits.memory_bytes
+    )
     doing: dict[int, str] = {}
     with (
         closing(Archive(records)) as archive,
-        closing(scheduler(execute, jobs, limits.workers, log, _engine, _time_limit, limits.memory_bytes)) as events,
+        closing(scheduler(work)) as events,
     ):
         archive.write(environment(tuple(record.case for record, _ in plans), asked, confirms=True))
         for record, _ in plans:
@@ -112,13 +116,5 @@ def _done(known: Sequence[Record], job: Job) -> frozenset[Done]:
 
 
 def _cut_short(job: Job, event: Event) -> RunRecord:
-    return RunRecord(
-        case=job.case,
-        variant=job.variant,
-        role=job.role,
-        engine=job.engine,
-        version="",
-        scene=job.scene_id,
-        status="crashed" if event.kind == "crashed" else "did not finish",
-        message=clean(event.content),
-    )
+    status = "crashed" if event.kind == "crashed" else "did not finish"
+    return msgspec.structs.replace(job.blank, status=status, message=clean(event.content))

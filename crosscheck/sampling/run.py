@@ -13,7 +13,7 @@ import numpy as np
 
 from crosscheck.engines.answers import clean
 from crosscheck.engines.contract import Effort
-from crosscheck.engines.registry import SERVED_WITH
+from crosscheck.engines.registry import SERVED_WITH, home
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import resolve
 from crosscheck.records.archive import Archive, decoded_lines
@@ -23,7 +23,7 @@ from crosscheck.records.made_by import made_by
 from crosscheck.running.job import MAIN, Done, Job
 from crosscheck.running.plan import sample_times, scene_identity
 from crosscheck.running.pool import run_jobs
-from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler
+from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler, Work
 from crosscheck.running.sweep import PROVIDER
 from crosscheck.sampling.file import SweepFile, load_sweep
 from crosscheck.sampling.points import sample_values
@@ -91,15 +91,13 @@ def run_sweep(
         records.unlink(missing_ok=True)
     known = _known(records)
     jobs = _jobs(sweep, subject, values, known, provider, limits.time_s or TIME_LIMIT_S)
+    log = str(out / "samples.log")
+    work = Work(run_sample, jobs, log, limits.workers, _kind, _time_limit, limits.memory_bytes)
     used: dict[int, SampleRecord] = {}
     with (
         closing(Archive(records, Written)) as archive,
         SamplesTable(out / TABLE, sweep) as table,
-        closing(
-            scheduler(
-                run_sample, jobs, limits.workers, str(out / "samples.log"), _kind, _time_limit, limits.memory_bytes
-            )
-        ) as events,
+        closing(scheduler(work)) as events,
     ):
         archive.write(environment())
         for event in events:
@@ -148,8 +146,8 @@ def _jobs(
             done = known.get((engine, scene_id, asked))
             job = Job(
                 case=sweep.title, variant=subject.variant.name, role=MAIN, engine=engine, scene=None, scene_id=scene_id,
-                times=subject.times, provider=provider, efforts=_effort(sweep, engine), finest_only=True,
-                kept=tuple(quantity.channel for quantity in sweep.quantities), done=_done(done),
+                times=subject.times, provider=provider, maker=home(engine), efforts=_effort(sweep, engine),
+                finest_only=True, kept=tuple(quantity.channel for quantity in sweep.quantities), done=_done(done),
                 time_limit_s=time_limit_s, lean=True,
             )  # fmt: skip
             found.append(SampleJob(job, sample, tuple(row.tolist()), sweep, subject.base, subject.variant, asked))

@@ -8,10 +8,10 @@ from typing import get_args
 
 import numpy as np
 
-from crosscheck.engines.answers import efforts_of
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import part_of
-from crosscheck.running.execute import find_engine
+from crosscheck.running.execute import NoSuchEngine, find_engine
 from crosscheck.sampling.file import SampleEffort, SweepFile, SweptQuantity
 from crosscheck.sampling.quantities import LETTERS
 from crosscheck.sampling.scenes import require_numbers
@@ -98,15 +98,16 @@ def _component(quantity: SweptQuantity) -> tuple[str, str] | None:
 
 def _engines(sweep: SweepFile, scene: Scene, duration_s: float, provider: str) -> Iterator[Defect]:
     for index, name in enumerate(sweep.engines):
-        engine = find_engine(provider, name)
-        if isinstance(engine, str):
-            yield Defect(str(Place().key("engines", index)), engine, "name one of them")
+        try:
+            engine = CheckedEngine(find_engine(provider, name), duration_s=duration_s)
+        except NoSuchEngine as error:
+            yield Defect(str(Place().key("engines", index)), str(error), "name one of them")
             continue
         for number, effort in enumerate(sweep.efforts):
             if effort.engine != name:
                 continue
             try:
-                own = {each.method for each in efforts_of(engine, scene, duration_s)}
+                own = {each.method for each in engine.efforts(scene)}
             except Exception:  # it is not installed, or does not take the scene: every sample says so
                 continue
             if wrong := _method(effort, own):

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from crosscheck.engines.answers import clean
-from crosscheck.running.execute import find_engine
+from crosscheck.running.execute import NoSuchEngine, find_engine
 
 UNSAID = "it does not say with which settings it runs"
 
@@ -27,9 +27,9 @@ def facts_of(names: Iterable[str], provider: str) -> dict[str, EngineFacts]:
 def _facts(name: str, provider: str) -> EngineFacts:
     try:
         engine = find_engine(provider, name)
-        if isinstance(engine, str):
-            return EngineFacts("", engine)
         algorithm, settings = (getattr(engine, what, "") for what in ("algorithm", "settings"))
+    except NoSuchEngine as error:
+        return EngineFacts("", str(error))
     except Exception as error:  # a plug-in may raise anything
         return EngineFacts("", clean(f"it cannot be asked: {error}"))
     return EngineFacts(clean(str(algorithm)), clean(str(settings)) or UNSAID)

@@ -17,9 +17,9 @@ from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 from typing import Any
 
-from crosscheck.engines.answers import BrokenContract, checked_model, checked_run
+from crosscheck.engines.answers import BrokenContract, checked_model, checked_run, describe
 from crosscheck.engines.contract import Effort, Model, Run
-from crosscheck.running.execute import describe, find_engine
+from crosscheck.running.execute import find_engine
 from crosscheck.running.job import Job
 from crosscheck.running.worker import TICK_S, Worker
 from flexmb.run.channels import channels_of
@@ -125,8 +125,6 @@ def _sample(model: Model, job: Job, effort: Effort) -> Sample:
 
 def _compile(job: Job) -> tuple[float, Model]:
     engine = find_engine(job.provider, job.engine)
-    if isinstance(engine, str):
-        raise LookupError(engine)
     engine.version()  # imports its library, which is not compiling
     start = perf_counter()
     model = checked_model(engine.compile(_scene(job)))

@@ -15,7 +15,7 @@ from flexmb.jain.cost import articulated
 from flexmb.levels.body import BY_NAME
 from flexmb.modal import flexible_model
 from flexmb.modal.integrals import modal_integrals
-from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody
+from flexmb.scene.bodies import BeamBody, Body, ModalBody
 from flexmb.scene.schema import Scene
 
 STEP_AT_HIGHEST = 3.4
@@ -110,7 +110,7 @@ def step(scene: Scene, name: str, rung: BodyModel, error: float) -> Step | None:
         whole = built(scene, ((name, rung),))
         before = {b.name for b in scene.bodies if b.name != name}
         parts = [b for b in whole.bodies if b.name not in before]
-        counts = [(_mode_count(b), "rigid" if isinstance(b, RigidBody) else b.level) for b in parts]
+        counts = [(_mode_count(b), b.level) for b in parts]
         fastest = _fastest(next(b for b in scene.bodies if b.name == name), rung, parts)
     except ValueError:
         return None

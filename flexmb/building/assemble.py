@@ -117,7 +117,8 @@ def _describe(body: a.Record, chain: list[BodyLink], numbering: Numbering) -> No
     body["modes"] = [link.mode_count for link in chain]
     body["hinge_kind"] = [KINDS.index(link.kind) for link in chain]
     body["axis"] = [link.kind.axis for link in chain]
-    body["sequence"] = [(*link.sequence, 0, 0, 0)[:3] for link in chain]
+    body["sequence"] = [(*link.axes.sequence, 0, 0, 0)[:3] for link in chain]
+    body["parameters"] = [(*link.axes.parameters, 0.0, 0.0, 0.0)[:3] for link in chain]
     body["nv"] = [link.kind.speeds for link in chain]
     body["q_index"], body["u_index"] = np.array(numbering.hinges).reshape(-1, 2).T
     body["eta_index"], body["etad_index"] = np.array(numbering.modes).reshape(-1, 2).T
@@ -181,12 +182,8 @@ def _speeds(
         if stiffness or damping:
             body["ball_spring"][k], out["damping"][u : u + 3] = stiffness, damping
         for n, (_, c) in enumerate(link.scalar):
-            if isinstance(c, s.AngularCoordinate):
-                law, load, motion = (c.stiffness_Nm_rad, c.damping_Nms_rad, c.rest_rad), c.torque_Nm, c.prescribed_rad
-            else:
-                law, load, motion = (c.stiffness_N_m, c.damping_Ns_m, c.rest_m), c.force_N, c.prescribed_m
             at.append(u + n)
-            rows.append((q + n, functions.number(load), functions.number(motion), *law))
+            rows.append((q + n, functions.number(c.effort), functions.number(c.prescribed), *c.spring))
     for wheel in wheels:
         at.append(numbering.u[wheel.name].start)
         motor, motion = functions.number(wheel.torque_Nm), functions.number(wheel.prescribed_rad)

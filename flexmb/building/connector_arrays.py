@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 
@@ -75,16 +75,19 @@ def connector_arrays(
             if sides[i, j]["body"] == a.ON_GROUND:
                 offset, quaternion = _offset(connector, side)
                 sides[i, j]["position"], sides[i, j]["rotation"] = offset, rotation_matrix(quaternion).ravel()
-        if isinstance(connector, s.Bushing):
-            record["kind"], row = a.BUSHING, bushings.index(connector)
-            record["row"] = row
-            matrices[row]["stiffness"], matrices[row]["damping"] = connector.stiffness, connector.damping
-        else:
-            record["kind"], record["acts"] = a.ALONG_LINE, ACTS[connector.acts]
-            record["free_length"], record["damping"] = connector.free_length_m, connector.damping_Ns_m
-            record["smoothing"] = max(SMOOTHING * connector.free_length_m, SHORTEST)
-            record["function"] = number(connector.force_N)
-            record["start"], record["stop"] = _add(laws, _pieces(by_stem(connector), connector.acts))
+        match connector:
+            case s.Bushing():
+                record["kind"], row = a.BUSHING, bushings.index(connector)
+                record["row"] = row
+                matrices[row]["stiffness"], matrices[row]["damping"] = connector.stiffness, connector.damping
+            case s.SpringDamper():
+                record["kind"], record["acts"] = a.ALONG_LINE, ACTS[connector.acts]
+                record["free_length"], record["damping"] = connector.free_length_m, connector.damping_Ns_m
+                record["smoothing"] = max(SMOOTHING * connector.free_length_m, SHORTEST)
+                record["function"] = number(connector.force_N)
+                record["start"], record["stop"] = _add(laws, _pieces(by_stem(connector), connector.acts))
+            case _:
+                assert_never(connector)
     springs = [each for each in scene.connectors if isinstance(each, HingeSpring)]
     frictions = [each for each in scene.connectors if isinstance(each, HingeFriction)]
     return {

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 
 from flexmb.building.models import ORIGIN, Models, level_of, one_point
 from flexmb.hinges.catalogue import kind_of
-from flexmb.hinges.kind import HingeKind, z_to
+from flexmb.hinges.kind import HingeKind, Reduced, z_to
 from flexmb.levels.body import BY_NAME
 from flexmb.levels.level import FidelityLevel
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
@@ -62,7 +62,7 @@ class End(NamedTuple):
 class BodyLink:
     """One body as the dynamics sees it, and the hinge that holds it.
 
-    `turn` (3,3) turns both frames of the hinge. The last `wheels` points of its model are the despun wheels of the
+    `axes`: the hinge as its kernels take it. The last `wheels` points of its model are the despun wheels of the
     body. Models and ports are made when first asked for: those of rigid bodies rarely are.
     """
 
@@ -71,12 +71,16 @@ class BodyLink:
     parent: str
     level: FidelityLevel
     kind: HingeKind
-    sequence: tuple[int, ...]
-    turn: Real
+    axes: Reduced
     inboard_end: End
     outboard_end: End
     body: s.Body | s.PointMass
     models: Models
+
+    @property
+    def turn(self) -> Real:
+        """(3,3) What turns both frames of the hinge."""
+        return self.axes.turn
 
     @property
     def is_rigid(self) -> bool:
@@ -86,9 +90,15 @@ class BodyLink:
     @property
     def mass_properties(self) -> tuple[float, s.Vector, s.Matrix3]:
         """Mass, mass centre and inertia about it of a rigid link without its wheels, in the body's own frame."""
-        if isinstance(self.body, s.RigidBody):
-            return self.body.mass_kg, self.body.com_m, self.body.inertia_kg_m2
-        return self.body.mass_kg, ZERO, (ZERO, ZERO, ZERO)
+        match self.body:
+            case s.RigidBody(mass_kg=mass, com_m=com, inertia_kg_m2=inertia):
+                return mass, com, inertia
+            case s.PointMass(mass_kg=mass):
+                return mass, ZERO, (ZERO, ZERO, ZERO)
+            case s.BeamBody() | s.ModalBody() | s.SidBody():
+                raise ValueError(f'"{self.name}" is no rigid link')
+            case _:
+                assert_never(self.body)
 
     @property
     def wheels(self) -> int:
@@ -158,21 +168,21 @@ def links(scene: s.Scene) -> list[BodyLink]:
     models = Models(scene)
     found = []
     for body, hinge in ordered(scene):
-        kind, (sequence, turn) = kind_of(hinge)
+        kind, axes = kind_of(hinge)
         inboard = End(hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
         outboard = End(hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
         level, parent = level_of(body), hinge.parent
         if isinstance(body, s.SidBody):
             models[body.name]  # says that they are not supported
-        found.append(BodyLink(body.name, hinge, parent, level, kind, sequence, turn, inboard, outboard, body, models))
+        found.append(BodyLink(body.name, hinge, parent, level, kind, axes, inboard, outboard, body, models))
     return found + [_point_mass(mass, models) for mass in scene.point_masses]
 
 
 def _point_mass(mass: s.PointMass, models: Models) -> BodyLink:
     """A point mass as a body without rotary inertia on translations along its directions."""
-    kind, (sequence, turn) = kind_of(mass)
+    kind, axes = kind_of(mass)
     inboard, outboard = End(mass.node, mass.offset_m, IDENTITY), End("origin", ZERO, IDENTITY)
-    return BodyLink(mass.name, mass, mass.body, BY_NAME["rigid"], kind, sequence, turn, inboard, outboard, mass, models)
+    return BodyLink(mass.name, mass, mass.body, BY_NAME["rigid"], kind, axes, inboard, outboard, mass, models)
 
 
 @dataclass(frozen=True)

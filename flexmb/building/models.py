@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import assert_never
 
 import numpy as np
 
@@ -53,14 +54,18 @@ class Models:
         if name == GROUND:
             return one_point(0.0, ZERO, (ZERO, ZERO, ZERO), {"origin": ORIGIN})
         body = self.body[name]
-        if isinstance(body, s.RigidBody):
-            nodes = {node: self.node(name, node) for node in rest_frames(body)}
-            return self._with_wheels(name, one_point(body.mass_kg, body.com_m, body.inertia_kg_m2, nodes))
-        if isinstance(body, s.SidBody):
-            raise NotImplementedError(f'body "{name}": SID files are not supported yet; use kind = "modal"')
-        assert isinstance(body, s.BeamBody | s.ModalBody)
-        model = flexible_model(body)
-        return self._with_wheels(name, model if level_of(body).flexible else _without_modes(model))
+        match body:
+            case s.RigidBody():
+                nodes = {node: self.node(name, node) for node in rest_frames(body)}
+                model = one_point(body.mass_kg, body.com_m, body.inertia_kg_m2, nodes)
+            case s.BeamBody() | s.ModalBody():
+                model = flexible_model(body)
+                model = model if level_of(body).flexible else _without_modes(model)
+            case s.SidBody():
+                raise NotImplementedError(f'body "{name}": SID files are not supported yet; use kind = "modal"')
+            case _:
+                assert_never(body)
+        return self._with_wheels(name, model)
 
     def _with_wheels(self, name: str, model: FlexibleModel) -> FlexibleModel:
         for wheel in self.wheels.get(name, ()):
@@ -78,7 +83,7 @@ def wheels_by_body(scene: s.Scene) -> dict[str, list[s.Wheel]]:
 
 def level_of(body: s.Body) -> FidelityLevel:
     """The fidelity level of a body."""
-    return BY_NAME["rigid" if isinstance(body, s.RigidBody) else body.level]
+    return BY_NAME[body.level]
 
 
 def one_point(mass: float, com: s.Vector, inertia: s.Matrix3, nodes: dict[str, FlexibleNode]) -> FlexibleModel:

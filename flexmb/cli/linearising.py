@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +16,8 @@ from flexmb.output.writing import check_folder
 
 if TYPE_CHECKING:
     from flexmb.linear.linear_model import LinearModel
+    from flexmb.system.tree_system import System
+    from flexmb.typing import Real
 
 
 def linearize(
@@ -55,45 +59,58 @@ def linearize(
     **Exit code**: 0 linearised, 1 no equilibrium was found, 2 the scene or an option is wrong.
     """
     with no_traceback():
-        from flexmb.linear.equilibrium import equilibrium
         from flexmb.linear.linear_tables import modes_table
-        from flexmb.linear.linearize import linearize as linearized
-        from flexmb.linear.newton import EquilibriumError
-        from flexmb.linear.spin import steady_spin
-        from flexmb.linear.truncation import truncation
-        from flexmb.scene.bodies import BeamBody
-        from flexmb.scene.files import load_scene
-        from flexmb.system.compile import compile
-        from flexmb.system.tree_system import System
-
-        def linear(system: System) -> LinearModel:
-            if spin is not None:
-                return steady_spin(system, spin, rate).linearize()
-            if at == "equilibrium":
-                return linearized(system, equilibrium(system), held=True)
-            return linearized(system)
 
         if at not in ("equilibrium", "initial"):
             raise ValueError(f"--at is equilibrium or initial, not {at!r}")
-        loaded = load_scene(scene)
-        try:
-            with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
-                model = linear(compile(loaded))
-                bends = any(isinstance(body, BeamBody) and body.level != "rigid" for body in loaded.bodies)
-                missing, note = None, ""
-                if cut and bends:
-                    try:
-                        missing = truncation(model, loaded, linear)
-                    except ArithmeticError as error:  # no equilibrium, or no accelerations: more modes may buckle
-                        note = f"truncation is not known, for with twice the modes of every beam: {error}"
-        except EquilibriumError as error:
-            errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
-            raise typer.Exit(EXIT_STOPPED) from None
+        with _no_steady_state(), console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
+            model, missing, note = _linearised(scene, at, spin, rate, cut)
         console.print(modes_table(model, missing))
         if note:
             console.print(Text(printable(note), style="yellow"))
         if export is not None:
             console.print("wrote", str(model.save(export)), soft_wrap=True)
+
+
+def _linearised(
+    scene: Path, at: str, spin: str | None, rate: float, cut: bool
+) -> tuple[LinearModel, Real | None, str]:
+    """The linear model, the truncation of its eigenvalues if asked for and known, and why it is not known."""
+    from flexmb.linear.equilibrium import equilibrium
+    from flexmb.linear.linearize import linearize as linearized
+    from flexmb.linear.spin import steady_spin
+    from flexmb.linear.truncation import truncation
+    from flexmb.scene.bodies import BeamBody
+    from flexmb.scene.files import load_scene
+    from flexmb.system.compile import compile
+
+    def linear(system: System) -> LinearModel:
+        if spin is not None:
+            return steady_spin(system, spin, rate).linearize()
+        if at == "equilibrium":
+            return linearized(system, equilibrium(system), held=True)
+        return linearized(system)
+
+    loaded = load_scene(scene)
+    model = linear(compile(loaded))
+    if not cut or not any(isinstance(body, BeamBody) and body.level != "rigid" for body in loaded.bodies):
+        return model, None, ""
+    try:
+        return model, truncation(model, loaded, linear), ""
+    except ArithmeticError as error:  # no equilibrium, or no accelerations: more modes may buckle
+        return model, None, f"truncation is not known, for with twice the modes of every beam: {error}"
+
+
+@contextmanager
+def _no_steady_state() -> Iterator[None]:
+    """Show the error of a search for an equilibrium or a steady spin, and exit with code 1."""
+    from flexmb.linear.newton import EquilibriumError
+
+    try:
+        yield
+    except EquilibriumError as error:
+        errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
+        raise typer.Exit(EXIT_STOPPED) from None
 
 
 def campbell(
@@ -123,18 +140,13 @@ def campbell(
     with no_traceback():
         from flexmb.linear.campbell import campbell as diagram
         from flexmb.linear.linear_tables import campbell_table
-        from flexmb.linear.newton import EquilibriumError
         from flexmb.scene.files import load_scene
 
         loaded, values = load_scene(scene), range_of("rates", rates)
         for file in (picture, *([] if csv is None else [csv])):
             check_folder(file.parent)
-        try:
-            with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
-                result = diagram(loaded, hinge, values)
-        except EquilibriumError as error:
-            errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
-            raise typer.Exit(EXIT_STOPPED) from None
+        with _no_steady_state(), console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
+            result = diagram(loaded, hinge, values)
         console.print(campbell_table(result))
         written = [result.plot(picture, modes)]
         if csv is not None:

@@ -1,7 +1,8 @@
 """Connectors along scalar coordinates: nonlinear springs with stops and actuators, and dry friction.
 
-A stop at depth d, pressed in at the rate d', pushes back by k d (1 + e d'), Hunt and Crossley (1975), and never pulls:
-the load starts from zero however fast it is met. Friction follows Hess and Soom (1990), smooth through zero:
+A stop at the depth d, increasing at the rate d', exerts k d (1 + e d'), Hunt and Crossley (1975), and never pulls. The
+load is continuous at any speed of contact, because it is proportional to d. Friction, Hess and Soom (1990), is smooth
+at zero speed:
 
     [Fc + (Fs - Fc) / (1 + (v/vs)^2)] v / sqrt(v^2 + vr^2)
 """
@@ -16,7 +17,7 @@ from flexmb.tables.features import FRICTION, HINGE_ACTUATORS, HINGE_SPRINGS
 
 @helper
 def add_loads_along_hinges(c, w):
-    """Loads of all springs and friction along coordinates, added to w.speed.applied."""
+    """Add the loads of all springs and friction along coordinates to w.speed.applied."""
     evaluate_along_hinges(c, w)
     for i in range(c.hinge_spring.shape[0]):
         w.speed[c.hinge_spring[i].speed].applied += w.hinge_spring[i].load
@@ -26,7 +27,7 @@ def add_loads_along_hinges(c, w):
 
 @helper
 def evaluate_along_hinges(c, w):
-    """The same into w.hinge_spring and w.friction, with energy and power."""
+    """Write loads, energies and powers of all springs and friction to w.hinge_spring and w.friction."""
     if has(c, HINGE_SPRINGS):
         for i in range(c.hinge_spring.shape[0]):
             _spring(c, w, i)
@@ -68,7 +69,7 @@ def _friction(c, w, i):
 
 @helper
 def stored_along_hinges(c, w):
-    """Energy (J) at the last evaluation."""
+    """Energy in J at the last evaluation."""
     total = 0.0
     for i in range(c.hinge_spring.shape[0]):
         total += w.hinge_spring[i].energy
@@ -77,7 +78,7 @@ def stored_along_hinges(c, w):
 
 @helper
 def power_along_hinges(c, w):
-    """Power (W) of dampers, stops, actuators and friction at the last evaluation."""
+    """Power in W of dampers, stops, actuators and friction at the last evaluation."""
     total = 0.0
     for i in range(c.hinge_spring.shape[0]):
         total += w.hinge_spring[i].power

@@ -132,7 +132,8 @@ class Feedback:
             posed = problem(*kernels, leaps)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
         ends = _with_instants(ends, table["time"][table["time"] > start], t_end)
-        return Begun(posed, y, Clock(clock.times, ends), controlled)
+        farthest = clock.farthest if len(table) == 0 else t_end  # a leap crosses no instant
+        return Begun(posed, y, Clock(clock.times, ends, farthest), controlled)
 
     def _start_after_samples(self, t: float, y: Real, made: a.Loop) -> None:
         """What sampled controllers say from the first instant on is there when continuous ones start."""

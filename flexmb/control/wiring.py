@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, assert_never
 
 import numpy as np
 
@@ -148,7 +148,10 @@ def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
             return a.DRIVE_LOAD, driven_speed(system, coordinate), 1, a.WORLD
         case TimeSensor():
             return a.TIME, 0, 1, a.WORLD
-    return a.PROFILE, 0, 2, a.WORLD
+        case ProfileSensor():
+            return a.PROFILE, 0, 2, a.WORLD
+        case _:
+            assert_never(sensor)
 
 
 def driven_speed(system: System, coordinate: str) -> int:
@@ -179,7 +182,10 @@ def _states(controller: Controller) -> list[float]:
             return list(initial)
         case Pid(period_s=period):
             return [0.0] * (laws.FILTERED + 1 if period is None else laws.BEGUN + 1)
-    return []
+        case Saturation() | GainTable():
+            return []
+        case _:
+            assert_never(controller)
 
 
 def _numbers(controller: Controller, inputs: int) -> list[float]:
@@ -199,7 +205,10 @@ def _numbers(controller: Controller, inputs: int) -> list[float]:
             return [lower, upper]
         case GainTable(points=points, values=values):
             return [*points, *values]
-    return list(controller.parameters)
+        case UserLaw(parameters=parameters):
+            return list(parameters)
+        case _:
+            assert_never(controller)
 
 
 def _tracking(pid: Pid) -> float:

@@ -1,12 +1,12 @@
-"""Connectors by the dense route: loads on both ends, loads along coordinates, and the energy stored.
+"""Connectors in the dense route: loads on both ends, loads along coordinates, and stored energy.
 
-Directly from the schema's definitions: rotations by SciPy, tables by its interpolator. A zero length has no direction
-here.
+Directly from the definitions in the schema, with rotations and table interpolation by SciPy. A line of zero length,
+which the compiled connectors smooth, is not defined here.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, assert_never
 
 import numpy as np
 
@@ -14,13 +14,13 @@ from flexmb.dense.function_jets import profile
 from flexmb.dense.jets import MovingFrame, skew
 from flexmb.dense.members import DenseTree
 from flexmb.scene import schema as s
-from flexmb.scene.connectors import AlongHinge, BetweenNodes, HingeFriction, actuator, by_stem
+from flexmb.scene.connectors import AlongHinge, BetweenNodes, actuator, by_stem
 from flexmb.scene.tree import coordinate_of
 from flexmb.typing import Real
 
 
 class Grip(NamedTuple):
-    """What a connector does at one instant: [torque; force] (6,) on A about A and on B about B, World; energy (J)."""
+    """Loads of a connector at one instant: [torque; force] (6,) on A about A, on B about B, World axes; energy (J)."""
 
     on_a: Real
     on_b: Real
@@ -28,7 +28,7 @@ class Grip(NamedTuple):
 
 
 class Hold(NamedTuple):
-    """What a connector does along the coordinate with places q and u: load, and energy (J)."""
+    """Load of a connector along the coordinate whose speed has the index u, and its energy (J)."""
 
     u: int
     load: float
@@ -36,35 +36,54 @@ class Hold(NamedTuple):
 
 
 def grip(connector: BetweenNodes, a: MovingFrame, b: MovingFrame, t: float) -> Grip:
-    """Of a connector between two frames in World, at time t."""
+    """Loads of a connector between two frames in World at time t."""
     arm = b.position.value - a.position.value
-    on_b, energy = _line(connector, a, b, t) if isinstance(connector, s.SpringDamper) else _bushing(connector, a, b)
+    match connector:
+        case s.SpringDamper():
+            on_b, energy = _line(connector, a, b, t)
+        case s.Bushing():
+            on_b, energy = _bushing(connector, a, b)
+        case _:
+            assert_never(connector)
     on_a = -np.concatenate([on_b[:3] + np.cross(arm, on_b[3:]), on_b[3:]])
     return Grip(on_a, on_b, energy)
 
 
 def hold(scene: s.Scene, tree: DenseTree, connector: AlongHinge, q: Real, u: Real, t: float) -> Hold:
-    """Of a connector along a coordinate of a hinge, point mass or wheel, at time t."""
+    """Load of a connector along a coordinate of a hinge, point mass or wheel at time t."""
     item, number = coordinate_of(scene, connector)
     x = [scalar for scalar in tree.scalars if scalar.owner == item.name][number]
-    law, rate = by_stem(connector), u[x.u]
-    if isinstance(connector, HingeFriction):
-        rising = 0.0 if law["static"] is None else law["static"] - law["sliding"]
-        level = law["sliding"] + rising / (1.0 + (rate / (law["stribeck"] or 1.0)) ** 2)
-        return Hold(x.u, -level * rate / np.hypot(rate, law["smoothing"]), 0.0)
-    load, energy = resistance(law, q[x.q] - law["rest"])
+    match connector:
+        case s.AngularFriction() | s.LinearFriction():
+            return Hold(x.u, _friction(by_stem(connector), u[x.u]), 0.0)
+        case s.AngularSpring() | s.LinearSpring():
+            load, energy = _spring(by_stem(connector), q[x.q], u[x.u])
+            push = actuator(connector)
+            return Hold(x.u, (0.0 if push is None else float(profile(push, t).value)) - load, energy)
+        case _:
+            assert_never(connector)
+
+
+def _friction(law: dict[str, Any], rate: float) -> float:
+    rising = 0.0 if law["static"] is None else law["static"] - law["sliding"]
+    level = law["sliding"] + rising / (1.0 + (rate / (law["stribeck"] or 1.0)) ** 2)
+    return -level * rate / float(np.hypot(rate, law["smoothing"]))
+
+
+def _spring(law: dict[str, Any], value: float, rate: float) -> tuple[float, float]:
+    """What resists, and the energy stored, of a spring along a coordinate with its damper and stops."""
+    load, energy = resistance(law, value - law["rest"])
     load += law["damping"] * rate
     for stop, side in ((law["lower"], -1.0), (law["upper"], 1.0)):
-        depth = 0.0 if stop is None else max(0.0, side * (q[x.q] - stop))
+        depth = 0.0 if stop is None else max(0.0, side * (value - stop))
         pressed = max(0.0, 1.0 + law["stop_dissipation"] * side * rate)
         load += side * law["stop_stiffness"] * depth * pressed
         energy += 0.5 * law["stop_stiffness"] * depth**2
-    push = actuator(connector)
-    return Hold(x.u, (0.0 if push is None else float(profile(push, t).value)) - load, energy)
+    return load, energy
 
 
 def resistance(law: dict[str, Any], x: float) -> tuple[float, float]:
-    """The load of a law at x, and the energy stored since x = 0."""
+    """The load of a law at x, and its energy relative to x = 0."""
     if law["table"]:
         from scipy.integrate import quad  # slow to import, as is the interpolator
 
@@ -93,7 +112,7 @@ def _line(connector: s.SpringDamper, a: MovingFrame, b: MovingFrame, t: float) -
     elastic, energy = resistance(law, length - connector.free_length_m)
     sign = {"both": 0.0, "tension": 1.0, "compression": -1.0}[connector.acts]
     tension = elastic + connector.damping_Ns_m * rate
-    if sign:  # the energy counts from where the spring goes slack
+    if sign:  # the energy is relative to the length at which the spring becomes slack
         energy += 0.5 * connector.preload_N**2 / connector.stiffness_N_m
         if sign * elastic <= 0.0:
             elastic, energy, tension = 0.0, 0.0, 0.0
@@ -125,7 +144,7 @@ def _bushing(connector: s.Bushing, a: MovingFrame, b: MovingFrame) -> tuple[Real
 
 
 def _left_jacobian(theta: Real) -> Real:
-    """(3,3) the sum of skew(theta)^n / (n+1)!, to round-off below a whole turn."""
+    """(3,3): the sum of skew(theta)^n / (n+1)!; 48 terms are exact to round-off for |theta| < 2 pi."""
     term = total = np.eye(3)
     for n in range(1, 48):
         term = term @ skew(theta) / (n + 1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import assert_never
+
 import numpy as np
 from numpy.polynomial import Polynomial
 
@@ -37,9 +39,11 @@ def profile(function: Function, t: float) -> Jet:
         case Pulse(value=value, start_s=start, duration_s=duration):
             return constant(value if start <= t < start + duration else 0.0)
         case ControlSignal():
-            return constant(0.0)  # at one state, by itself: the loop is open
+            return constant(0.0)  # a single evaluation has no controllers
         case Table(times_s=times, values=values):
             from scipy.interpolate import make_interp_spline  # slow to import, and few scenes have tables
 
             spline = make_interp_spline(times, values, k=5)
             return Jet(spline(t), spline(t, 1), spline(t, 2))
+        case _:
+            assert_never(function)

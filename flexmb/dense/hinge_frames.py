@@ -1,52 +1,53 @@
-"""All that the dense route knows of hinges: sizes, frames, rates and springs of every kind in the schema."""
+"""All that the dense route knows of hinges: sizes, frames, rates and springs of the freedoms that they consist of.
+
+The scene says which freedoms a hinge has; the compiled kernels of `flexmb.hinges` do not read that, but have each kind
+written out. A slip in either therefore shows when the two routes are compared.
+"""
 
 from __future__ import annotations
+
+from typing import assert_never
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from flexmb.dense.jets import Jet, MovingFrame, constant, product, rotation_about, skew
 from flexmb.scene import schema as s
-from flexmb.scene.tree import coordinates
+from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.typing import Real
 
 Item = s.Hinge | s.PointMass
-AXES = dict(zip("xyz", np.eye(3), strict=True))
 
 
 def hinge_sizes(hinge: Item) -> tuple[int, int]:
     """Numbers of coordinates and speeds."""
-    match hinge:
-        case s.Spherical():
-            return 4, 3
-        case s.Free():
-            return 7, 6
-    count = len(coordinates(hinge))
-    return count, count
+    sizes = [freedom.sizes for freedom in hinge.freedoms]
+    return sum(q for q, _ in sizes), sum(u for _, u in sizes)
 
 
 def hinge_frame(hinge: Item, c: Jet) -> MovingFrame:
     """Outboard hinge frame seen from the inboard one; c (B,1,n) are jets of its coordinates, rates its speeds."""
-    match hinge:
-        case s.Revolute(axis=axis):
-            return rotated((axis, c[..., 0]))
-        case s.Prismatic(axis=axis):
-            return moved((axis, c[..., 0]))
-        case s.Cylindrical(axis=axis):
-            return moved((axis, c[..., 1])).carry(rotated((axis, c[..., 0])))
-        case s.Universal():
-            return rotated((AXES["x"], c[..., 0]), (AXES["y"], c[..., 1]))
-        case s.Gimbal(sequence=sequence):
-            return rotated(*((AXES[axis], c[..., n]) for n, axis in enumerate(sequence)))
-        case s.Planar():
-            return moved((AXES["x"], c[..., 0]), (AXES["y"], c[..., 1])).carry(rotated((AXES["z"], c[..., 2])))
-        case s.PointMass(directions=directions):
-            return moved(*((direction, c[..., n]) for n, direction in enumerate(directions)))
-        case s.Spherical():
+    found, place = rotated(), 0
+    for freedom in hinge.freedoms:
+        count = max(freedom.sizes)
+        own = _across(freedom, c[..., place : place + count])
+        found, place = found.carry(own) if place else own, place + count
+    return found
+
+
+def _across(freedom: Freedom, c: Jet) -> MovingFrame:
+    """The frame beyond one freedom."""
+    match freedom:
+        case ScalarFreedom(axis=axis, turns=turns, shifts=shifts):
+            along = moved((axis, c[..., 0].map(lambda x: shifts * x))) if shifts else moved()
+            turned = rotated((axis, c[..., 0].map(lambda x: turns * x))) if turns else rotated()
+            return MovingFrame(along.position, turned.rotation)
+        case Ball():
             return MovingFrame(moved().position, _attitude(c.value, c.rate, c.acceleration))
-        case s.Free():
+        case Floating():
             return _floating(c)
-    return rotated()
+        case _:
+            assert_never(freedom)
 
 
 def rotated(*turns: tuple[ArrayLike, Jet]) -> MovingFrame:
@@ -90,29 +91,43 @@ def rotation_of(quaternion: ArrayLike) -> Real:
 
 def coordinate_rates(hinge: Item, q: Real, u: Real) -> Real:
     """dq/dt of the hinge's coordinates, from its own q and u."""
-    match hinge:
-        case s.Spherical():
+    found, i, j = [u[:0]], 0, 0
+    for freedom in hinge.freedoms:
+        nq, nu = freedom.sizes
+        found.append(_rates(freedom, q[i : i + nq], u[j : j + nu]))
+        i, j = i + nq, j + nu
+    return np.concatenate(found)
+
+
+def _rates(freedom: Freedom, q: Real, u: Real) -> Real:
+    match freedom:
+        case ScalarFreedom():
+            return u
+        case Ball():
             return _quaternion_rate(q, u)
-        case s.Free():
+        case Floating():
             still = np.zeros((1, 1, 6))
             R = _floating(Jet(q[None, None], still, still)).rotation.value[0, 0]
             return np.concatenate([R @ u[3:], _quaternion_rate(q[3:], u[:3])])
-    return u
+        case _:
+            assert_never(freedom)
 
 
 def ball_torque(hinge: Item, q: Real, u: Real) -> Real | float:
     """Generalised force (3,) of the isotropic spring and damper of a spherical hinge, 0 for all other kinds."""
-    if not isinstance(hinge, s.Spherical):
-        return 0.0
-    return -hinge.stiffness_Nm_rad * _rotation_vector(q) - hinge.damping_Nms_rad * u
+    for ball in _balls(hinge):
+        return -ball.stiffness * _rotation_vector(q) - ball.damping * u
+    return 0.0
 
 
 def ball_energy(hinge: Item, q: Real) -> float:
     """Energy (J) of that spring."""
-    if not isinstance(hinge, s.Spherical):
-        return 0.0
-    theta = _rotation_vector(q)
-    return 0.5 * hinge.stiffness_Nm_rad * float(theta @ theta)
+    return sum(0.5 * ball.stiffness * float(np.sum(_rotation_vector(q) ** 2)) for ball in _balls(hinge))
+
+
+def _balls(hinge: Item) -> list[Ball]:
+    """The ball joint that a hinge is, if any."""
+    return [freedom for freedom in hinge.freedoms if isinstance(freedom, Ball)]
 
 
 def _rotation_vector(quaternion: Real) -> Real:

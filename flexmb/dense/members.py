@@ -1,6 +1,6 @@
-"""What the dense route needs of a scene: members base to tip, their inertia points, and the places of coordinates.
+"""A scene for the dense route: members from base to tip, their inertia points, and the indices of their coordinates.
 
-The order of q and u, body by body (depth-first, point masses last): hinge, modes, wheels of the body.
+The order of q and u is body by body (depth-first, point masses last), in each body hinge, modes, wheels.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import assert_never
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,7 +36,7 @@ class Seat:
 
 @dataclass(frozen=True)
 class Member:
-    """One body or point mass, and the hinge that holds it; `parent` is -1 for the ground."""
+    """One body or point mass, and the hinge that connects it to its parent, -1 for the ground."""
 
     name: str
     parent: int
@@ -52,7 +53,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Rotor:
-    """A wheel on a member: its centre's frame, and its places in q and u."""
+    """A wheel on a member: the frame of its centre, and its indices in q and u."""
 
     wheel: s.Wheel
     member: int
@@ -70,7 +71,7 @@ class Rotor:
 
 @dataclass(frozen=True)
 class ScalarSpeed:
-    """A speed that is the rate of one coordinate, with what acts on it; `q`, `u` are its places."""
+    """A speed that is the rate of one coordinate, with the forces on it; `q`, `u` are the indices of both."""
 
     owner: str
     q: int
@@ -84,7 +85,7 @@ class ScalarSpeed:
 
 @dataclass(frozen=True)
 class DenseTree:
-    """The scene in the dense route's terms."""
+    """A scene as the dense route uses it."""
 
     members: list[Member]
     rotors: list[Rotor]
@@ -111,8 +112,7 @@ def build(scene: s.Scene, folder: Path | None = None) -> DenseTree:
     for body, hinge in ordered(scene):
         inboard = _seat(models[hinge.parent], hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
         outboard = _seat(models[body.name], hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
-        level: s.Level = "rigid" if isinstance(body, s.RigidBody) else body.level
-        tree = _append(tree, body.name, hinge.parent, hinge, inboard, outboard, models[body.name], level)
+        tree = _append(tree, body.name, hinge.parent, hinge, inboard, outboard, models[body.name], body.level)
         for wheel in scene.wheels:
             if wheel.body == body.name:
                 tree = _append_wheel(tree, wheel, _seat(models[body.name], wheel.node, wheel.offset_m))
@@ -158,11 +158,7 @@ def _append_wheel(tree: DenseTree, wheel: s.Wheel, seat: Seat) -> DenseTree:
 
 
 def _scalar(owner: str, q: int, u: int, c: Coordinate) -> ScalarSpeed:
-    if isinstance(c, s.AngularCoordinate):
-        spring, drive = (c.stiffness_Nm_rad, c.damping_Nms_rad, c.rest_rad), (c.torque_Nm, c.prescribed_rad)
-    else:
-        spring, drive = (c.stiffness_N_m, c.damping_Ns_m, c.rest_m), (c.force_N, c.prescribed_m)
-    return ScalarSpeed(owner, q, u, *spring, *drive)
+    return ScalarSpeed(owner, q, u, *c.spring, c.effort, c.prescribed)
 
 
 def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY) -> Seat:
@@ -170,19 +166,23 @@ def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion:
 
 
 def _model(body: s.Body, folder: Path | None) -> FlexibleModel:
-    if isinstance(body, s.RigidBody):
-        frames = {name: (frame.position, frame.quaternion) for name, frame in rest_frames(body).items()}
-        return rigid_model(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2), frames)
-    if isinstance(body, s.SidBody) or body.level not in LEVELS:
-        raise NotImplementedError(f'body "{body.name}": the dense route knows levels {", ".join(LEVELS)}')
-    model = flexible_model(body, folder)
-    return _stiff(model) if body.level == "rigid" else model
+    match body:
+        case s.RigidBody():
+            frames = {name: (frame.position, frame.quaternion) for name, frame in rest_frames(body).items()}
+            return rigid_model(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2), frames)
+        case (s.BeamBody() | s.ModalBody()) if body.level in LEVELS:
+            model = flexible_model(body, folder)
+            return _stiff(model) if body.level == "rigid" else model
+        case s.BeamBody() | s.ModalBody() | s.SidBody():
+            raise NotImplementedError(f'body "{body.name}": the dense route has levels {", ".join(LEVELS)}')
+        case _:
+            assert_never(body)
 
 
 def rigid_model(
     mass: float, com: Real, inertia: Real, frames: Mapping[str, tuple[Vector, Quaternion]]
 ) -> FlexibleModel:
-    """A body without modes: one point at its centre of mass."""
+    """A body without modes: one inertia point at its mass centre."""
     none = np.zeros((3, 0))
     nodes = {
         name: FlexibleNode(np.array(position, dtype=float), rotation_of(quaternion), none, none)
@@ -196,7 +196,7 @@ def rigid_model(
 
 
 def _stiff(model: FlexibleModel) -> FlexibleModel:
-    """The same points without modes."""
+    """The same body without modes."""
     nodes = {
         name: replace(node, translation=node.translation[:, :0], rotation_modes=node.rotation_modes[:, :0])
         for name, node in model.nodes.items()

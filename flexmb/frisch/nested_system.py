@@ -1,4 +1,4 @@
-"""Frisch's route to a system's accelerations and loads, and its matrices by the names of the paper."""
+"""Accelerations and loads of a system by Frisch's equations, and their matrices by the names of the paper."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from flexmb.typing import Index, Real
 class Partitions:
     """The equations of motion (111), partition by partition, all vectors in World axes.
 
-    First rows: rotation of every nest of a body, then translation of those nests whose hinge translates: point masses
-    and the base of the paper, here prismatic hinges and their like too. Second: wheels. Third: modes. Last: translation
-    of the remaining nests, whose hinges suppress it. `bodies` numbers the body of each block of three.
+    First rows: rotation of the nests of all bodies, then translation of those nests whose hinges translate (in the
+    paper point masses and the base, here also prismatic hinges, for example). Second: wheels. Third: modes. Last:
+    translation of the remaining nests, which their hinges suppress.
 
     X, I_c, F, Gamma, I_s, M1, A, M2   as in (111)
-    eta                                right sides eta_1 .. eta_4 with external loads, without those of hinges
+    eta                                right-hand sides eta_1 .. eta_4 with external loads, without those of hinges
     S                                  (126) times (133), rows as above, a column for each speed
     bias                               expanded accelerations at udot = 0: second terms of (127), (134)
     """
@@ -87,10 +87,10 @@ class NestedMotion(NamedTuple):
 
 
 def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partitions: bool = False) -> NestedSystem:
-    """Frisch's equations of a checked scene with any of the print's defects kept.
+    """Frisch's equations of a checked scene; `errata` are the defects of the print to keep.
 
-    `null_partitions` computes the partitions of (126) that vanish instead of skipping them: the difference is the
-    price of not having the paper's logic flags.
+    `null_partitions` also computes those partitions of (126) that vanish. The difference in time is what the paper's
+    logic flags save.
     """
     chain = links(scene)
     numbering = Numbering(chain, scene)
@@ -101,7 +101,8 @@ def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partition
 class NestedSystem:
     """The equations of one scene. Threads may share them: each has a workspace of its own.
 
-    y = [q, u, work]: ValueError or TypeError for what does not fit, DynamicsError where numbers overflow.
+    All methods take y = [q, u, work]. They raise ValueError or TypeError for arrays that do not fit, DynamicsError
+    where numbers overflow.
     """
 
     def __init__(
@@ -118,7 +119,7 @@ class NestedSystem:
 
     @per_thread
     def own_workspace(self) -> NestedWorkspace:
-        """The one that all questions of this thread write."""
+        """The workspace of the calling thread, overwritten by every method."""
         return self.workspace()
 
     def workspace(self) -> NestedWorkspace:
@@ -131,7 +132,7 @@ class NestedSystem:
         return status, self.own_workspace.speed["acceleration"].copy()
 
     def motion(self, t: float, y: Real) -> tuple[int, NestedMotion]:
-        """Status code, and accelerations with everything the suppressed rows give."""
+        """Status code, accelerations, and the loads from the suppressed rows."""
         w = self.own_workspace
         status = evaluation.loads(*self._layout.whole(t, y), self.constants, w)
         drives = np.where(self.constants.speed["prescribed"] >= 0, w.speed["drive"], 0.0)
@@ -140,7 +141,7 @@ class NestedSystem:
 
     @property
     def doubt(self) -> Index:
-        """(1,) whether the last evaluation met a pivot that may be rounding."""
+        """(1,) whether the last evaluation met a pivot that may consist of rounding errors."""
         return self.own_workspace.doubt
 
     @property
@@ -149,7 +150,7 @@ class NestedSystem:
         return int(self.own_workspace.fault[0])
 
     def reduced(self, t: float, y: Real) -> tuple[Real, Real]:
-        """Matrix (nu,nu) and right side (nu,) of (136)."""
+        """Matrix (nu,nu) and right-hand side (nu,) of (136)."""
         t, y = self._layout.whole(t, y)
         evaluation.assemble(t, y, self.constants, self.own_workspace)
         return finite_result(self.own_workspace.M.copy(), t), finite_result(self.own_workspace.right.copy(), t)

@@ -10,6 +10,7 @@ from flexmb.hinges import (
     planar,
     prismatic,
     revolute,
+    screw,
     spherical,
     translation2,
     translation3,
@@ -22,7 +23,8 @@ from flexmb.tables.features import HINGE
 KINDS: tuple[HingeKind, ...] = tuple(
     module.HINGE
     for module in (
-        weld, revolute, prismatic, cylindrical, gimbal2, gimbal3, spherical, planar, translation2, translation3, free
+        weld, revolute, prismatic, cylindrical, gimbal2, gimbal3, spherical, planar, translation2, translation3, free,
+        screw,
     )
 )  # fmt: skip
 

@@ -7,12 +7,12 @@ from flexmb.spatial.rotation import rotation_z
 
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     return rotation_z(q[i]), (0.0, 0.0, q[i + 1])
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     H[2, 0] = 1.0
     H[5, 1] = 1.0
     zero = (0.0, 0.0, 0.0)

@@ -20,12 +20,12 @@ def _attitude(q, i):
 
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     return _attitude(q, i), (q[i], q[i + 1], q[i + 2])
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     for n in range(6):
         H[n, n] = 1.0
     w = (u[j], u[j + 1], u[j + 2])
@@ -35,7 +35,7 @@ def motion(q, i, u, j, sequence, H):
 
 
 @helper
-def rate(q, i, u, j, sequence, dq):
+def rate(q, i, u, j, dq):
     """The quaternion enters the position rate normalised, so that scaling it scales only its own rate."""
     n2 = q[i + 3] * q[i + 3] + q[i + 4] * q[i + 4] + q[i + 5] * q[i + 5] + q[i + 6] * q[i + 6]
     s = 1.0 / sqrt(n2)

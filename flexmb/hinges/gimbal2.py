@@ -23,7 +23,7 @@ def axis_numbers(sequence: str) -> tuple[int, ...]:
 
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     return (
         matmul(rotation_axis(sequence[0], q[i]), rotation_axis(sequence[1], q[i + 1])),
         (0.0, 0.0, 0.0),
@@ -31,7 +31,7 @@ def pose(q, i, sequence):
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     # Frisch's free coordinate vectors in outboard axes: the first axis is carried back through the second rotation
     second = unit(sequence[1])
     first = times_t(rotation_axis(sequence[1], q[i + 1]), unit(sequence[0]))

@@ -9,13 +9,13 @@ from flexmb.spatial.vector import add, cross, matmul, scale, times_t
 
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     inner = matmul(rotation_axis(sequence[1], q[i + 1]), rotation_axis(sequence[2], q[i + 2]))
     return matmul(rotation_axis(sequence[0], q[i]), inner), (0.0, 0.0, 0.0)
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     third_turn = rotation_axis(sequence[2], q[i + 2])
     third = unit(sequence[2])
     second = times_t(third_turn, unit(sequence[1]))

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flexmb.jit.kernel import helper
-from flexmb.scene.hinges import AngularCoordinate
 from flexmb.scene.schema import Hinge, PointMass, Vector
 from flexmb.scene.tree import coordinates
 from flexmb.tables.arrays import NO_AXIS
@@ -23,25 +22,24 @@ Names = list[tuple[str, str]]
 class Reduced(NamedTuple):
     """A hinge of a scene as its kernels take it.
 
-    `sequence` holds the axis numbers of a gimbal; `turn` (3,3) turns both hinge frames, so that a single axis is z.
+    `sequence` holds the axis numbers of a gimbal, `parameters` the kind's real numbers, at most three of each; `turn`
+    (3,3) turns both hinge frames, so that a single axis is z.
     """
 
     sequence: tuple[int, ...] = ()
     turn: Real = np.eye(3)
+    parameters: tuple[float, ...] = ()
 
 
 def scalar_state(item: Item) -> tuple[list[float], list[float]]:
     """Initial values and rates of scalar coordinates (rad or m, per second)."""
-    found = [
-        (c.angle_rad, c.rate_rad_s) if isinstance(c, AngularCoordinate) else (c.position_m, c.rate_m_s)
-        for _, c in coordinates(item)
-    ]
-    return [value for value, _ in found], [rate for _, rate in found]
+    found = [c for _, c in coordinates(item)]
+    return [c.value for c in found], [c.rate for c in found]
 
 
 def scalar_names(item: Item) -> tuple[Names, Names]:
     """(name, unit) of scalar coordinates and of their rates, by their keys in the scene."""
-    units = [(name, "rad" if isinstance(c, AngularCoordinate) else "m") for name, c in coordinates(item)]
+    units = [(name, c.UNIT) for name, c in coordinates(item)]
     return units, [(f"{name}.rate", f"{unit}/s") for name, unit in units]
 
 
@@ -87,7 +85,7 @@ def scalar_hinge(
     """A kind all of whose speeds are the rates of its coordinates."""
 
     @helper
-    def rate(q, i, u, j, sequence, dq):
+    def rate(q, i, u, j, dq):
         for n in range(freedoms):
             dq[i + n] = u[j + n]
 

@@ -8,12 +8,12 @@ from flexmb.spatial.scalar import sincos
 
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     return rotation_z(q[i + 2]), (q[i], q[i + 1], 0.0)
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     s, c = sincos(q[i + 2])
     H[3, 0] = c
     H[4, 0] = -s

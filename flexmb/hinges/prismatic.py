@@ -7,12 +7,12 @@ from flexmb.tables.arrays import LINEAR_Z
 
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     return (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, q[i])
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     H[5, 0] = 1.0
     zero = (0.0, 0.0, 0.0)
     return (zero, (0.0, 0.0, u[j])), (zero, zero)

@@ -8,12 +8,12 @@ from flexmb.tables.arrays import ANGULAR_Z
 
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     return rotation_z(q[i]), (0.0, 0.0, 0.0)
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     H[2, 0] = 1.0
     zero = (0.0, 0.0, 0.0)
     return ((0.0, 0.0, u[j]), zero), (zero, zero)

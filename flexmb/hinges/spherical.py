@@ -8,12 +8,12 @@ from flexmb.spatial.rotation import quaternion_matrix, quaternion_rate
 
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     return quaternion_matrix(q[i], q[i + 1], q[i + 2], q[i + 3]), (0.0, 0.0, 0.0)
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     for n in range(3):
         H[n, n] = 1.0
     zero = (0.0, 0.0, 0.0)
@@ -21,7 +21,7 @@ def motion(q, i, u, j, sequence, H):
 
 
 @helper
-def rate(q, i, u, j, sequence, dq):
+def rate(q, i, u, j, dq):
     dw, dx, dy, dz = quaternion_rate(q[i], q[i + 1], q[i + 2], q[i + 3], (u[j], u[j + 1], u[j + 2]))
     dq[i] = dw
     dq[i + 1] = dx

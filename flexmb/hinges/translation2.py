@@ -8,12 +8,12 @@ from flexmb.scene.schema import PointMass
 
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     return (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (q[i], q[i + 1], 0.0)
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     H[3, 0] = 1.0
     H[4, 1] = 1.0
     zero = (0.0, 0.0, 0.0)

@@ -6,12 +6,12 @@ from flexmb.scene.schema import PointMass, Weld
 
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     return (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     zero = (0.0, 0.0, 0.0)
     return (zero, zero), (zero, zero)
 

@@ -229,7 +229,7 @@ def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
     components. Quadratures follow the trapezoidal rule. a starts as udot, at the start and after every segment end,
     where udot may jump.
     """
-    times, segment_ends = clock
+    times, segment_ends, _ = clock
     nq, controlled = accuracy.coordinates, accuracy.controlled
     n, nu = y.shape[0], controlled - nq
     s = NewmarkArrays(

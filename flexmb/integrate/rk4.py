@@ -20,7 +20,7 @@ from flexmb.integrate.control import (
     stretch,
 )
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
+from flexmb.integrate.leap import leap_over, may_leap
 from flexmb.integrate.memory import DONE, STRETCH, begin, keep_place
 from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import handed_on, helper, kernel, written_out
@@ -68,7 +68,7 @@ def _detour(problem, watch, trouble, step, y, scratch, output, run):
     Returns a status code and the time of y, which is again the last good state. scratch: slopes (4,n) and a state (n,);
     output: times of samples, and samples; run: accuracy and counts. CROSSED, and the time, where it comes to a level.
     """
-    (k, trial), (times, out), target, last, (accuracy, counts) = scratch, output, step.end, step.last, run
+    (k, trial), target, last, (accuracy, counts) = scratch, step.end, step.last, run
     t = problem.back(y, problem.constants)
     if not t > -math.inf:
         return trouble, target
@@ -77,40 +77,35 @@ def _detour(problem, watch, trouble, step, y, scratch, output, run):
         status = permitted(accuracy.max_steps, counts)
         if status != OK:
             return status, t
-        far = leap(problem, last, y, k[0], trial, k[1], counts) if failed else 0.0
-        if far > 0.0:
-            leapt = Interval(t, t + far, last)
-            if watch is not None:
-                ends = Ends(y, k[0], trial, k[1])
-                status, t_at = pause_in_leap(problem, watch, leapt, ends, output, run)
-                if status != OK:
-                    return status, t_at
-            store_leapt(leapt, y, k[0], trial, k[1], times, out, counts)
-            t, h = t + far, far
-        else:
-            status, t_new = step_end(t, h, target, trouble, accuracy.max_steps, counts)
+        if failed:
+            status, t_at, length = leap_over(problem, watch, t, last, Ends(y, k[0], trial, k[1]), output, run)
             if status != OK:
-                return status, t
-            status = rk4_step(problem, t, last, y, t_new - t, k, trial, counts)
-            if status == OK:
-                problem.project(t_new, trial, problem.constants)
-                status = derivative(problem, min(t_new, last), trial, k[3], counts)
-            if status != OK and not may_leap(status):
-                return status, t
-            failed = status != OK
-            if failed:
-                trouble, h = status, RETREAT * h
-                counts[REJECTED] += 1
+                return status, t_at
+            if length > 0.0:
+                t, h, failed = t_at, length, False
                 continue
-            if watch is not None:
-                ends = Ends(y, k[0], trial, k[3])
-                status, t_at = pause(problem, watch, Interval(t, t_new, last), ends, inside, k, output, run)
-                if status != OK:
-                    return status, t_at
-            t, h = t_new, 2.0 * h
+        status, t_new = step_end(t, h, target, trouble, accuracy.max_steps, counts)
+        if status != OK:
+            return status, t
+        status = rk4_step(problem, t, last, y, t_new - t, k, trial, counts)
+        if status == OK:
+            problem.project(t_new, trial, problem.constants)
+            status = derivative(problem, min(t_new, last), trial, k[3], counts)
+        if status != OK and not may_leap(status):
+            return status, t
+        failed = status != OK
+        if failed:
+            trouble, h = status, RETREAT * h
+            counts[REJECTED] += 1
+            continue
+        if watch is not None:
+            ends = Ends(y, k[0], trial, k[3])
+            status, t_at = pause(problem, watch, Interval(t, t_new, last), ends, inside, k, output, run)
+            if status != OK:
+                return status, t_at
+        t, h = t_new, 2.0 * h
         copy(trial, y)
         counts[ACCEPTED] += 1
-        failed = False
     return OK, t
 
 
@@ -121,7 +116,7 @@ def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
     Every stretch between samples and segment ends is divided into equal steps not exceeding `accuracy.step`, and y is
     put back on its manifold after each.
     """
-    times, segment_ends = clock
+    times, segment_ends, _ = clock
     k, trial = np.empty((4, y.shape[0])), np.empty(y.shape[0])
     t = begin(problem, times, y, trial, memory, out, counts)
     start, done, segment = memory.numbers[STRETCH], int(memory.numbers[DONE]), 0

@@ -51,7 +51,7 @@ def rk4_lanes(problem, s, entries, clock, accuracy, out, counts):
     out (LANES,T,n): states at every time of the clock. counts (LANES,COUNTS). The status is OK unless all lanes have
     failed: those that failed alone are not finite at the end.
     """
-    times, segment_ends = clock
+    times, segment_ends, _ = clock
     t = times[0]
     set_all(entries.time, t)
     lane_copy(s.y, s.trial)

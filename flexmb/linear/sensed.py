@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -73,7 +73,10 @@ def _units(system: System, sensor: Sensor) -> list[str]:
             return ["N" if names[coordinate] == "m" else "N m"]
         case ProfileSensor():
             return ["1", "1/s"]
-    return ["s"]
+        case TimeSensor():
+            return ["s"]
+        case _:
+            assert_never(sensor)
 
 
 def _change(system: System, sensor: Sensor, at: ChangedRow) -> Real:
@@ -98,7 +101,10 @@ def _change(system: System, sensor: Sensor, at: ChangedRow) -> Real:
             return np.zeros((1, k)) if speed < 0 else _part(system, at, "drives", speed)[1].reshape(1, k)
         case TimeSensor():
             return np.zeros((1, k))
-    return np.zeros((2, k))
+        case ProfileSensor():
+            return np.zeros((2, k))
+        case _:
+            assert_never(sensor)
 
 
 def _part(system: System, at: ChangedRow, name: str, i: int) -> tuple[Real, Real]:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flexmb.run.event_record import EventRecord
 from flexmb.run.restart import Restart
-from flexmb.run.situation import EventRecord
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.system.observables import undetermined_loads
 from flexmb.tables import arguments

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from math import inf
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 
+from flexmb.integrate.problem import Clock
 from flexmb.scene.check import check_run
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
-from flexmb.scene.functions import Pulse, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import watches_signals
 from flexmb.system.tree_system import System
@@ -50,6 +51,8 @@ def timing(scene: Scene) -> Timing:
     switches, start, end = set[float](), -inf, inf
     sines, knots = list[Sine](), set[float]()
     for _, _, function in values(ROOT, scene):
+        if not isinstance(function, Function):
+            continue
         match function:
             case Pulse(start_s=start, duration_s=duration) | SmoothStep(start_s=start, duration_s=duration):
                 switches |= {start, start + duration}
@@ -58,8 +61,13 @@ def timing(scene: Scene) -> Timing:
             case Table(times_s=times):
                 start, end = max(start, times[0]), min(end, times[-1])
                 knots.update(times)
-            case Sine(amplitude=amplitude, angular_frequency_rad_s=frequency) if amplitude and frequency:
-                sines.append(function)
+            case Sine(amplitude=amplitude, angular_frequency_rad_s=frequency):
+                if amplitude and frequency:
+                    sines.append(function)
+            case Constant() | Ramp() | ControlSignal():
+                pass  # these have no switches
+            case _:
+                assert_never(function)
     return Timing(tuple(sorted(switches)), start, end, tuple(sines), tuple(knots))
 
 
@@ -84,6 +92,17 @@ def segment_ends(system: System, t_start: float, t_end: float, equal_steps: bool
     if watches_signals(system.scene):
         ends = sorted({*ends, *found.turns(t_start, t_end)})
     return np.array([*ends, t_end, *[t_end] * is_switch])
+
+
+def clock_of(system: System, t_start: float, times: Real, equal_steps: bool, breaks: bool) -> Clock:
+    """The clock of a run from t_start (s) with these output times (T,) s; breaks: see `segment_ends`.
+
+    A leap over a singular position near the end of the run may go on beyond it, up to where a function switches.
+    """
+    found, t_end = timing_of(system), times[-1]
+    ends = segment_ends(system, t_start, t_end, equal_steps, breaks)
+    switches = [time for time in found.switches if time >= t_end]
+    return Clock(times, ends, -inf if breaks else float(min([*switches, found.end])))
 
 
 def refuse_times(system: System, t_start: float, t_end: float) -> None:

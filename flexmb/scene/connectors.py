@@ -8,7 +8,7 @@ A law is `preload` + `stiffness` x + `stiffening[0]` x² + `stiffening[1]` x³ .
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, SceneStruct, Vector
 from flexmb.scene.functions import Function
@@ -44,6 +44,8 @@ class SpringDamper(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag
     damping_Ns_m: float = 0.0
     acts: Literal["both", "tension", "compression"] = "both"
     force_N: Function | None = None
+
+    ACTUATOR: ClassVar[str] = "force_N"
 
 
 class Bushing(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="bushing"):
@@ -94,6 +96,9 @@ class AngularSpring(SceneStruct, frozen=True, kw_only=True, tag_field="kind", ta
     stop_dissipation_s_rad: float = 0.0
     torque_Nm: Function | None = None
 
+    ANGULAR: ClassVar[bool] = True
+    ACTUATOR: ClassVar[str] = "torque_Nm"
+
 
 class LinearSpring(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="linear_spring"):
     """The same along a displacement of a hinge or point mass, with an actuator `force_N`: see AngularSpring."""
@@ -114,6 +119,9 @@ class LinearSpring(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag
     stop_dissipation_s_m: float = 0.0
     force_N: Function | None = None
 
+    ANGULAR: ClassVar[bool] = False
+    ACTUATOR: ClassVar[str] = "force_N"
+
 
 class AngularFriction(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="angular_friction"):
     """Dry friction along an angle of a hinge, or in the bearing of a wheel; `hinge` names either.
@@ -131,6 +139,8 @@ class AngularFriction(SceneStruct, frozen=True, kw_only=True, tag_field="kind", 
     stribeck_rad_s: float | None = None
     smoothing_rad_s: float
 
+    ANGULAR: ClassVar[bool] = True
+
 
 class LinearFriction(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="linear_friction"):
     """Dry friction along a displacement of a hinge or point mass: see AngularFriction."""
@@ -142,6 +152,8 @@ class LinearFriction(SceneStruct, frozen=True, kw_only=True, tag_field="kind", t
     static_N: float | None = None
     stribeck_m_s: float | None = None
     smoothing_m_s: float
+
+    ANGULAR: ClassVar[bool] = False
 
 
 BetweenNodes = SpringDamper | Bushing
@@ -158,4 +170,5 @@ def by_stem(connector: Connector) -> dict[str, Any]:
 
 def actuator(connector: SpringDamper | HingeSpring) -> Function | None:
     """What its actuator does over time."""
-    return connector.torque_Nm if isinstance(connector, AngularSpring) else connector.force_N
+    found: Function | None = getattr(connector, connector.ACTUATOR)
+    return found

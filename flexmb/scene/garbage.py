@@ -1,4 +1,4 @@
-"""Python's collector of garbage held back while many objects are made that stay: large scenes, compiled kernels."""
+"""Suspension of Python's garbage collector while many lasting objects are created: large scenes, compiled kernels."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from contextlib import contextmanager
 
 @contextmanager
 def collector_paused() -> Iterator[None]:
-    """No search for cycles within.
+    """A context without garbage collection.
 
-    Searching all objects for garbage again and again, as their number grows, takes longer than making them: twice the
-    time for a scene of 10^5 bodies. Compiling takes a seventh less time without it.
+    Repeated searches for cycles among a growing number of objects take longer than creating them: at 10^5 bodies, twice
+    as long. Compiling takes a seventh less time without them.
     """
     was_running = gc.isenabled()
     gc.disable()

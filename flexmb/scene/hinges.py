@@ -13,9 +13,21 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, SceneStruct, Vector
-from flexmb.scene.functions import Function
+from flexmb.scene.freedoms import (
+    AngularCoordinate,
+    Ball,
+    Floating,
+    Freedom,
+    LinearCoordinate,
+    ScalarFreedom,
+    slide,
+    turn,
+)
 
+X_AXIS: Vector = (1.0, 0.0, 0.0)
+Y_AXIS: Vector = (0.0, 1.0, 0.0)
 Z_AXIS: Vector = (0.0, 0.0, 1.0)
+AXES = {"x": X_AXIS, "y": Y_AXIS, "z": Z_AXIS}
 
 
 class _Hinge(SceneStruct, frozen=True, kw_only=True, tag_field="kind"):
@@ -29,43 +41,18 @@ class _Hinge(SceneStruct, frozen=True, kw_only=True, tag_field="kind"):
     child_position_m: Vector = ZERO
     child_quaternion: Quaternion = IDENTITY
 
-
-class AngularCoordinate(SceneStruct, frozen=True, kw_only=True):
-    """One angle: initial value and rate, spring, damper, motor, or prescribed motion.
-
-    With closures, initial values other than zero are kept to the last digit where the others can follow, and changed
-    with a warning where they contradict each other. `given = true`: both are meant, zero too; where they cannot be kept
-    there is an error, and angles and displacements without it are guesses that say which way the loop is assembled.
-    """
-
-    angle_rad: float = 0.0
-    rate_rad_s: float = 0.0
-    given: bool = False
-    stiffness_Nm_rad: float = 0.0
-    damping_Nms_rad: float = 0.0
-    rest_rad: float = 0.0
-    torque_Nm: Function | None = None
-    prescribed_rad: Function | None = None
-
-
-class LinearCoordinate(SceneStruct, frozen=True, kw_only=True):
-    """One displacement: initial value and rate, spring, damper, motor, or prescribed motion.
-
-    `given` as of an angle.
-    """
-
-    position_m: float = 0.0
-    rate_m_s: float = 0.0
-    given: bool = False
-    stiffness_N_m: float = 0.0
-    damping_Ns_m: float = 0.0
-    rest_m: float = 0.0
-    force_N: Function | None = None
-    prescribed_m: Function | None = None
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """What the hinge consists of, from the inboard frame outward; every kind says it."""
+        raise NotImplementedError(f'hinge "{self.name}": {type(self).__name__} does not say which freedoms it has')
 
 
 class Weld(_Hinge, frozen=True, kw_only=True, tag="weld"):
     """No freedom."""
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return ()
 
 
 class Revolute(_Hinge, frozen=True, kw_only=True, tag="revolute"):
@@ -74,12 +61,36 @@ class Revolute(_Hinge, frozen=True, kw_only=True, tag="revolute"):
     axis: Vector = Z_AXIS
     rotation: AngularCoordinate = AngularCoordinate()
 
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return (turn("rotation", self.axis, self.rotation),)
+
+
+class Screw(_Hinge, frozen=True, kw_only=True, tag="screw"):
+    """One rotation about `axis`, with a translation along it of `pitch_m_rad` times the angle.
+
+    A positive pitch is a right-handed screw; one that advances by h (m) a turn has the pitch h / (2 pi). The spring,
+    damper and motor act on the angle: its torque does the work of the force along the axis too.
+    """
+
+    axis: Vector = Z_AXIS
+    pitch_m_rad: float
+    rotation: AngularCoordinate = AngularCoordinate()
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return (ScalarFreedom("rotation", self.axis, 1.0, self.pitch_m_rad, self.rotation),)
+
 
 class Prismatic(_Hinge, frozen=True, kw_only=True, tag="prismatic"):
     """One translation along `axis`."""
 
     axis: Vector = Z_AXIS
     translation: LinearCoordinate = LinearCoordinate()
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return (slide("translation", self.axis, self.translation),)
 
 
 class Cylindrical(_Hinge, frozen=True, kw_only=True, tag="cylindrical"):
@@ -89,12 +100,20 @@ class Cylindrical(_Hinge, frozen=True, kw_only=True, tag="cylindrical"):
     rotation: AngularCoordinate = AngularCoordinate()
     translation: LinearCoordinate = LinearCoordinate()
 
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return turn("rotation", self.axis, self.rotation), slide("translation", self.axis, self.translation)
+
 
 class Universal(_Hinge, frozen=True, kw_only=True, tag="universal"):
     """Rotation about x of the inboard frame, then about the carried y."""
 
     first: AngularCoordinate = AngularCoordinate()
     second: AngularCoordinate = AngularCoordinate()
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return turn("first", X_AXIS, self.first), turn("second", Y_AXIS, self.second)
 
 
 class Gimbal(_Hinge, frozen=True, kw_only=True, tag="gimbal"):
@@ -105,6 +124,13 @@ class Gimbal(_Hinge, frozen=True, kw_only=True, tag="gimbal"):
 
     sequence: str = "xyz"
     rotations: tuple[AngularCoordinate, ...] = (AngularCoordinate(), AngularCoordinate(), AngularCoordinate())
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return tuple(
+            turn(f"rotations[{n}]", AXES[letter], rotation)
+            for n, (letter, rotation) in enumerate(zip(self.sequence, self.rotations, strict=True))
+        )
 
 
 class Spherical(_Hinge, frozen=True, kw_only=True, tag="spherical"):
@@ -117,6 +143,10 @@ class Spherical(_Hinge, frozen=True, kw_only=True, tag="spherical"):
     stiffness_Nm_rad: float = 0.0
     damping_Nms_rad: float = 0.0
 
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return (Ball(self.quaternion, self.angular_velocity_rad_s, self.stiffness_Nm_rad, self.damping_Nms_rad),)
+
 
 class Planar(_Hinge, frozen=True, kw_only=True, tag="planar"):
     """Translation in the x-y plane of the inboard frame, then rotation about z. Speeds: [xdot, ydot, angle rate]."""
@@ -124,6 +154,14 @@ class Planar(_Hinge, frozen=True, kw_only=True, tag="planar"):
     x: LinearCoordinate = LinearCoordinate()
     y: LinearCoordinate = LinearCoordinate()
     rotation: AngularCoordinate = AngularCoordinate()
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return (
+            slide("x", X_AXIS, self.x),
+            slide("y", Y_AXIS, self.y),
+            turn("rotation", Z_AXIS, self.rotation),
+        )
 
 
 class Free(_Hinge, frozen=True, kw_only=True, tag="free"):
@@ -139,12 +177,19 @@ class Free(_Hinge, frozen=True, kw_only=True, tag="free"):
     velocity_m_s: Vector = ZERO
     given: bool = False
 
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return (Floating(self.position_m, self.quaternion, self.angular_velocity_rad_s, self.velocity_m_s),)
 
-Hinge = Weld | Revolute | Prismatic | Cylindrical | Universal | Gimbal | Spherical | Planar | Free
+
+Hinge = Weld | Revolute | Prismatic | Cylindrical | Universal | Gimbal | Spherical | Planar | Free | Screw
 WITH_AXIS = tuple(
     struct.__struct_config__.tag for struct in get_args(Hinge) if "axis" in struct.__struct_fields__
 )
 """Kinds that have an axis of their own."""
+
+
+ClosureKind = Literal["weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar"]
 
 
 class Closure(SceneStruct, frozen=True, kw_only=True):
@@ -159,7 +204,7 @@ class Closure(SceneStruct, frozen=True, kw_only=True):
     """
 
     name: str
-    type: Literal["weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar"]
+    type: ClosureKind
     body_a: str
     node_a: str = "origin"
     body_b: str

@@ -7,7 +7,7 @@ indices; keys carry units. Frames, signs and orders: docs/notation.md.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from flexmb.scene.bodies import (
     ZERO,
@@ -55,18 +55,18 @@ from flexmb.scene.control import (
     UserLaw,
 )
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
+from flexmb.scene.freedoms import AngularCoordinate, Freedom, LinearCoordinate, MotionKeys, slide, turn
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
-    AngularCoordinate,
     Closure,
     Cylindrical,
     Free,
     Gimbal,
     Hinge,
-    LinearCoordinate,
     Planar,
     Prismatic,
     Revolute,
+    Screw,
     Spherical,
     Universal,
     Weld,
@@ -96,6 +96,17 @@ class Wheel(SceneStruct, frozen=True, kw_only=True):
     torque_Nm: Function | None = None
     prescribed_rad: Function | None = None
 
+    KEYS: ClassVar[MotionKeys] = MotionKeys("angle_rad", "speed_rad_s", "torque_Nm", "prescribed_rad")
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """The wheel's turn about its axis, as a hinge would have it."""
+        spin = AngularCoordinate(
+            angle_rad=self.angle_rad, rate_rad_s=self.speed_rad_s, damping_Nms_rad=self.friction_Nms_rad,
+            torque_Nm=self.torque_Nm, prescribed_rad=self.prescribed_rad,
+        )  # fmt: skip
+        return (turn("angle", self.axis, spin),)
+
 
 class PointMass(SceneStruct, frozen=True, kw_only=True):
     """A point mass on a node of a body, free along 0 to 3 orthonormal `directions` (node axes)."""
@@ -107,6 +118,13 @@ class PointMass(SceneStruct, frozen=True, kw_only=True):
     mass_kg: float
     directions: tuple[Vector, ...] = ()
     coordinates: tuple[LinearCoordinate, ...] = ()
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """Its slides, as a hinge would have them; without coordinates it is at rest, without spring."""
+        given = self.coordinates or (LinearCoordinate(),) * len(self.directions)
+        pairs = enumerate(zip(self.directions, given, strict=True))
+        return tuple(slide(f"coordinates[{n}]", axis, coordinate) for n, (axis, coordinate) in pairs)
 
 
 class Load(SceneStruct, frozen=True, kw_only=True):
@@ -198,7 +216,7 @@ __all__ = [
     "Impact", "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load",
     "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid",
     "Planar", "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute",
-    "RigidBody", "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical",
+    "RigidBody", "Saturation", "Scene", "SceneEvent", "Screw", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical",
     "SpinUp", "SpringDamper", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector",
     "Waiver", "Weld", "Wheel",
 ]  # fmt: skip

@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple, TypeVar, assert_never
 
-from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
+from msgspec.structs import replace
+
+from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, SidBody, Vector
 from flexmb.scene.columns import struct_keys
-from flexmb.scene.connectors import AlongHinge, AngularFriction, AngularSpring
-from flexmb.scene.control import CoordinateSensor, TimeSensor
+from flexmb.scene.connectors import AlongHinge, AngularFriction
+from flexmb.scene.control import (
+    CoordinateSensor,
+    DistanceSensor,
+    DriveSensor,
+    LoadSensor,
+    MarkerSensor,
+    ProfileSensor,
+    TimeSensor,
+)
 from flexmb.scene.events import Impact
-from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate
+from flexmb.scene.freedoms import AngularCoordinate, Coordinate, LinearCoordinate
+from flexmb.scene.hinges import Hinge
 from flexmb.scene.schema import PointMass, Scene, Wheel
 
 GROUND = "ground"
-
-Coordinate = AngularCoordinate | LinearCoordinate
+Item = TypeVar("Item", bound=Hinge | PointMass)
 
 
 class Branch(NamedTuple):
-    """A body and the hinge that joins it to its parent."""
+    """A body and its inboard hinge."""
 
     body: Body
     hinge: Hinge
@@ -41,7 +52,7 @@ class NamedCoordinate(NamedTuple):
 def ordered(scene: Scene) -> tuple[Branch, ...]:
     """Bodies depth-first from the ground, each with its inboard hinge; siblings in the order of the scene's hinges.
 
-    Every parent precedes its children and every subtree is contiguous. Raises ValueError where the scene is no tree.
+    Every parent precedes its children, and every subtree is contiguous. Raises ValueError if the scene is not a tree.
     """
     bodies = {body.name: body for body in scene.bodies}
     outboard: dict[str, list[Hinge]] = {name: [] for name in (GROUND, *bodies)}
@@ -65,8 +76,9 @@ def ordered(scene: Scene) -> tuple[Branch, ...]:
 def rest_frames(body: Body) -> dict[str, NodeFrame]:
     """Rest frames of all nodes of a body by name, implicit ones included.
 
-    Implicit are "origin" (rigid, beam, clamped modal: the body frame), and "root" and "tip" of a beam. A free-free
-    modal body has "origin" only where it lists one. The nodes of a SID body are in its file: ValueError.
+    Implicit nodes are "origin", the body frame (of rigid bodies, beams and clamped modal bodies), and "root" and "tip"
+    of a beam. A free-free modal body has an "origin" only if it lists one. ValueError for a SID body, whose nodes are
+    in its file.
     """
     origin = {"origin": NodeFrame(ZERO, IDENTITY)}
     match body:
@@ -78,11 +90,15 @@ def rest_frames(body: Body) -> dict[str, NodeFrame]:
         case ModalBody():
             listed = {node.name: NodeFrame(node.position_m, node.quaternion) for node in body.nodes}
             return (origin if body.boundary == "clamped-free" else {}) | listed
-    raise ValueError(f'the nodes of body "{body.name}" are in the SID file "{body.file}": convert it by flexmb import')
+        case SidBody():
+            what = f'the nodes of body "{body.name}" are in the SID file "{body.file}"'
+            raise ValueError(f"{what}: convert it by flexmb import")
+        case _:
+            assert_never(body)
 
 
 def node_frame(body: Body, node: str) -> NodeFrame:
-    """Rest frame of `node` on `body`; ValueError names the nodes there are."""
+    """Rest frame of `node` on `body`; ValueError, which lists the body's nodes, if there is no such node."""
     frames = rest_frames(body)
     if node not in frames:
         raise ValueError(f'body "{body.name}" has no node "{node}"; its nodes are {", ".join(frames)}')
@@ -106,8 +122,17 @@ def coordinates(item: Hinge | PointMass) -> tuple[NamedCoordinate, ...]:
     return tuple(found)
 
 
+def with_coordinates(item: Item, changed: Iterable[Coordinate]) -> Item:
+    """A hinge or point mass with other scalar coordinates, in the order of `coordinates`."""
+    found: dict[str, Any] = {}
+    for (name, _), coordinate in zip(coordinates(item), changed, strict=True):
+        key, bracket, _ = name.partition("[")
+        found[key] = (*found.get(key, ()), coordinate) if bracket else coordinate
+    return replace(item, **found)
+
+
 def scalar_paths(scene: Scene) -> dict[str, str]:
-    """Scalar coordinates as states name them, "<hinge>.<key>" and "<wheel>.angle", and the paths of their structs.
+    """Names of scalar coordinates in states, "<hinge>.<key>" and "<wheel>.angle", and the paths of their structs.
 
     Paths are those of `Scene.with_values`.
     """
@@ -121,18 +146,19 @@ def scalar_paths(scene: Scene) -> dict[str, str]:
 
 
 def rate_name(coordinate: str, path: str) -> str:
-    """How states name the rate of a scalar coordinate, which has a path as of `scalar_paths`."""
+    """The name in states of the rate of a scalar coordinate, from the name and the path in `scalar_paths`."""
     if path.startswith("wheels."):
         return f"{coordinate.removesuffix('.angle')}.speed"
     return f"{coordinate}.rate"
+
+
 def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMass | Wheel, int]:
     """The item along whose coordinate a connector acts, and the number of the coordinate among its scalar ones.
 
-    ValueError where there is none, or where the connector does not say which.
+    ValueError if there is none, or if the connector does not determine which.
     """
     items = {item.name: item for item in (*scene.hinges, *scene.point_masses, *scene.wheels)}
-    angular = isinstance(connector, AngularSpring | AngularFriction)
-    sort = "angle" if angular else "displacement"
+    sort = "angle" if connector.ANGULAR else "displacement"
     item = items.get(connector.hinge)
     if item is None:
         raise ValueError(f'there is no hinge, point mass or wheel "{connector.hinge}"')
@@ -143,7 +169,7 @@ def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMas
     names = {
         name: n
         for n, (name, each) in enumerate(coordinates(item))
-        if isinstance(each, AngularCoordinate) == angular and connector.coordinate in ("", name)
+        if each.ANGULAR == connector.ANGULAR and connector.coordinate in ("", name)
     }
     if len(names) == 1:
         return item, next(iter(names.values()))
@@ -153,7 +179,7 @@ def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMas
 
 
 def watches_signals(scene: Scene) -> bool:
-    """Whether an event watches what only sensors and controllers say, or will: the load of a stop."""
+    """Whether any event watches, or may later watch (the load of a stop), a signal of a sensor or controller."""
     if not scene.events:
         return False
     rests = any(isinstance(action, Impact) and action.rests for event in scene.events for action in event.actions)
@@ -161,18 +187,24 @@ def watches_signals(scene: Scene) -> bool:
 
 
 def watchable(scene: Scene) -> dict[str, str]:
-    """What an event may watch without a look at sensors, by the name it gives: "time", a scalar coordinate, its rate.
+    """Quantities that events can watch without evaluating sensors: "time", scalar coordinates and their rates, by name.
 
-    A sensor of time or of the only coordinate of a hinge, wheel or point mass stands for what it measures.
+    Sensors of time, or of the only coordinate of a hinge, wheel or point mass, are included: their names map to the
+    quantity that they measure.
     """
     paths = scalar_paths(scene)
     found = {"time": "time"} | {name: name for name in paths}
     found |= {rate: rate for rate in (rate_name(name, path) for name, path in paths.items())}
     for sensor in scene.sensors:
-        if isinstance(sensor, TimeSensor):
-            found[sensor.name] = "time"
-        elif isinstance(sensor, CoordinateSensor):
-            own = [name for name in paths if name.startswith(f"{sensor.of}.")]
-            if len(own) == 1:
-                found[sensor.name] = own[0] if sensor.quantity == "value" else rate_name(own[0], paths[own[0]])
+        match sensor:
+            case TimeSensor():
+                found[sensor.name] = "time"
+            case CoordinateSensor():
+                own = [name for name in paths if name.startswith(f"{sensor.of}.")]
+                if len(own) == 1:
+                    found[sensor.name] = own[0] if sensor.quantity == "value" else rate_name(own[0], paths[own[0]])
+            case MarkerSensor() | DistanceSensor() | LoadSensor() | DriveSensor() | ProfileSensor():
+                pass  # these are known from a look at them alone
+            case _:
+                assert_never(sensor)
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import pi
+from typing import assert_never
 
 import numpy as np
 
@@ -27,7 +28,7 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
         match function:
             case Constant(value=value):
                 row["kind"], row["data"] = _CONSTANT, (value, 0.0, 0.0, 0.0)
-            case ControlSignal():  # a run with feedback writes what its controllers say in here
+            case ControlSignal():  # a run with feedback writes the output of its controllers to `data`
                 row["kind"] = _CONSTANT
             case Ramp(value=value, rate=rate, start_s=begin):
                 row["kind"], row["data"] = _RAMP, (value, rate, begin, 0.0)
@@ -40,14 +41,16 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
             case Pulse(value=value, start_s=begin, duration_s=duration):
                 row["kind"], row["data"] = _PULSE, (value, begin, begin + duration, 0.0)
             case Table(times_s=times, values=values):
-                # here, because this import takes longer than everything else a run without tables imports
+                # imported here because it takes longer than all other imports of a run without tables
                 from scipy.interpolate import PPoly, make_interp_spline
 
                 row["kind"] = _TABLE
                 spline = PPoly.from_spline(make_interp_spline(times, values, k=5))
                 ends = zip(spline.x[:-1], spline.x[1:], strict=True)
-                # the spline's end knots repeat: their intervals have no length
+                # the intervals between repeated end knots have no length and are left out
                 pieces += [(left, 0.0, *spline.c[:, i]) for i, (left, right) in enumerate(ends) if right > left]
+            case _:
+                assert_never(function)
         row["stop"] = len(pieces)
     return out, np.array(pieces, dtype=float).reshape(-1, 8)
 

@@ -7,6 +7,7 @@ turns of its phase, a ramp by its start. Runs that begin at another time are `la
 from __future__ import annotations
 
 import math
+from typing import assert_never
 
 import msgspec
 
@@ -18,7 +19,7 @@ from crosscheck.biting.invariances.counterpart import (
     without_feedback,
 )
 from crosscheck.library.time_functions import in_functions
-from flexmb.scene.functions import Constant, Function, Ramp, Sine
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene
 
 SHIFT_S = 2.0
@@ -40,8 +41,11 @@ def _rewritten(scene: Scene) -> Counterpart:
                 return msgspec.structs.replace(function, phase_rad=function.phase_rad + TURNS * 2.0 * math.pi)
             case Constant():
                 return function
-        kind = function.__struct_config__.tag
-        raise NotApplicable(f'a "{kind}" cannot be shifted without a start time of the run')
+            case SmoothStep() | SpinUp() | Pulse() | Table() | ControlSignal():
+                kind = function.__struct_config__.tag
+                raise NotApplicable(f'a "{kind}" cannot be shifted without a start time of the run')
+            case _:
+                assert_never(function)
 
     other = in_functions(scene, on_another_clock)
     if other == scene:

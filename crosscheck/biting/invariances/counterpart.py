@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import assert_never
 
 import numpy as np
 
-from flexmb.scene.bodies import BeamBody, ModalBody, Quaternion, RigidBody, Vector
-from flexmb.scene.hinges import LinearCoordinate
+from flexmb.scene.bodies import BeamBody, ModalBody, Quaternion, RigidBody, SidBody, Vector
 from flexmb.scene.schema import Scene
-from flexmb.scene.tree import Coordinate
 from flexmb.typing import Real
 
 Channels = dict[str, Real]
@@ -93,13 +92,6 @@ def product(a: Real, b: Real) -> Real:
     return np.column_stack([scalar, vector])
 
 
-def is_prescribed(coordinate: Coordinate) -> bool:
-    """Whether a function of time says what the coordinate does."""
-    if isinstance(coordinate, LinearCoordinate):
-        return coordinate.prescribed_m is not None
-    return coordinate.prescribed_rad is not None
-
-
 def vector(values: Real) -> Vector:
     x, y, z = (float(value) for value in values)
     return (x, y, z)
@@ -122,6 +114,8 @@ def total_mass(scene: Scene) -> float:
                 found += float(np.trapezoid(density, x)) + sum(tip.mass_kg for tip in body.tip_masses)
             case ModalBody() if body.points:
                 found += sum(point.mass_kg for point in body.points)
-            case _:
+            case ModalBody() | SidBody():
                 raise NotApplicable(f'body "{body.name}" keeps its mass in a file')
+            case _:
+                assert_never(body)
     return found

@@ -8,21 +8,20 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-import msgspec
+from msgspec.structs import replace
 
 from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, NotApplicable
 from crosscheck.library.time_functions import delayed, in_functions
 from flexmb.scene.check.control import named
-from flexmb.scene.columns import struct_keys
 from flexmb.scene.control import Controller, TimeSensor
 from flexmb.scene.events import Change, SceneEvent
+from flexmb.scene.freedoms import Coordinate
 from flexmb.scene.functions import Function, SpinUp, Table
-from flexmb.scene.hinges import AngularCoordinate, LinearCoordinate
-from flexmb.scene.schema import PointMass, Scene, Wheel
-from flexmb.scene.tree import watchable
+from flexmb.scene.schema import Scene, Wheel
+from flexmb.scene.tree import Item, coordinates, watchable, with_coordinates
 
 START_S = 2.375  # no multiple of any period
-Item = TypeVar("Item", bound=msgspec.Struct)
+Moved = TypeVar("Moved", bound=Coordinate | Wheel)
 OF_THE_CLOCK = ("start_s", "phase_rad", "offset_s")
 
 
@@ -33,39 +32,33 @@ def _later(scene: Scene) -> Counterpart:
     def event_later(event: SceneEvent) -> SceneEvent:
         if watched[event.watch] != "time":
             return event
-        return msgspec.structs.replace(event, level=event.level + START_S)
+        return replace(event, level=event.level + START_S)
 
     def controller_later(controller: Controller) -> Controller:
         if controller.period_s is None:
             return controller
-        return msgspec.structs.replace(controller, offset_s=controller.offset_s + START_S)
+        return replace(controller, offset_s=controller.offset_s + START_S)
 
     shifted: Scene = in_functions(scene, _shifted)
-    other = msgspec.structs.replace(
+    other = replace(
         shifted,
-        hinges=tuple(map(_as_its_profiles_begin, shifted.hinges)),
-        point_masses=tuple(map(_as_its_profiles_begin, shifted.point_masses)),
-        wheels=tuple(map(_as_its_profiles_begin, shifted.wheels)),
+        hinges=tuple(map(_coordinates_as_their_profiles_begin, shifted.hinges)),
+        point_masses=tuple(map(_coordinates_as_their_profiles_begin, shifted.point_masses)),
+        wheels=tuple(map(_as_its_profile_begins, shifted.wheels)),
         events=tuple(map(event_later, shifted.events)),
         controllers=tuple(map(controller_later, shifted.controllers)),
     )
     return Counterpart(other, lambda times, channels: channels, starts_s=START_S)
 
 
-def _as_its_profiles_begin(item: Item) -> Item:
+def _coordinates_as_their_profiles_begin(item: Item) -> Item:
     """Without initial values of what is prescribed: a scene may repeat there what its profile is at t = 0."""
-    match item:
-        case AngularCoordinate(prescribed_rad=profile) if profile is not None:
-            return msgspec.structs.replace(item, angle_rad=0.0, rate_rad_s=0.0)
-        case LinearCoordinate(prescribed_m=profile) if profile is not None:
-            return msgspec.structs.replace(item, position_m=0.0, rate_m_s=0.0)
-        case Wheel(prescribed_rad=profile) if profile is not None:
-            return msgspec.structs.replace(item, angle_rad=0.0, speed_rad_s=0.0)
-        case PointMass():
-            return msgspec.structs.replace(item, coordinates=tuple(map(_as_its_profiles_begin, item.coordinates)))
-    inner = {key: getattr(item, key) for key in struct_keys(type(item))}
-    coordinates = {k: v for k, v in inner.items() if isinstance(v, AngularCoordinate | LinearCoordinate)}
-    return msgspec.structs.replace(item, **{k: _as_its_profiles_begin(v) for k, v in coordinates.items()})
+    return with_coordinates(item, [_as_its_profile_begins(each) for _, each in coordinates(item)])
+
+
+def _as_its_profile_begins(item: Moved) -> Moved:
+    keys = item.KEYS
+    return item if getattr(item, keys.prescribed) is None else replace(item, **{keys.value: 0.0, keys.rate: 0.0})
 
 
 def _shifted(function: Function) -> Function:

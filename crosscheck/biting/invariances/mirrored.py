@@ -17,40 +17,30 @@ from crosscheck.biting.invariances.counterpart import (
     Invariance,
     NotApplicable,
     by_kind,
-    is_prescribed,
     without_events,
     without_feedback,
 )
 from crosscheck.library.time_functions import scaled
 from flexmb.scene.bodies import ModalBody, ModalNode, SidBody
 from flexmb.scene.connectors import BetweenNodes, Bushing
+from flexmb.scene.freedoms import Coordinate, ScalarFreedom
 from flexmb.scene.functions import Function
-from flexmb.scene.hinges import (
-    WITH_AXIS,
-    AngularCoordinate,
-    Closure,
-    Cylindrical,
-    Gimbal,
-    Hinge,
-    LinearCoordinate,
-    Prismatic,
-    Revolute,
-    Universal,
-)
+from flexmb.scene.hinges import WITH_AXIS, Closure, Hinge
 from flexmb.scene.schema import Load, PointMass, Scene, Wheel
-from flexmb.scene.tree import coordinate_of, coordinates
+from flexmb.scene.tree import coordinate_of, coordinates, with_coordinates
 from flexmb.surrogate import modal_points
 from flexmb.typing import Real
 
-C = TypeVar("C", AngularCoordinate, LinearCoordinate)
+M = TypeVar("M", bound=Hinge | PointMass | Wheel)
 POLAR_SIGNS = (1.0, 1.0, -1.0)
 AXIAL_SIGNS = (-1.0, -1.0, 1.0)
 QUATERNION_SIGNS = (1.0, *AXIAL_SIGNS)
 POLAR_KEYS = (
     "gravity_m_s2", "com_m", "position_m", "offset_m", "com_offset_m", "parent_position_m", "child_position_m",
-    "position_a_m", "position_b_m", "velocity_m_s", "directions", "translation_modes", "second_translation",
+    "position_a_m", "position_b_m", "velocity_m_s", "translation_modes", "second_translation",
 )  # fmt: skip
 AXIAL_KEYS = ("angular_velocity_rad_s", "rotation_modes", "second_rotation")
+SCREW_KEYS = ("pitch_m_rad",)
 QUATERNION_KEYS = ("quaternion", "parent_quaternion", "child_quaternion", "quaternion_a", "quaternion_b")
 
 
@@ -62,12 +52,15 @@ def _mirrored(scene: Scene) -> Counterpart:
             raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')
     for connector in scene.connectors:
         item = None if isinstance(connector, BetweenNodes) else coordinate_of(scene, connector)[0]
-        if isinstance(item, Cylindrical | Universal | Gimbal | PointMass):
-            raise NotApplicable(f'the coordinate of connector "{connector.name}" may count the other way in a mirror')
+        if item is not None and min(_signs(item), default=1.0) < 0.0:
+            raise NotApplicable(f'a coordinate of what connector "{connector.name}" acts on counts the other way')
     if scene.modal_states:  # which of a beam's modes are odd in z is known when the model is made
         scene = modal_points(scene)
     polar, axial, quaternion = (np.array(signs) for signs in (POLAR_SIGNS, AXIAL_SIGNS, QUATERNION_SIGNS))
-    drives = {item.name: _drive_signs(item) for item in (*scene.hinges, *scene.point_masses)}
+    drives = {}
+    for item in (*scene.hinges, *scene.point_masses):
+        pairs = zip(coordinates(item), _signs(item), strict=True)
+        drives[item.name] = np.array([sign for (_, each), sign in pairs if each.prescribed is not None])
 
     def back(times: Real, channels: Channels) -> Channels:
         found = by_kind(channels, lambda rows: rows * polar, lambda rows: rows * axial, lambda q: q * quaternion)
@@ -81,27 +74,15 @@ def _mirrored(scene: Scene) -> Counterpart:
 
 def _reflected(item: Any) -> Any:
     """A struct and all structs in it as the mirror shows them."""
+    if isinstance(item, Hinge | PointMass):
+        counted = zip(coordinates(item), _signs(item), strict=True)
+        changed = [each if sign > 0.0 else _opposite(each) for (_, each), sign in counted]
+        item = with_coordinates(item, changed)
+    if isinstance(item, Hinge | PointMass | Wheel):
+        item = _with_axes(item)
     changes = {key: _value(key, getattr(item, key)) for key in item.__struct_fields__}
     item = msgspec.structs.replace(item, **changes)
     match item:
-        case Revolute() | Wheel():
-            return msgspec.structs.replace(item, axis=_signed(item.axis, AXIAL_SIGNS))
-        case Prismatic():
-            return msgspec.structs.replace(item, axis=_signed(item.axis, POLAR_SIGNS))
-        case Cylindrical():  # its axis serves the translation, so that the rotation about it is the opposite one
-            axis = _signed(item.axis, POLAR_SIGNS)
-            return msgspec.structs.replace(item, axis=axis, rotation=_opposite(item.rotation))
-        case Universal():
-            return msgspec.structs.replace(item, first=_opposite(item.first), second=_opposite(item.second))
-        case Gimbal():
-            turns = zip(item.sequence, item.rotations, strict=True)
-            rotations = tuple(each if letter == "z" else _opposite(each) for letter, each in turns)
-            return msgspec.structs.replace(item, rotations=rotations)
-        case PointMass() if len(item.directions) == 3:  # three are right-handed: all point the other way
-            opposite = _signed(item.directions, (-1.0, -1.0, -1.0))
-            return msgspec.structs.replace(
-                item, directions=opposite, coordinates=tuple(map(_opposite, item.coordinates))
-            )
         case Load():
             signs = POLAR_SIGNS if item.type == "force" else AXIAL_SIGNS
             return msgspec.structs.replace(item, direction=_signed(item.direction, signs))
@@ -123,6 +104,37 @@ def _reflected(item: Any) -> Any:
         case Closure() if item.type in WITH_AXIS:  # which has no sense of rotation
             return msgspec.structs.replace(item, axis=_signed(item.axis, POLAR_SIGNS))
     return item
+
+
+def _with_axes(item: M) -> M:
+    """An item with its own axes as the mirror shows them: polar where something slides along them, axial where it only
+    turns. A right-handed screw is a left-handed one."""
+    slides = any(isinstance(each, ScalarFreedom) and each.motion == "slide" for each in item.freedoms)
+    changes: dict[str, Any] = {}
+    for key in item.__struct_fields__:
+        value = getattr(item, key)
+        if key == "directions":  # three are right-handed: in the mirror all point the other way
+            changes[key] = _signed(value, AXIAL_SIGNS if len(value) == 3 else POLAR_SIGNS)
+        elif key == "axis":
+            changes[key] = _signed(value, POLAR_SIGNS if slides else AXIAL_SIGNS)
+        elif key in SCREW_KEYS:
+            changes[key] = -value
+    return msgspec.structs.replace(item, **changes)
+
+
+def _signs(item: Hinge | PointMass | Wheel) -> list[float]:
+    """By scalar coordinate, 1 where it counts on in the mirror, -1 where it counts back.
+
+    The mirror shows the axis of a turn as axial, that of a shift as polar; the item's own may be the opposite one.
+    """
+    found = []
+    for own, image in zip(item.freedoms, _with_axes(item).freedoms, strict=True):
+        if isinstance(own, ScalarFreedom) and isinstance(image, ScalarFreedom):
+            if own.motion == "screw" and image.shifts != -own.shifts:
+                raise NotApplicable(f'hinge "{item.name}" has a hand, and no key that changes it')
+            seen = _signed(own.axis, POLAR_SIGNS if own.motion == "slide" else AXIAL_SIGNS)
+            found.append(1.0 if np.dot(seen, image.axis) > 0.0 else -1.0)
+    return found
 
 
 def _value(key: str, value: Any) -> Any:
@@ -156,38 +168,13 @@ def _times(matrix: Any, sign: float) -> Any:
     return tuple(tuple(sign * number for number in row) for row in matrix)
 
 
-def _opposite(coordinate: C) -> C:
+def _opposite(coordinate: Coordinate) -> Coordinate:
     """A coordinate with the opposite sign: where it starts and rests, its motor and its prescribed motion."""
-    changes: dict[str, Any] = {}
-    for key in coordinate.__struct_fields__:
-        value = getattr(coordinate, key)
-        if key.startswith(("angle", "position", "rate", "rest")):
-            changes[key] = -value
-        elif isinstance(value, Function):
-            changes[key] = scaled(value, -1.0)
-    return msgspec.structs.replace(coordinate, **changes)
-
-
-def _drive_signs(item: Hinge | PointMass) -> Real:
-    """The signs of the drive loads of a hinge or a point mass, one for each prescribed coordinate."""
-    found = []
-    for place, (_, each) in enumerate(coordinates(item)):
-        angular = isinstance(each, AngularCoordinate)
-        if not is_prescribed(each):
-            continue
-        match item:
-            case PointMass():
-                opposite = len(item.directions) == 3
-            case Universal():
-                opposite = True
-            case Cylindrical():
-                opposite = angular
-            case Gimbal():
-                opposite = item.sequence[place] != "z"
-            case _:
-                opposite = False
-        found.append(-1.0 if opposite else 1.0)
-    return np.array(found)
+    keys, rest = coordinate.KEYS, coordinate.SPRING[2]
+    numbers = {key: -getattr(coordinate, key) for key in (keys.value, keys.rate, rest)}
+    functions = {keys.effort: coordinate.effort, keys.prescribed: coordinate.prescribed}
+    driven = {key: scaled(function, -1.0) for key, function in functions.items() if function is not None}
+    return msgspec.structs.replace(coordinate, **numbers, **driven)
 
 
 MIRRORED = Invariance("mirrored", "seen in a mirror", _mirrored)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple, assert_never, get_args
 
 import msgspec
 
@@ -11,15 +11,22 @@ from crosscheck.biting.invariances.counterpart import (
     Counterpart,
     Invariance,
     NotApplicable,
-    is_prescribed,
     without_events,
     without_feedback,
 )
 from crosscheck.library.time_functions import scaled, slowed
 from flexmb.scene.bodies import ModalBody, SidBody
-from flexmb.scene.connectors import AngularSpring, Bushing, LinearFriction, LinearSpring, SpringDamper
+from flexmb.scene.connectors import (
+    AlongHinge,
+    AngularFriction,
+    AngularSpring,
+    Bushing,
+    Connector,
+    LinearFriction,
+    LinearSpring,
+    SpringDamper,
+)
 from flexmb.scene.functions import Function
-from flexmb.scene.hinges import LinearCoordinate
 from flexmb.scene.schema import Load, ModalState, Scene, Waiver
 from flexmb.scene.tree import coordinates
 from flexmb.scene.units import split_unit
@@ -59,12 +66,13 @@ def _blocks(turning: Dimension, mixed: Dimension, moving: Dimension) -> Each:
 
 NUMBER = Dimension()
 FORCE, ENERGY = Dimension(1, 1, -2), Dimension(2, 1, -2)
+EFFORT = {True: ENERGY, False: FORCE}  # along an angle, along a displacement
 OF_UNIT = {
     "": NUMBER, "rad": NUMBER, "s": Dimension(time=1), "m": Dimension(1), "kg": Dimension(mass=1),
     "N": FORCE, "N m": ENERGY, "N m²": Dimension(3, 1, -2), "m/s": Dimension(1, 0, -1),
     "m/s²": Dimension(1, 0, -2), "rad/s": Dimension(time=-1), "kg/m": Dimension(-1, 1), "kg m": Dimension(1, 1),
     "kg m²": Dimension(2, 1), "N/m": Dimension(0, 1, -2), "N s/m": Dimension(0, 1, -1), "N m/rad": ENERGY,
-    "N m s/rad": Dimension(2, 1, -1), "s/rad": Dimension(time=1), "s/m": Dimension(-1, 0, 1),
+    "N m s/rad": Dimension(2, 1, -1), "m/rad": Dimension(1), "s/rad": Dimension(time=1), "s/m": Dimension(-1, 0, 1),
 }  # fmt: skip
 # Of bushings: the first three rows and columns are of turns, the others of displacements.
 OF_BUSHING = {
@@ -125,14 +133,12 @@ def _drives(scene: Scene) -> dict[str, Any]:
     their loads."""
     found: dict[str, Any] = {wheel.name: ENERGY.factor for wheel in scene.wheels}
     for item in (*scene.hinges, *scene.point_masses):
-        prescribed = [each for _, each in coordinates(item) if is_prescribed(each)]
+        prescribed = [each for _, each in coordinates(item) if each.prescribed is not None]
         if prescribed:
-            found[item.name] = [
-                (FORCE if isinstance(each, LinearCoordinate) else ENERGY).factor for each in prescribed
-            ]
+            found[item.name] = [EFFORT[each.ANGULAR].factor for each in prescribed]
     for connector in scene.connectors:
-        linear = isinstance(connector, LinearSpring | LinearFriction)
-        found[connector.name] = (FORCE if linear else ENERGY).factor
+        if isinstance(connector, AlongHinge):
+            found[connector.name] = EFFORT[connector.ANGULAR].factor
     return found
 
 
@@ -149,19 +155,34 @@ def _dimension(item: msgspec.Struct, key: str) -> Dimension | Each:
             return FORCE if item.type == "force" else ENERGY
         case ModalState() if key == "rates":
             return Dimension(time=-1)
-        case Bushing() if key in OF_BUSHING:
-            return OF_BUSHING[key]
-        case SpringDamper() | AngularSpring() | LinearSpring() if key == "stiffening":
-            return _stiffening(item)
+    if isinstance(item, Connector) and not split_unit(key)[1]:
+        return _without_unit(item, key)
     return OF_MODES[key] if key in OF_MODES else OF_UNIT[split_unit(key)[1]]
+
+
+def _without_unit(connector: Connector, key: str) -> Dimension | Each:
+    """Of what a connector has under a key that says no unit."""
+    match connector:
+        case Bushing():
+            return OF_BUSHING.get(key, NUMBER)
+        case SpringDamper() | AngularSpring() | LinearSpring():
+            return _stiffening(connector) if key == "stiffening" else NUMBER
+        case AngularFriction() | LinearFriction():
+            return NUMBER
+        case _:
+            assert_never(connector)
 
 
 def _stiffening(spring: SpringDamper | AngularSpring | LinearSpring) -> Each:
     """Of what is multiplied with the second and higher powers of an angle or a displacement."""
     count = len(spring.stiffening)
-    if isinstance(spring, AngularSpring):
-        return (ENERGY,) * count
-    return tuple(Dimension(-1 - n, 1, -2) for n in range(count))
+    match spring:
+        case AngularSpring():
+            return (ENERGY,) * count
+        case LinearSpring() | SpringDamper():
+            return tuple(Dimension(-1 - n, 1, -2) for n in range(count))
+        case _:
+            assert_never(spring)
 
 
 def _converted(value: Any, dimension: Dimension | Each) -> Any:

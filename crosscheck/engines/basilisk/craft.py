@@ -115,7 +115,7 @@ def _chains(parts: tuple[CraftPart, ...]) -> tuple[tuple[int, ...], ...]:
         own = next((chain for chain in chains.values() if chain[-1] == part.parent), None)
         if own is None:
             raise NoCraft("a part carries two others: Basilisk's effectors are chains without branches")
-        if parts[own[0]].freedom.angular != part.freedom.angular:
+        if parts[own[0]].freedom.motion != part.freedom.motion:
             raise NoCraft("a chain both turns and slides: Basilisk's effectors do one of them")
         own.append(number)
     return tuple(map(tuple, chains.values()))

@@ -14,7 +14,7 @@ from crosscheck.engines.basilisk.craft import HUB, CraftPart
 from crosscheck.engines.basilisk.dynamics import CraftDynamics, CraftSolution, CraftState
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import Frame, axis_rotation, cross, quaternion_of, rotation_matrix
-from crosscheck.engines.links import attachment
+from crosscheck.engines.links import attachment, by_motion
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -42,7 +42,7 @@ class PartMotion:
         """The motion of a part whose joint's inboard frame moves like this."""
         axis = self.rotation @ part.freedom.axis
         w = self.turning
-        if part.freedom.angular:
+        if by_motion(part.freedom, True, False):
             rotation = self.rotation @ axis_rotation(part.freedom.axis, value)
             angular = self.angular + axis * acceleration + cross(w, axis * rate)
             return PartMotion(rotation, self.position, w + axis * rate, self.velocity, angular, self.linear)

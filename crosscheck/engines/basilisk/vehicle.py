@@ -21,6 +21,7 @@ from Basilisk.simulation import (
 )
 
 from crosscheck.engines.basilisk.craft import Craft, CraftPart, CraftWheel
+from crosscheck.engines.links import by_motion
 from flexmb.typing import Real
 
 _STEP = 1.0  # s; equations of motion take a step for noise, of which there is none
@@ -101,7 +102,7 @@ class _Chain:
     """A chain of parts as one effector."""
 
     def __init__(self, parts: list[CraftPart]) -> None:
-        turns = parts[0].freedom.angular
+        turns = by_motion(parts[0].freedom, True, False)
         self.effector, self._names = _turning_chain(parts) if turns else _sliding_chain(parts)
         self._payload = messaging.ArrayMotorTorqueMsgPayload if turns else messaging.ArrayMotorForceMsgPayload
         self._message: Any = (messaging.ArrayMotorTorqueMsg if turns else messaging.ArrayMotorForceMsg)()

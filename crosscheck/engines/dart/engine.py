@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import TYPE_CHECKING
 
-from crosscheck.engines.contract import Effort, EngineMissing, Support
+from crosscheck.engines.contract import Effort, EngineMissing, Model
 from crosscheck.engines.links import obstacle
+from crosscheck.engines.peer import PeerEngine
+from crosscheck.engines.scipy_loop import RTOL_LADDER
 from flexmb.scene.schema import Scene
 
-if TYPE_CHECKING:
-    from crosscheck.engines.dart.model import DartModel
 
-
-class DartEngine:
+class DartEngine(PeerEngine):
     """Rigid trees, exact: DART's forward dynamics, hybrid where coordinates are prescribed."""
 
     name = "dart"
@@ -33,21 +31,16 @@ class DartEngine:
             raise EngineMissing("DART is not installed: pip install flexmb[more-peers]") from error
         return version("dartpy")
 
-    def supports(self, scene: Scene) -> Support:
-        reason = _open_loops_only(scene) or obstacle(scene, "DART", ())
-        return Support("no", reason) if reason else Support("exact")
+    def obstacle(self, scene: Scene) -> str:
+        return _open_loops_only(scene) or obstacle(scene, "DART", ())
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-8, 1e-10, 1e-12))
+        return RTOL_LADDER
 
-    def compile(self, scene: Scene) -> DartModel:
-        self.version()
-        from crosscheck.engines.dart.model import DartModel
+    def model(self, scene: Scene) -> Model:
+        from crosscheck.engines.dart.model import compiled
 
-        support = self.supports(scene)
-        if support.kind == "no":
-            raise ValueError(f'scene "{scene.name}": {support.reason}')
-        return DartModel(scene)
+        return compiled(scene)
 
 
 def _open_loops_only(scene: Scene) -> str:

@@ -9,13 +9,14 @@ springs and dampers are part of an implicit step, and are not used.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import assert_never
 
 import dartpy
 import numpy as np
 
 from crosscheck.engines.conventions import Frame
-from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
+from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar, by_motion
+from crosscheck.engines.rigid_tree import Slot, scalar_start
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -24,30 +25,16 @@ NEXT_TO_NOTHING = 1e-200
 
 
 @dataclass(frozen=True)
-class DartSlot:
-    """A freedom, and where its coordinates `q` start in those of the scene and its speeds `v` in those of DART.
-
-    The scene's coordinates are those of the schema: positions before quaternions wxyz.
-    """
-
-    freedom: Freedom
-    link: Link
-    q: int
-    v: int
-
-    @property
-    def driven(self) -> bool:
-        return isinstance(self.freedom, Scalar) and self.freedom.prescribed is not None
-
-
-@dataclass(frozen=True)
 class DartTree:
-    """`bodies[i]` is the body whose frame is that of link i; `nq` counts the scene's coordinates."""
+    """`bodies[i]` is the body whose frame is that of link i; `nq` counts the scene's coordinates.
+
+    A slot's `q` counts the scene's coordinates, positions before quaternions wxyz; its `v` counts DART's speeds.
+    """
 
     skeleton: dartpy.dynamics.Skeleton
     links: tuple[Link, ...]
     bodies: tuple[dartpy.dynamics.BodyNode, ...]
-    slots: tuple[DartSlot, ...]
+    slots: tuple[Slot, ...]
     nq: int
 
 
@@ -56,14 +43,14 @@ def build_tree(scene: Scene, chain: tuple[Link, ...]) -> DartTree:
     skeleton = dartpy.dynamics.Skeleton(scene.name)
     skeleton.setGravity(np.array(scene.gravity_m_s2, dtype=float))
     bodies: list[dartpy.dynamics.BodyNode] = []
-    slots: list[DartSlot] = []
+    slots: list[Slot] = []
     q = 0
     for link in chain:
         body = bodies[link.parent] if link.parent >= 0 else None
         at: Frame | None = link.inboard
         for freedom in link.freedoms:
             joint, body = _joint(skeleton, body, freedom)
-            slot = DartSlot(freedom, link, q, joint.getIndexInSkeleton(0))
+            slot = Slot(freedom, link, q, joint.getIndexInSkeleton(0))
             if slot.driven:
                 joint.setActuatorType(dartpy.dynamics.ActuatorType.ACCELERATION)
             slots.append(slot)
@@ -84,37 +71,43 @@ def initial_state(tree: DartTree) -> tuple[Real, Real]:
     q, v = np.zeros(tree.nq), np.zeros(tree.skeleton.getNumDofs())
     for slot in tree.slots:
         match slot.freedom:
-            case Scalar(prescribed=None) as freedom:
-                q[slot.q], v[slot.v] = freedom.value, freedom.rate
             case Scalar() as freedom:
-                q[slot.q], v[slot.v], _ = profile(freedom.prescribed)(0.0)
+                q[slot.q], v[slot.v] = scalar_start(freedom)
             case Ball() as freedom:
                 q[slot.q : slot.q + 4] = freedom.quaternion
                 v[slot.v : slot.v + 3] = freedom.angular_velocity
             case Floating() as freedom:
                 q[slot.q : slot.q + 7] = [*freedom.position, *freedom.quaternion]
                 v[slot.v : slot.v + 6] = [*freedom.angular_velocity, *freedom.velocity]
+            case _:
+                assert_never(slot.freedom)
     return q, v
 
 
 def _coordinates(freedom: Freedom) -> int:
-    return {Scalar: 1, Ball: 4, Floating: 7}[type(freedom)]
+    match freedom:
+        case Scalar():
+            return 1
+        case Ball() | Floating():
+            return freedom.sizes[0]
+        case _:
+            assert_never(freedom)
 
 
 def _joint(
     skeleton: dartpy.dynamics.Skeleton, parent: dartpy.dynamics.BodyNode | None, freedom: Freedom
 ) -> tuple[dartpy.dynamics.Joint, dartpy.dynamics.BodyNode]:
     match freedom:
-        case Scalar(angular=True, axis=axis):
-            joint, body = skeleton.createRevoluteJointAndBodyNodePair(parent)
-            joint.setAxis(axis)
         case Scalar(axis=axis):
-            joint, body = skeleton.createPrismaticJointAndBodyNodePair(parent)
+            turns, slides = skeleton.createRevoluteJointAndBodyNodePair, skeleton.createPrismaticJointAndBodyNodePair
+            joint, body = by_motion(freedom, turns, slides)(parent)
             joint.setAxis(axis)
         case Ball():
             joint, body = skeleton.createBallJointAndBodyNodePair(parent)
         case Floating():
             joint, body = skeleton.createFreeJointAndBodyNodePair(parent)
+        case _:
+            assert_never(freedom)
     return joint, body
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig, SimulatorStatus
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, EventStatus
 
-from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
+from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.drake.actions import DrakeActions, DrakeLoads, Drives, JointActions
 from crosscheck.engines.drake.observer import DrakeObserver
 from crosscheck.engines.drake.tree import DrakeState, build_tree, initial_state, place, recentred
@@ -46,10 +46,8 @@ class DrakeModel:
         with np.errstate(over="ignore", invalid="ignore"):  # divergence is a status
             states, evaluations, message = self._integrate(run.times, effort)
         wall = time.perf_counter() - start
-        reached = run.times[: len(states)]
-        status: Status = "finished" if len(states) == len(run.times) else "diverged"
-        samples = self._observed(reached, states)
-        return stack(reached, samples, status=status, message=message, wall_s=wall, evaluations=evaluations)
+        samples = self._observed(run.times[: len(states)], states)
+        return stack(run.times, samples, message=message, wall_s=wall, evaluations=evaluations)
 
     def _connected(self, has_forces: bool, has_loads: bool) -> Diagram:
         """The plant with the actions that this scene needs: without any Drake integrates in C++ alone."""

@@ -14,7 +14,7 @@ begin again at zero, whenever the pitch has grown large.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -36,8 +36,8 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from crosscheck.engines.conventions import Frame, rotation_matrix
-from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
+from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar, by_motion
+from crosscheck.engines.rigid_tree import Slot, scalar_start
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -46,21 +46,13 @@ BALLAST = 1e20
 
 
 @dataclass(frozen=True)
-class DrakeSlot:
-    """A freedom, its Drake joint, and where its coordinates `q` and speeds `v` start.
+class DrakeSlot(Slot):
+    """A freedom with its Drake joint.
 
     Drake's own elements give springs of scalar joints and all dampers, but refuse negative coefficients.
     """
 
-    freedom: Freedom
-    link: Link
     joint: Joint
-    q: int
-    v: int
-
-    @property
-    def driven(self) -> bool:
-        return isinstance(self.freedom, Scalar) and self.freedom.prescribed is not None
 
 
 @dataclass(frozen=True)
@@ -109,7 +101,10 @@ def build_tree(scene: Scene, chain: tuple[Link, ...], *, ballasted: bool) -> Dra
         bodies.append(body)
         last.append(joint)
     plant.Finalize()
-    slots = tuple(DrakeSlot(*each, each[-1].position_start(), each[-1].velocity_start()) for each in joints)
+    slots = tuple(
+        DrakeSlot(freedom, link, joint.position_start(), joint.velocity_start(), joint)
+        for freedom, link, joint in joints
+    )
     return DrakeTree(plant, chain, tuple(bodies), tuple(last), slots)
 
 
@@ -123,10 +118,8 @@ def initial_state(tree: DrakeTree) -> DrakeState:
     turned = []
     for slot in tree.slots:
         match slot.freedom:
-            case Scalar(prescribed=None) as freedom:
-                q[slot.q], v[slot.v] = freedom.value, freedom.rate
             case Scalar() as freedom:
-                q[slot.q], v[slot.v], _ = profile(freedom.prescribed)(0.0)
+                q[slot.q], v[slot.v] = scalar_start(freedom)
             case Ball() as freedom:
                 turned.append(slot.link.inboard.rotation @ rotation_matrix(freedom.quaternion))
                 v[slot.v : slot.v + 3] = freedom.angular_velocity
@@ -134,6 +127,8 @@ def initial_state(tree: DrakeTree) -> DrakeState:
                 R = rotation_matrix(freedom.quaternion)
                 q[slot.q : slot.q + 7] = [*freedom.quaternion, *freedom.position]
                 v[slot.v : slot.v + 6] = [*(R @ freedom.angular_velocity), *(R @ freedom.velocity)]
+            case _:
+                assert_never(slot.freedom)
     return DrakeState(q, v, tuple(turned))
 
 
@@ -170,20 +165,22 @@ def _orthogonal(rotation: Real) -> RotationMatrix:
 
 def _joint(name: str, freedom: Freedom, inboard: object, outboard: object) -> Joint:
     match freedom:
-        case Scalar(angular=angular, axis=axis, damping=damping):
-            kind = RevoluteJoint if angular else PrismaticJoint
+        case Scalar(axis=axis, damping=damping):
+            kind = by_motion(freedom, RevoluteJoint, PrismaticJoint)
             return kind(name, inboard, outboard, axis, damping=max(damping, 0.0))
         case Ball(damping=damping):
             return BallRpyJoint(name, inboard, outboard, damping=max(damping, 0.0))
         case Floating():
             return QuaternionFloatingJoint(name, inboard, outboard)
+        case _:
+            assert_never(freedom)
 
 
 def _equip(plant: MultibodyPlant, joint: Joint, freedom: Freedom, ballasted: bool) -> None:
     if not isinstance(freedom, Scalar):
         return
     if freedom.stiffness > 0.0:
-        spring = RevoluteSpring if freedom.angular else PrismaticSpring
+        spring = by_motion(freedom, RevoluteSpring, PrismaticSpring)
         plant.AddForceElement(spring(joint, freedom.rest, freedom.stiffness))
     if ballasted and freedom.prescribed is not None:
         rotor = plant.AddJointActuator(joint.name(), joint)

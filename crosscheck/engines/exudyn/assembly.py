@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import assert_never
 
 import numpy as np
 
@@ -16,13 +17,13 @@ from crosscheck.engines.exudyn.loads import along_axis
 from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
 from crosscheck.engines.exudyn.motion import AT_REST, FrameMotion, across_quaternion
 from crosscheck.engines.functions_of_time import Profile, profile
-from crosscheck.engines.links import axes
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.connectors import BetweenNodes
-from flexmb.scene.hinges import AngularCoordinate, Free, Hinge, Spherical, Weld
+from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
+from flexmb.scene.hinges import Free, Hinge
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
-from flexmb.scene.tree import GROUND, coordinates, node_frame, ordered
+from flexmb.scene.tree import GROUND, node_frame, ordered
 from flexmb.surrogate.lumping import Inertia, inertia_of, rigid_equivalent
 from flexmb.typing import Real
 
@@ -173,22 +174,25 @@ def _attach(
         return found[0].carrier
 
     point = zero @ outboard.position
-    match hinge:
-        case Free():
-            make(across_quaternion(port.motion, hinge))
+    first = next(iter(hinge.freedoms), None)
+    match first:
+        case Floating():
+            make(across_quaternion(port.motion, first))
             link = joints.free(hinge.name)
-        case Weld():
+        case None:
             link, _ = joints.weld(shop, hinge.name, port, make, point)
-        case Spherical():
-            link, _ = joints.spherical(shop, hinge, port, make, point)
-        case _:
+        case Ball():
+            link, _ = joints.spherical(shop, hinge.name, first, port, make, point)
+        case ScalarFreedom():
             link, _ = joints.chain(shop, hinge.name, port, _steps(hinge), make, point)
+        case _:
+            assert_never(first)
     return link, found[0]
 
 
-def _steps(hinge: Hinge) -> list[tuple[Real, joints.Coordinate]]:
+def _steps(item: Hinge | Wheel | PointMass) -> list[tuple[Real, joints.Coordinate]]:
     """(axis in the carried hinge frame, coordinate) of every freedom, from the inboard side."""
-    return [(_unit(axis), each.coordinate) for axis, each in zip(axes(hinge), coordinates(hinge), strict=True)]
+    return [(_unit(each.axis), each.coordinate) for each in item.freedoms if isinstance(each, ScalarFreedom)]
 
 
 def _place(
@@ -309,15 +313,11 @@ def _wheel(shop: Workshop, parent: Placed, wheel: Wheel) -> tuple[ExudynLink, Ca
     """A wheel as a body of its own on a revolute joint; friction and motor between it and its node."""
     axis = _unit(wheel.axis)
     port = _port(shop, parent, wheel.node, Frame(np.array(wheel.offset_m), np.eye(3)))
-    spin = AngularCoordinate(
-        angle_rad=wheel.angle_rad, rate_rad_s=wheel.speed_rad_s, damping_Nms_rad=wheel.friction_Nms_rad,
-        torque_Nm=wheel.torque_Nm, prescribed_rad=wheel.prescribed_rad,
-    )  # fmt: skip
     across_axis = np.eye(3) - np.outer(axis, axis)
     tensor = wheel.axial_inertia_kg_m2 * np.outer(axis, axis) + wheel.transverse_inertia_kg_m2 * across_axis
     inertia = Inertia(wheel.mass_kg, np.zeros(3), tensor)
     return joints.chain(
-        shop, wheel.name, port, [(axis, spin)], lambda motion: shop.rigid(motion, port.zero, inertia), np.zeros(3)
+        shop, wheel.name, port, _steps(wheel), lambda motion: shop.rigid(motion, port.zero, inertia), np.zeros(3)
     )
 
 
@@ -325,10 +325,7 @@ def _point_mass(shop: Workshop, parent: Placed, mass: PointMass) -> tuple[Exudyn
     """A rigid body without rotary inertia, guided along the point mass's directions."""
     port = _port(shop, parent, mass.node, Frame(np.array(mass.offset_m), np.eye(3)))
     inertia = Inertia(mass.mass_kg, np.zeros(3), np.zeros((3, 3)))
-    steps = [
-        (_unit(direction), each.coordinate)
-        for direction, each in zip(mass.directions, coordinates(mass), strict=True)
-    ]
+    steps = _steps(mass)
 
     def make(motion: FrameMotion) -> Carrier:
         return shop.rigid(motion, port.zero, inertia)

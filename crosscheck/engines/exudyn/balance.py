@@ -36,10 +36,10 @@ def energy_and_momentum(assembly: Assembly, states: States, paths: Paths) -> tup
             if stage.stiffness:
                 energy["spring"] += 0.5 * stage.stiffness * (coordinate(stage, paths) - stage.rest) ** 2
         if link.spherical is not None:
-            hinge, inboard, outboard = link.spherical
+            ball, inboard, outboard = link.spherical
             # the hinge frames at coordinate zero have parallel Exudyn axes, so their relative turn is the hinge's
             turn = Rotation.from_matrix(_relative(paths[inboard.key], paths[outboard.key])).magnitude()
-            energy["spring"] += 0.5 * hinge.stiffness_Nm_rad * turn**2
+            energy["spring"] += 0.5 * ball.stiffness * turn**2
     return energy, momentum
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Model, Run, Snapshot, Support, Trajectory
 from crosscheck.engines.exudyn import library
-from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign, root_frame
+from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign, floats, root_frame
 from crosscheck.engines.exudyn.kkt import initial_state
 from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.state import States
@@ -66,7 +66,7 @@ def _first_bending(scene: Scene) -> float:
     beam, root = scene.bodies[0], scene.hinges[0]
     assert isinstance(beam, BeamBody)
     station = beam.stations[0]
-    number = 22.37 if isinstance(root, Planar) else 3.516
+    number = 22.37 if floats(root) else 3.516
     return number / beam.length_m**2 * sqrt(station.EIz_Nm2 / station.mass_per_length_kg_m)
 
 

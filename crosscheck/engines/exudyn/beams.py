@@ -17,6 +17,7 @@ from crosscheck.engines.conventions import Frame, frame
 from crosscheck.engines.exudyn.carriers import Workshop
 from crosscheck.engines.exudyn.motion import initial
 from crosscheck.engines.functions_of_time import Profile, breaks, profile
+from flexmb.scene.freedoms import ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import Hinge, Planar, Revolute
 from flexmb.scene.schema import BeamBody, Load, Scene
@@ -59,7 +60,7 @@ def assemble_beam(scene: Scene, elements: int) -> PlanarBeam:
     stations = _stations(scene, beam, elements)
     add = _geometrically_exact if sheared else _cable
     nodes = add(shop, beam, stations, root)
-    holds, prescribed = ((), []) if isinstance(hinge, Planar) else _clamp(shop, nodes[0], root, hinge)
+    holds, prescribed = ((), []) if floats(hinge) else _clamp(shop, nodes[0], root, hinge)
     for load in scene.loads:
         _load(shop, nodes[_nearest(stations, beam, load.node)], load)
     sampler = shop.mbs.AddSensor(
@@ -109,8 +110,14 @@ def _root(beam: BeamBody, hinge: Hinge) -> _Root:
 
 
 def axis_sign(hinge: Hinge) -> float:
-    """+1 where the hinge axis is World +z, -1 where it is -z."""
-    return float(np.sign(hinge.axis[2])) if isinstance(hinge, Revolute) else 1.0
+    """+1 where the hinge axis is World +z, or there is none, -1 where it is -z."""
+    axes = [freedom.axis for freedom in hinge.freedoms if isinstance(freedom, ScalarFreedom) and freedom.turns]
+    return float(np.sign(axes[0][2])) if axes else 1.0
+
+
+def floats(hinge: Hinge) -> bool:
+    """Whether the root moves freely in the plane, and is not held in a place as by a weld or a revolute hinge."""
+    return len(hinge.freedoms) == 3
 
 
 def _clamp(

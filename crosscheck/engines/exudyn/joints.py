@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, assert_never
 
 import numpy as np
 
@@ -15,10 +16,10 @@ from crosscheck.engines.exudyn.carriers import Carrier, Workshop
 from crosscheck.engines.exudyn.loads import along_axis
 from crosscheck.engines.exudyn.motion import FrameMotion, across, across_quaternion, initial
 from crosscheck.engines.functions_of_time import Profile, profile
-from flexmb.scene.hinges import AngularCoordinate, LinearCoordinate, Spherical
+from flexmb.scene.freedoms import Ball, Coordinate
+from flexmb.scene.hinges import WITH_AXIS, ClosureKind
 from flexmb.typing import Real
 
-Coordinate = AngularCoordinate | LinearCoordinate
 Outboard = Callable[[FrameMotion], Carrier]
 """Makes the carrier beyond a link, given the motion of the outboard hinge frame."""
 
@@ -41,7 +42,6 @@ class Stage:
     `markers` are those of its joint, inboard and outboard.
     """
 
-    angular: bool
     axis: Real
     inboard: Carrier
     inboard_point: Real
@@ -54,13 +54,16 @@ class Stage:
     markers: tuple[int, int]
 
     @property
+    def angular(self) -> bool:
+        return self.coordinate.ANGULAR
+
+    @property
     def stiffness(self) -> float:
-        c = self.coordinate
-        return c.stiffness_Nm_rad if isinstance(c, AngularCoordinate) else c.stiffness_N_m
+        return self.coordinate.spring[0]
 
     @property
     def rest(self) -> float:
-        return self.coordinate.rest_rad if isinstance(self.coordinate, AngularCoordinate) else self.coordinate.rest_m
+        return self.coordinate.spring[2]
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ class ExudynLink:
     stages: tuple[Stage, ...]
     connectors: tuple[tuple[int, bool], ...]
     marker: int | None
-    spherical: tuple[Spherical, Carrier, Carrier] | None = None
+    spherical: tuple[Ball, Carrier, Carrier] | None = None
 
 
 def free(name: str) -> ExudynLink:
@@ -91,45 +94,45 @@ def weld(shop: Workshop, name: str, port: HingePort, make: Outboard, point: Real
 
 
 def spherical(
-    shop: Workshop, hinge: Spherical, port: HingePort, make: Outboard, point: Real
+    shop: Workshop, name: str, ball: Ball, port: HingePort, make: Outboard, point: Real
 ) -> tuple[ExudynLink, Carrier]:
     """Ball joint, with the isotropic spring and damper of the scene."""
-    carrier = make(across_quaternion(port.motion, hinge))
+    carrier = make(across_quaternion(port.motion, ball))
     markers = [shop.marker(port.carrier, port.position), shop.marker(carrier, point)]
     connectors = [(shop.mbs.AddObject(shop.items.SphericalJoint(markerNumbers=markers)), True)]
-    if hinge.stiffness_Nm_rad or hinge.damping_Nms_rad:
+    if ball.stiffness or ball.damping:
         turning = np.diag([0.0] * 3 + [1.0] * 3)
         spring = shop.items.RigidBodySpringDamper(
-            markerNumbers=markers, stiffness=hinge.stiffness_Nm_rad * turning,
-            damping=hinge.damping_Nms_rad * turning, useIntrinsicFormulation=True,
+            markerNumbers=markers, stiffness=ball.stiffness * turning,
+            damping=ball.damping * turning, useIntrinsicFormulation=True,
         )  # fmt: skip
         connectors.append((shop.mbs.AddObject(spring), False))
-    return ExudynLink(hinge.name, (), tuple(connectors), markers[1], (hinge, port.carrier, carrier)), carrier
+    return ExudynLink(name, (), tuple(connectors), markers[1], (ball, port.carrier, carrier)), carrier
 
 
-CONSTRAINED = {
+CONSTRAINED: dict[ClosureKind, list[int]] = {
     "weld": [1, 1, 1, 1, 1, 1],
-    "revolute": [1, 1, 1, 1, 1, 0],
     "prismatic": [1, 1, 0, 1, 1, 1],
     "cylindrical": [1, 1, 0, 1, 1, 0],
     "universal": [1, 1, 1, 0, 0, 1],
-    "spherical": [1, 1, 1, 0, 0, 0],
     "planar": [0, 0, 1, 1, 1, 0],
 }
 """Displacements along and turns about x, y, z of frame A that a closure's joint suppresses, z being its axis."""
 
 
-def closure(shop: Workshop, name: str, kind: str, ports: Sequence[HingePort], axis: Real) -> ExudynLink:
+def closure(shop: Workshop, name: str, kind: ClosureKind, ports: Sequence[HingePort], axis: Real) -> ExudynLink:
     """A joint of some kind between two ports; `axis` (3,) has the same components in both frames."""
-    turn = np.eye(3) if kind in ("universal", "planar", "weld", "spherical") else _axes_with(axis, 2)
+    turn = _axes_with(axis, 2) if kind in WITH_AXIS else np.eye(3)
     markers = [shop.marker(port.carrier, port.position, port.zero @ turn) for port in ports]
     match kind:
         case "revolute":
             joint = shop.items.RevoluteJointZ(markerNumbers=markers)
         case "spherical":
             joint = shop.items.SphericalJoint(markerNumbers=markers)
-        case _:
+        case "weld" | "prismatic" | "cylindrical" | "universal" | "planar":
             joint = shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=CONSTRAINED[kind])
+        case _:
+            assert_never(kind)
     return ExudynLink(name, (), ((shop.mbs.AddObject(joint), True),), markers[1])
 
 
@@ -152,8 +155,8 @@ def chain(
         connectors += [] if constraint is None else [(constraint, True)]
         stages.append(
             Stage(
-                isinstance(coordinate, AngularCoordinate), port.zero @ axis, inboard, position, outboard, arrival,
-                coordinate, motor, prescribed, constraint, (markers[0], markers[1]),
+                port.zero @ axis, inboard, position, outboard, arrival, coordinate, motor, prescribed, constraint,
+                (markers[0], markers[1]),
             )
         )  # fmt: skip
         inboard, position = outboard, arrival
@@ -162,33 +165,29 @@ def chain(
 
 def _markers(shop: Workshop, a: Carrier, p: Real, b: Carrier, q: Real, axis: Real, coordinate: Coordinate) -> list:
     """Markers on both sides with the axis along z (revolute) or x (prismatic), as Exudyn's joints want it."""
-    axes = _axes_with(axis, 2 if isinstance(coordinate, AngularCoordinate) else 0)
+    axes = _axes_with(axis, 2 if coordinate.ANGULAR else 0)
     return [shop.marker(a, p, axes), shop.marker(b, q, axes)]
 
 
 def _joint(shop: Workshop, markers: list[int], coordinate: Coordinate) -> int:
-    kind = shop.items.RevoluteJointZ if isinstance(coordinate, AngularCoordinate) else shop.items.PrismaticJointX
+    kind = shop.items.RevoluteJointZ if coordinate.ANGULAR else shop.items.PrismaticJointX
     return shop.mbs.AddObject(kind(markerNumbers=markers))
 
 
 def _spring(shop: Workshop, markers: list[int], coordinate: Coordinate) -> list[int]:
-    match coordinate:
-        case AngularCoordinate(stiffness_Nm_rad=k, damping_Nms_rad=d, rest_rad=rest) if k or d:
-            memory = shop.angle_memory(initial(coordinate)[0])
-            spring = shop.items.TorsionalSpringDamper(
-                markerNumbers=markers, nodeNumber=memory, stiffness=k, damping=d, offset=rest
-            )
-        case LinearCoordinate(stiffness_N_m=k, damping_Ns_m=d, rest_m=rest) if k or d:
-            spring = shop.items.LinearSpringDamper(markerNumbers=markers, stiffness=k, damping=d, offset=rest)
-        case _:
-            return []
-    return [shop.mbs.AddObject(spring)]
+    k, d, rest = coordinate.spring
+    if not (k or d):
+        return []
+    law: dict[str, Any] = dict(markerNumbers=markers, stiffness=k, damping=d, offset=rest)
+    if coordinate.ANGULAR:
+        memory = shop.angle_memory(initial(coordinate)[0])
+        return [shop.mbs.AddObject(shop.items.TorsionalSpringDamper(nodeNumber=memory, **law))]
+    return [shop.mbs.AddObject(shop.items.LinearSpringDamper(**law))]
 
 
 def _motor(shop: Workshop, markers: list[int], coordinate: Coordinate) -> Callable[[float], Profile] | None:
     """A pair of loads along the joint axis, turning with the bodies: + on the outboard side, - on the inboard one."""
-    angular = isinstance(coordinate, AngularCoordinate)
-    function = coordinate.torque_Nm if angular else coordinate.force_N
+    angular, function = coordinate.ANGULAR, coordinate.effort
     if function is None:
         return None
     load = shop.items.LoadTorqueVector if angular else shop.items.LoadForceVector
@@ -205,8 +204,7 @@ def _prescribed(
     shop: Workshop, a: Carrier, p: Real, b: Carrier, q: Real, axis: Real, coordinate: Coordinate
 ) -> tuple[Callable[[float], Profile] | None, int | None]:
     """A constraint that makes the relative coordinate follow its function of time."""
-    angular = isinstance(coordinate, AngularCoordinate)
-    function = coordinate.prescribed_rad if angular else coordinate.prescribed_m
+    angular, function = coordinate.ANGULAR, coordinate.prescribed
     if function is None:
         return None, None
     f = profile(function)

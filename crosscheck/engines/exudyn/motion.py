@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import assert_never
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from crosscheck.engines.conventions import axis_rotation, rotation_matrix
 from crosscheck.engines.exudyn.modal import NodeShape
 from crosscheck.engines.exudyn.rotations import exponential, left_jacobian
 from crosscheck.engines.functions_of_time import profile
-from flexmb.scene.hinges import AngularCoordinate, Free, LinearCoordinate, Spherical
+from flexmb.scene.freedoms import Ball, Coordinate, Floating
 from flexmb.typing import Real
 
 
@@ -66,31 +67,27 @@ class FrameMotion:
 AT_REST = FrameMotion(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 
 
-def initial(coordinate: AngularCoordinate | LinearCoordinate) -> tuple[float, float]:
+def initial(coordinate: Coordinate) -> tuple[float, float]:
     """Value and rate at t = 0: of the prescribed function where there is one, else the scene's initial values."""
-    match coordinate:
-        case AngularCoordinate(prescribed_rad=None):
-            return coordinate.angle_rad, coordinate.rate_rad_s
-        case LinearCoordinate(prescribed_m=None):
-            return coordinate.position_m, coordinate.rate_m_s
-        case AngularCoordinate(prescribed_rad=function) | LinearCoordinate(prescribed_m=function):
-            start = profile(function)(0.0)
-            return start.value, start.rate
+    if coordinate.prescribed is None:
+        return coordinate.value, coordinate.rate
+    start = profile(coordinate.prescribed)(0.0)
+    return start.value, start.rate
 
 
-def across(inboard: FrameMotion, axis: Real, coordinate: AngularCoordinate | LinearCoordinate) -> FrameMotion:
+def across(inboard: FrameMotion, axis: Real, coordinate: Coordinate) -> FrameMotion:
     """The frame beyond one scalar coordinate about or along `axis` (in the inboard frame)."""
     value, rate = initial(coordinate)
-    if isinstance(coordinate, AngularCoordinate):
-        return inboard.turned(axis, value, rate)
-    return inboard.moved(value * axis, rate * axis)
+    return inboard.turned(axis, value, rate) if coordinate.ANGULAR else inboard.moved(value * axis, rate * axis)
 
 
-def across_quaternion(inboard: FrameMotion, hinge: Spherical | Free) -> FrameMotion:
-    """The frame beyond a hinge with a quaternion; a free hinge's velocity is in the outboard axes."""
-    rate = np.array(hinge.angular_velocity_rad_s)
-    if isinstance(hinge, Spherical):
-        return inboard.spherical(hinge.quaternion, rate)
-    to_inboard = rotation_matrix(hinge.quaternion)
-    moved = inboard.moved(np.array(hinge.position_m), to_inboard @ np.array(hinge.velocity_m_s))
-    return moved.spherical(hinge.quaternion, rate)
+def across_quaternion(inboard: FrameMotion, freedom: Ball | Floating) -> FrameMotion:
+    """The frame beyond a freedom with a quaternion; the velocity of free flight is in the outboard axes."""
+    match freedom:
+        case Ball():
+            moved = inboard
+        case Floating(position=position, quaternion=quaternion, velocity=velocity):
+            moved = inboard.moved(np.array(position), rotation_matrix(quaternion) @ np.array(velocity))
+        case _:
+            assert_never(freedom)
+    return moved.spherical(freedom.quaternion, np.array(freedom.angular_velocity))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import assert_never
 
 from crosscheck.engines.contract import Support
 from crosscheck.engines.exudyn.assembly import deforming, flexible
+from crosscheck.engines.links import first_screw
 from flexmb.scene.hinges import Free
 from flexmb.scene.modal_data import modal_arrays
-from flexmb.scene.schema import BeamBody, Body, ModalBody, Scene, SidBody
+from flexmb.scene.schema import BeamBody, Body, ModalBody, RigidBody, Scene, SidBody
 from flexmb.scene.tree import GROUND
 
 NOT_WORKLESS = (
@@ -29,6 +31,9 @@ def _refusals(scene: Scene) -> Iterator[str]:
     for closure in scene.closures:
         if closure.body_b == GROUND:
             yield f'closure "{closure.name}": its load is read on body_b, which is the ground here: exchange a and b'
+    screw = first_screw(scene)
+    if screw:
+        yield f'hinge "{screw}" is a screw: the adapter of Exudyn offers no such joint'
     bodies = {body.name: body for body in scene.bodies}
     for body in scene.bodies:
         yield from _body_refusals(body)
@@ -44,8 +49,11 @@ def _body_refusals(body: Body) -> Iterator[str]:
     match body:
         case SidBody():
             yield f'body "{body.name}": its SID file is read by flexmb alone: convert it by flexmb import'
-        case BeamBody() if body.level != "rigid":
-            yield f'body "{body.name}": expand the beam to raw points and modes first'
+        case RigidBody():
+            return
+        case BeamBody():
+            if body.level != "rigid":
+                yield f'body "{body.name}": expand the beam to raw points and modes first'
         case ModalBody() if body.level not in ("rigid", "full"):
             yield f'body "{body.name}": Exudyn\'s floating frame is of level "full", not "{body.level}"'
         case ModalBody(level="full"):
@@ -57,6 +65,10 @@ def _body_refusals(body: Body) -> Iterator[str]:
                 )
             elif arrays.com_offset.any():
                 yield f'body "{body.name}": put the points at their mass centres (com_offset_m = 0)'
+        case ModalBody():
+            return  # its modes are left out
+        case _:
+            assert_never(body)
 
 
 def _approximations(scene: Scene) -> Iterator[str]:

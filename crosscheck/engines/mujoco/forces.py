@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import assert_never
 
 import mujoco
 import numpy as np
 
 from crosscheck.engines.conventions import cross, rotation_vector
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Attachment, Ball, Scalar, attachment
+from crosscheck.engines.links import Attachment, Ball, Floating, Scalar, attachment
 from crosscheck.engines.mujoco.connections import MujocoConnections
 from crosscheck.engines.mujoco.tree import ARMATURE, MujocoSlot, MujocoTree
+from crosscheck.engines.rigid_tree import PointLoad
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -26,7 +28,7 @@ class Forces:
 
     def __init__(self, tree: MujocoTree, scene: Scene) -> None:
         scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
-        self.driven: list[MujocoSlot] = [slot for slot in scalars if slot.freedom.prescribed is not None]
+        self.driven: list[MujocoSlot] = [slot for slot in tree.slots if slot.driven]
         self._tree = tree
         self._motions = [(slot.q, slot.v, profile(slot.freedom.prescribed)) for slot in self.driven]
         self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
@@ -61,6 +63,10 @@ class Forces:
                 case Ball(stiffness=k):
                     turn = rotation_vector(q[slot.q : slot.q + 4] / np.linalg.norm(q[slot.q : slot.q + 4]))
                     energy += 0.5 * k * (turn @ turn)
+                case Floating():
+                    pass  # free flight has no spring
+                case _:
+                    assert_never(slot.freedom)
         return float(energy)
 
     def _apply(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -90,17 +96,13 @@ class _BodyWrench:
 
     def __init__(self, tree: MujocoTree, at: Attachment, load: Load) -> None:
         self._body = int(tree.bodies[at.link])
-        self._arm = at.frame.position - tree.links[at.link].inertia.com
-        self._in_world = load.frame == "world"
-        direction = np.array(load.direction, dtype=float)
-        self._direction = direction if self._in_world else at.frame.rotation @ direction
-        self._is_force = load.type == "force"
-        self._size = profile(load.function)
+        self._load = PointLoad(load, at.frame)
+        self._arm = self._load.point - tree.links[at.link].inertia.com
 
     def add(self, t: float, data: mujoco.MjData) -> None:
         R = data.xmat[self._body].reshape(3, 3)
-        vector = self._size(t).value * (self._direction if self._in_world else R @ self._direction)
-        if self._is_force:
+        vector = self._load.in_world(t, R)
+        if self._load.is_force:
             data.xfrc_applied[self._body, :3] += vector
             data.xfrc_applied[self._body, 3:] += cross(R @ self._arm, vector)
         else:

@@ -11,7 +11,7 @@ from math import ceil
 import mujoco
 import numpy as np
 
-from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
+from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
 from crosscheck.engines.links import closed_frames, links
 from crosscheck.engines.mujoco.forces import Forces
@@ -61,11 +61,7 @@ class MujocoModel:
             for t, (qpos, qvel) in zip(run.times, states, strict=False):
                 data.time, data.qpos[:], data.qvel[:] = t, qpos, qvel
                 samples.append(self._observer.observe(data))
-        status: Status = "finished" if len(states) == len(run.times) else "diverged"
-        reached = run.times[: len(states)]
-        return stack(
-            reached, samples, status=status, message=message, wall_s=wall, evaluations=stages * steps
-        )
+        return stack(run.times, samples, message=message, wall_s=wall, evaluations=stages * steps)
 
     def _initial(self) -> mujoco.MjData:
         data = mujoco.MjData(self._tree.model)

@@ -12,14 +12,15 @@ are raised to `LEAST_INERTIA`, an error of that much against the carrier's momen
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import assert_never
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import quaternion_of, rotation_matrix
-from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar
+from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, by_motion
+from crosscheck.engines.rigid_tree import Slot, scalar_start
 from flexmb.typing import Real
 
 ARMATURE = 1e20
@@ -36,15 +37,11 @@ class MujocoClosure:
 
 
 @dataclass(frozen=True)
-class MujocoSlot:
-    """A freedom and where its coordinates `q` and speeds `v` start; `joint` is the id of its first MuJoCo joint."""
+class MujocoSlot(Slot):
+    """A freedom with the ids of its MuJoCo body and of the first of its MuJoCo joints."""
 
-    freedom: Freedom
-    link: Link
     body: int
     joint: int
-    q: int
-    v: int
 
 
 @dataclass(frozen=True)
@@ -90,10 +87,8 @@ def initial_state(tree: MujocoTree) -> tuple[Real, Real]:
     q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
     for slot in tree.slots:
         match slot.freedom:
-            case Scalar(prescribed=None) as freedom:
-                q[slot.q], v[slot.v] = freedom.value, freedom.rate
             case Scalar() as freedom:
-                q[slot.q], v[slot.v], _ = profile(freedom.prescribed)(0.0)
+                q[slot.q], v[slot.v] = scalar_start(freedom)
             case Ball() as freedom:
                 q[slot.q : slot.q + 4] = freedom.quaternion
                 v[slot.v : slot.v + 3] = freedom.angular_velocity
@@ -101,6 +96,8 @@ def initial_state(tree: MujocoTree) -> tuple[Real, Real]:
                 q[slot.q : slot.q + 7] = [*freedom.position, *freedom.quaternion]
                 linear = rotation_matrix(freedom.quaternion) @ freedom.velocity
                 v[slot.v : slot.v + 6] = [*linear, *freedom.angular_velocity]
+            case _:
+                assert_never(slot.freedom)
     return q, v
 
 
@@ -120,7 +117,7 @@ def _add_joints(body: mujoco.MjsBody, freedom: Freedom, name: str) -> None:
     kinds = mujoco.mjtJoint
     match freedom:
         case Scalar():
-            joint = body.add_joint(name=name, type=kinds.mjJNT_HINGE if freedom.angular else kinds.mjJNT_SLIDE)
+            joint = body.add_joint(name=name, type=by_motion(freedom, kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE))
             joint.axis = freedom.axis
             if freedom.prescribed is None:
                 joint.stiffness = [freedom.stiffness, 0.0, 0.0]
@@ -136,6 +133,8 @@ def _add_joints(body: mujoco.MjsBody, freedom: Freedom, name: str) -> None:
             for axis, letter in zip(np.eye(3), "xyz", strict=True):
                 body.add_joint(name=f"{name}.{letter}", type=kinds.mjJNT_SLIDE, axis=axis)
             body.add_joint(name=name, type=kinds.mjJNT_BALL)
+        case _:
+            assert_never(freedom)
 
 
 def _slots(model: mujoco.MjModel, links: tuple[Link, ...], bodies: NDArray[np.intp]) -> tuple[MujocoSlot, ...]:
@@ -144,9 +143,20 @@ def _slots(model: mujoco.MjModel, links: tuple[Link, ...], bodies: NDArray[np.in
         joint = int(model.body_jntadr[body])
         for freedom in link.freedoms:
             q, v = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
-            slots.append(MujocoSlot(freedom, link, int(body), joint, q, v))
-            joint += 4 if isinstance(freedom, Floating) else 1
+            slots.append(MujocoSlot(freedom, link, q, v, int(body), joint))
+            joint += _joints_of(freedom)
     return tuple(slots)
+
+
+def _joints_of(freedom: Freedom) -> int:
+    """How many of MuJoCo's joints it is."""
+    match freedom:
+        case Scalar() | Ball():
+            return 1
+        case Floating():
+            return 4
+        case _:
+            assert_never(freedom)
 
 
 def _principal(inertia: Real) -> tuple[Real, Real]:

@@ -7,7 +7,7 @@ held for a weld) follow their functions of time.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 import pinocchio as pin
@@ -50,7 +50,7 @@ class Dynamics:
         self.loads = PlacedLoads(tree, scene)
         self.closures = PinocchioClosures(tree, scene)
         self.connections = PinocchioConnections(tree, scene)
-        self.driven: list[PinocchioSlot] = [slot for slot in tree.slots if _is_driven(slot)]
+        self.driven: list[PinocchioSlot] = [slot for slot in tree.slots if slot.driven]
         self._motions = [profile(slot.freedom.prescribed) for slot in self.driven]
         driven_q, driven_v = [slot.q for slot in self.driven], [slot.v for slot in self.driven]
         free_q = np.setdiff1d(np.arange(tree.model.nq), driven_q)
@@ -159,11 +159,16 @@ class Dynamics:
     def _turning_rate(self, slot: PinocchioSlot, own: Real, state: PinocchioState, qdot: Real) -> None:
         """Rates of ball and free-flyer coordinates; the quaternion's `own` (not normalised) value enters its rate."""
         start = _quaternion_start(slot)
-        if isinstance(slot.freedom, Floating):
-            linear, omega = state.v[slot.v : slot.v + 3], state.v[slot.v + 3 : slot.v + 6]
-            qdot[slot.q : slot.q + 3] = pin.Quaternion(state.q[start : start + 4]).toRotationMatrix() @ linear
-        else:
-            omega = state.v[slot.v : slot.v + 3]
+        match slot.freedom:
+            case Ball():
+                omega = state.v[slot.v : slot.v + 3]
+            case Floating():
+                linear, omega = state.v[slot.v : slot.v + 3], state.v[slot.v + 3 : slot.v + 6]
+                qdot[slot.q : slot.q + 3] = pin.Quaternion(state.q[start : start + 4]).toRotationMatrix() @ linear
+            case Scalar():
+                return  # without a quaternion the rates are the speeds
+            case _:
+                assert_never(slot.freedom)
         qdot[start : start + 4] = scalar_last(quaternion_rate(scalar_first(own).tolist(), omega.tolist()))
 
     def _wrenches(self, t: float, state: PinocchioState) -> pin.StdVec_Force | None:
@@ -175,9 +180,13 @@ class Dynamics:
         return wrenches
 
 
-def _is_driven(slot: PinocchioSlot) -> bool:
-    return isinstance(slot.freedom, Scalar) and slot.freedom.prescribed is not None
-
-
 def _quaternion_start(slot: PinocchioSlot) -> int:
-    return slot.q if isinstance(slot.freedom, Ball) else slot.q + 3
+    match slot.freedom:
+        case Ball():
+            return slot.q
+        case Floating():
+            return slot.q + 3
+        case Scalar():
+            raise ValueError(f'"{slot.link.joint}" has no quaternion')
+        case _:
+            assert_never(slot.freedom)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, get_args
+from typing import get_args
 
-from crosscheck.engines.contract import Effort, EngineMissing, Support
+from crosscheck.engines.contract import Effort, EngineMissing, Model
 from crosscheck.engines.links import Scalar, links, obstacle
+from crosscheck.engines.peer import PeerEngine
+from crosscheck.engines.scipy_loop import RTOL_LADDER
 from flexmb.scene.schema import Connector, Scene
-
-if TYPE_CHECKING:
-    from crosscheck.engines.pinocchio.model import PinocchioModel
 
 MOST_JOINTS = 500
 WHY_NOT_MORE = "Pinocchio's data hold arrays of n x n x n numbers for n speeds, and more than 20 GB for 1000"
 
 
-class PinocchioEngine:
+class PinocchioEngine(PeerEngine):
     """Rigid trees, exact: articulated-body accelerations, hybrid dynamics where coordinates are prescribed."""
 
     name = "pinocchio"
@@ -35,24 +34,19 @@ class PinocchioEngine:
             raise EngineMissing("Pinocchio is not installed: pip install flexmb[peers]") from error
         return pinocchio.__version__
 
-    def supports(self, scene: Scene) -> Support:
+    def obstacle(self, scene: Scene) -> str:
         if len(scene.hinges) > MOST_JOINTS:
-            return Support("no", f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}")
-        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), get_args(Connector))
-        reason = reason or (scene.closures and _beside_closures(scene))
-        return Support("no", reason) if reason else Support("exact")
+            return f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
+        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), get_args(Connector), screws=True)
+        return reason or (_beside_closures(scene) if scene.closures else "")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-8, 1e-10, 1e-12))
+        return RTOL_LADDER
 
-    def compile(self, scene: Scene) -> PinocchioModel:
-        self.version()
-        from crosscheck.engines.pinocchio.model import PinocchioModel
+    def model(self, scene: Scene) -> Model:
+        from crosscheck.engines.pinocchio.model import compiled
 
-        support = self.supports(scene)
-        if support.kind == "no":
-            raise ValueError(f'scene "{scene.name}": {support.reason}')
-        return PinocchioModel(scene)
+        return compiled(scene)
 
 
 def _beside_closures(scene: Scene) -> str:

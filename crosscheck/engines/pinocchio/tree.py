@@ -7,31 +7,28 @@ joints in outboard axes. A weld is a revolute joint held at zero, so that its lo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import assert_never
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.engines.conventions import Frame, scalar_last
-from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
+from crosscheck.engines.rigid_tree import Slot, scalar_start
 from flexmb.scene.functions import Constant
 from flexmb.typing import Real
 
-_HELD = Scalar(True, np.array([0.0, 0.0, 1.0]), 0.0, 0.0, 0.0, 0.0, 0.0, None, Constant(value=0.0))
+_HELD = Scalar("turn", np.array([0.0, 0.0, 1.0]), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, None, Constant(value=0.0))
 
 
 Places = slice | NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class PinocchioSlot:
-    """A freedom and where its coordinates `q` and speeds `v` start; `held`: it stands for a weld."""
+class PinocchioSlot(Slot):
+    """A freedom; if it is `held` it stands for a weld."""
 
-    freedom: Freedom
-    link: Link
-    q: int
-    v: int
     held: bool
 
 
@@ -84,26 +81,38 @@ def initial_state(tree: PinocchioTree) -> tuple[Real, Real]:
     q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
     for slot in tree.slots:
         match slot.freedom:
-            case Scalar(prescribed=None) as freedom:
-                q[slot.q], v[slot.v] = freedom.value, freedom.rate
             case Scalar() as freedom:
-                q[slot.q], v[slot.v], _ = profile(freedom.prescribed)(0.0)
+                q[slot.q], v[slot.v] = scalar_start(freedom)
             case Ball() as freedom:
                 q[slot.q : slot.q + 4] = scalar_last(freedom.quaternion)
                 v[slot.v : slot.v + 3] = freedom.angular_velocity
             case Floating() as freedom:
                 q[slot.q : slot.q + 7] = [*freedom.position, *scalar_last(freedom.quaternion)]
                 v[slot.v : slot.v + 6] = [*freedom.velocity, *freedom.angular_velocity]
+            case _:
+                assert_never(slot.freedom)
     return q, v
 
 
 def _joint(freedom: Freedom) -> pin.JointModel:
     match freedom:
-        case Scalar(angular=True, axis=axis):
-            return pin.JointModelRevoluteUnaligned(axis)
-        case Scalar(axis=axis):
-            return pin.JointModelPrismaticUnaligned(axis)
+        case Scalar():
+            return _along_axis(freedom)
         case Ball():
             return pin.JointModelSpherical()
         case Floating():
             return pin.JointModelFreeFlyer()
+        case _:
+            assert_never(freedom)
+
+
+def _along_axis(joint: Scalar) -> pin.JointModel:
+    match joint.motion:
+        case "turn":
+            return pin.JointModelRevoluteUnaligned(joint.axis)
+        case "slide":
+            return pin.JointModelPrismaticUnaligned(joint.axis)
+        case "screw":
+            return pin.JointModelHelicalUnaligned(joint.axis, joint.pitch)
+        case _:
+            assert_never(joint.motion)

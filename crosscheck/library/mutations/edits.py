@@ -13,9 +13,9 @@ from flexmb.scene.bodies import BeamNode, Body, ModalNode, Node, Quaternion, Sid
 from flexmb.scene.connectors import Connector
 from flexmb.scene.control import Controller, Sensor
 from flexmb.scene.events import SceneEvent
-from flexmb.scene.hinges import AngularCoordinate, Closure, Hinge, LinearCoordinate
+from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.schema import Load, PointMass, Scene, Wheel
-from flexmb.scene.tree import Coordinate, coordinates
+from flexmb.scene.tree import Coordinate, coordinates, with_coordinates
 
 AnyNode = Node | BeamNode | ModalNode
 Struct = TypeVar("Struct", bound=msgspec.Struct)
@@ -81,36 +81,14 @@ def replaced(items: tuple[Named, ...], target: str, change: Callable[[Named], Na
     return tuple(change(item) if item.name == target else item for item in items)
 
 
-def with_coordinates(hinge: Hinge, change: Callable[[Coordinate], Coordinate]) -> Hinge:
+def with_each_coordinate(hinge: Hinge, change: Callable[[Coordinate], Coordinate]) -> Hinge:
     """The hinge with each of its scalar coordinates changed; none has a weld, a spherical and a free hinge."""
-    single: dict[str, Coordinate] = {}
-    several: dict[str, tuple[Coordinate, ...]] = {}
-    for name, coordinate in coordinates(hinge):
-        field, numbered, _ = name.partition("[")
-        if numbered:
-            several[field] = (*several.get(field, ()), change(coordinate))
-        else:
-            single[field] = change(coordinate)
-    return msgspec.structs.replace(hinge, **single, **several)
+    return with_coordinates(hinge, (change(coordinate) for _, coordinate in coordinates(hinge)))
 
 
 def key_of(coordinate: Coordinate, stem: str) -> str:
     """The key of a coordinate that begins with `stem`, whatever its unit: "stiffness", "prescribed"."""
     return next(key for key in coordinate.__struct_fields__ if key.startswith(stem))
-
-
-def motor_key(coordinate: Coordinate) -> str:
-    """The key of the motor's function."""
-    match coordinate:
-        case AngularCoordinate():
-            return "torque_Nm"
-        case LinearCoordinate():
-            return "force_N"
-
-
-def place_key(coordinate: Coordinate) -> str:
-    """The key of the initial value."""
-    return "angle_rad" if isinstance(coordinate, AngularCoordinate) else "position_m"
 
 
 def whole(scene: Scene) -> Iterator[MutationTarget]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import msgspec
 
-from crosscheck.library.mutations.edits import key_of, on_event, place_key
+from crosscheck.library.mutations.edits import on_event
 from crosscheck.library.mutations.mutation import FACTOR, HUNDREDTH, LESS, Mutation, MutationTarget
 from crosscheck.library.time_functions import scaled
 from flexmb.scene.events import Action, Change, Impact, Latch, SceneEvent
@@ -39,7 +39,7 @@ def _begins(scene: Scene, event: SceneEvent) -> float:
     for item in (*scene.hinges, *scene.point_masses):
         for key, coordinate in coordinates(item):
             if name.removesuffix(".rate") == f"{item.name}.{key}":
-                stem = key_of(coordinate, "rate") if name.endswith(".rate") else place_key(coordinate)
+                stem = coordinate.KEYS.rate if name.endswith(".rate") else coordinate.KEYS.value
                 return float(getattr(coordinate, stem))
     return 0.0  # of time
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import assert_never
 
 import msgspec
 import numpy as np
@@ -14,20 +15,19 @@ from crosscheck.library.mutations.edits import (
     conjugate,
     hinges,
     key_of,
-    motor_key,
     on_body,
     on_hinge,
     opposite,
-    place_key,
     scaled,
-    with_coordinates,
+    with_each_coordinate,
 )
 from crosscheck.library.mutations.mutation import DROPPED, FACTOR, OPPOSITE, Mutation, MutationTarget
-from flexmb.scene.bodies import BeamBody, Body, ModalBody
-from flexmb.scene.hinges import AngularCoordinate, Free, Gimbal, Hinge, Spherical
+from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
+from flexmb.scene.hinges import Free, Gimbal, Hinge, Spherical
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import Coordinate, coordinates
+from flexmb.scene.units import split_unit
 
 DEGREE = math.pi / 180.0
 ROUNDING = 1e-15
@@ -48,19 +48,17 @@ def _reversal_is_a_name(scene: Scene, target: str) -> str:
     if any(getattr(each, "hinge", "") == target for each in scene.connectors):
         return ""
     for _, coordinate in coordinates(hinge):
-        functions = (getattr(coordinate, motor_key(coordinate)), getattr(coordinate, key_of(coordinate, "prescribed")))
-        values = [getattr(coordinate, key_of(coordinate, k)) for k in ("rate", "rest")]
-        if any(function is not None for function in functions) or any(values) or _has_a_side(coordinate):
+        driven = coordinate.effort is not None or coordinate.prescribed is not None
+        if driven or coordinate.rate or coordinate.spring[2] or _has_a_side(coordinate):
             return ""
     return "it starts at rest at zero, its spring too, without motor: the sign of the axis only names the coordinate"
 
 
 def _has_a_side(coordinate: Coordinate) -> bool:
     """Whether the initial place is another on the opposite axis: a half-turn is not, but for a spring."""
-    place = getattr(coordinate, place_key(coordinate))
-    if isinstance(coordinate, AngularCoordinate) and not coordinate.stiffness_Nm_rad:
-        return abs(math.sin(place)) > ROUNDING
-    return place != 0.0
+    if coordinate.ANGULAR and not coordinate.spring[0]:
+        return abs(math.sin(coordinate.value)) > ROUNDING
+    return coordinate.value != 0.0
 
 
 def _gimbal_order(scene: Scene, target: str) -> Scene:
@@ -90,7 +88,11 @@ def _stiffer_body(body: Body) -> Body:
             return msgspec.structs.replace(body, stations=stations)
         case ModalBody() if body.stiffness:
             return msgspec.structs.replace(body, stiffness=scaled(body.stiffness))
-    raise CaseError(f'control "stiffness" changes beams, inline modal bodies and hinge springs, not "{body.name}"')
+        case RigidBody() | ModalBody() | SidBody():
+            what = f'control "stiffness" changes beams, inline modal bodies and hinge springs, not "{body.name}"'
+            raise CaseError(what)
+        case _:
+            assert_never(body)
 
 
 def _damping(factor: float) -> Callable[[Scene, str], Scene]:
@@ -104,7 +106,10 @@ def _damping(factor: float) -> Callable[[Scene, str], Scene]:
                 return msgspec.structs.replace(body, modes=msgspec.structs.replace(body.modes, damping_ratio=less))
             case ModalBody() if body.damping:
                 return msgspec.structs.replace(body, damping=scaled(body.damping, factor))
-        raise CaseError(f'body "{body.name}" has no damping whose size this mutation can change')
+            case RigidBody() | ModalBody() | SidBody():
+                raise CaseError(f'body "{body.name}" has no damping whose size this mutation can change')
+            case _:
+                assert_never(body)
 
     def changed(scene: Scene, target: str) -> Scene:
         if any(body.name == target for body in scene.bodies):
@@ -123,65 +128,58 @@ def _damping(factor: float) -> Callable[[Scene, str], Scene]:
 
 
 def _hinge_constant(hinge: Hinge, stem: str, factor: float) -> Hinge:
-    """Every spring or damper of the hinge: of its scalar coordinates, or of the whole (spherical)."""
-    whole = f"{stem}_{'Nm' if stem == 'stiffness' else 'Nms'}_rad"
-    if isinstance(hinge, Spherical):
-        return msgspec.structs.replace(hinge, **{whole: factor * getattr(hinge, whole)})
+    """Every spring or damper of the hinge: of its scalar coordinates, and of the whole (spherical)."""
+    whole = [key for key in hinge.__struct_fields__ if split_unit(key)[0] == stem]
+    hinge = msgspec.structs.replace(hinge, **{key: factor * getattr(hinge, key) for key in whole})
 
     def changed(coordinate: Coordinate) -> Coordinate:
         key = key_of(coordinate, stem)
         return msgspec.structs.replace(coordinate, **{key: factor * getattr(coordinate, key)})
 
-    return with_coordinates(hinge, changed)
+    return with_each_coordinate(hinge, changed)
 
 
 def _rest(scene: Scene, target: str) -> Scene:
     def unloaded(coordinate: Coordinate) -> Coordinate:
         return msgspec.structs.replace(coordinate, **{key_of(coordinate, "rest"): 0.0})
 
-    return on_hinge(scene, target, lambda hinge: with_coordinates(hinge, unloaded))
+    return on_hinge(scene, target, lambda hinge: with_each_coordinate(hinge, unloaded))
 
 
 def _slack(scene: Scene, target: str) -> str:
     hinge = next(hinge for hinge in scene.hinges if hinge.name == target)
-    springs = [getattr(each, key_of(each, "stiffness")) for _, each in coordinates(hinge)]
-    return "" if any(springs) else "it has no spring that could be at rest somewhere"
+    sprung = any(each.spring[0] for _, each in coordinates(hinge))
+    return "" if sprung else "it has no spring that could be at rest somewhere"
 
 
 def _initial(stem: str, factor: float) -> Callable[[Scene, str], Scene]:
     """Initial values ("place") or rates of the coordinates that are not prescribed, times a factor."""
 
     def changed(coordinate: Coordinate) -> Coordinate:
-        if getattr(coordinate, key_of(coordinate, "prescribed")) is not None:
+        if coordinate.prescribed is not None:
             return coordinate
-        key = place_key(coordinate) if stem == "place" else key_of(coordinate, stem)
+        key = coordinate.KEYS.value if stem == "place" else key_of(coordinate, stem)
         return msgspec.structs.replace(coordinate, **{key: factor * getattr(coordinate, key)})
 
-    return lambda scene, target: on_hinge(scene, target, lambda hinge: with_coordinates(hinge, changed))
+    return lambda scene, target: on_hinge(scene, target, lambda hinge: with_each_coordinate(hinge, changed))
 
 
 def _initial_unit(scene: Scene, target: str) -> Scene:
     def in_degrees(coordinate: Coordinate) -> Coordinate:
-        if not isinstance(coordinate, AngularCoordinate) or coordinate.prescribed_rad is not None:
+        if not coordinate.ANGULAR or coordinate.prescribed is not None:
             return coordinate
-        return msgspec.structs.replace(coordinate, angle_rad=DEGREE * coordinate.angle_rad)
+        return msgspec.structs.replace(coordinate, **{coordinate.KEYS.value: DEGREE * coordinate.value})
 
-    return on_hinge(scene, target, lambda hinge: with_coordinates(hinge, in_degrees))
+    return on_hinge(scene, target, lambda hinge: with_each_coordinate(hinge, in_degrees))
 
 
 def _initial_speed_sign(scene: Scene, target: str) -> Scene:
     def reversed_speed(hinge: Hinge) -> Hinge:
-        match hinge:
-            case Free():
-                return msgspec.structs.replace(hinge, angular_velocity_rad_s=opposite(hinge.angular_velocity_rad_s))
-            case Spherical():
-                return msgspec.structs.replace(hinge, angular_velocity_rad_s=opposite(hinge.angular_velocity_rad_s))
-        return hinge
+        if not isinstance(hinge, Free | Spherical):
+            return hinge
+        return msgspec.structs.replace(hinge, angular_velocity_rad_s=opposite(hinge.angular_velocity_rad_s))
 
-    hinge = next((hinge for hinge in scene.hinges if hinge.name == target), None)
-    if isinstance(hinge, Free | Spherical):
-        return on_hinge(scene, target, reversed_speed)
-    return _initial("rate", OPPOSITE)(scene, target)
+    return on_hinge(_initial("rate", OPPOSITE)(scene, target), target, reversed_speed)
 
 
 def _speed_axes(scene: Scene, target: str) -> Scene:
@@ -191,7 +189,7 @@ def _speed_axes(scene: Scene, target: str) -> Scene:
         if not isinstance(hinge, Free | Spherical):
             raise CaseError(f'the speeds of hinge "{hinge.name}" have no axes: "speed_axes" needs a free or ball joint')
         R = rotation_matrix(hinge.quaternion)
-        names = ("angular_velocity_rad_s", "velocity_m_s") if isinstance(hinge, Free) else ("angular_velocity_rad_s",)
+        names = {"angular_velocity_rad_s", "velocity_m_s"} & set(hinge.__struct_fields__)
         return msgspec.structs.replace(
             hinge, **{name: tuple(map(float, np.asarray(getattr(hinge, name)) @ R)) for name in names}
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import assert_never
 
 import msgspec
 import numpy as np
@@ -12,7 +13,7 @@ from crosscheck.library.mutations.edits import bodies, on_body, opposite, point_
 from crosscheck.library.mutations.mutation import FACTOR, Mutation
 from crosscheck.library.mutations.resting import rests
 from crosscheck.library.mutations.turning import EPS, only_axis
-from flexmb.scene.bodies import BeamBody, Body, Matrix3, ModalBody, RigidBody
+from flexmb.scene.bodies import BeamBody, Body, Matrix3, ModalBody, RigidBody, SidBody
 from flexmb.scene.schema import PointMass, Scene
 
 MILLI = 1e-3
@@ -29,7 +30,10 @@ def _mass(scene: Scene, target: str) -> Scene:
                 return _scaled_stations(body, ("mass_per_length_kg_m",))
             case ModalBody() if body.points:
                 return _scaled_points(body)
-        raise CaseError(f'body "{body.name}" keeps its mass in a file: control "mass" needs it inline')
+            case ModalBody() | SidBody():
+                raise CaseError(f'body "{body.name}" keeps its mass in a file: control "mass" needs it inline')
+            case _:
+                assert_never(body)
 
     return on_body(scene, target, heavier)
 
@@ -43,7 +47,10 @@ def _inertia(scene: Scene, target: str) -> Scene:
                 return _more_inertia(body)
             case BeamBody():
                 return _scaled_stations(body, ("rotary_y_kg_m", "rotary_z_kg_m"))
-        raise CaseError(f'control "inertia" changes rigid bodies and beams, not "{body.name}"')
+            case ModalBody() | SidBody():
+                raise CaseError(f'control "inertia" changes rigid bodies and beams, not "{body.name}"')
+            case _:
+                assert_never(body)
 
     return on_body(scene, target, stiffer_to_turn)
 

@@ -7,8 +7,11 @@ in World and in body axes.
 
 from __future__ import annotations
 
-from flexmb.scene.bodies import BeamBody, Body, Matrix3, Quaternion, RigidBody, Vector
-from flexmb.scene.hinges import Closure, Free, Hinge, Planar, Prismatic, Revolute, Spherical, Weld
+from typing import assert_never
+
+from flexmb.scene.bodies import BeamBody, Body, Matrix3, ModalBody, Quaternion, RigidBody, SidBody, Vector
+from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
+from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.schema import Load, Scene, Wheel
 
 X, Y, Z = AXES = (0, 1, 2)
@@ -70,7 +73,10 @@ def _body(body: Body, axis: int, mounted: set[str]) -> bool:
         case BeamBody():
             lumps = all(within(each.com_m, axis) and _inertia(each.inertia_kg_m2, axis) for each in body.tip_masses)
             return axis != X and lumps and all(_turned(node.quaternion, axis) for node in body.nodes)
-    return False
+        case ModalBody() | SidBody():
+            return False
+        case _:
+            assert_never(body)
 
 
 def _hinge(hinge: Hinge, axis: int) -> bool:
@@ -80,22 +86,22 @@ def _hinge(hinge: Hinge, axis: int) -> bool:
         and _turned(hinge.parent_quaternion, axis)
         and _turned(hinge.child_quaternion, axis)
     )
-    match hinge:
-        case Weld():
-            return frames
-        case Revolute():
-            return frames and along(hinge.axis, axis)
-        case Prismatic():
-            return frames and within(hinge.axis, axis)
-        case Planar():
-            return frames and axis == Z
-        case Spherical():
-            return frames and _turned(hinge.quaternion, axis) and along(hinge.angular_velocity_rad_s, axis)
-        case Free():
-            place = within(hinge.position_m, axis) and _turned(hinge.quaternion, axis)
-            speed = within(hinge.velocity_m_s, axis) and along(hinge.angular_velocity_rad_s, axis)
-            return frames and place and speed
-    return False
+    return frames and all(_freedom(each, axis) for each in hinge.freedoms)
+
+
+def _freedom(freedom: Freedom, axis: int) -> bool:
+    """Turns about the mirror's normal and shifts across it stay in the plane; no screw does both."""
+    match freedom:
+        case ScalarFreedom():
+            turns = not freedom.turns or along(freedom.axis, axis)
+            return turns and (not freedom.shifts or within(freedom.axis, axis))
+        case Ball():
+            return _turned(freedom.quaternion, axis) and along(freedom.angular_velocity, axis)
+        case Floating():
+            place = within(freedom.position, axis) and _turned(freedom.quaternion, axis)
+            return place and within(freedom.velocity, axis) and along(freedom.angular_velocity, axis)
+        case _:
+            assert_never(freedom)
 
 
 def _closure(closure: Closure, axis: int) -> bool:
@@ -112,7 +118,10 @@ def _closure(closure: Closure, axis: int) -> bool:
             return frames and along(closure.axis, axis)
         case "prismatic":
             return frames and within(closure.axis, axis)
-    return False
+        case "cylindrical" | "universal" | "planar":
+            return False
+        case _:
+            assert_never(closure.type)
 
 
 def _wheel(wheel: Wheel, axis: int) -> bool:

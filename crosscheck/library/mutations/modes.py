@@ -12,7 +12,7 @@ from crosscheck.library.mutations.edits import bodies, on_body, whole
 from crosscheck.library.mutations.mirror import along, mirrors, within
 from crosscheck.library.mutations.mutation import Mutation
 from crosscheck.library.mutations.resting import rests, twists_only
-from flexmb.scene.bodies import BeamBody, Body, ModalBody, ModalNode, RigidBody
+from flexmb.scene.bodies import BeamBody, Body, ModalBody, ModalNode
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import modal_points
 
@@ -23,7 +23,7 @@ def _unstiffened(scene: Scene, target: str) -> Scene:
     """Level stiffened becomes full (of body `target`, or of all)."""
 
     def changed(body: Body) -> Body:
-        wanted = target in ("", body.name) and not isinstance(body, RigidBody) and body.level == "stiffened"
+        wanted = target in ("", body.name) and body.level == "stiffened"
         return msgspec.structs.replace(body, level="full") if wanted else body
 
     return msgspec.structs.replace(scene, bodies=tuple(map(changed, scene.bodies)))
@@ -33,7 +33,7 @@ def _undeformed(scene: Scene, target: str) -> Scene:
     """Level full or stiffened becomes ruthless: inertia of the undeformed body."""
 
     def changed(body: Body) -> Body:
-        wanted = not isinstance(body, RigidBody) and body.level in ("full", "stiffened", "linear")
+        wanted = body.level in ("full", "stiffened", "linear")
         return msgspec.structs.replace(body, level="ruthless") if wanted else body
 
     return on_body(scene, target, changed)

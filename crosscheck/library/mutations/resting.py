@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import assert_never
+
 import numpy as np
 
 from crosscheck.library.mutations.mirror import only_known
 from flexmb.scene.bodies import IDENTITY, BeamBody, Body, RigidBody, SidBody
-from flexmb.scene.hinges import Free, Gimbal, Hinge, Revolute, Spherical, Universal, Weld
+from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
+from flexmb.scene.hinges import Free, Hinge, Weld
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import GROUND, node_frame
@@ -36,23 +39,36 @@ def is_clamped_along_world(scene: Scene, name: str) -> bool:
     """Whether the body is welded to the ground with its axes, and those of its nodes, along World's."""
     body = next(body for body in scene.bodies if body.name == name)
     hinge = next(hinge for hinge in scene.hinges if hinge.child == name)
-    nodes = [IDENTITY] if isinstance(body, SidBody) else [node.quaternion for node in body.nodes]
+    nodes = [] if isinstance(body, SidBody) else [node.quaternion for node in body.nodes]
     turned = [*nodes, hinge.parent_quaternion, hinge.child_quaternion]
     return isinstance(hinge, Weld) and hinge.parent == GROUND and all(each == IDENTITY for each in turned)
 
 
 def _held(body: Body, hinge: Hinge) -> bool:
     """By a hinge to the ground, in the mass centre or on an axis through it."""
-    if isinstance(hinge, Weld):
+    freedoms = hinge.freedoms
+    if not freedoms:
         return isinstance(body, RigidBody) or twists_only(body)
-    if not (isinstance(body, RigidBody) and isinstance(hinge, Revolute | Universal | Gimbal | Spherical)):
+    if not isinstance(body, RigidBody) or not all(map(_only_turns, freedoms)):
         return False
     node = node_frame(body, hinge.child_node)
     turned = rotation_matrix(node.quaternion)
     arm = np.asarray(body.com_m) - np.asarray(node.position) - turned @ np.asarray(hinge.child_position_m)
-    if isinstance(hinge, Revolute):
-        arm = np.cross(turned @ rotation_matrix(hinge.child_quaternion) @ np.asarray(hinge.axis), arm)
+    if len(freedoms) == 1 and isinstance(freedoms[0], ScalarFreedom):
+        arm = np.cross(turned @ rotation_matrix(hinge.child_quaternion) @ np.asarray(freedoms[0].axis), arm)
     return bool(np.max(np.abs(arm)) <= EPS)
+
+
+def _only_turns(freedom: Freedom) -> bool:
+    match freedom:
+        case ScalarFreedom():
+            return not freedom.shifts
+        case Ball():
+            return True
+        case Floating():
+            return False
+        case _:
+            assert_never(freedom)
 
 
 def _free(scene: Scene, body: Body, hinge: Free) -> bool:

@@ -4,36 +4,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from typing import TypeVar, assert_never
 
 import msgspec
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import (
-    key_of,
-    motor_key,
     on_connector,
     on_hinge,
     on_load,
     on_sensor,
     on_wheel,
-    with_coordinates,
+    with_each_coordinate,
 )
 from crosscheck.library.mutations.mutation import FACTOR, HUNDREDTH, OPPOSITE, Mutation, MutationTarget
 from crosscheck.library.time_functions import delayed, scaled
-from flexmb.scene.connectors import AngularSpring, Connector, HingeSpring, SpringDamper, actuator
+from flexmb.scene.connectors import Connector, HingeSpring, SpringDamper, actuator
 from flexmb.scene.control import ProfileSensor
-from flexmb.scene.functions import Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.freedoms import Coordinate
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene, Wheel
-from flexmb.scene.tree import Coordinate, coordinates
+from flexmb.scene.tree import coordinates
 
 Change = Callable[[Function], Function]
+Moved = TypeVar("Moved", bound=Coordinate | Wheel)
 PHASE_RAD = 0.01
 
 
 def _motors(scene: Scene) -> Iterator[MutationTarget]:
     """Hinges and wheels with a motor, and springs with an actuator."""
     for hinge in scene.hinges:
-        if any(getattr(each, motor_key(each)) is not None for _, each in coordinates(hinge)):
+        if any(each.effort is not None for _, each in coordinates(hinge)):
             yield MutationTarget(hinge.name, "motor of a hinge")
     yield from (MutationTarget(wheel.name, "motor of a wheel") for wheel in scene.wheels if wheel.torque_Nm is not None)
     yield from (MutationTarget(each.name, "actuator of a connector") for each, _ in _actuators(scene))
@@ -43,8 +44,7 @@ def _driven(scene: Scene) -> Iterator[MutationTarget]:
     """Everything with a function of time; one kind for each kind of function."""
     for hinge in scene.hinges:
         for _, each in coordinates(hinge):
-            for what, key in (("motor", motor_key(each)), ("drive", key_of(each, "prescribed"))):
-                function = getattr(each, key)
+            for what, function in (("motor", each.effort), ("drive", each.prescribed)):
                 if function is not None:
                     yield MutationTarget(hinge.name, f"{what}, {_kind(function)}")
     for wheel in scene.wheels:
@@ -70,30 +70,19 @@ def _actuators(scene: Scene) -> Iterator[tuple[SpringDamper | HingeSpring, Funct
 def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = None) -> Scene:
     """What is called `target`, with its prescribed motions changed by `motion` and all other functions by `change`."""
 
-    def of_coordinate(coordinate: Coordinate) -> Coordinate:
-        motor, prescribed = motor_key(coordinate), key_of(coordinate, "prescribed")
-        return msgspec.structs.replace(
-            coordinate,
-            **{motor: _changed(getattr(coordinate, motor), change)},
-            **{prescribed: _changed(getattr(coordinate, prescribed), motion)},
-        )
-
-    def of_wheel(wheel: Wheel) -> Wheel:
-        return msgspec.structs.replace(
-            wheel,
-            torque_Nm=_changed(wheel.torque_Nm, change),
-            prescribed_rad=_changed(wheel.prescribed_rad, motion),
-        )
+    def of_coordinate(item: Moved) -> Moved:
+        keys = item.KEYS
+        changes = {keys.effort: change, keys.prescribed: motion}
+        return msgspec.structs.replace(item, **{key: _changed(getattr(item, key), by) for key, by in changes.items()})
 
     def of_spring(spring: Connector) -> Connector:
         assert isinstance(spring, SpringDamper | HingeSpring)  # it has an actuator
-        key = "torque_Nm" if isinstance(spring, AngularSpring) else "force_N"
-        return msgspec.structs.replace(spring, **{key: _changed(actuator(spring), change)})
+        return msgspec.structs.replace(spring, **{spring.ACTUATOR: _changed(actuator(spring), change)})
 
     if any(hinge.name == target for hinge in scene.hinges):
-        return on_hinge(scene, target, lambda hinge: with_coordinates(hinge, of_coordinate))
+        return on_hinge(scene, target, lambda hinge: with_each_coordinate(hinge, of_coordinate))
     if any(wheel.name == target for wheel in scene.wheels):
-        return on_wheel(scene, target, of_wheel)
+        return on_wheel(scene, target, of_coordinate)
     if any(load.name == target for load in scene.loads):
         return on_load(scene, target, lambda load: msgspec.structs.replace(load, function=change(load.function)))
     if any(each.name == target for each, _ in _actuators(scene)):
@@ -132,7 +121,10 @@ def _farther(motion: Function) -> Function:
         case SmoothStep():
             end = motion.start_value + FACTOR * (motion.end_value - motion.start_value)
             return msgspec.structs.replace(motion, end_value=end)
-    return scaled(motion, FACTOR)
+        case Constant() | SpinUp() | Pulse() | Table() | ControlSignal():
+            return scaled(motion, FACTOR)
+        case _:
+            assert_never(motion)
 
 
 def _a_little_late(function: Function) -> Function:
@@ -140,15 +132,19 @@ def _a_little_late(function: Function) -> Function:
     match function:
         case SmoothStep() | Pulse():
             return delayed(function, HUNDREDTH * function.duration_s)
-        case Sine() if function.angular_frequency_rad_s != 0.0:
-            return delayed(function, PHASE_RAD / function.angular_frequency_rad_s)
+        case Sine():
+            frequency = function.angular_frequency_rad_s
+            return delayed(function, PHASE_RAD / frequency) if frequency != 0.0 else function
         case Ramp():
             return delayed(function, HUNDREDTH)
         case SpinUp():
             return msgspec.structs.replace(function, duration_s=FACTOR * function.duration_s)
         case Table():
             raise CaseError("a table of values ends where it ends: it cannot come late")
-    return function
+        case Constant() | ControlSignal():  # these have no time of their own
+            return function
+        case _:
+            assert_never(function)
 
 
 def _kind(function: Function) -> str:

@@ -10,7 +10,8 @@ import numpy as np
 
 from crosscheck.library.mutations.mirror import mirrors
 from flexmb.scene.bodies import Body, RigidBody
-from flexmb.scene.hinges import Cylindrical, Hinge, Planar, Prismatic, Revolute, Weld
+from flexmb.scene.freedoms import ScalarFreedom
+from flexmb.scene.hinges import Hinge
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import GROUND, node_frame, ordered
@@ -58,12 +59,8 @@ def _axis(parent: Body | None, carried: Real | None, body: Body, hinge: Hinge) -
 
 def _own(hinge: Hinge) -> Real | None:
     """The axis of a hinge in its own axes, zero where it does not turn, None where it turns otherwise."""
-    match hinge:
-        case Weld() | Prismatic():
-            return np.zeros(3)
-        case Revolute() | Cylindrical():
-            axis = np.asarray(hinge.axis)
-            return axis / np.linalg.norm(axis)
-        case Planar():
-            return np.array([0.0, 0.0, 1.0])
-    return None
+    lines = [each for each in hinge.freedoms if isinstance(each, ScalarFreedom)]
+    turning = [np.asarray(each.axis) / np.linalg.norm(each.axis) for each in lines if each.turns]
+    if len(lines) < len(hinge.freedoms) or len(turning) > 1:
+        return None
+    return turning[0] if turning else np.zeros(3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from math import inf, sqrt
 from operator import itemgetter
+from typing import assert_never
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from flexmb.scene.connectors import (
     AngularFriction,
     AngularSpring,
     Bushing,
+    Connector,
     HingeFriction,
     HingeSpring,
     LinearFriction,
@@ -33,7 +35,8 @@ NOT_NEGATIVE = ("free_length", "damping", "stop_stiffness", "stop_dissipation", 
 
 def connectors(scene: Scene) -> Iterator[Defect]:
     """Every connector by itself, and that it acts on something that moves."""
-    for place, connector in sound(scene, "connectors"):
+    for place, item in sound(scene, "connectors"):
+        connector: Connector = item
         yield from _signs(place, connector)
         match connector:
             case SpringDamper():
@@ -49,6 +52,8 @@ def connectors(scene: Scene) -> Iterator[Defect]:
                 yield from _stops(place, connector)
             case AngularFriction() | LinearFriction():
                 yield from _friction(place, connector)
+            case _:
+                assert_never(connector)
         if isinstance(connector, AlongHinge):
             try:
                 coordinate_of(scene, connector)
@@ -56,7 +61,7 @@ def connectors(scene: Scene) -> Iterator[Defect]:
                 yield Defect(str(place.key("hinge")), str(error), "name a hinge, and its coordinate as the hinge does")
 
 
-def _signs(place: Place, connector: SpringDamper | Bushing | AlongHinge) -> Iterator[Defect]:
+def _signs(place: Place, connector: Connector) -> Iterator[Defect]:
     for key, (stem, value) in zip(connector.__struct_fields__, by_stem(connector).items(), strict=True):
         if stem in NOT_NEGATIVE and isinstance(value, float) and value < 0.0:
             noun = stem.replace("_", " ")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, assert_never
 
 from flexmb.scene.bodies import BeamBody, ModalBody
 from flexmb.scene.check.profiles import MOTIONS
@@ -23,10 +23,10 @@ from flexmb.scene.control import (
     Saturation,
     Sensor,
     StateSpace,
+    TimeSensor,
     UserLaw,
 )
 from flexmb.scene.functions import ControlSignal
-from flexmb.scene.hinges import Free, Spherical
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import coordinates, scalar_paths
@@ -61,17 +61,17 @@ def sensor_width(scene: Scene, sensor: Sensor) -> int | None:
             return 6
         case ProfileSensor() | DistanceSensor():
             return 2
-    return 1
+        case DriveSensor() | TimeSensor():
+            return 1
+        case _:
+            assert_never(sensor)
 
 
 def _coordinates(scene: Scene, of: str, rates: bool) -> int | None:
     for hinge in scene.hinges:
         if hinge.name == of:
-            if isinstance(hinge, Free):
-                return 6 if rates else 7
-            if isinstance(hinge, Spherical):
-                return 3 if rates else 4
-            return len(coordinates(hinge))
+            # a gimbal whose sequence does not fit its rotations has no freedoms yet, and is told so elsewhere
+            return len(coordinates(hinge)) or sum(freedom.sizes[rates] for freedom in hinge.freedoms)
     for mass in scene.point_masses:
         if mass.name == of:
             return len(coordinates(mass))
@@ -80,9 +80,15 @@ def _coordinates(scene: Scene, of: str, rates: bool) -> int | None:
 
 def depends_at_once(sensor: Sensor) -> bool:
     """Whether forces change what it measures without delay: accelerations and loads."""
-    if isinstance(sensor, MarkerSensor):
-        return sensor.quantity in AT_ONCE
-    return isinstance(sensor, LoadSensor | DriveSensor)
+    match sensor:
+        case MarkerSensor():
+            return sensor.quantity in AT_ONCE
+        case LoadSensor() | DriveSensor():
+            return True
+        case CoordinateSensor() | DistanceSensor() | TimeSensor() | ProfileSensor():
+            return False
+        case _:
+            assert_never(sensor)
 
 
 def output_width(controller: Controller, inputs: int | None) -> int | None:
@@ -96,7 +102,10 @@ def output_width(controller: Controller, inputs: int | None) -> int | None:
             return outputs
         case GainTable():
             return None if inputs is None else max(1, inputs - 1)
-    return inputs
+        case Saturation():
+            return inputs
+        case _:
+            assert_never(controller)
 
 
 def widths_of(scene: Scene) -> dict[str, int | None]:
@@ -206,8 +215,9 @@ def _sizes(place: Place, controller: Controller, inputs: int | None) -> Iterator
             yield from _matrices(place, controller, inputs)
         case Pid():
             yield from _pid(place, controller, inputs)
-        case Saturation(lower=lower, upper=upper) if not lower <= upper:
-            yield Defect(str(place.key("lower")), f"it is above upper, {upper:g}", "exchange the two")
+        case Saturation(lower=lower, upper=upper):
+            if not lower <= upper:
+                yield Defect(str(place.key("lower")), f"it is above upper, {upper:g}", "exchange the two")
         case GainTable(points=points, values=values):
             if len(points) != len(values) or not points:
                 what = f"there are {len(points)} points and {len(values)} values"
@@ -222,6 +232,8 @@ def _sizes(place: Place, controller: Controller, inputs: int | None) -> Iterator
                 yield Defect(str(place.key("function")), *forbidden)
             if outputs < 1:
                 yield Defect(str(place.key("outputs")), f"it has {outputs} outputs", "give one or more")
+        case _:
+            assert_never(controller)
     if inputs == 0 and not isinstance(controller, UserLaw | StateSpace):
         yield Defect(str(place.key("inputs")), "it has no input", "name a sensor or controller")
 

@@ -14,10 +14,11 @@ from flexmb.scene.check.profiles import MOTIONS, initial_motion
 from flexmb.scene.check.walk import UNIT_LENGTH, sound
 from flexmb.scene.columns import alike, column
 from flexmb.scene.events import Release
-from flexmb.scene.hinges import WITH_AXIS, Z_AXIS, AngularCoordinate, Gimbal
+from flexmb.scene.freedoms import Coordinate
+from flexmb.scene.hinges import WITH_AXIS, Z_AXIS, Gimbal
 from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.schema import Scene, Wheel
-from flexmb.scene.tree import Coordinate, coordinates
+from flexmb.scene.tree import coordinates
 
 USUALLY_POSITIVE = ("stiffness_Nm_rad", "stiffness_N_m", "damping_Nms_rad", "damping_Ns_m", "friction_Nms_rad")
 
@@ -59,8 +60,7 @@ def wheels(scene: Scene) -> Iterator[Defect]:
         yield from inertia.mass(place.key("mass_kg"), wheel.mass_kg)
         yield from _wheel_inertia(place, wheel)
         yield from _springs(place, wheel)
-        motor = None if f"{wheel.name}.angle" in _let_go(scene) else "torque_Nm"
-        yield from _drive(place, wheel, ("angle_rad", "speed_rad_s"), motor, "prescribed_rad")
+        yield from _drive(place, wheel, f"{wheel.name}.angle" in _let_go(scene))
 
 
 def point_masses(scene: Scene) -> Iterator[Defect]:
@@ -103,27 +103,20 @@ def _coordinates(place: Place, item: Any, released: set[str]) -> Iterator[Defect
     for name, coordinate in coordinates(item):
         spot = Place(f"{place.path}.{name}", place.names)
         yield from _springs(spot, coordinate)
-        keys, motor, motion = _keys(coordinate)
-        yield from _drive(spot, coordinate, keys, None if f"{item.name}.{name}" in released else motor, motion)
+        yield from _drive(spot, coordinate, f"{item.name}.{name}" in released)
 
 
-def _keys(coordinate: Coordinate) -> tuple[tuple[str, str], str, str]:
-    if isinstance(coordinate, AngularCoordinate):
-        return ("angle_rad", "rate_rad_s"), "torque_Nm", "prescribed_rad"
-    return ("position_m", "rate_m_s"), "force_N", "prescribed_m"
-
-
-def _drive(
-    place: Place, item: SceneStruct, keys: tuple[str, str], motor: str | None, motion: str
-) -> Iterator[Defect]:
-    """motor: the key of what may not be given beside a prescribed motion, if anything."""
-    profile = getattr(item, motion)
+def _drive(place: Place, item: Coordinate | Wheel, released: bool) -> Iterator[Defect]:
+    """Of a prescribed coordinate: where it starts, and no motor, which acts only on what an event releases."""
+    keys = item.KEYS
+    profile = getattr(item, keys.prescribed)
     if profile is None:
         return
-    if motor is not None and getattr(item, motor) is not None:
-        what = f"{motor} on a prescribed coordinate cannot change the motion"
-        yield Defect(str(place.key(motor)), what, f"leave out {motor} or {motion}; the drive load is an output")
-    yield from initial_motion(place, item, keys, profile)
+    if not released and getattr(item, keys.effort) is not None:
+        what = f"{keys.effort} on a prescribed coordinate cannot change the motion"
+        remedy = f"leave out {keys.effort} or {keys.prescribed}; the drive load is an output"
+        yield Defect(str(place.key(keys.effort)), what, remedy)
+    yield from initial_motion(place, item, (keys.value, keys.rate), profile)
 
 
 def _gimbal(place: Place, hinge: Gimbal) -> Iterator[Defect]:

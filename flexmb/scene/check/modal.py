@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from math import pi, sqrt
+from typing import assert_never
 
 import numpy as np
 
@@ -46,18 +47,25 @@ def modal_states(scene: Scene) -> Iterator[Defect]:
         if isinstance(body, RigidBody) or body.level == "rigid":
             yield Defect(str(place.key("body")), f'body "{body.name}" is rigid: it has no modes', "leave it out")
             continue
-        count = mode_count(body) if isinstance(body, BeamBody) else _inline_modes(body)
+        count = _count(body)
         for key, given, required in (("coordinates", state.coordinates, True), ("rates", state.rates, False)):
             if count is not None and len(given) != count and (given or required):
                 what = f'{len(given)} modal {key} for the {count} modes of body "{body.name}"'
                 yield Defect(str(place.key(key)), what, f"give {count} values")
 
 
-def _inline_modes(body: ModalBody) -> int | None:
-    try:
-        return modal_arrays(body).translation_modes.shape[2]
-    except (OSError, ValueError):
-        return None  # reported with the body
+def _count(body: BeamBody | ModalBody) -> int | None:
+    """How many modes a body has; None where that cannot be told, which is reported with the body."""
+    match body:
+        case BeamBody():
+            return mode_count(body)
+        case ModalBody():
+            try:
+                return modal_arrays(body).translation_modes.shape[2]
+            except (OSError, ValueError):
+                return None
+        case _:
+            assert_never(body)
 
 
 def _read(place: Place, body: ModalBody) -> Generator[Defect, None, ModalArrays | None]:

@@ -8,6 +8,7 @@ hinges.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import assert_never
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,25 +17,13 @@ from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody, Vector
 from flexmb.scene.check.profiles import start_of
 from flexmb.scene.check.walk import entries
 from flexmb.scene.columns import column
-from flexmb.scene.functions import Function
-from flexmb.scene.hinges import (
-    AngularCoordinate,
-    Cylindrical,
-    Free,
-    Gimbal,
-    Hinge,
-    Planar,
-    Prismatic,
-    Revolute,
-    Spherical,
-    Universal,
-    Weld,
-)
+from flexmb.scene.freedoms import Ball, Coordinate, Floating, Freedom, ScalarFreedom
+from flexmb.scene.hinges import Hinge
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Defect
-from flexmb.scene.quaternions import about, rotation_matrix
+from flexmb.scene.quaternions import rotation_by, rotation_matrix
 from flexmb.scene.schema import PointMass, Scene, Wheel
-from flexmb.scene.tree import GROUND, Coordinate, NodeFrame, coordinates, ordered, rest_frames
+from flexmb.scene.tree import GROUND, NodeFrame, ordered, rest_frames
 from flexmb.typing import Real
 
 # A moment below this share of the largest leaves no digits of the acceleration.
@@ -138,7 +127,7 @@ def _clusters(scene: Scene, nodes: _Nodes, ends: Real) -> tuple[list[bool], list
             continue
         parent, k = nodes.number[hinge.parent], nodes.number[body.name]
         beyond[parent] = beyond[parent] or beyond[k]
-        if not isinstance(hinge, Weld):
+        if hinge.freedoms:
             beyond[parent] = beyond[parent] or massive[k] or not known[k]
         elif known[parent] and known[k]:
             to_parent = _motions(*nodes.frames([hinge], "parent"))[0]
@@ -160,6 +149,8 @@ def _spatial_inertias(scene: Scene, nodes: _Nodes) -> tuple[list[bool], Real]:
     known = [True] * len(scene.bodies)
     for i, body in enumerate(scene.bodies):
         match body:
+            case RigidBody():
+                pass  # all of them at once, above
             case BeamBody():
                 total[i] = _beam(body)
             case ModalBody():
@@ -167,6 +158,8 @@ def _spatial_inertias(scene: Scene, nodes: _Nodes) -> tuple[list[bool], Real]:
                 total[i] = np.sum(_lumps(a.mass, a.position + a.com_offset, a.inertia), axis=0)
             case SidBody():
                 known[i] = False
+            case _:
+                assert_never(body)
     items: tuple[Wheel | PointMass, ...] = (*scene.wheels, *scene.point_masses)
     for item in items:
         i = nodes.number[item.body]
@@ -179,12 +172,16 @@ def _spatial_inertias(scene: Scene, nodes: _Nodes) -> tuple[list[bool], Real]:
 
 def _attached(item: Wheel | PointMass) -> Real:
     """A wheel that spins freely resists no rotation about its axis."""
-    if isinstance(item, PointMass):
-        return _lump(item.mass_kg, np.zeros(3), np.zeros((3, 3)))
-    along = np.outer(item.axis, item.axis)
-    inertia = item.transverse_inertia_kg_m2 * (np.eye(3) - along)
-    if item.prescribed_rad is not None:
-        inertia = inertia + item.axial_inertia_kg_m2 * along
+    match item:
+        case PointMass():
+            inertia = np.zeros((3, 3))
+        case Wheel():
+            along = np.outer(item.axis, item.axis)
+            inertia = item.transverse_inertia_kg_m2 * (np.eye(3) - along)
+            if item.prescribed_rad is not None:
+                inertia = inertia + item.axial_inertia_kg_m2 * along
+        case _:
+            assert_never(item)
     return _lump(item.mass_kg, np.zeros(3), inertia)
 
 
@@ -242,71 +239,47 @@ def _skew(v: Real) -> Real:
 
 def _free_directions(hinges: Sequence[Hinge]) -> list[Real]:
     """By hinge, free rows (n,6) of its map at the start, outboard hinge axes; prescribed coordinates are left out."""
-    single = [i for i, hinge in enumerate(hinges) if _turns_or_slides_freely(hinge)]
-    rows = np.zeros((len(single), 1, 6))
-    rows[:, 0, :3] = rows[:, 0, 3:] = column([hinges[i] for i in single], "axis", 3)
-    turns = np.array([isinstance(hinges[i], Revolute) for i in single], bool)
-    rows[turns, 0, 3:] = rows[~turns, 0, :3] = 0.0
-    by_number = dict(zip(single, rows, strict=True))
-    return [by_number[i] if i in by_number else _directions_of(hinge) for i, hinge in enumerate(hinges)]
+    freedoms = [hinge.freedoms for hinge in hinges]
+    single = [i for i, own in enumerate(freedoms) if len(own) == 1 and _moves_freely(own[0])]
+    lines = [own for i in single for own in freedoms[i] if isinstance(own, ScalarFreedom)]
+    axis = column(lines, "axis", 3)
+    rows = np.concatenate([column(lines, size)[:, None] * axis for size in ("turns", "shifts")], axis=1)
+    by_number = dict(zip(single, rows[:, None], strict=True))
+    return [by_number[i] if i in by_number else _directions_of(own) for i, own in enumerate(freedoms)]
 
 
-def _turns_or_slides_freely(hinge: Hinge) -> bool:
-    """Whether it is one of the two most frequent hinges, free to move."""
-    if isinstance(hinge, Revolute):
-        return hinge.rotation.prescribed_rad is None
-    return isinstance(hinge, Prismatic) and hinge.translation.prescribed_m is None
+def _moves_freely(freedom: Freedom) -> bool:
+    """Whether it is a single direction that no later freedom carries: that of most hinges."""
+    return isinstance(freedom, ScalarFreedom) and freedom.coordinate.prescribed is None
 
 
-def _directions_of(hinge: Hinge) -> Real:
-    """Those of one hinge."""
-    angular = np.eye(6)[:3]
-    directions: Sequence[ArrayLike]
-    match hinge:
-        case Spherical():
-            return angular
-        case Free():
-            return np.eye(6)
-        case Revolute() | Prismatic() | Cylindrical():
-            columns = {"rotation": (*hinge.axis, 0.0, 0.0, 0.0), "translation": (0.0, 0.0, 0.0, *hinge.axis)}
-            directions = [columns[name] for name, _ in coordinates(hinge)]
-        case Planar():
-            back = about("z", -_start(hinge.rotation))
-            directions = [(0.0, 0.0, 0.0, *axis) for axis in back.T[:2]] + [angular[2]]
-        case Universal():
-            directions = _carried("xy", hinge)
-        case Gimbal():
-            directions = _carried(hinge.sequence, hinge)
+def _directions_of(freedoms: Sequence[Freedom]) -> Real:
+    """Those of several freedoms: each is carried to the outboard frame by those that follow it."""
+    found = [np.zeros((0, 6))]
+    R, p = np.eye(3), np.zeros(3)  # of the outboard frame, seen from where the freedom leads
+    for freedom in reversed(freedoms):
+        own, turned, moved = _across(freedom)
+        found.append(own @ _motions(R[None], p[None])[0].T)
+        R, p = turned @ R, moved + turned @ p
+    return np.concatenate(found[::-1])
+
+
+def _across(freedom: Freedom) -> tuple[Real, Real, Real]:
+    """Free rows (n,6) of one freedom at the start, in the axes to which it leads; their rotation and position."""
+    match freedom:
+        case ScalarFreedom(axis=axis, turns=turns, shifts=shifts, coordinate=coordinate):
+            row, start = np.outer((turns, shifts), axis).reshape(1, 6), _start(coordinate)
+            free = row if coordinate.prescribed is None else row[:0]
+            return free, rotation_by(start * row[0, :3]), start * row[0, 3:]
+        case Ball(quaternion=quaternion):
+            return np.eye(6)[:3], rotation_matrix(quaternion), np.zeros(3)
+        case Floating(position=position, quaternion=quaternion):
+            return np.eye(6), rotation_matrix(quaternion), np.array(position)
         case _:
-            return np.zeros((0, 6))
-    kept = [
-        np.asarray(direction, dtype=float)
-        for direction, (_, coordinate) in zip(directions, coordinates(hinge), strict=True)
-        if _profile(coordinate) is None
-    ]
-    return np.array(kept).reshape(-1, 6)
-
-
-def _carried(sequence: str, hinge: Universal | Gimbal) -> list[Real]:
-    """Axes of successive rotations seen from the outboard frame: turned back by the rotations that follow."""
-    angles = [_start(coordinate) for _, coordinate in coordinates(hinge)]
-    directions = []
-    for k, letter in enumerate(sequence):
-        after = np.eye(3)
-        for axis, angle in zip(sequence[k + 1 :], angles[k + 1 :], strict=True):
-            after = after @ about(axis, angle)
-        directions.append(np.concatenate([after["xyz".index(letter)], np.zeros(3)]))
-    return directions
-
-
-def _profile(coordinate: Coordinate) -> Function | None:
-    return coordinate.prescribed_rad if isinstance(coordinate, AngularCoordinate) else coordinate.prescribed_m
+            assert_never(freedom)
 
 
 def _start(coordinate: Coordinate) -> float:
     """Initial value (rad or m): the profile's where there is one."""
-    profile = _profile(coordinate)
-    start = start_of(profile) if profile is not None else None
-    if start is not None:
-        return start[0]
-    return coordinate.angle_rad if isinstance(coordinate, AngularCoordinate) else coordinate.position_m
+    start = None if coordinate.prescribed is None else start_of(coordinate.prescribed)
+    return coordinate.value if start is None else start[0]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from math import cos, sin
-from typing import Any, get_args
+from typing import Any, assert_never, get_args
 
 from flexmb.scene.bodies import SceneStruct
 from flexmb.scene.check.walk import non_finite, suspicious, values
 from flexmb.scene.columns import alike
 from flexmb.scene.convert import ROOT
-from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene
 
@@ -37,7 +37,7 @@ def _with_functions(items: Sequence[Any]) -> set[int]:
 
 
 def start_of(function: Function) -> tuple[float, float] | None:
-    """Value and rate at t = 0; None for a function that is not well-formed or jumps."""
+    """Value and rate at t = 0; None for a function that is not well-formed, jumps or is a controller's."""
     match function:
         case Constant(value=value):
             return value, 0.0
@@ -45,19 +45,26 @@ def start_of(function: Function) -> tuple[float, float] | None:
             return value - rate * start, rate
         case Sine(amplitude=a, angular_frequency_rad_s=w, phase_rad=phase, offset=offset):
             return offset + a * sin(phase), a * w * cos(phase)
-        case SmoothStep(duration_s=duration) if duration > 0.0:
-            return _smooth_step_start(function)
-        case SpinUp(duration_s=duration) if duration > 0.0:
-            return 0.0, 0.0
-        case Table(times_s=times, values=samples) if not any(
-            (*_table(ROOT, function), *_covers(ROOT, function, None, 0.0))
-        ):
-            # here, because this import takes longer than everything else a scene without tables imports
-            from scipy.interpolate import make_interp_spline
+        case SmoothStep(duration_s=duration):
+            return _smooth_step_start(function) if duration > 0.0 else None
+        case SpinUp(duration_s=duration):
+            return (0.0, 0.0) if duration > 0.0 else None
+        case Table():
+            return _table_start(function)
+        case Pulse() | ControlSignal():
+            return None
+        case _:
+            assert_never(function)
 
-            spline = make_interp_spline(times, samples, k=5)
-            return float(spline(0.0)), float(spline(0.0, 1))
-    return None
+
+def _table_start(table: Table) -> tuple[float, float] | None:
+    if any((*_table(ROOT, table), *_covers(ROOT, table, None, 0.0))):
+        return None
+    # here, because this import takes longer than everything else a scene without tables imports
+    from scipy.interpolate import make_interp_spline
+
+    spline = make_interp_spline(table.times_s, table.values, k=5)
+    return float(spline(0.0)), float(spline(0.0, 1))
 
 
 def initial_motion(place: Place, item: SceneStruct, keys: tuple[str, str], function: Function) -> Iterator[Defect]:

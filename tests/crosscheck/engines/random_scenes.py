@@ -14,12 +14,14 @@ from flexmb.scene.collecting import make
 from flexmb.scene.functions import Constant, Sine
 from flexmb.scene.hinges import WITH_AXIS
 from flexmb.scene.schema import AngularCoordinate, Gimbal, Hinge, LinearCoordinate, Node, Scene, Spherical
-from tests.trees import STRUCTS, scalar_coordinates
+from flexmb.scene.units import split_unit
+from tests.trees import LATER_KINDS as LATER_KINDS
+from tests.trees import REQUIRED, STRUCTS, scalar_coordinates
 
-_DRAWN = (  # in an order that keeps the random scenes of a seed what they are
+# A new kind is none of these, so that the random scenes of a seed stay what they are; it is one of `LATER_KINDS`.
+KINDS = (
     "weld", "revolute", "prismatic", "cylindrical", "universal", "gimbal2", "gimbal3", "spherical", "planar", "free",
 )  # fmt: skip
-KINDS = (*_DRAWN, *(kind for kind in STRUCTS if kind not in (*_DRAWN, "gimbal")))
 
 
 def unit(rng: Generator) -> np.ndarray:
@@ -89,9 +91,11 @@ def _hinge(
         case "spherical":
             return make(Spherical, stiffness=rng.uniform(1.0, 5.0), damping=rng.uniform(0.1, 0.5), **values)
     axis = {"axis": unit(rng)} if kind in WITH_AXIS else {}
+    keys = STRUCTS[kind].__struct_fields__
+    required = {split_unit(key)[0]: value for key, value in REQUIRED.items() if key in keys}
     drawn = {AngularCoordinate: turn, LinearCoordinate: shift}
     own = {key: drawn[type(c)](driven and i == 0) for i, (key, c) in enumerate(scalar_coordinates(STRUCTS[kind]))}
-    return make(STRUCTS[kind], **axis, **own, **values)
+    return make(STRUCTS[kind], **axis, **own, **values, **required)
 
 
 def _coordinate(rng: Generator, motor: str, driven: bool) -> dict:

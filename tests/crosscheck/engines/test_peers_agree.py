@@ -5,7 +5,7 @@ import pytest
 
 from crosscheck.engines.contract import EngineMissing, Snapshot
 from crosscheck.engines.registry import engines
-from tests.crosscheck.engines.random_scenes import KINDS, random_scene
+from tests.crosscheck.engines.random_scenes import KINDS, LATER_KINDS, random_scene
 
 ENGINES = engines()
 
@@ -64,3 +64,14 @@ def test_random_tree(name, seed):
 def test_random_tree_with_prescribed_coordinates(name, seed):
     rng = np.random.default_rng(100 + seed)
     _compare(random_scene(rng, ("revolute", *rng.choice(KINDS[:-1], 7)), driven=True), name)
+
+
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=pytest.mark.slow if name.startswith("native-") else ())  # each compiles for half a minute
+    for name in ENGINES if name != "pinocchio"
+])  # fmt: skip
+def test_random_tree_with_kinds_that_came_later(name):
+    """... one by itself, one that is prescribed and one behind others."""
+    rng = np.random.default_rng(7)
+    kinds = [kind for later in LATER_KINDS for kind in (later, later, "spherical", later)]
+    _compare(random_scene(rng, kinds, driven=True), name)

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from flexmb.building import assemble, carried
-from flexmb.dense import DenseSystem, body_frames
-from flexmb.dense.hinge_frames import hinge_frame, moved, rotated
+from flexmb.dense import DenseSystem
 from flexmb.entry import articulated
 from flexmb.hinges import catalogue
 from flexmb.hinges.kind import HingeKind, Reduced, scalar_hinge, z_to
@@ -19,7 +18,9 @@ from flexmb.levels.body import LEVELS
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import Level
 from flexmb.scene.build import angular
+from flexmb.scene.freedoms import ScalarFreedom
 from flexmb.scene.hinges import Z_AXIS, _Hinge
+from flexmb.scene.tree import coordinates
 from flexmb.spatial.rotation import rotation_z
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z
@@ -33,7 +34,7 @@ POINTS = [
 ]
 ENDS = {"name": "h", "parent": "ground", "child": "b"}
 TWO_AXES = s.Gimbal(**ENDS, sequence="zy", rotations=(angular(), angular()))
-ITEMS = [*(struct(**ENDS) for struct in get_args(s.Hinge)), TWO_AXES, *POINTS]
+ITEMS = [*(trees.bare(struct, **ENDS) for struct in get_args(s.Hinge)), TWO_AXES, *POINTS]
 
 
 @pytest.mark.parametrize("item", ITEMS, ids=lambda item: type(item).__name__)
@@ -56,11 +57,22 @@ def test_what_a_kind_says_of_its_speeds_is_true(kind):
     item = next(item for item in ITEMS if catalogue.kind_of(item)[0] is kind)
     units = [unit for _, unit in kind.names(item)[1]]
     assert [n for n, unit in enumerate(units) if unit == "m/s"] == list(kind.displacements)
-    state = np.ones(8)
-    H = count(kind.motion, state, 0, state, 0, np.array([0, 1, 2]), np.zeros((6, 6))).arguments[-1].astype(float)
+    state, parameters = np.ones(8), np.full(3, 0.3)
+    counted = count(kind.motion, state, 0, state, 0, np.array([0, 1, 2]), parameters, np.zeros((6, 6)))
+    H = counted.arguments[-1].astype(float)
     rows = [row for row in (ANGULAR_Z, LINEAR_Z) if kind.speeds == 1 and np.array_equal(H[:, 0], np.eye(6)[row])]
     assert rows == ([kind.axis] if kind.axis >= 0 else [])
     assert (kind.quaternion >= 0) == (kind.coordinates == kind.speeds + 1)
+
+
+@pytest.mark.parametrize("item", ITEMS, ids=lambda item: type(item).__name__)
+def test_freedoms_have_the_coordinates_of_the_kind(item):
+    """As many coordinates and speeds as the kernels have, under the same names in the same order."""
+    kind = catalogue.kind_of(item)[0]
+    sizes = [freedom.sizes for freedom in item.freedoms]
+    assert (sum(q for q, _ in sizes), sum(u for _, u in sizes)) == (kind.coordinates, kind.speeds)
+    scalars = [(each.name, each.coordinate) for each in item.freedoms if isinstance(each, ScalarFreedom)]
+    assert scalars == list(coordinates(item))
 
 
 def test_levels_are_those_of_the_schema():
@@ -68,27 +80,31 @@ def test_levels_are_those_of_the_schema():
 
 
 def test_a_thing_of_no_kind_is_refused():
-    with pytest.raises(TypeError, match="no kind of flexmb.hinges takes a Screw: h"):
-        catalogue.kind_of(Screw(**ENDS))
+    with pytest.raises(TypeError, match="no kind of flexmb.hinges takes a Drill: h"):
+        catalogue.kind_of(Drill(**ENDS))
 
 
 PITCH = 0.3  # m/rad
 
 
-class Screw(_Hinge, frozen=True, kw_only=True, tag="screw"):
+class Drill(_Hinge, frozen=True, kw_only=True, tag="drill"):
     """Rotation about `axis`, and PITCH times as much translation along it."""
 
     axis: s.Vector = Z_AXIS
     rotation: s.AngularCoordinate = s.AngularCoordinate()
 
+    @property
+    def freedoms(self) -> tuple[ScalarFreedom, ...]:
+        return (ScalarFreedom("rotation", self.axis, 1.0, PITCH, self.rotation),)
+
 
 @helper
-def pose(q, i, sequence):
+def pose(q, i, sequence, parameters):
     return rotation_z(q[i]), (0.0, 0.0, PITCH * q[i])
 
 
 @helper
-def motion(q, i, u, j, sequence, H):
+def motion(q, i, u, j, sequence, parameters, H):
     H[2, 0] = 1.0
     H[5, 0] = PITCH
     zero = (0.0, 0.0, 0.0)
@@ -96,36 +112,28 @@ def motion(q, i, u, j, sequence, H):
 
 
 def reduced(item) -> Reduced | None:
-    return Reduced(turn=z_to(item.axis)) if isinstance(item, Screw) else None
+    return Reduced(turn=z_to(item.axis)) if isinstance(item, Drill) else None
 
 
-SCREW = scalar_hinge("screw", 1, pose=pose, motion=motion, reduced=reduced)
-
-
-def screw_frame(hinge, c):
-    if not isinstance(hinge, Screw):
-        return hinge_frame(hinge, c)
-    angle = c[..., 0]
-    return moved((hinge.axis, angle.map(lambda x: PITCH * x))).carry(rotated((hinge.axis, angle)))
+DRILL = scalar_hinge("drill", 1, pose=pose, motion=motion, reduced=reduced)
 
 
 @pytest.fixture
-def with_screw(monkeypatch):
-    """A catalogue of one more kind, and the dense route with its frame."""
-    kinds = (*catalogue.KINDS, SCREW)
+def with_drill(monkeypatch):
+    """A catalogue of one more kind; the dense route and all else follow from its freedoms."""
+    kinds = (*catalogue.KINDS, DRILL)
     for room in (catalogue, assemble, carried):
         monkeypatch.setattr(room, "KINDS", kinds)
     for name in ("pose", "motion", "rate", "retract"):
         monkeypatch.setattr(catalogue, name, numbered(name, HINGE, [getattr(kind, name) for kind in kinds]))
-    monkeypatch.setattr(body_frames, "hinge_frame", screw_frame)
 
 
-def screwed(bodies: int = 4) -> s.Scene:
-    """A random tree whose last hinges are screws."""
+def drilled(bodies: int = 4) -> s.Scene:
+    """A random tree whose last hinges are drills."""
     scene = trees.random_scene(3, trees.Recipe(bodies=bodies, carriers=("rigid", "modal"), wheels=1, point_masses=1))
     place = [key for key in _Hinge.__struct_fields__]
-    screws = [
-        Screw(
+    drills = [
+        Drill(
             **{key: getattr(hinge, key) for key in place}, axis=AXIS,
             rotation=angular(angle=0.4, rate=1.5, stiffness=3.0, damping=0.2),
         )
@@ -133,13 +141,13 @@ def screwed(bodies: int = 4) -> s.Scene:
     ]  # fmt: skip
     return s.Scene(
         **{key: getattr(scene, key) for key in scene.__struct_fields__ if key != "hinges"},
-        hinges=(scene.hinges[0], *screws),
+        hinges=(scene.hinges[0], *drills),
     )  # fmt: skip
 
 
-def test_a_made_up_hinge_needs_its_declaration_only(with_screw):
+def test_a_made_up_hinge_needs_its_declaration_only(with_drill):
     """Tables, numbering, dispatch and initial state follow; the accelerations solve the dense equations."""
-    scene = screwed()
+    scene = drilled()
     system, dense = System(scene), DenseSystem(scene)
     q, u = np.zeros(system.nq), np.zeros(system.nu)
     for link in system.links:

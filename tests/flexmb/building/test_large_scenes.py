@@ -27,7 +27,7 @@ PARENTS = {
     "star": lambda k: min(k, 1) - 1,
     "binary tree": lambda k: (k - 1) // 2 if k else -1,
 }
-FEW = 104  # a multiple of what some tables are rounded up to
+FEW = 48  # a multiple of what some tables are rounded up to
 
 
 def tree(shape: str, bodies: int) -> SceneBuilder:
@@ -120,8 +120,8 @@ def _bytes(shape: str, bodies: int) -> int:
 
 @pytest.mark.parametrize("shape", PARENTS)
 def test_no_depth_is_too_deep(shape):
-    """Twenty times Python's limit of recursion."""
-    bodies = 20 * sys.getrecursionlimit()
+    """Four times Python's limit of recursion."""
+    bodies = 4 * sys.getrecursionlimit()
     scene = SceneBuilder(shape)
     for k in range(bodies):
         parent = PARENTS[shape](k)

@@ -21,6 +21,7 @@ from tests.flexmb import spectral
 SPAN = 0.4  # s; the motions below turn by less than 1 rad in it
 I, J = 1, 2  # first places in q and u: a hinge must not care where it is
 SEQUENCES = {GIMBAL2: ["xy", "zy", "yx"], GIMBAL3: ["xyz", "zxz", "yzx", "xyx"]}
+PARAMETERS = np.array([0.3, 0.0, 0.0])  # m/rad, the pitch of a screw
 CASES = [(kind, sequence) for kind in KINDS for sequence in SEQUENCES.get(kind, ["xyz"])]
 
 
@@ -38,18 +39,18 @@ SCENE = Anything(np.zeros(0))
 
 
 @kernel
-def pose(c, kind, q, i, sequence):
-    return catalogue.pose(c, kind, q, i, sequence)
+def pose(c, kind, q, i, sequence, parameters):
+    return catalogue.pose(c, kind, q, i, sequence, parameters)
 
 
 @kernel
-def motion(c, kind, q, i, u, j, sequence, H):
-    return catalogue.motion(c, kind, q, i, u, j, sequence, H)
+def motion(c, kind, q, i, u, j, sequence, parameters, H):
+    return catalogue.motion(c, kind, q, i, u, j, sequence, parameters, H)
 
 
 @kernel
-def rate(c, kind, q, i, u, j, sequence, dq):
-    catalogue.rate(c, kind, q, i, u, j, sequence, dq)
+def rate(c, kind, q, i, u, j, dq):
+    catalogue.rate(c, kind, q, i, u, j, dq)
 
 
 class Hinge:
@@ -70,18 +71,19 @@ class Hinge:
         return q
 
     def pose(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        R, p = pose(SCENE, self.kind, np.append(np.zeros(I), q), I, self.sequence)
+        R, p = pose(SCENE, self.kind, np.append(np.zeros(I), q), I, self.sequence, PARAMETERS)
         return np.reshape(R, (3, 3)), np.array(p)
 
     def motion(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
         """H (6,6) as left by the kernel, velocity (6,), bias (6,)."""
         H = np.zeros((6, 6))
-        V, A = motion(SCENE, self.kind, np.append(np.zeros(I), q), I, np.append(np.zeros(J), u), J, self.sequence, H)
+        q, u = np.append(np.zeros(I), q), np.append(np.zeros(J), u)
+        V, A = motion(SCENE, self.kind, q, I, u, J, self.sequence, PARAMETERS, H)
         return H, np.concatenate(V), np.concatenate(A)
 
     def rate(self, q: np.ndarray, u: np.ndarray) -> np.ndarray:
         dq = np.full(I + self.nq, 9.0)
-        rate(SCENE, self.kind, np.append(np.zeros(I), q), I, np.append(np.zeros(J), u), J, self.sequence, dq)
+        rate(SCENE, self.kind, np.append(np.zeros(I), q), I, np.append(np.zeros(J), u), J, dq)
         assert np.all(dq[:I] == 9.0), "writes outside its own coordinates"
         return dq[I:]
 

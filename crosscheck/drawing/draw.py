@@ -9,19 +9,21 @@ that drawing needs no mechanics; bodies without a marker are not drawn. `film.py
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import assert_never
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.records.drawing import CarriedPoint, Drawing, DrawnWheel, Line
-from flexmb.scene.bodies import ZERO, Body, RigidBody, Vector
-from flexmb.scene.connectors import BetweenNodes, HingeSpring, SpringDamper
+from flexmb.scene.bodies import ZERO, BeamBody, Body, ModalBody, RigidBody, SidBody, Vector
+from flexmb.scene.connectors import BetweenNodes, Bushing, HingeSpring, SpringDamper
 from flexmb.scene.schema import Marker, Scene, Wheel
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
 LARGEST_ASPECT = 12.0
+DRAWN_AS = {SpringDamper: "spring", Bushing: "mount"}
 THINNEST_WHEEL = 0.1  # width of a wheel over its radius, where its inertias would make it thinner
 
 
@@ -33,10 +35,13 @@ def draw(scene: Scene, trails: Sequence[str] | None = None) -> Drawing:
         markers = [marker for marker in scene.markers if marker.body == body.name]
         if not markers:
             continue
-        if isinstance(body, RigidBody):
-            lines += _rigid(scene, body, markers[0])
-        else:
-            lines.append(_flexible(scene, body, markers))
+        match body:
+            case RigidBody():
+                lines += _rigid(scene, body, markers[0])
+            case BeamBody() | ModalBody() | SidBody():
+                lines.append(_flexible(scene, body, markers))
+            case _:
+                assert_never(body)
         for wheel in scene.wheels:
             marker = next((each for each in markers if _turns_with(body, each, wheel)), None)
             if wheel.body == body.name and marker is not None:
@@ -81,7 +86,7 @@ def _connectors(scene: Scene) -> list[Line]:
     for each in scene.connectors:
         kind, points = "mount", []
         if isinstance(each, BetweenNodes):
-            kind = "spring" if isinstance(each, SpringDamper) else "mount"
+            kind = DRAWN_AS[type(each)]
             points = [
                 _carried(scene, each.body_a, each.node_a, each.position_a_m),
                 _carried(scene, each.body_b, each.node_b, each.position_b_m),

@@ -12,9 +12,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from crosscheck.drawing.draw import draw
 from crosscheck.engines.contract import Effort
 from crosscheck.records.drawing import Drawing
-from crosscheck.running.draw import draw
 from flexmb.interchange.sid.blocks import SidError
 from flexmb.interchange.sid.to_body import with_sid_bodies
 from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
@@ -87,10 +87,10 @@ def _with_markers(scene: Scene, body: Body) -> Scene:
         longer = msgspec.structs.replace(body, nodes=(*body.nodes, *added))
         bodies = tuple(longer if each.name == body.name else each for each in scene.bodies)
         scene, body = msgspec.structs.replace(scene, bodies=bodies), longer
-    nodes = ["origin"] if isinstance(body, RigidBody) else list(rest_frames(body))
+    nodes = list(rest_frames(body))
     seen = {(marker.body, marker.node) for marker in scene.markers}
-    if isinstance(body, RigidBody) and any(name == body.name for name, _ in seen):
-        return scene
+    if isinstance(body, RigidBody):
+        nodes = [] if any(name == body.name for name, _ in seen) else ["origin"]
     markers = tuple(
         Marker(name=f"{body.name} {node} {ADDED}", body=body.name, node=node)
         for node in nodes

@@ -1,0 +1,172 @@
+"""Elementary freedoms: what every hinge, wheel and point mass consists of, from its inboard frame to its outboard one.
+
+A freedom is a turn about an axis, a shift along it, both at once by one coordinate, a ball joint or free flight. Its
+axes are those that the freedoms before it have carried along. Directions, peers' joints and what mirrors and units do
+to a hinge follow from these; nothing here knows physics.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, NamedTuple
+
+from flexmb.scene.bodies import Quaternion, SceneStruct, Vector
+from flexmb.scene.functions import Function
+
+
+class MotionKeys(NamedTuple):
+    """The keys under which a coordinate, or a wheel, has its initial value and rate, its motor and prescribed value."""
+
+    value: str
+    rate: str
+    effort: str
+    prescribed: str
+
+
+class _ScalarCoordinate(SceneStruct, frozen=True, kw_only=True):
+    """What angles and displacements have in common, each under keys with its own units."""
+
+    KEYS: ClassVar[MotionKeys]
+    ANGULAR: ClassVar[bool]
+    UNIT: ClassVar[str]
+    SPRING: ClassVar[tuple[str, str, str]]
+
+    @property
+    def value(self) -> float:
+        """Initial value (rad or m)."""
+        return float(getattr(self, self.KEYS.value))
+
+    @property
+    def rate(self) -> float:
+        """Initial rate (rad/s or m/s)."""
+        return float(getattr(self, self.KEYS.rate))
+
+    @property
+    def effort(self) -> Function | None:
+        """The motor (N m or N)."""
+        found: Function | None = getattr(self, self.KEYS.effort)
+        return found
+
+    @property
+    def prescribed(self) -> Function | None:
+        """The prescribed value (rad or m)."""
+        found: Function | None = getattr(self, self.KEYS.prescribed)
+        return found
+
+    @property
+    def spring(self) -> tuple[float, float, float]:
+        """Stiffness, damping and value at rest (N m, rad, s or N, m, s)."""
+        stiffness, damping, rest = (float(getattr(self, key)) for key in self.SPRING)
+        return stiffness, damping, rest
+
+
+class AngularCoordinate(_ScalarCoordinate, frozen=True, kw_only=True):
+    """One angle: initial value and rate, spring, damper, motor, or prescribed motion.
+
+    With closures, initial values other than zero are kept to the last digit where the others can follow, and changed
+    with a warning where they contradict each other. `given = true`: both are meant, zero too; where they cannot be kept
+    there is an error, and angles and displacements without it are guesses that say which way the loop is assembled.
+    """
+
+    KEYS: ClassVar[MotionKeys] = MotionKeys("angle_rad", "rate_rad_s", "torque_Nm", "prescribed_rad")
+    ANGULAR: ClassVar[bool] = True
+    UNIT: ClassVar[str] = "rad"
+    SPRING: ClassVar[tuple[str, str, str]] = ("stiffness_Nm_rad", "damping_Nms_rad", "rest_rad")
+
+    angle_rad: float = 0.0
+    rate_rad_s: float = 0.0
+    given: bool = False
+    stiffness_Nm_rad: float = 0.0
+    damping_Nms_rad: float = 0.0
+    rest_rad: float = 0.0
+    torque_Nm: Function | None = None
+    prescribed_rad: Function | None = None
+
+
+class LinearCoordinate(_ScalarCoordinate, frozen=True, kw_only=True):
+    """One displacement: initial value and rate, spring, damper, motor, or prescribed motion.
+
+    `given` as of an angle.
+    """
+
+    KEYS: ClassVar[MotionKeys] = MotionKeys("position_m", "rate_m_s", "force_N", "prescribed_m")
+    ANGULAR: ClassVar[bool] = False
+    UNIT: ClassVar[str] = "m"
+    SPRING: ClassVar[tuple[str, str, str]] = ("stiffness_N_m", "damping_Ns_m", "rest_m")
+
+    position_m: float = 0.0
+    rate_m_s: float = 0.0
+    given: bool = False
+    stiffness_N_m: float = 0.0
+    damping_Ns_m: float = 0.0
+    rest_m: float = 0.0
+    force_N: Function | None = None
+    prescribed_m: Function | None = None
+
+
+Coordinate = AngularCoordinate | LinearCoordinate
+
+
+class ScalarFreedom(NamedTuple):
+    """One coordinate, called `name`: a turn by `turns` times it about `axis`, a shift by `shifts` times it along it.
+
+    rad and m per unit of the coordinate. A turn alone is (1, 0), a shift alone (0, 1).
+    """
+
+    name: str
+    axis: Vector
+    turns: float
+    shifts: float
+    coordinate: Coordinate
+
+    @property
+    def motion(self) -> Literal["turn", "slide", "screw"]:
+        """Which elementary joint it is."""
+        if not self.shifts:
+            return "turn"
+        return "screw" if self.turns else "slide"
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Numbers of coordinates and speeds."""
+        return 1, 1
+
+
+class Ball(NamedTuple):
+    """Quaternion and angular velocity (rad/s) in outboard axes; torque -stiffness * rotation vector - damping * w."""
+
+    quaternion: Quaternion
+    angular_velocity: Vector
+    stiffness: float
+    damping: float
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Numbers of coordinates and speeds."""
+        return 4, 3
+
+
+class Floating(NamedTuple):
+    """Position (m) of the outboard origin in inboard axes, quaternion; both velocities relative, in outboard axes."""
+
+    position: Vector
+    quaternion: Quaternion
+    angular_velocity: Vector
+    velocity: Vector
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Numbers of coordinates and speeds."""
+        return 7, 6
+
+
+Freedom = ScalarFreedom | Ball | Floating
+
+
+def turn(name: str, axis: Vector, coordinate: AngularCoordinate) -> ScalarFreedom:
+    """A rotation by a coordinate."""
+    return ScalarFreedom(name, axis, 1.0, 0.0, coordinate)
+
+
+def slide(name: str, axis: Vector, coordinate: LinearCoordinate) -> ScalarFreedom:
+    """A translation by a coordinate."""
+    return ScalarFreedom(name, axis, 0.0, 1.0, coordinate)

@@ -1,0 +1,100 @@
+"""A kind that was made up here: what follows from its freedoms knows it, everything else refuses it by name."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.biting.invariances.counterpart import NotApplicable
+from crosscheck.biting.invariances.mirrored import MIRRORED
+from crosscheck.biting.invariances.units import _without_unit
+from crosscheck.engines.connections import _along, exerts
+from crosscheck.engines.links import freedoms, obstacle
+from crosscheck.library.mutations.mirror import _hinge as is_own_image
+from crosscheck.library.mutations.turning import _own as axis_of
+from flexmb.dense.connectors import grip
+from flexmb.dense.hinge_frames import hinge_frame
+from flexmb.dense.jets import Jet, MovingFrame, constant
+from flexmb.scene import schema as s
+from flexmb.scene.bodies import SceneStruct
+from flexmb.scene.check.outboard import _free_directions
+from flexmb.scene.freedoms import Freedom, ScalarFreedom, slide
+from flexmb.scene.hinges import _Hinge
+
+ENDS = {"name": "joint", "parent": "ground", "child": "arm"}
+X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+class Boring(_Hinge, frozen=True, kw_only=True, tag="boring"):
+    """Drives forward along z while it turns, then slides along the carried x."""
+
+    rotation: s.AngularCoordinate = s.AngularCoordinate()
+    x: s.LinearCoordinate = s.LinearCoordinate()
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        return ScalarFreedom("rotation", Z, 1.0, 0.5, self.rotation), slide("x", X, self.x)
+
+
+class Silent(_Hinge, frozen=True, kw_only=True, tag="silent"):
+    """Does not say which freedoms it has."""
+
+
+class MadeUp(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="made_up"):
+    """A connector of no kind."""
+
+    name: str = "odd"
+
+
+BORING = Boring(**ENDS, rotation=s.AngularCoordinate(angle_rad=0.5), x=s.LinearCoordinate(position_m=2.0))
+
+
+def test_directions_follow_from_freedoms() -> None:
+    """The turn moves the point that has slid out by 2 m at 2 m per radian, across; the drive moves it along z."""
+    assert _free_directions([BORING])[0] == pytest.approx(np.array([[0, 0, 1, 0, 2, 0.5], [0, 0, 0, 1, 0, 0]]))
+
+
+def test_dense_frames_follow_from_freedoms() -> None:
+    q, u = np.array([0.5, 2.0]), np.array([3.0, 0.0])
+    frame = hinge_frame(BORING, Jet(q[None, None], u[None, None], np.zeros((1, 1, 2))))
+    c, sine = np.cos(0.5), np.sin(0.5)
+    assert frame.position.value[0, 0] == pytest.approx([2.0 * c, 2.0 * sine, 0.25])
+    assert frame.position.rate[0, 0] == pytest.approx([-6.0 * sine, 6.0 * c, 1.5])
+    assert frame.angular_velocity()[0, 0] == pytest.approx([0.0, 0.0, 3.0])
+
+
+def test_joints_of_peers_follow_from_freedoms() -> None:
+    assert [(each.motion, each.pitch) for each in freedoms(BORING)] == [("screw", 0.5), ("slide", 0.0)]
+    scene = s.Scene(name="odd", bodies=(), hinges=(BORING,))
+    assert obstacle(scene, "Anything", ()) == 'hinge "joint" is a screw: the adapter of Anything offers no such joint'
+    assert obstacle(scene, "Anything", (), screws=True) == ""
+
+
+def test_rules_of_mutations_follow_from_freedoms() -> None:
+    assert axis_of(BORING) == pytest.approx(np.array(Z))
+    assert not any(is_own_image(BORING, axis) for axis in range(3))
+
+
+@pytest.mark.parametrize("use", [_free_directions, lambda hinges: freedoms(hinges[0])], ids=["directions", "joints"])
+def test_a_hinge_that_does_not_say_its_freedoms_is_refused_by_name(use: Any) -> None:
+    with pytest.raises(NotImplementedError, match='hinge "joint": Silent does not say which freedoms it has'):
+        use([Silent(**ENDS)])
+
+
+STILL = MovingFrame(constant(np.zeros(3)), constant(np.eye(3)))
+
+
+@pytest.mark.parametrize(
+    "use",
+    [exerts, _along, lambda odd: grip(odd, STILL, STILL, 0.0), lambda odd: _without_unit(odd, "stiffness")],
+    ids=["peers, between nodes", "peers, along a hinge", "dense route", "other units"],
+)
+def test_a_made_up_connector_is_refused_by_name(use: Any) -> None:
+    with pytest.raises(AssertionError, match=r"MadeUp\(name='odd'\)"):
+        use(MadeUp())
+
+
+def test_a_hand_that_no_key_changes_has_no_counterpart_in_the_mirror() -> None:
+    body = s.RigidBody(name="arm", mass_kg=1.0, inertia_kg_m2=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), Z))
+    with pytest.raises(NotApplicable, match='hinge "joint" has a hand, and no key that changes it'):
+        MIRRORED.of(s.Scene(name="odd", bodies=(body,), hinges=(BORING,)))
