@@ -1,4 +1,4 @@
-"""What an answer looks like: names, statuses, shapes, times, reasons, and that it is the same every time."""
+"""The form of an answer: names, statuses, shapes, times, reasons, and reproducibility."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from flexmb.typing import Real
 
 FORM = Chapter(physical=False)
 TIMES = np.linspace(0.0, 0.5, 11)
-LEAST_PART = 1e-4  # of a call is solved: adapters spend more time on converting than one would think, but not all
-PATIENCE_S = 2.0  # for what a run has begun to end
+LEAST_SHARE = 1e-4  # of a call's time that the solve must take: converting takes most of some adapters' time
+CLEANUP_S = 2.0  # within which threads and processes of a run must end
 
 
 @FORM.clause("`version` names the version of the library, or raises EngineMissing where it is not installed.")
@@ -73,7 +73,7 @@ def a_solve_takes_time(engine: Engine) -> None:
         taken.append(perf_counter() - before)
     for each, call_s in zip(told, taken, strict=True):
         clocks = f"wall_s is {each:.3g} s of a call that takes {call_s:.3g} s"
-        require(each > LEAST_PART * min(taken), f"{clocks}: time the solve by a clock, such as time.perf_counter()")
+        require(each > LEAST_SHARE * min(taken), f"{clocks}: time the solve by a clock, such as time.perf_counter()")
         require(each <= 1.01 * call_s + 1e-3, f"{clocks}: compiling and warming up are no part of it")
 
 
@@ -86,7 +86,7 @@ def a_run_leaves_nothing_behind(engine: Engine) -> None:
         before = _holdings()
         for _ in range(4):
             _leave(engine)
-    patience = monotonic() + PATIENCE_S
+    patience = monotonic() + CLEANUP_S
     while (left := _left(known, before)) and monotonic() < patience:
         sleep(0.02)
     require(not left, f"after runs have returned there are {left}: end what a run begins before it returns")
@@ -194,7 +194,7 @@ def _start(engine: Engine) -> Snapshot:
 
 
 def _leave(engine: Engine) -> None:
-    """A run of a model of its own, of which nothing is kept."""
+    """A run of a new model, of which nothing is kept."""
     scene, model = _compiled(engine)
     simulated(model, TIMES, ladder(engine, scene, TIMES[-1])[0])
     del model
@@ -203,8 +203,8 @@ def _leave(engine: Engine) -> None:
 
 @contextmanager
 def _only_new_garbage() -> Iterator[None]:
-    """`gc.collect` passes over the million objects that are there already, which would take half a second each time."""
-    was_frozen = gc.get_freeze_count() > 0  # by who knows best what it wants to keep
+    """Let `gc.collect` skip the objects that exist already, about a million, which would take 0.5 s each time."""
+    was_frozen = gc.get_freeze_count() > 0  # then the caller has frozen its own objects
     gc.freeze()
     try:
         yield
@@ -214,14 +214,14 @@ def _only_new_garbage() -> Iterator[None]:
 
 
 def _holdings() -> dict[str, int]:
-    """What this process holds, in numbers."""
+    """The numbers of this process's threads, children and open files."""
     me = psutil.Process()
     files = me.num_fds() if hasattr(me, "num_fds") else len(me.open_files())
     return {"threads": me.num_threads(), "processes": len(me.children()), "open files": files}
 
 
 def _left(known: set[threading.Thread], before: dict[str, int]) -> str:
-    """What is there that was not, in words."""
+    """What exists in addition to what was known before, in words."""
     threads = [each.name for each in threading.enumerate() if each not in known]
     more = {what: number - before[what] for what, number in _holdings().items() if number > before[what]}
     told = [f"threads of Python ({', '.join(threads)})"] if threads else []
@@ -229,6 +229,6 @@ def _left(known: set[threading.Thread], before: dict[str, int]) -> str:
 
 
 def _same_side(found: Real, like: Real) -> Real:
-    """The quaternion or its negative, which is the same rotation, whichever is nearer."""
+    """The quaternion or its negative, whichever is nearer to the other."""
     return found if float(np.dot(found, like)) >= 0.0 else -found
 

@@ -86,7 +86,7 @@ def force_in_world_axes(engine: Engine) -> None:
 @MOTION.clause("A force in node axes turns with the body.")
 def force_in_node_axes(engine: Engine) -> None:
     acceleration = snapshot(engine, _pushed("node")).markers["body"].acceleration
-    # The turned body feels its own x, which is World y, at World (-0.5, 0, 0).
+    # The force is along the turned body's x, which is World y, at World (-0.5, 0, 0).
     equal("the acceleration of the body", acceleration, [0, 0, -2.0 / INERTIA[2], 0, 4.0 / MASS, 0])
 
 

@@ -1,7 +1,7 @@
-"""An engine's answers are held against the contract before they are recorded; one that breaks it is a failed run.
+"""Checks of an engine's answers against the contract, before they are recorded. An invalid answer is a failed run.
 
-Every function returns the answer in plain types of our own (float64 copies, short clean text), so that nothing an
-engine keeps or changes later reaches a record.
+Every function returns the answer in our own plain types (float64 copies, short clean text), so that what an engine
+changes later does not reach a record.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ UNIT = 8 * float(np.finfo(np.float32).eps)
 
 
 class BrokenContract(ValueError):
-    """An answer that the contract does not allow; the message says what was expected and what came."""
+    """An answer that the contract does not allow; the message says what was expected and what was found."""
 
 
 def clean(text: str) -> str:
-    """Text that can be encoded and is not endless."""
+    """Text of limited length that can be encoded as UTF-8."""
     cut = text[:LONGEST_TEXT]
     more = f" ... ({len(text) - len(cut)} characters more)" if len(cut) < len(text) else ""
     return cut.encode("utf-8", "backslashreplace").decode() + more
@@ -57,7 +57,7 @@ def describe(error: BaseException) -> str:
     try:
         text = str(error)
     except Exception:
-        text = "its text cannot be had"
+        text = "its message cannot be read"
     if isinstance(error, BrokenContract):
         return clean(f"broke the contract: {text}")
     return clean(f"{type(error).__name__}: {text}{place}")
@@ -132,7 +132,8 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
 
 
 def _reached(found: Any, times: Real, finished: bool) -> int:
-    """How many of the samples asked for are there. A clock that adds up T intervals is off by T roundings at most."""
+    """The number of requested samples that were reached. A time summed from T intervals has at most T rounding
+    errors."""
     _require(isinstance(found, np.ndarray) and found.ndim == 1, f"times is {_named(found)} and not an array (T,)")
     taken = _array(found, "times", len(found))
     _require(len(taken) <= len(times), f"times has {len(taken)} samples, more than the {len(times)} asked for")
@@ -156,7 +157,7 @@ def _path(found: Any, where: str, count: int) -> MarkerPath:
 
 
 def _known(scene: Scene) -> dict[str, set[str]]:
-    """Who can have each of the outputs that several items have."""
+    """For each output that is given by item, the names of the items that can have it."""
     hinges, wheels = _names(scene.hinges), _names(scene.wheels)
     return {
         "loads": hinges | _names(scene.closures) | _names(scene.point_masses),
@@ -169,7 +170,7 @@ def _known(scene: Scene) -> dict[str, set[str]]:
 
 
 def _output(found: Any, where: str, count: int, known: set[str] | None) -> Any:
-    """An output of a run in plain arrays: by name where `known` items can have it, else one array or None."""
+    """An output of a run as plain arrays: by name if only `known` items can have it, else one array or None."""
     columns = OUTPUTS[where]
     if known is not None:
         named = _named_by(found, where, known)
@@ -178,7 +179,7 @@ def _output(found: Any, where: str, count: int, known: set[str] | None) -> Any:
 
 
 def _named_by(found: Any, where: str, known: set[str]) -> list[tuple[str, Any]]:
-    """The items of a mapping whose keys are names that are known."""
+    """The items of a mapping all of whose keys must be known names."""
     _require(isinstance(found, Mapping), f"{where} is {_named(found)}, not a mapping")
     there = ", ".join(sorted(known)) or "none"
     for name in found:
@@ -187,7 +188,7 @@ def _named_by(found: Any, where: str, known: set[str]) -> list[tuple[str, Any]]:
 
 
 def _array(found: Any, where: str, count: int, *width: int | None) -> Real:
-    """A float64 copy of an array (count, *width) of real numbers; `None` leaves a width open."""
+    """A float64 copy of an array (count, *width) of real numbers; a width of None may be any."""
     plain = isinstance(found, np.ndarray) and not isinstance(found, np.ma.MaskedArray)
     _require(plain, f"{where} is {_named(found)}, not an array")
     _require(found.dtype.kind in "fiu", f"{where} is of dtype {found.dtype}, not of real numbers")
@@ -198,7 +199,7 @@ def _array(found: Any, where: str, count: int, *width: int | None) -> Real:
 
 
 def _finite_samples(run: Trajectory, finished: bool) -> int:
-    """How many samples from the first are finite throughout; all must be where the run says that it finished."""
+    """The number of samples, from the first, in which everything is finite; in a finished run all must be."""
     count = len(run.times)
     for where, values in _signals(run):
         good = np.all(np.isfinite(values), axis=tuple(range(1, values.ndim)))
@@ -210,7 +211,7 @@ def _finite_samples(run: Trajectory, finished: bool) -> int:
 
 
 def _undetermined(found: Trajectory) -> tuple[str, ...]:
-    """Names of channels of loads and drives that there are."""
+    """The names of undetermined channels, which must be loads or drives of the run."""
     _instance(found.undetermined, tuple, "undetermined")
     there = {f"load:{name}.{part}" for name in found.loads for part in LOAD_PARTS}
     there |= {f"drive:{name}" for name in found.drives}
@@ -221,7 +222,7 @@ def _undetermined(found: Trajectory) -> tuple[str, ...]:
 
 
 def _determined(run: Trajectory, output: str, name: str, values: Real) -> Real:
-    """The columns of a load or drive that the motion determines."""
+    """The columns of an output that the motion determines."""
     if output == "loads":
         known = [part for key, part in LOAD_PARTS.items() if f"load:{name}.{key}" not in run.undetermined]
         return np.hstack([values[:, :0], *(values[:, part] for part in known)])

@@ -192,11 +192,8 @@ def freedoms(item: Hinge | PointMass | Wheel) -> tuple[Freedom, ...]:
 
 
 def _scalar(freedom: ScalarFreedom) -> Scalar:
-    pitch = freedom.shifts if freedom.motion == "screw" else 0.0
-    c = freedom.coordinate
-    return Scalar(
-        freedom.motion, np.array(freedom.axis, dtype=float), pitch, c.value, c.rate, *c.spring, c.effort, c.prescribed
-    )
+    c, axis = freedom.coordinate, np.array(freedom.axis, dtype=float)
+    return Scalar(freedom.motion, axis, freedom.pitch, c.value, c.rate, *c.spring, c.effort, c.prescribed)
 
 
 def _disc(wheel: Wheel) -> Inertia:

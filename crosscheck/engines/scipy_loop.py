@@ -17,10 +17,10 @@ from flexmb.scene.functions import Function
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
-# Angles of elastic chains are a thousandth of a radian: coarser absolute tolerances let their fastest modes ring.
-_SMALL = 1e-3
-# Coordinates and speeds are of order one to a hundred, so below this the error control would chase round-off.
-_ROUND_OFF = 1e-13
+# atol/rtol. Angles of elastic chains are about 1e-3 rad: a coarser absolute tolerance lets their fastest modes ring.
+_ATOL_RATIO = 1e-3
+# Coordinates and speeds are of order 1 to 100: with a smaller atol the error control would react to round-off.
+_LEAST_ATOL = 1e-13
 
 
 RTOL_LADDER = tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-8, 1e-10, 1e-12))
@@ -72,8 +72,8 @@ def integrate(
 ) -> tuple[list[Real], int, str]:
     """States at the sample times reached, evaluations of the right-hand side, and why it stopped early.
 
-    It restarts wherever a function of time is not smooth, so that the error control never steps over a kink; the
-    right-hand side sees the limit from the left at the end of a stretch.
+    The integrator restarts where a function of time is not smooth, so that no step crosses a kink; at the end of each
+    interval the right-hand side takes the limit from the left.
     """
     ends = [times[0], *breaks_between(functions, times[0], times[-1]), times[-1]]
     states = [y]
@@ -84,7 +84,7 @@ def integrate(
         solved = solve_ivp(
             lambda t, y, last=before_end: rate(min(t, last), y),
             (begin, end), y, method=effort.method, t_eval=np.union1d(inside, [end]),
-            rtol=effort.value, atol=max(_SMALL * effort.value, _ROUND_OFF),
+            rtol=effort.value, atol=max(_ATOL_RATIO * effort.value, _LEAST_ATOL),
         )  # fmt: skip
         evaluations += solved.nfev
         good = np.isfinite(solved.y).all(axis=0)

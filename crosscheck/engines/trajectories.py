@@ -48,7 +48,7 @@ def _stacked(values: Sequence[Any]) -> Any:
 
 
 def first_samples(run: Trajectory, count: int) -> Trajectory:
-    """The run up to its sample number `count`, which is left out."""
+    """The first `count` samples of the run."""
 
     def cut(output: Any) -> Any:
         if isinstance(output, dict):
@@ -67,7 +67,7 @@ def first_samples(run: Trajectory, count: int) -> Trajectory:
 
 
 def continuous(quaternions: Real) -> Real:
-    """The same rotations (T,4) with signs chosen so that successive quaternions are near each other."""
+    """The same rotations (T,4), with the signs of successive quaternions chosen so that they are close."""
     steps = np.sign(np.sum(quaternions[1:] * quaternions[:-1], axis=1))
     signs = np.cumprod(np.concatenate([[1.0], np.where(steps < 0.0, -1.0, 1.0)]))
     return quaternions * signs[:, None]

@@ -1,7 +1,7 @@
 """The routes to a reference: engines that run the variant at their efforts, and closed forms of the case's folder.
 
-Engines go the usual way, through `sweep` and its workers. A closed form is Python of the case's folder: it is loaded
-here and nowhere else.
+Engines run as usual, by `sweep` and its workers. A closed form is Python code of the case's folder, which is executed
+only here.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class RouteSignals:
-    """What one route gave at the reference's times: channels (T, k) with their U, in SI and World axes.
+    """The result of a route at the reference's times: channels (T, k) with their U, in SI and World axes.
 
-    `name` is short, `title` says in words what the route is. `engine` is "" for a closed form, `method` its integrator.
+    `title` describes the route. `engine` and its integrator `method` are "" for a closed form.
     `made_with` is the engine's version.
     """
 
@@ -67,9 +67,9 @@ def run_routes(
     scheduler: Scheduler,
     listener: Listener,
 ) -> list[RouteSignals]:
-    """The signals of every route of the recipe at `times` (T,); CaseError where a route gives none.
+    """The signals of every route of the recipe at `times` (T,); CaseError if a route gives none.
 
-    Closed forms come first: they take no time, and a fault in them needs no engine to be seen.
+    Closed forms are evaluated first, since they are fast and may have errors.
     """
     found = {
         place: _closed_form(case.folder / route.exact, route, times)
@@ -84,7 +84,7 @@ def run_routes(
 
 
 def _name(place: int) -> str:
-    """What the variant of a route is called where it is run."""
+    """The name of the variant as which a route is run."""
     return f"route {place + 1}"
 
 

@@ -1,4 +1,4 @@
-"""What a case's page says in words and tables; its charts are in `charts.py`."""
+"""Texts and tables of a case's page; its charts are in `charts.py`."""
 
 from __future__ import annotations
 

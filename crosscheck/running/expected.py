@@ -1,4 +1,4 @@
-"""How long jobs will take, from what they took the last time."""
+"""Estimates of how long jobs will take, from how long they took last time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.rung import repeats_of
 
-BESIDES_S = 0.05  # of a job besides its runs: reading it, packing and sending what it found
+BESIDES_S = 0.05  # of a job besides its runs: reading it, packing and sending its results
 
 
 def expected_seconds(records: Iterable[object]) -> dict[tuple[str, ...], float]:
@@ -23,10 +23,10 @@ def expected_seconds(records: Iterable[object]) -> dict[tuple[str, ...], float]:
 
 
 class Remaining:
-    """An estimate of the time that jobs still need, which learns from those that have ended.
+    """An estimate of the remaining time, scaled by the time that the jobs ended so far have taken.
 
-    What the clock says for the work done so far is taken to hold for the rest: how many jobs run at a time, and how
-    much of it is recorded already, need not be known. A job that nobody knows is taken for an average one.
+    So the number of parallel jobs and the share of recorded runs need not be known. A job without a known time counts
+    as an average one.
     """
 
     def __init__(self) -> None:
@@ -34,14 +34,14 @@ class Remaining:
         self._done = 0.0
 
     def expect(self, jobs: Iterable[tuple[int, float | None]]) -> None:
-        """Take in jobs by number, with the seconds that each is expected to take."""
+        """Add jobs by number, with their expected seconds."""
         given = list(jobs)
         known = [seconds for _, seconds in given if seconds is not None]
         average = sum(known) / len(known) if known else 1.0
         self._open |= {number: average if seconds is None else seconds for number, seconds in given}
 
     def ended(self, job: int) -> None:
-        """A job is through, in whatever way."""
+        """A job has ended in some way."""
         self._done += self._open.pop(job)
 
     def seconds(self, elapsed_s: float) -> float | None:

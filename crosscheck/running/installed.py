@@ -1,4 +1,4 @@
-"""Which engines there are here: what they are, installed or not, in which version, and how to get them."""
+"""The known engines: whether each is installed, in which version, and how to install it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ANSWER_LIMIT_S = 60.0
 
 @dataclass(frozen=True)
 class EngineState:
-    """An engine: what it is in a line, its version, or None, what is the matter (`absence`), and how to install it."""
+    """An engine: a one-line summary, its version, or None with the kind of `absence` and how to install it."""
 
     name: str
     version: str | None
@@ -28,7 +28,7 @@ class EngineState:
 
 
 def describe_engines() -> list[EngineState]:
-    """All engines known here, shipped ones and plug-ins; these are asked in processes of their own."""
+    """All engines, built-in ones and plug-ins; plug-ins are asked in their own processes."""
     states = [_state(name) for name in BUILT_IN]
     names = plug_ins()
     found = {name: _useless(name, "it gave no answer") for name in names}
@@ -44,7 +44,7 @@ def describe_engines() -> list[EngineState]:
 
 
 def tell(name: str, emit: Callable[[EngineState], None]) -> None:
-    """What a worker does to describe an engine."""
+    """The job of a worker that describes an engine."""
     emit(_state(name))
 
 

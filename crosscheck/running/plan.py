@@ -1,4 +1,4 @@
-"""From a case to jobs: the scene of every variant, transformed, mutated or refined, for every engine that runs it."""
+"""The jobs of a case: the scene of every variant, transformed, mutated or refined, for every engine that runs it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def plan(
 ) -> tuple[CaseRecord, list[Job]]:
     """The record of a case, reduced to the engines asked for, and its jobs; `time_limit_s` replaces the case's own.
 
-    With `films` every variant has a run more, from which its animation is made.
+    With `films` every variant has another run, from which its animation is made.
     """
     run = (alone if case.alone else select)(case.run, asked)
     infos: dict[str, VariantInfo] = {}
@@ -88,7 +88,7 @@ def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None
         case "modal_points":
             return modal_points(scene)
         case "segments":
-            assert variant.segments is not None  # as the rules of a run file demand
+            assert variant.segments is not None  # checked with the run file
             return finite_segments(scene, variant.split_body, variant.segments)
         case "substructures":
             assert variant.pieces is not None
@@ -126,17 +126,17 @@ def scene_identity(scene: Scene, times: Real) -> str:
 def _attempt(
     case: Case, variant: Variant, refined: Refined | None = None, control: Control | None = None
 ) -> tuple[Scene | None, str]:
-    """The checked scene of a variant, or None and the reason: one bad variant must not stop the others."""
+    """The checked scene of a variant, or None and the reason, so that one bad variant does not stop the others."""
     try:
         scene = case.scene(variant)
-        if control is not None:  # a fault in what the variant models, hence at its level
+        if control is not None:  # the mutation changes the scene at the variant's level
             scene = mutate(at_level(scene, variant), control.mutation, control.target)
             variant = msgspec.structs.replace(variant, level=None)
         scene = variant_scene(scene, variant, refined)
-        check = check_and_warn if control is None else check_scene  # a fault that was put in may be doubtful
+        check = check_and_warn if control is None else check_scene  # a mutated scene may be doubtful
         check(scene, t_end=variant.duration_s or case.run.duration_s)
         return scene, ""
-    except (ValueError, NotImplementedError, OSError, SceneWarning) as error:  # a warning where it is made an error
+    except (ValueError, NotImplementedError, OSError, SceneWarning) as error:  # --strict makes warnings errors
         return None, str(error)
 
 
@@ -169,10 +169,10 @@ def _job(
 
 
 def _film(case: Case, run: RunFile, variant: Variant, provider: str) -> tuple[Job, Drawing] | None:
-    """The run that the variant's animation is made from; None where it has to do with what is recorded anyway."""
+    """The run for the variant's animation; None if the recorded runs suffice or cannot be supplemented."""
     if ENGINE not in variant.engines:
         return None
-    if variant.transform == "modal_points":  # the beams themselves, in their own modes
+    if variant.transform == "modal_points":  # draw the beams themselves
         variant = msgspec.structs.replace(variant, transform="none")
     scene, _ = _attempt(case, variant)
     made = None if scene is None else film(scene)
@@ -198,7 +198,7 @@ def _film(case: Case, run: RunFile, variant: Variant, provider: str) -> tuple[Jo
 
 
 def prescribed(variant: Variant, engine: str) -> tuple[Effort, ...]:
-    """The efforts that the case prescribes for an engine, none where it leaves them to the engine."""
+    """The efforts that the case prescribes for an engine, empty if they are left to the engine."""
     return tuple(
         Effort(kind=ladder.kind, value=value, method=ladder.method)
         for ladder in variant.efforts
@@ -208,7 +208,7 @@ def prescribed(variant: Variant, engine: str) -> tuple[Effort, ...]:
 
 
 def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> VariantInfo:
-    """Bodies that the variant takes to pieces are drawn whole: their markers keep their names."""
+    """The variant's info; bodies that it divides are drawn whole, since their markers keep their names."""
     if scene is None:
         return VariantInfo(level="", drawing=None, error=error)
     drawn = case.scene(variant) if variant.transform in TAKES_APART else scene
@@ -218,7 +218,7 @@ def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> Vari
 
 
 def scene_basis(case: Case, variant: Variant) -> str:
-    """What accepted figures of a variant stand on: scene, transformation, refinement and times as they are written."""
+    """The basis of accepted figures of a variant: scene, transformation, refinement and times as written in files."""
     times = (variant.duration_s or case.run.duration_s, variant.samples or case.run.samples)
     text = f"{scene_digest(case, variant)} {times} {variant.refined}"
     return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -231,7 +231,7 @@ def _levels(scene: Scene) -> str:
 
 
 def _engines_compared_across(run: RunFile, variant: Variant) -> tuple[str, ...]:
-    """Engines whose result of this variant is compared with another variant: there its discretisation matters."""
+    """Engines whose result of this variant is compared with another variant, so that its discretisation matters."""
     pairs: tuple[Comparison | Control, ...] = (*run.comparisons, *run.controls)
     crossing = [(a, b) for a, b in (pair.sides for pair in pairs) if a.variant != b.variant]
     found = {side.engine for pair in crossing for side in pair if side.variant == variant.name}

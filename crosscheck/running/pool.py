@@ -1,13 +1,10 @@
-"""The local scheduler, a small process pool that survives its workers.
+"""The local scheduler: a process pool in which the death of a worker costs only its job.
 
-Each worker is a process of its own (`worker`); one that dies takes only its job with it.
-
-Why not a pool from a library: the standard pools and loky fail as a whole when a process is killed, which an engine's
-crash in C++ does, and have no limit of time. Pebble (5.2) has one and survives the death of a worker, but it gives a
-job to whichever worker comes first (kernels would be compiled once a worker and engines would share processes), hands
-out one result a job (here every effort is recorded as it ends, so that a killed run loses nothing), watches no memory,
-and ends a worker without what that started. What a library does carry, processes and their memory, is psutil's.
-"""
+No library has such a pool. The standard pools and loky fail as a whole when a process is killed, as by an engine's
+crash in C++, and have no time limits. Pebble (5.2) has time limits and survives dead workers, but it gives a job to any
+free worker (kernels would be compiled by every worker, and engines would share processes), returns one result a job
+(here every effort is recorded as it ends, so that a killed session loses nothing), limits no memory, and leaves the
+descendants of a worker alive. psutil measures and ends processes. """
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One sample in a worker: its scene is made, run by one engine, and reduced to the quantities."""
+"""The job of one sample: its scene is made, run by one engine, and reduced to the quantities."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class SampleRecord(
 ):
     """The outcome of one sample in one engine; `quantities` are there when it is "finished".
 
-    `scene` identifies the scene with its values and the sample times, `asked` the quantities and how they are found,
+    `scene` identifies the scene with its values and the sample times, `asked` the quantities with their reductions,
     `made_by` everything else that the result depends on, as of a RunRecord.
     """
 
@@ -52,7 +52,7 @@ Read = Written | BrokenLine
 
 @dataclass(frozen=True)
 class SampleJob:
-    """A sample as it is sent to a worker: `job` without its scene, which is made of `base` there."""
+    """A sample as sent to a worker, which makes the scene of the `job` from `base`."""
 
     job: Job
     sample: int
@@ -73,7 +73,7 @@ class SampleJob:
 
 
 def run_sample(sample: SampleJob, emit: Callable[[Any], None]) -> None:
-    """The work of a worker: a SampleRecord, or a Confirmed where the recorded one stands."""
+    """The function of a worker: emits a SampleRecord, or a Confirmed if the recorded one is valid."""
 
     def reduced(found: Solved | Confirmed | str) -> None:
         if isinstance(found, Solved):
@@ -85,7 +85,7 @@ def run_sample(sample: SampleJob, emit: Callable[[Any], None]) -> None:
 
 
 def _with_scene(sample: SampleJob) -> Job:
-    """The job with its scene, or with the reason why there is none: values can make a scene impossible."""
+    """The job with its scene, or with the error if the values make the scene invalid."""
     try:
         scene = variant_scene(with_values(sample.base, sample.sweep, sample.values), sample.variant)
         check_scene(scene, t_end=float(sample.job.times[-1]))

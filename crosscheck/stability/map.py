@@ -15,7 +15,7 @@ from flexmb.typing import Real
 
 CellStatus = Literal["measured", "failed", "did not finish", "did not run"]
 
-NO_PREDICTION = -3  # instead of the number of a class
+NO_PREDICTION = -3  # in place of the number of a class
 STABLE, UNSTABLE = "#9ecae1", "#f4a582"  # colours of maps that ask only whether a motion is stable
 DIGITS = ("#08519c", "#4292c6", "#9ecae1", "#fdae6b", "#e6550d")  # from many digits to few
 
@@ -84,10 +84,10 @@ class Kind:
 
 @dataclass(frozen=True)
 class Overlay:
-    """The boundary known from elsewhere: where `predict(x, y)` (arrays of one shape) passes `levels`.
+    """The theoretical or published boundary: where `predict(x, y)` (arrays of one shape) crosses `levels`.
 
-    Below the first level the first class is expected, and so on: as many levels as the map has thresholds. A `bound`
-    only says what the quantity does not exceed, so that classes below the expected one are right too. `source` names
+    Below the first level the first class is expected, and so on; there are as many levels as thresholds of the map. A
+    `bound` limits the quantity only from above, so that classes below the expected one are correct too. `source` names
     the theory or the publication.
     """
 
@@ -98,7 +98,7 @@ class Overlay:
     bound: bool = False
 
     def classes(self, x: Real, y: Real) -> NDArray[np.intp]:
-        """Numbers of the classes expected at x, y; `NO_PREDICTION` where the theory gives no number."""
+        """Numbers of the classes expected at x, y; `NO_PREDICTION` where the prediction is NaN."""
         predicted = self.predict(x, y)
         return np.where(np.isnan(predicted), NO_PREDICTION, np.searchsorted(self.levels, predicted, side="right"))
 

@@ -1,4 +1,4 @@
-"""What engines say of themselves for a timing report: their algorithm, and the settings that make a race fair."""
+"""Statements of engines for a timing report: their algorithm and how they are run."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ UNSAID = "it does not say with which settings it runs"
 
 @dataclass(frozen=True)
 class EngineFacts:
-    """An engine's `algorithm` ("" where it does not say) and its `settings`, in words."""
+    """An engine's `algorithm` ("" if unknown) and its `settings`, in words."""
 
     algorithm: str
     settings: str
 
 
 def facts_of(names: Iterable[str], provider: str) -> dict[str, EngineFacts]:
-    """The facts of each engine by its name; an engine that cannot be made says nothing."""
+    """The facts of each engine by its name; of an engine that cannot be made the reason."""
     return {name: _facts(name, provider) for name in names}
 
 

@@ -1,4 +1,4 @@
-"""`flexmb linearize` and `flexmb campbell`: linear models, and frequencies against a spin rate."""
+"""`flexmb linearize` and `flexmb campbell`: linear models, and frequencies as functions of a spin rate."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def linearize(
         "equilibrium"
     ),
     spin: Annotated[
-        str | None, typer.Option(help="Hinge or wheel that spins steadily instead, at `--rate`.", show_default=False)
+        str | None, typer.Option(help="Hinge or wheel in a steady spin at `--rate`.", show_default=False)
     ] = None,
-    rate: Annotated[float, typer.Option(help="Its rate in rad/s.")] = 0.0,
+    rate: Annotated[float, typer.Option(help="Rate of the spin in rad/s.")] = 0.0,
     cut: Annotated[
         bool,
         typer.Option("--truncation/--no-truncation", help="Linearise again with twice the modes of every beam."),
@@ -41,8 +41,8 @@ def linearize(
     """
     Linearise a scene by exact derivatives; print frequency, damping and dominant coordinates of every mode.
 
-    At `equilibrium` and for a spin, functions of time stand still at their values at t = 0; at the `initial` state
-    prescribed motions go on as their functions have them.
+    At `equilibrium` and for a spin, functions of time have their constant values at t = 0; at the `initial` state
+    prescribed motions continue by their functions.
 
     **Examples**
 
@@ -50,8 +50,8 @@ def linearize(
         flexmb linearize gyrostat.toml --at initial --export gyrostat.npz
         flexmb linearize rotor.toml --spin shaft --rate 30
 
-    **Truncation** is the relative change of each eigenvalue when every beam has twice its modes: how far a frequency
-    may still fall. Motions that nothing holds are listed as rigid-body motions.
+    **Truncation** is the relative change of each eigenvalue when every beam has twice its modes, an estimate of the
+    truncation error. Motions without stiffness are listed as rigid-body motions.
 
     **Exported** are A, B, C, D of x' = A x + B f, y = C x + D f with x = [displacements; speeds], their names and
     units, the mass matrix and the eigenvalues.
@@ -98,7 +98,7 @@ def _linearised(
     try:
         return model, truncation(model, loaded, linear), ""
     except ArithmeticError as error:  # no equilibrium, or no accelerations: more modes may buckle
-        return model, None, f"truncation is not known, for with twice the modes of every beam: {error}"
+        return model, None, f"the truncation is not known; with twice the modes of every beam: {error}"
 
 
 @contextmanager
@@ -118,17 +118,17 @@ def campbell(
     hinge: Annotated[str, typer.Argument(help="Revolute hinge or wheel that spins.", metavar="HINGE")],
     rates: Annotated[str, typer.Option(help="Rates in rad/s: `from:to:count`.", show_default=False)],
     modes: Annotated[
-        int | None, typer.Option(help="How many of the lowest modes to draw; default all.", show_default=False)
+        int | None, typer.Option(help="Number of modes to draw, lowest first; by default all.", show_default=False)
     ] = None,
     picture: Annotated[Path, typer.Option("--picture", "-o", help="Picture file.")] = Path("out/campbell.png"),
     csv: Annotated[Path | None, typer.Option(help="File for the numbers.", show_default=False)] = None,
     no_user_code: NoUserCode = False,
 ) -> None:
     """
-    Frequencies and growth rates against a spin rate: a table and a picture.
+    Frequencies and growth rates as functions of a spin rate (Campbell diagram): a table and a picture.
 
-    At each rate the deformation is found in which nothing accelerates, and the scene linearised about it by exact
-    derivatives. Modes are seen from the turning bodies and followed by their shapes.
+    At each rate the scene is linearised about its steady state by exact derivatives. Frequencies are those in the
+    rotating frame, and modes are tracked by their shapes.
 
     **Examples**
 

@@ -38,9 +38,9 @@ def hinge_frame(hinge: Item, c: Jet) -> MovingFrame:
 def _across(freedom: Freedom, c: Jet) -> MovingFrame:
     """The frame beyond one freedom."""
     match freedom:
-        case ScalarFreedom(axis=axis, turns=turns, shifts=shifts):
-            along = moved((axis, c[..., 0].map(lambda x: shifts * x))) if shifts else moved()
-            turned = rotated((axis, c[..., 0].map(lambda x: turns * x))) if turns else rotated()
+        case ScalarFreedom(axis=axis):
+            along = moved((axis, c[..., 0].map(lambda x: freedom.shifts * x))) if freedom.shifts else moved()
+            turned = rotated((axis, c[..., 0])) if freedom.turns else rotated()
             return MovingFrame(along.position, turned.rotation)
         case Ball():
             return MovingFrame(moved().position, _attitude(c.value, c.rate, c.acceleration))

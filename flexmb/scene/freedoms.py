@@ -107,23 +107,32 @@ Coordinate = AngularCoordinate | LinearCoordinate
 
 
 class ScalarFreedom(NamedTuple):
-    """One coordinate, called `name`: a turn by `turns` times it about `axis`, a shift by `shifts` times it along it.
+    """One coordinate, called `name`: of an angle a turn about `axis`, of a displacement a shift along it.
 
-    rad and m per unit of the coordinate. A turn alone is (1, 0), a shift alone (0, 1).
+    With a `pitch` (m/rad) a turn shifts along its axis too, by the pitch times the angle: a screw.
     """
 
     name: str
     axis: Vector
-    turns: float
-    shifts: float
     coordinate: Coordinate
+    pitch: float = 0.0
 
     @property
     def motion(self) -> Literal["turn", "slide", "screw"]:
         """Which elementary joint it is."""
-        if not self.shifts:
-            return "turn"
-        return "screw" if self.turns else "slide"
+        if not self.coordinate.ANGULAR:
+            return "slide"
+        return "screw" if self.pitch else "turn"
+
+    @property
+    def turns(self) -> float:
+        """rad about the axis per unit of the coordinate."""
+        return 1.0 if self.coordinate.ANGULAR else 0.0
+
+    @property
+    def shifts(self) -> float:
+        """m along the axis per unit of the coordinate."""
+        return self.pitch if self.coordinate.ANGULAR else 1.0
 
     @property
     def sizes(self) -> tuple[int, int]:
@@ -160,13 +169,3 @@ class Floating(NamedTuple):
 
 
 Freedom = ScalarFreedom | Ball | Floating
-
-
-def turn(name: str, axis: Vector, coordinate: AngularCoordinate) -> ScalarFreedom:
-    """A rotation by a coordinate."""
-    return ScalarFreedom(name, axis, 1.0, 0.0, coordinate)
-
-
-def slide(name: str, axis: Vector, coordinate: LinearCoordinate) -> ScalarFreedom:
-    """A translation by a coordinate."""
-    return ScalarFreedom(name, axis, 0.0, 1.0, coordinate)

@@ -1,4 +1,4 @@
-"""Suspension of Python's garbage collector while many lasting objects are created: large scenes, compiled kernels."""
+"""Suspension of Python's garbage collector while many objects are made that stay: large scenes, compiled kernels."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from contextlib import contextmanager
 def collector_paused() -> Iterator[None]:
     """A context without garbage collection.
 
-    Repeated searches for cycles among a growing number of objects take longer than creating them: at 10^5 bodies, twice
-    as long. Compiling takes a seventh less time without them.
+    The objects that are created within it remain in use. Repeated searches for cycles among a growing number of them
+    take longer than creating them: twice as long for a scene of 10^5 bodies. Compiling takes a seventh less time.
     """
     was_running = gc.isenabled()
     gc.disable()

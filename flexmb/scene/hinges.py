@@ -13,16 +13,7 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, SceneStruct, Vector
-from flexmb.scene.freedoms import (
-    AngularCoordinate,
-    Ball,
-    Floating,
-    Freedom,
-    LinearCoordinate,
-    ScalarFreedom,
-    slide,
-    turn,
-)
+from flexmb.scene.freedoms import AngularCoordinate, Ball, Floating, Freedom, LinearCoordinate, ScalarFreedom
 
 X_AXIS: Vector = (1.0, 0.0, 0.0)
 Y_AXIS: Vector = (0.0, 1.0, 0.0)
@@ -63,7 +54,7 @@ class Revolute(_Hinge, frozen=True, kw_only=True, tag="revolute"):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        return (turn("rotation", self.axis, self.rotation),)
+        return (ScalarFreedom("rotation", self.axis, self.rotation),)
 
 
 class Screw(_Hinge, frozen=True, kw_only=True, tag="screw"):
@@ -79,7 +70,7 @@ class Screw(_Hinge, frozen=True, kw_only=True, tag="screw"):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        return (ScalarFreedom("rotation", self.axis, 1.0, self.pitch_m_rad, self.rotation),)
+        return (ScalarFreedom("rotation", self.axis, self.rotation, self.pitch_m_rad),)
 
 
 class Prismatic(_Hinge, frozen=True, kw_only=True, tag="prismatic"):
@@ -90,7 +81,7 @@ class Prismatic(_Hinge, frozen=True, kw_only=True, tag="prismatic"):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        return (slide("translation", self.axis, self.translation),)
+        return (ScalarFreedom("translation", self.axis, self.translation),)
 
 
 class Cylindrical(_Hinge, frozen=True, kw_only=True, tag="cylindrical"):
@@ -102,7 +93,10 @@ class Cylindrical(_Hinge, frozen=True, kw_only=True, tag="cylindrical"):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        return turn("rotation", self.axis, self.rotation), slide("translation", self.axis, self.translation)
+        return (
+            ScalarFreedom("rotation", self.axis, self.rotation),
+            ScalarFreedom("translation", self.axis, self.translation),
+        )
 
 
 class Universal(_Hinge, frozen=True, kw_only=True, tag="universal"):
@@ -113,7 +107,7 @@ class Universal(_Hinge, frozen=True, kw_only=True, tag="universal"):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        return turn("first", X_AXIS, self.first), turn("second", Y_AXIS, self.second)
+        return ScalarFreedom("first", X_AXIS, self.first), ScalarFreedom("second", Y_AXIS, self.second)
 
 
 class Gimbal(_Hinge, frozen=True, kw_only=True, tag="gimbal"):
@@ -128,7 +122,7 @@ class Gimbal(_Hinge, frozen=True, kw_only=True, tag="gimbal"):
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
         return tuple(
-            turn(f"rotations[{n}]", AXES[letter], rotation)
+            ScalarFreedom(f"rotations[{n}]", AXES[letter], rotation)
             for n, (letter, rotation) in enumerate(zip(self.sequence, self.rotations, strict=True))
         )
 
@@ -158,9 +152,9 @@ class Planar(_Hinge, frozen=True, kw_only=True, tag="planar"):
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
         return (
-            slide("x", X_AXIS, self.x),
-            slide("y", Y_AXIS, self.y),
-            turn("rotation", Z_AXIS, self.rotation),
+            ScalarFreedom("x", X_AXIS, self.x),
+            ScalarFreedom("y", Y_AXIS, self.y),
+            ScalarFreedom("rotation", Z_AXIS, self.rotation),
         )
 
 

@@ -55,7 +55,7 @@ from flexmb.scene.control import (
     UserLaw,
 )
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
-from flexmb.scene.freedoms import AngularCoordinate, Freedom, LinearCoordinate, MotionKeys, slide, turn
+from flexmb.scene.freedoms import AngularCoordinate, Freedom, LinearCoordinate, MotionKeys, ScalarFreedom
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
     Closure,
@@ -105,7 +105,7 @@ class Wheel(SceneStruct, frozen=True, kw_only=True):
             angle_rad=self.angle_rad, rate_rad_s=self.speed_rad_s, damping_Nms_rad=self.friction_Nms_rad,
             torque_Nm=self.torque_Nm, prescribed_rad=self.prescribed_rad,
         )  # fmt: skip
-        return (turn("angle", self.axis, spin),)
+        return (ScalarFreedom("angle", self.axis, spin),)
 
 
 class PointMass(SceneStruct, frozen=True, kw_only=True):
@@ -124,7 +124,7 @@ class PointMass(SceneStruct, frozen=True, kw_only=True):
         """Its slides, as a hinge would have them; without coordinates it is at rest, without spring."""
         given = self.coordinates or (LinearCoordinate(),) * len(self.directions)
         pairs = enumerate(zip(self.directions, given, strict=True))
-        return tuple(slide(f"coordinates[{n}]", axis, coordinate) for n, (axis, coordinate) in pairs)
+        return tuple(ScalarFreedom(f"coordinates[{n}]", axis, coordinate) for n, (axis, coordinate) in pairs)
 
 
 class Load(SceneStruct, frozen=True, kw_only=True):

@@ -262,7 +262,7 @@ def test_a_template_takes_no_file_s_place(runner: CliRunner, tmp_path: Path) -> 
     file = csv_of(tmp_path / "my.csv")
     before = file.read_bytes()
     code, output = verify(runner, str(file), "--template")
-    assert (code, "is there already" in output, file.read_bytes() == before) == (2, True, True)
+    assert (code, "exists already" in output, file.read_bytes() == before) == (2, True, True)
 
 
 def test_a_coarse_csv_has_every_channel(runner: CliRunner, tmp_path: Path) -> None:

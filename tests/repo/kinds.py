@@ -16,7 +16,7 @@ from flexmb.scene.freedoms import Coordinate, Freedom
 UNIONS = {
     "hinges": s.Hinge, "connectors": s.Connector, "bodies": s.Body, "functions of time": s.Function,
     "actions of events": s.Action, "sensors": s.Sensor, "controllers": s.Controller, "coordinates": Coordinate,
-    "items with freedoms": s.PointMass | s.Wheel, "freedoms": Freedom, "joints of peers": Joint,
+    "items with freedoms": s.PointMass | s.Wheel, "freedoms": Freedom | Joint,
 }  # fmt: skip
 UNION_OF = {kind.__name__: union for union, kinds in UNIONS.items() for kind in get_args(kinds)}
 

@@ -130,7 +130,7 @@ def _signs(item: Hinge | PointMass | Wheel) -> list[float]:
     found = []
     for own, image in zip(item.freedoms, _with_axes(item).freedoms, strict=True):
         if isinstance(own, ScalarFreedom) and isinstance(image, ScalarFreedom):
-            if own.motion == "screw" and image.shifts != -own.shifts:
+            if image.pitch != -own.pitch:
                 raise NotApplicable(f'hinge "{item.name}" has a hand, and no key that changes it')
             seen = _signed(own.axis, POLAR_SIGNS if own.motion == "slide" else AXIAL_SIGNS)
             found.append(1.0 if np.dot(seen, image.axis) > 0.0 else -1.0)

@@ -83,7 +83,7 @@ class CraftDynamics:
         return CraftState(y[:3], quaternion, y[7:10], y[10:13], spins, values, rates)
 
     def solve(self, t: float, state: CraftState) -> CraftSolution:
-        """Leaves the vehicle in the state."""
+        """The accelerations and the power; the vehicle keeps the state."""
         self.vehicle.put(state.position, state.quaternion, state.velocity, state.turning, state.spins)
         driven = np.array([motor(t).value for motor in self._motors])
         for number, chain in enumerate(self._chains):
@@ -109,7 +109,7 @@ class CraftDynamics:
         )
 
     def _push(self, t: float, state: CraftState) -> float:
-        """Put the loads on the hub; their power (W)."""
+        """Apply the loads to the hub; returns their power (W)."""
         R = rotation_matrix(state.quaternion)
         in_world, on_hub, torque = np.zeros(3), np.zeros(3), np.zeros(3)
         for load in self._loads:

@@ -19,9 +19,9 @@ class BasiliskEngine(PeerEngine):
     summary = "one spacecraft: a free hub, balanced wheels, hinged and sliding parts"
     algorithm = "hub and effectors, back-substitution"
     settings = (
-        "The equations of motion of its Spacecraft with its own effectors, compiled and called from Python, stepped by "
-        "SciPy's DOP853, in Python. Its own integrators hold torques constant over a step of a clock of whole "
-        "nanoseconds, and would be off by that. Outputs are observed after the timed solve."
+        "The equations of motion of its Spacecraft with its own effectors, compiled and called from Python, with "
+        "SciPy's DOP853, also in Python. Basilisk's own integrators hold torques constant in a step and count time in "
+        "whole nanoseconds, which limits their accuracy. Outputs are computed after the timed solve."
     )
 
     def version(self) -> str:

@@ -18,10 +18,10 @@ class DartEngine(PeerEngine):
     summary = "rigid trees in minimal coordinates, hybrid dynamics of its own"
     algorithm = "articulated bodies, O(N)"
     settings = (
-        "The articulated-body dynamics of its Skeleton, compiled and called from Python, stepped by SciPy's DOP853, in "
-        "Python, so that much of its time on small scenes is not its own. Its own World.step is a semi-implicit Euler "
-        "method of first order, with springs and dampers taken implicitly, and would be no rival. No contacts. Outputs "
-        "are observed after the timed solve."
+        "The articulated-body dynamics of its Skeleton, compiled and called from Python, with SciPy's DOP853, also in "
+        "Python: on small scenes much of the time is Python's. DART's own World.step is a semi-implicit Euler method "
+        "of first order with implicit springs and dampers, too inaccurate for a comparison. No contacts. Outputs are "
+        "computed after the timed solve."
     )
 
     def version(self) -> str:
@@ -44,7 +44,7 @@ class DartEngine(PeerEngine):
 
 
 def _open_loops_only(scene: Scene) -> str:
-    """Why a closed loop is refused: constraints are impulses of a step, and no part of the forward dynamics."""
+    """Why a closed loop is refused: DART's constraints are impulses in a step and not part of the forward dynamics."""
     if not scene.closures:
         return ""
     return f'closure "{scene.closures[0].name}": DART closes loops by impulses of its own steps only, to first order'

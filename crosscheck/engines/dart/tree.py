@@ -1,9 +1,9 @@
-"""The scene's links as a DART `Skeleton`: every hinge a chain of elementary joints on bodies next to massless.
+"""The scene's links as a DART `Skeleton`: every hinge a chain of elementary joints on nearly massless bodies.
 
 Conventions of DART: spatial vectors [angular; linear]; a ball joint's coordinates are a rotation vector and its speeds
 are in outboard axes; those of a free joint are a rotation vector, then the position, in the joint's inboard frame, and
 its speeds, angular first, are in the axes of the *parent body*, wherever the joint's frame is turned to. Its own
-springs and dampers are part of an implicit step, and are not used.
+springs and dampers belong to its implicit step and are not used.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from crosscheck.engines.rigid_tree import Slot, scalar_start
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
-NEXT_TO_NOTHING = 1e-200
-"""kg or kg m^2: DART warns of zero mass and zero inertia; this is below the round-off of whatever it is added to."""
+NEGLIGIBLE = 1e-200
+"""kg or kg m^2: DART warns of zero mass and inertia; this is below the round-off of anything to which it is added."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class DartTree:
 
 
 def build_tree(scene: Scene, chain: tuple[Link, ...]) -> DartTree:
-    """Prescribed joints get accelerations as commands, all others forces."""
+    """The tree; prescribed joints take accelerations as commands, all others forces."""
     skeleton = dartpy.dynamics.Skeleton(scene.name)
     skeleton.setGravity(np.array(scene.gravity_m_s2, dtype=float))
     bodies: list[dartpy.dynamics.BodyNode] = []
@@ -57,7 +57,7 @@ def build_tree(scene: Scene, chain: tuple[Link, ...]) -> DartTree:
             q += _coordinates(freedom)
             _place(joint, at)
             at = None
-            body.setInertia(_inertia(NEXT_TO_NOTHING, np.zeros(3), np.zeros((3, 3))))
+            body.setInertia(_inertia(NEGLIGIBLE, np.zeros(3), np.zeros((3, 3))))
         if not link.freedoms:
             joint, body = skeleton.createWeldJointAndBodyNodePair(body)
             _place(joint, at)
@@ -112,7 +112,7 @@ def _joint(
 
 
 def _place(joint: dartpy.dynamics.Joint, at: Frame | None) -> None:
-    """Where the joint is on its parent; a chain's later joints are where those before them have carried them."""
+    """Set the joint's frame on its parent; the frames of a chain's later joints are those of the bodies before them."""
     if at is not None:
         pose = dartpy.math.Isometry3()
         pose.set_rotation(at.rotation)
@@ -121,5 +121,5 @@ def _place(joint: dartpy.dynamics.Joint, at: Frame | None) -> None:
 
 
 def _inertia(mass: float, com: Real, about_com: Real) -> dartpy.dynamics.Inertia:
-    moment = about_com + NEXT_TO_NOTHING * np.eye(3)
-    return dartpy.dynamics.Inertia(max(mass, NEXT_TO_NOTHING), com, moment)
+    moment = about_com + NEGLIGIBLE * np.eye(3)
+    return dartpy.dynamics.Inertia(max(mass, NEGLIGIBLE), com, moment)

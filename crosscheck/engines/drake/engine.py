@@ -30,7 +30,7 @@ class DrakeEngine(PeerEngine):
         return reason or inertia_obstacle(links(scene), "Drake")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        """Accuracies bound the error of one step, absolutely; that of a run is a thousand times as large."""
+        """Accuracies bound the absolute error of one step; that of a run is about a thousand times as large."""
         return tuple(Effort("tolerance", accuracy, "runge_kutta5") for accuracy in (1e-8, 1e-10, 1e-12, 1e-13))
 
     def model(self, scene: Scene) -> Model:

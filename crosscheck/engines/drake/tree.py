@@ -4,11 +4,11 @@ Conventions of Drake: quaternions wxyz; spatial vectors [angular; linear]; the v
 are those of the outboard frame in the *inboard* one, in inboard axes; a floating joint's coordinates are quaternion,
 then position. Spatial inertias are taken about the body origin, as multiples of the mass.
 
-Two artifices. (1) A prescribed coordinate has a rotor with inertia `BALLAST`, so that nothing but the applied
+Two workarounds. (1) A prescribed coordinate has a rotor with inertia `BALLAST`, so that only the applied
 BALLAST * acceleration moves it; the error of its acceleration is the load / BALLAST, below round-off. Its load is that
 of a second plant without rotors. (2) Drake's only ball joint has roll, pitch and yaw, which are singular at a pitch of
-a quarter turn. Its inboard frame F is a parameter of the context: it is turned to where the joint is, and the angles
-begin again at zero, whenever the pitch has grown large.
+pi/2. Its inboard frame F is a parameter of the context: when the pitch is large, F is rotated to the joint's present
+orientation and the angles restart at zero.
 """
 
 from __future__ import annotations

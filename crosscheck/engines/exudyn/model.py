@@ -1,4 +1,4 @@
-"""A scene compiled for Exudyn: pointwise evaluation and runs, in the terms of the engine contract."""
+"""A scene compiled for Exudyn."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ class MujocoEngine(PeerEngine):
     settings = (
         "Its own RK4, its most accurate integrator for smooth motion, in its own C loop: one call of mj_step makes all "
         "steps between two samples. Contacts are off, and bodies have no geometry. Prescribed motion, motors and "
-        "functions of time are callbacks in Python where a scene has them. Outputs are observed after the timed solve."
+        "functions of time are callbacks in Python where a scene has them. Outputs are computed after the timed solve."
     )
 
     def version(self) -> str:
@@ -47,7 +47,7 @@ class MujocoEngine(PeerEngine):
         return self.efforts_for(scene, USUAL_S)
 
     def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
-        """Steps by halves, the coarsest fitting the scene's pace."""
+        """Steps by halves; the coarsest fits the scene's fastest motion."""
         return ladder("RK4", pace(scene, duration_s), duration_s, _RUNGS)
 
     def model(self, scene: Scene) -> Model:

@@ -32,7 +32,7 @@ class Forces:
         self._tree = tree
         self._motions = [(slot.q, slot.v, profile(slot.freedom.prescribed)) for slot in self.driven]
         self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
-        self._pushed: tuple[float, list[tuple[int, float]]] = np.nan, []  # what `_pushes` has found last, and when
+        self._pushed: tuple[float, list[tuple[int, float]]] = np.nan, []  # the last result of `_pushes`, with its time
         self._loads = [_BodyWrench(tree, attachment(scene, tree.links, load), load) for load in scene.loads]
         self.connections = MujocoConnections(tree, scene)
         self._connected = bool(self.connections)
@@ -50,7 +50,7 @@ class Forces:
             mujoco.set_mjcb_control(None)
 
     def follow(self, t: float, data: mujoco.MjData) -> None:
-        """Put the prescribed coordinates where their functions say."""
+        """Set the prescribed coordinates to their functions of time."""
         for q, v, motion in self._motions:
             data.qpos[q], data.qvel[v], _ = motion(t)
 
@@ -83,7 +83,10 @@ class Forces:
             self.connections.add(t, data)
 
     def _pushes(self, t: float) -> list[tuple[int, float]]:
-        """Speeds with what their motors give or what makes them follow; stages of a step share their times."""
+        """Indices of speeds with their motor loads or the loads of their prescribed motion.
+
+        The last result is kept, since stages of a step share their times.
+        """
         if t != self._pushed[0]:
             efforts = [(index, motor(t).value) for index, motor in self._motors]
             following = [(v, ARMATURE * motion(t).acceleration) for _, v, motion in self._motions]

@@ -71,8 +71,8 @@ class MujocoModel:
     def _integrate(self, times: Real, longest: float) -> tuple[list[tuple[Real, Real]], int, str]:
         """(qpos, qvel) at the sample times reached, steps made, and why it stopped early.
 
-        Samples and breaks of the functions of time cut the run into stretches of whole equal steps <= `longest`. At the
-        start of each, prescribed coordinates are put on their functions, so that their round-off cannot pile up.
+        Sample times and breaks of the functions of time divide the run into intervals of equal steps <= `longest`. At
+        the start of each, prescribed coordinates are set to their functions, so that round-off does not accumulate.
         """
         model, data = self._tree.model, self._initial()
         wanted = set(times.tolist())
@@ -81,7 +81,7 @@ class MujocoModel:
         total = 0
         with self._forces.active():
             for begin, end in pairwise(ends):
-                # A ratio that is whole but for round-off must not cost one more step.
+                # Round-off in a whole ratio must not cost another step.
                 steps = max(1, ceil((end - begin) / longest * (1.0 - 1e-9)))
                 model.opt.timestep = (end - begin) / steps
                 data.time = begin
@@ -111,7 +111,7 @@ def _last_warning(data: mujoco.MjData) -> str:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Divergence is a status here: keep MuJoCo from writing its log file into the working directory."""
+    """Keep MuJoCo from writing a log file into the working directory; divergence is reported as a status."""
     mujoco.set_mju_user_warning(lambda message: None)
     try:
         yield

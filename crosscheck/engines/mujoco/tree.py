@@ -3,10 +3,10 @@
 Conventions of MuJoCo: quaternions wxyz; a ball's velocity in outboard axes; slides before the ball of a floating link
 are in inboard axes (three slides and a ball serve on any parent, MuJoCo's free joint only on the ground).
 
-Two artifices. (1) A prescribed coordinate has an armature so large that nothing but the applied ARMATURE * acceleration
-moves it; its load is that of the inverse dynamics, where armature has no part. The error of its acceleration is the
-load / ARMATURE. (2) MuJoCo refuses principal moments of inertia below 1e-15 kg m^2: smaller ones (point masses, rods)
-are raised to `LEAST_INERTIA`, an error of that much against the carrier's moment of inertia.
+Two workarounds. (1) A prescribed coordinate has an armature so large that only the applied ARMATURE * acceleration
+moves it; its load is that of the inverse dynamics, which does not contain the armature. The error of its acceleration
+is the load / ARMATURE. (2) MuJoCo refuses principal moments of inertia below 1e-15 kg m^2: smaller ones (point masses,
+rods) are raised to `LEAST_INERTIA`.
 """
 
 from __future__ import annotations

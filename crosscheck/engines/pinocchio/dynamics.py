@@ -1,8 +1,8 @@
 """Forward and hybrid dynamics of a Pinocchio tree as an ordinary differential equation.
 
 State y = [free coordinates, free speeds, work]. Quaternions are integrated as four numbers: qdot is linear in q, so the
-norm is an invariant of the exact flow, and everything else uses the normalised q. Driven coordinates (prescribed, or
-held for a weld) follow their functions of time.
+norm is an invariant of the exact flow, and everything else uses the normalised q. Driven coordinates (prescribed ones,
+and the fixed ones that stand for welds) follow their functions of time.
 """
 
 from __future__ import annotations

@@ -22,9 +22,9 @@ class PinocchioEngine(PeerEngine):
     summary = "rigid trees in minimal coordinates"
     algorithm = "articulated bodies, O(N)"
     settings = (
-        "Its articulated-body algorithm, or its proximal constrained dynamics where loops are closed, compiled and "
-        "called from Python. It has no integrator: SciPy's DOP853 steps it, in Python, so that much of its time on "
-        "small scenes is not its own. It has no contacts here. Outputs are observed after the timed solve."
+        "Its articulated-body algorithm, or its proximal constrained dynamics for closed loops, compiled and called "
+        "from Python. It has no integrator: SciPy's DOP853 steps it, in Python, so that on small scenes much of the "
+        "time is Python's. No contacts. Outputs are computed after the timed solve."
     )
 
     def version(self) -> str:

@@ -43,7 +43,7 @@ class PinocchioTree:
 
 
 def places(numbers: ArrayLike) -> Places:
-    """Entries of an array by their numbers; as a slice, which costs a third, where they follow one another."""
+    """Indices of entries of an array; consecutive ones as a slice, which takes a third of the time."""
     found = np.asarray(numbers, dtype=np.intp)
     if len(found) == 0:
         return slice(0, 0)
@@ -55,7 +55,7 @@ def placement(frame: Frame) -> pin.SE3:
 
 
 def build_tree(links: tuple[Link, ...], gravity: Real) -> PinocchioTree:
-    """Links come depth-first, as Pinocchio needs them: `crba` is silently wrong otherwise, hence the check."""
+    """The model; links are ordered depth-first, since Pinocchio's `crba` is silently wrong in another order."""
     model = pin.Model()
     model.gravity.linear = gravity
     joints: list[int] = []

@@ -50,7 +50,7 @@ def measure(scene: Scene, load: float, other: float) -> Measurement:
     return Measurement(growth_rate(system, states_of(system, ["beam.modes"], ["beam.modes"])))
 
 
-# ---- The overlay: beam elements of its own, nothing of flexmb's
+# ---- The overlay: independent beam elements
 
 
 @cache

@@ -18,7 +18,7 @@ from flexmb.scene.schema import InertiaPoint, ModalNode, Scene
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
-STEPS, PARTS = 4096, 64  # of a run: 1000 periods and more where step x frequency is 1.54 and more
+STEPS, PARTS = 4096, 64  # of a run: at least 1000 periods if step x frequency is at least 1.54
 GROWTH = 2e-5  # of the amplitude's logarithm in a step; beats of a bounded motion stay below a hundredth of it
 SLOW = 1.0  # rad/s
 START = 1e-3  # m
@@ -51,7 +51,7 @@ class Stepper:
             path, finished = done.markers["fast"], done.finished
             return path.position[:, 0], path.velocity[:, 3], "" if finished else why
         other = engine(self.engine)
-        other.version()  # says how to install it where it is missing
+        other.version()  # raises EngineMissing
         found = other.compile(scene).simulate(Run(times), Effort("step", step, self.name))
         path = found.markers["fast"]
         return path.position[:, 0], path.velocity[:, 3], "" if found.status == "finished" else found.message
@@ -149,7 +149,7 @@ METHODS = (
 )
 
 
-# ---- Methods that choose their steps: the tolerance takes the place of the step
+# ---- Methods with error control: the tolerance replaces the step
 
 PERIODS = 1000
 BOUNDED = 2.0  # times the start

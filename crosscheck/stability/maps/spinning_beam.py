@@ -1,4 +1,4 @@
-"""Spin rate against level for a beam clamped to a spinning hub: which levels lose their stability, and where."""
+"""Spin rate against level for a beam clamped to a spinning hub: where each level becomes unstable."""
 
 from __future__ import annotations
 

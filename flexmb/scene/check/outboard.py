@@ -267,8 +267,8 @@ def _directions_of(freedoms: Sequence[Freedom]) -> Real:
 def _across(freedom: Freedom) -> tuple[Real, Real, Real]:
     """Free rows (n,6) of one freedom at the start, in the axes to which it leads; their rotation and position."""
     match freedom:
-        case ScalarFreedom(axis=axis, turns=turns, shifts=shifts, coordinate=coordinate):
-            row, start = np.outer((turns, shifts), axis).reshape(1, 6), _start(coordinate)
+        case ScalarFreedom(axis=axis, coordinate=coordinate):
+            row, start = np.outer((freedom.turns, freedom.shifts), axis).reshape(1, 6), _start(coordinate)
             free = row if coordinate.prescribed is None else row[:0]
             return free, rotation_by(start * row[0, :3]), start * row[0, 3:]
         case Ball(quaternion=quaternion):

@@ -18,7 +18,7 @@ from flexmb.dense.jets import Jet, MovingFrame, constant
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import SceneStruct
 from flexmb.scene.check.outboard import _free_directions
-from flexmb.scene.freedoms import Freedom, ScalarFreedom, slide
+from flexmb.scene.freedoms import Freedom, ScalarFreedom
 from flexmb.scene.hinges import _Hinge
 
 ENDS = {"name": "joint", "parent": "ground", "child": "arm"}
@@ -33,7 +33,7 @@ class Boring(_Hinge, frozen=True, kw_only=True, tag="boring"):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        return ScalarFreedom("rotation", Z, 1.0, 0.5, self.rotation), slide("x", X, self.x)
+        return ScalarFreedom("rotation", Z, self.rotation, 0.5), ScalarFreedom("x", X, self.x)
 
 
 class Silent(_Hinge, frozen=True, kw_only=True, tag="silent"):

@@ -191,10 +191,10 @@ def test_a_figure_without_a_basis_is_held_against_as_it_always_was(own: None) ->
     ("module", "name"),
     [
         *((uncertainty, name) for name in (
-            "SAFETY", "UNPROVEN_SAFETY", "ORDER_BAND", "SPREAD", "UNRULED", "SAME_ORDER", "LARGEST_ORDER_IN_WORK",
-            "HARDLY_MORE", "MUCH_MORE", "ORDER_CREDIT",
+            "SAFETY", "UNPROVEN_SAFETY", "ORDER_BAND", "SCATTER", "UNCONTROLLED_SAFETY", "SAME_ORDER",
+            "LARGEST_ORDER_IN_WORK", "NO_GROWTH", "EXCESS_GROWTH", "ORDER_CREDIT",
         )),
-        (sizes, "NOTHING"), (sizes, "ROUNDING"),
+        (sizes, "LEAST_OF_SCENE"), (sizes, "LEAST_OF_FAMILY"),
     ],
 )  # fmt: skip
 def test_another_rule_for_uncertainties_is_recognised(

@@ -95,7 +95,7 @@ class Drill(_Hinge, frozen=True, kw_only=True, tag="drill"):
 
     @property
     def freedoms(self) -> tuple[ScalarFreedom, ...]:
-        return (ScalarFreedom("rotation", self.axis, 1.0, PITCH, self.rotation),)
+        return (ScalarFreedom("rotation", self.axis, self.rotation, PITCH),)
 
 
 @helper

@@ -134,7 +134,8 @@ BAD = {
     "mimic": (SINGLE.replace("<axis", '<mimic joint="k"/><axis'), 'joint "j": it mimics'),
     "kind": (SINGLE.replace('"revolute"', '"screw"'), 'its type is "screw"'),
     "loop": (
-        SINGLE.replace("</robot>", joint("k", "fixed", "b", "a", 2) + "</robot>"), "0 links are not the child of a joint",
+        SINGLE.replace("</robot>", joint("k", "fixed", "b", "a", 2) + "</robot>"),
+        "0 links are not the child of a joint",
     ),
     "two parents": (
         SINGLE.replace("</robot>", joint("k", "fixed", "a", "b", 2) + "</robot>"),
