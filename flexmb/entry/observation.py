@@ -75,7 +75,9 @@ def places(of: Mapping[str, tuple[int, ...]]) -> Places:
 
 def parts(every: Real, of: Places) -> dict[str, Real]:
     """Views of the parts of a row, by name."""
-    return {name: every[place].reshape(shape) for name, (place, shape) in of.items()}
+    return {
+        name: every[place] if len(shape) == 1 else every[place].reshape(shape) for name, (place, shape) in of.items()
+    }
 
 
 def outputs(of: Mapping[str, tuple[int, ...]], marker_body: Index, marker_port: Index) -> Outputs:
