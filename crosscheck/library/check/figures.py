@@ -1,4 +1,4 @@
-"""Accepted figures: each is a number, and belongs to something that the run file judges."""
+"""Rules of accepted figures: each is a valid number and belongs to something that the run file judges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is judged and drawn: comparisons, controls, conserved quantities and charts."""
+"""Rules of comparisons, controls, conserved quantities and charts."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def check_patterns(goals: dict[str, float], scales: dict[str, float], place: Pla
 
 
 def check_pattern(pattern: str, place: Place) -> Iterator[Defect]:
-    """A pattern must be able to name a channel."""
+    """A pattern must be able to match a channel."""
     why = fault(pattern)
     if why:
         remedy = "write a kind of channel, or kind:name, or kind:name.part"
