@@ -93,7 +93,6 @@ def exerts(connector: BetweenNodes) -> Callable[[float, Moving, Moving], Exerted
 
 
 def connections(scene: Scene, chain: tuple[Link, ...]) -> tuple[Connection, ...]:
-    """Connectors between nodes."""
     return tuple(Connection(scene, chain, each) for each in scene.connectors if isinstance(each, BetweenNodes))
 
 

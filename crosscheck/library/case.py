@@ -289,6 +289,12 @@ class RunFile(_CasePart, frozen=True, kw_only=True):
     charts: tuple[Chart, ...] = msgspec.field(name="chart", default=())
     reference: ReferenceRecipe | None = None
 
+    def alone(self, *variants: Variant) -> RunFile:
+        """The run file with these variants only, and with nothing that is judged or drawn."""
+        return msgspec.structs.replace(
+            self, variants=variants, comparisons=(), controls=(), conservations=(), charts=(), reference=None
+        )
+
     def variant(self, name: str) -> Variant:
         """The variant called `name`; CaseError lists the names."""
         for variant in self.variants:

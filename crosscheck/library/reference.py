@@ -84,7 +84,6 @@ def has_reference(folder: Path) -> bool:
 
 
 def digest(text: str) -> str:
-    """SHA-256 of a text."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -134,7 +133,6 @@ def column_names(channel: str, width: int) -> list[str]:
 
 
 def values_text(times: Real, channels: dict[str, Real]) -> str:
-    """The text of reference.csv."""
     header = [TIME, *(name for channel, rows in channels.items() for name in column_names(channel, rows.shape[1]))]
     text = io.StringIO()
     csv.writer(text, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(header)

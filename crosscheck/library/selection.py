@@ -127,7 +127,6 @@ def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
 
 
 def _pairs(run: RunFile, comparison: Comparison) -> list[Comparison]:
-    """A comparison as explicit pairs."""
     if comparison.variant is None:
         return [comparison]
     engines = comparison.engines or run.variant(comparison.variant).engines

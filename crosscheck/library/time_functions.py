@@ -68,7 +68,6 @@ def _times(value: float | tuple[float, ...], factor: float) -> float | tuple[flo
 
 
 def in_functions(item: Any, change: Callable[[Function], Function]) -> Any:
-    """A struct with every function of time inside it changed."""
     if isinstance(item, Function):
         return change(item)
     if isinstance(item, tuple):

@@ -98,8 +98,6 @@ class Vehicle:
 
 
 class _Chain:
-    """A chain of parts as one effector."""
-
     def __init__(self, parts: list[CraftPart]) -> None:
         turns = parts[0].freedom.angular
         self.effector, self._names = _turning_chain(parts) if turns else _sliding_chain(parts)
@@ -181,7 +179,6 @@ def _definite(inertia: Real) -> list[list[float]]:
 
 
 def _column(vector: Real) -> list[list[float]]:
-    """As Basilisk takes vectors."""
     return [[float(each)] for each in vector]
 
 

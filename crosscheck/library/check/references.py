@@ -18,7 +18,6 @@ RELATIVE = (1e-16, 1e-2)  # range of the accuracy of a closed form
 
 
 def check_reference(run: RunFile, recipe: ReferenceRecipe, place: Place) -> Iterator[Defect]:
-    """The problems of a recipe."""
     names = [variant.name for variant in run.variants]
     variant = find_variant(run, recipe.variant)
     if variant is None:
@@ -42,7 +41,6 @@ def check_reference(run: RunFile, recipe: ReferenceRecipe, place: Place) -> Iter
 
 
 def check_anchors(provenance: Provenance) -> Iterator[Defect]:
-    """The problems of published numbers."""
     for i, anchor in enumerate(provenance.anchors):
         place = ROOT.key("anchor", i)
         why = fault(anchor.channel)

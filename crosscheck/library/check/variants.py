@@ -25,7 +25,6 @@ ORDERS = (0.1, 16.0)
 
 
 def check_variant(run: RunFile, variant: Variant, place: Place) -> Iterator[Defect]:
-    """The problems of a variant."""
     if not variant.engines:
         yield problem(place.key("engines"), "name at least one engine", 'for example ["native"]')
     yield from check_engines_once(variant.engines, place.key("engines"))
