@@ -109,7 +109,6 @@ def _law(connector: PeerLine) -> Callable[[float, Moving, Moving], tuple[Real, f
 
 
 def connections(scene: Scene, chain: tuple[Link, ...]) -> tuple[Connection, ...]:
-    """Connectors between nodes."""
     return tuple(Connection(scene, chain, each) for each in scene.connectors if isinstance(each, PeerLine))
 
 
