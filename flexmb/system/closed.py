@@ -221,22 +221,21 @@ class ClosedSystem(System):
         return self._evaluation(t, y, self._motion(t, y, algorithm))
 
     def _evaluation(self, t: float, y: Real, motion: ClosedMotion) -> Evaluation:
-        row = np.empty(self.observation.width)
-        self._fill(row, t, y, motion)
-        return self.observation.evaluation(row)
+        return self.observation.evaluation(self._row(t, y, motion))
 
     def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
         """As of a tree; in a run, at a singular position too."""
-        self._fill(row, t, y, self._motion_or_across(t, y, algorithm))
+        row[:] = self._row(t, y, self._motion_or_across(t, y, algorithm))
 
-    def _fill(self, row: Real, t: float, y: Real, motion: ClosedMotion) -> None:
+    def _row(self, t: float, y: Real, motion: ClosedMotion) -> Real:
         """With the loads of closures too; NaN what the motion does not determine."""
         self.observe_motion(t, y, motion.accelerations, motion.drives, motion.hinges)
-        self.observation.fill(row, t, motion.closures)
+        row = self.observation.row(t, motion.closures)
         if motion.spread is not None:
             parts, spread = self.observation.columns_of(row[None]), motion.spread
             for name, changes in (("loads", spread.hinges), ("closures", spread.closures), ("drives", spread.drives)):
                 parts[name][0][spread.leaves_open(changes)] = np.nan
+        return row
 
     def _motion_or_across(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
         """The motion; in a run through a singular position, where nothing determines it, the mean of those beside."""

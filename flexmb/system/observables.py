@@ -75,7 +75,7 @@ def undetermined_loads(loads: Mapping[str, Real], drives: Mapping[str, Real]) ->
 class Names:
     """Of what is observed: (body, port) of markers; hinges, wheels, closures in order; places in u of the driven.
 
-    connectors: between nodes; hinge_forces: springs along hinges, then friction.
+    connectors: between nodes; hinge_forces: springs along hinges, then other laws.
     """
 
     markers: dict[str, tuple[int, int]]
@@ -105,15 +105,14 @@ class Observation:
         """Fresh arrays of the same kind."""
         return outputs(self._shapes, *self._at)
 
-    def fill(self, row: Real, t: float, closures: Real) -> None:
-        """Copy what was filled last, and the loads (C,6) of closures, into a row (width,).
-
-        DynamicsError where a number is not finite.
-        """
-        every = len(self.out.every)
+    def row(self, t: float, closures: Real) -> Real:
+        """(width,) What was filled last, with the loads (C,6) of closures; DynamicsError where it is not finite."""
+        row, every = np.empty(self.width), len(self.out.every)
         row[:every] = finite_result(self.out.every, t)
         row[every : every + len(self.out.drives)] = self.out.drives
-        row[every + len(self.out.drives) :] = finite_result(closures, t).ravel()
+        if len(closures):
+            row[every + len(self.out.drives) :] = finite_result(closures, t).ravel()
+        return row
 
     def columns_of(self, rows: Real) -> dict[str, Real]:
         """Parts of rows (T,width) by the names in `columns`, (T, ...) each, which are views."""
@@ -128,7 +127,8 @@ class Observation:
                 name: MarkerMotion(row[:3], row[3:12].reshape(3, 3), row[12:18], row[18:24])
                 for name, row in zip(names.markers, found["markers"], strict=True)
             },
-            loads=dict(zip((*names.hinges, *names.closures), (*found["loads"], *found["closures"]), strict=True)),
+            loads=dict(zip(names.hinges, found["loads"], strict=True))
+            | dict(zip(names.closures, found["closures"], strict=True)),
             wheel_loads=dict(zip(names.wheels, found["wheel_loads"], strict=True)),
             drives={name: found["drives"][places] for name, places in names.driven.items()},
             energy=dict(zip(ENERGIES, found["energy"].tolist(), strict=True)),

@@ -219,9 +219,9 @@ class System(FreeMotion):
         return self._evaluate(*self.layout.packed(t, q, u), algorithm)
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
-        row = np.empty(self.observation.width)
-        self.observe_row(t, y, algorithm, row)
-        return self.observation.evaluation(row)
+        self._observe(t, y, algorithm)
+        observation = self.observation
+        return observation.evaluation(observation.row(t, _NO_CLOSURES))
 
     def _observe(self, t: float, y: Real, algorithm: Algorithm) -> None:
         """Fills the outputs."""
@@ -237,7 +237,7 @@ class System(FreeMotion):
         Raises DynamicsError as `evaluate` does.
         """
         self._observe(t, y, algorithm)
-        self.observation.fill(row, t, _NO_CLOSURES)
+        row[:] = self.observation.row(t, _NO_CLOSURES)
 
 def copied(kind: type[System], kernels: Kernels, *given: Any) -> System:
     """What a pickled system becomes again, run by the same kind of kernels."""

@@ -275,7 +275,7 @@ def test_without_the_compiler_one_line_says_why():
 EDITED = "from flexmb.entry import entry; print(entry(1.0), sum(entry.stats.cache_hits.values()))"
 ENTRY = """
 from flexmb.jit.kernel import handed_on, helper, kernel, sweep
-from flexmb.part import part
+from .part import part
 
 @kernel
 def entry(x):
