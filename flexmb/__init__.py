@@ -13,43 +13,80 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:  # under the names that they are exported by
+# The public names are those of `flexmb.scene.schema.__all__`, and these of other modules.
+_HOME = {
+    "flexmb.advisor.advice": "Advice advise",
+    "flexmb.closure.closures": "ClosureError",
+    "flexmb.control.user": "user_function",
+    "flexmb.linear.campbell": "Campbell campbell",
+    "flexmb.linear.equilibrium": "equilibrium",
+    "flexmb.linear.linear_model": "LinearModel",
+    "flexmb.linear.linearize": "linearize",
+    "flexmb.linear.newton": "EquilibriumError",
+    "flexmb.linear.spin": "steady_spin SteadySpin",
+    "flexmb.run.batch_trajectory": "BatchTrajectory",
+    "flexmb.run.event_record": "EventRecord",
+    "flexmb.run.interruption": "Interrupted",
+    "flexmb.run.restart": "Restart",
+    "flexmb.run.simulate": "simulate",
+    "flexmb.run.simulate_batch": "simulate_batch",
+    "flexmb.run.stages": "RunStage simulate_stages",
+    "flexmb.run.trajectory": "Trajectory",
+    "flexmb.scene.build": "SceneBuilder",
+    "flexmb.scene.check": "check_scene",
+    "flexmb.scene.files": "load_scene save_scene",
+    "flexmb.scene.open_loop": "open_loop",
+    "flexmb.scene.problems": "SceneError SceneWarning",
+    "flexmb.scene.user_code": "no_user_code",
+    "flexmb.system.batch": "Batch",
+    "flexmb.system.compile": "compile compile_batch",
+    "flexmb.system.observables": "Evaluation",
+    "flexmb.system.tree_system": "System",
+    "flexmb.tables.state": "DynamicsError PrecisionWarning State",
+    "flexmb.tables.status": "Status",
+}
+_MODULE_OF = {name: module for module, names in _HOME.items() for name in names.split()}
+
+_MODULES = {"schema": "flexmb.scene.schema", "scene": "flexmb.scene"}
+"""Modules that scripts reach without importing them: `flexmb.schema.Scene`, `flexmb.scene.quaternions`."""
+
+if TYPE_CHECKING:  # the same names for type checkers and editors, which do not execute `__getattr__`; a test compares
     from flexmb.advisor.advice import Advice as Advice
     from flexmb.advisor.advice import advise as advise
     from flexmb.closure.closures import ClosureError as ClosureError
     from flexmb.control.user import user_function as user_function
     from flexmb.linear.campbell import Campbell as Campbell
     from flexmb.linear.campbell import campbell as campbell
-    from flexmb.linear.equilibrium import EquilibriumError as EquilibriumError
     from flexmb.linear.equilibrium import equilibrium as equilibrium
     from flexmb.linear.linear_model import LinearModel as LinearModel
     from flexmb.linear.linearize import linearize as linearize
+    from flexmb.linear.newton import EquilibriumError as EquilibriumError
     from flexmb.linear.spin import SteadySpin as SteadySpin
     from flexmb.linear.spin import steady_spin as steady_spin
     from flexmb.run.batch_trajectory import BatchTrajectory as BatchTrajectory
+    from flexmb.run.event_record import EventRecord as EventRecord
     from flexmb.run.interruption import Interrupted as Interrupted
     from flexmb.run.restart import Restart as Restart
     from flexmb.run.simulate import simulate as simulate
     from flexmb.run.simulate_batch import simulate_batch as simulate_batch
-    from flexmb.run.situation import EventRecord as EventRecord
     from flexmb.run.stages import RunStage as RunStage
     from flexmb.run.stages import simulate_stages as simulate_stages
     from flexmb.run.trajectory import Trajectory as Trajectory
     from flexmb.scene import schema as schema
     from flexmb.scene.build import SceneBuilder as SceneBuilder
-    from flexmb.scene.check import SceneError as SceneError
-    from flexmb.scene.check import SceneWarning as SceneWarning
     from flexmb.scene.check import check_scene as check_scene
-    from flexmb.scene.connectors import *  # noqa: F403  (the schema's names are part of this API)
+    from flexmb.scene.connectors import *  # noqa: F403  (the schema's names, those of connectors and hinges among them)
     from flexmb.scene.files import load_scene as load_scene
     from flexmb.scene.files import save_scene as save_scene
     from flexmb.scene.hinges import *  # noqa: F403
     from flexmb.scene.open_loop import open_loop as open_loop
+    from flexmb.scene.problems import SceneError as SceneError
+    from flexmb.scene.problems import SceneWarning as SceneWarning
     from flexmb.scene.schema import *  # noqa: F403
     from flexmb.scene.user_code import no_user_code as no_user_code
     from flexmb.system.batch import Batch as Batch
-    from flexmb.system.batch import compile_batch as compile_batch
     from flexmb.system.compile import compile as compile
+    from flexmb.system.compile import compile_batch as compile_batch
     from flexmb.system.observables import Evaluation as Evaluation
     from flexmb.system.tree_system import System as System
     from flexmb.tables.state import DynamicsError as DynamicsError
@@ -57,60 +94,19 @@ if TYPE_CHECKING:  # under the names that they are exported by
     from flexmb.tables.state import State as State
     from flexmb.tables.status import Status as Status
 
-_LATER = {
-    "Advice": "flexmb.advisor.advice",
-    "advise": "flexmb.advisor.advice",
-    "Campbell": "flexmb.linear.campbell",
-    "campbell": "flexmb.linear.campbell",
-    "ClosureError": "flexmb.closure.closures",
-    "equilibrium": "flexmb.linear.equilibrium",
-    "EquilibriumError": "flexmb.linear.equilibrium",
-    "linearize": "flexmb.linear.linearize",
-    "Interrupted": "flexmb.run.interruption",
-    "LinearModel": "flexmb.linear.linear_model",
-    "steady_spin": "flexmb.linear.spin",
-    "SteadySpin": "flexmb.linear.spin",
-    "Restart": "flexmb.run.restart",
-    "simulate": "flexmb.run.simulate",
-    "simulate_batch": "flexmb.run.simulate_batch",
-    "EventRecord": "flexmb.run.situation",
-    "simulate_stages": "flexmb.run.stages",
-    "RunStage": "flexmb.run.stages",
-    "BatchTrajectory": "flexmb.run.batch_trajectory",
-    "SceneBuilder": "flexmb.scene.build",
-    "check_scene": "flexmb.scene.check",
-    "SceneError": "flexmb.scene.problems",
-    "SceneWarning": "flexmb.scene.problems",
-    "load_scene": "flexmb.scene.files",
-    "save_scene": "flexmb.scene.files",
-    "open_loop": "flexmb.scene.open_loop",
-    "no_user_code": "flexmb.scene.user_code",
-    "Batch": "flexmb.system.batch",
-    "compile_batch": "flexmb.system.batch",
-    "Status": "flexmb.tables.status",
-    "DynamicsError": "flexmb.tables.state",
-    "Evaluation": "flexmb.system.observables",
-    "PrecisionWarning": "flexmb.tables.state",
-    "State": "flexmb.tables.state",
-    "System": "flexmb.system.tree_system",
-    "compile": "flexmb.system.compile",
-    "Trajectory": "flexmb.run.trajectory",
-    "user_function": "flexmb.control.user",
-}
-
-_MODULES = {"schema": "flexmb.scene.schema", "scene": "flexmb.scene"}
-"""What is no public name but was always there: scripts write `flexmb.schema.Scene`, `flexmb.scene.quaternions`."""
-
 
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
-        import_module("flexmb.scene.build")  # with it comes the rest of the room
+        import_module("flexmb.scene.build")  # imports all modules of the room
         return import_module(_MODULES[name])
     if name == "__all__":
-        return sorted([*_LATER, *import_module("flexmb.scene.schema").__all__])
-    if name not in _LATER and (name.startswith("_") or name not in import_module("flexmb.scene.schema").__all__):
+        value = [*_MODULE_OF, *import_module("flexmb.scene.schema").__all__]
+    elif name in _MODULE_OF:
+        value = getattr(import_module(_MODULE_OF[name]), name)
+    elif name[:1].isupper() and name in import_module("flexmb.scene.schema").__all__:  # its names are all capitalised
+        value = getattr(import_module("flexmb.scene.schema"), name)
+    else:
         raise AttributeError(f"module 'flexmb' has no attribute {name!r}")
-    value = getattr(import_module(_LATER.get(name, "flexmb.scene.schema")), name)
     globals()[name] = value
     return value
 

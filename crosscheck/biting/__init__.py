@@ -1,1 +1,2 @@
-"""Proof that cases bite: faults that their goals must notice, and changes without meaning that they must not."""
+"""Tests of the cases themselves: faults that their goals must notice, and invariances under which results must
+agree."""

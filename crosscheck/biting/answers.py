@@ -1,7 +1,7 @@
-"""Faults planted in an engine's answer: what an adapter does to right numbers when it converts them wrongly.
+"""Faults planted in an engine's answer, such as an adapter makes in converting correct numbers.
 
-Each takes a run as an engine hands it out and gives it back falsified. They stand beside the mutations of scenes: those
-are slips in the data, these in conventions.
+Each changes the run that an engine returned. Mutations of scenes are slips in the data, these are slips in
+conventions.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from flexmb.typing import Real
 
 MILLI = 1e3
 SHIFT = 0.01  # of the scene's extent
-ALONG = ("drive", "hinge_force")  # channels of one part, called after a hinge, wheel or connector
+ALONG = ("drive", "hinge_force")  # channels with one part, named after a hinge, wheel or connector
 
 
 @dataclass(frozen=True)
 class AnswerFault:
-    """One fault of an adapter: what it does, the slip that it stands for, and the falsified run."""
+    """One fault of an adapter: its effect, the slip that it represents, and the function that changes a run."""
 
     name: str
     what: str
@@ -63,7 +63,7 @@ def _connector_point(run: Trajectory, scene: Scene) -> Trajectory:
 
 
 def _about_another_point(run: Trajectory, loads: dict[str, Real]) -> dict[str, Real]:
-    """Torques about a point that is off by `SHIFT` of the scene's extent along (1, 1, 1)."""
+    """Torques about a point displaced by `SHIFT` of the scene's extent along (1, 1, 1)."""
     extent = max((float(np.max(np.abs(path.position))) for path in run.markers.values()), default=1.0) or 1.0
     arm = np.full(3, SHIFT * extent)
 
@@ -74,7 +74,7 @@ def _about_another_point(run: Trajectory, loads: dict[str, Real]) -> dict[str, R
 
 
 def _load_axes(run: Trajectory, scene: Scene) -> Trajectory:
-    """Loads in the axes of a marker on the outboard body, where there is one."""
+    """Loads in the axes of a marker on the outboard body, if there is one."""
     shown = {marker.body: run.markers[marker.name] for marker in scene.markers if marker.name in run.markers}
     loads = dict(run.loads)
     for hinge in scene.hinges:
@@ -84,7 +84,7 @@ def _load_axes(run: Trajectory, scene: Scene) -> Trajectory:
 
 
 def _connector_axes(run: Trajectory, scene: Scene) -> Trajectory:
-    """Loads of connectors in the axes of a marker on `body_b`, where there is one."""
+    """Loads of connectors in the axes of a marker on `body_b`, if there is one."""
     shown = {marker.body: run.markers[marker.name] for marker in scene.markers if marker.name in run.markers}
     loads = dict(run.connectors)
     for each in scene.connectors:
@@ -124,7 +124,7 @@ def _millimetres(path: MarkerPath) -> MarkerPath:
 
 
 def _wheels_left_out(run: Trajectory, scene: Scene) -> Trajectory:
-    """The angular momentum less that of the wheels' initial spin, along their axes as markers of their bodies show."""
+    """The angular momentum without that of the wheels' initial spin, along their axes by markers of their bodies."""
     if run.momentum is None:
         return run
     momentum = run.momentum.copy()
@@ -227,7 +227,7 @@ FAULTS = (
 
 
 def run_of(times: Real, channels: dict[str, Real]) -> Trajectory:
-    """The run whose channels (T, k) these are: `channels_of` the other way."""
+    """The run with these channels (T, k): the inverse of `channels_of`."""
     kinds = ("marker", "load", "wheel_load", "connector", *ALONG)
     names: dict[str, dict[str, None]] = {kind: {} for kind in kinds}
     for channel in channels:

@@ -1,7 +1,7 @@
-"""What the stored reference of a case says of a fault: so a foreign code is caught, of which there is no true run.
+"""Whether the stored reference of a case notices a fault, as for a foreign code, of which there is no true run.
 
-A channel counts where the engine's own true run agrees with the reference: elsewhere a difference says nothing of the
-fault. The faulty answer has the uncertainty of the true run; what the reference does not know itself adds to it.
+A channel counts if the engine's own true run agrees with the reference: otherwise a difference is no evidence of the
+fault. The faulty answer has the uncertainty of the true run, to which that of the reference is added.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class ByReference:
-    """The reference of a subject beside the engine's finished true run of it; `asked` are its goals and scales."""
+    """The reference of a subject and the engine's finished true run; `asked` are its goals and scales."""
 
     true: Result
     reference: ReferenceSignals
@@ -33,12 +33,11 @@ class ByReference:
 
     @cached_property
     def trusted(self) -> frozenset[str]:
-        """The channels in which the true run agrees with the reference."""
         found = hold(self.true, self.reference, self.asked)
         return frozenset(name for name, _, finding in found if finding.status == "agree")
 
     def of_scene(self, faulty: Result) -> dict[str, ShownIn]:
-        """By channel what is said of the run of a faulty scene; by pattern, if it did not finish."""
+        """The findings on the run of a faulty scene by channel, or by pattern if it did not finish."""
         found = hold(faulty, self.reference, self.asked, like=self.true)
         return {
             name: ShownIn(status=finding.status, E=finding.E, U=finding.U, goal=goal)
@@ -47,11 +46,11 @@ class ByReference:
         }
 
     def of_answer(self, wrong: Mapping[str, Real]) -> dict[str, ShownIn]:
-        """What is said of channels (T, k) of the true run that were falsified; the reference may have none of them."""
+        """The findings on falsified channels (T, k) of the true run, those that the reference has."""
         places = shared_times(self.reference.times, self.true.times)
         found = {}
         for name in self.trusted & set(wrong):
-            assert places is not None  # or no channel would be trusted
+            assert places is not None  # otherwise no channel would be trusted
             pattern = most_specific(self.asked.goals, name)
             assert pattern is not None
             goal, scaled = self.asked.goals[pattern], most_specific(self.asked.scales, name)
@@ -64,7 +63,7 @@ class ByReference:
 
 
 def by_reference(what: JudgedVariant, true: Result) -> ByReference | str:
-    """The stored reference of the subject's case, or why none can judge its faults."""
+    """The stored reference of the subject's case, or why there is none that can be used."""
     run = msgspec.structs.replace(what.case.run, variants=(what.variant,))
     recorded = held_reference(what.case, run)
     if recorded is None or recorded.variant != what.variant.name:

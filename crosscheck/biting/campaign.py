@@ -1,7 +1,7 @@
-"""A mutation campaign: the mutants of cases run by the usual workers, judged like negative controls, and scored.
+"""A mutation campaign: the mutants of cases are run by the usual workers, judged as negative controls, and scored.
 
-The true run takes the engine's whole ladder of efforts, which gives its uncertainty; every mutant runs at the finest,
-and takes its uncertainty from the true one. Faults of an answer are planted in the true run: no engine has to run.
+The true run uses the engine's whole ladder of efforts, which gives its uncertainty; every mutant runs at the finest
+effort and has the uncertainty of the true run. Faults of an answer are planted in the true run and need no other.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from flexmb.typing import Real
 RECORDS = "mutants.jsonl"
 SCORES = "mutation.json"
 MUTANT_LIMIT_S = 120.0
-PATIENCE = 20.0  # times the true run's time: a mutant that does not end by then has not the same motion
+PATIENCE = 20.0  # times the true run's time, after which a mutant counts as having another motion
 
 
 class MutationFile(msgspec.Struct, frozen=True, kw_only=True):
@@ -63,7 +63,7 @@ def run_campaign(
 ) -> tuple[CaseBite, ...]:
     """Run all mutants of the cases in one engine and score them; `mutation.json` in `out` has the result.
 
-    What `mutants.jsonl` in `out` holds already, of the same scenes and sources, is not run again unless `fresh`.
+    Results in `mutants.jsonl` in `out` of the same scenes and sources are not run again unless `fresh`.
     CaseError where a case judges nothing that the engine runs.
     """
     subjects = [subject(case, engine) for case in cases]
@@ -80,7 +80,8 @@ def run_campaign(
 
 
 def _plan(case: Case, provider: str, limits: Limits) -> tuple[CaseRecord, list[Job]]:
-    """The true run with the case's time, mutants with `MUTANT_LIMIT_S`, unless the limits have their own."""
+    """The jobs: the true run with the case's time limit, mutants with `MUTANT_LIMIT_S`, unless `limits` says
+    otherwise."""
     record, jobs = plan(case, (), provider, limits.time_s)
     if limits.time_s is not None:
         return record, jobs
@@ -90,7 +91,6 @@ def _plan(case: Case, provider: str, limits: Limits) -> tuple[CaseRecord, list[J
 
 
 def scored(what: JudgedVariant, mutants: Litter, results: CaseResults) -> CaseBite:
-    """The scores of one case from the results of its mutants."""
     verdicts: dict[str, list[Verdict]] = {name: [] for name in mutants.mutants}
     for verdict in judge(results):
         verdicts[verdict.comparison].append(verdict)
@@ -132,7 +132,7 @@ def _mutant(control: Control, verdicts: Sequence[Verdict], reference: dict[str, 
 
 
 def _answers(what: JudgedVariant, true: Result, stored: ByReference | None) -> tuple[list[Mutant], list[PassedOver]]:
-    """Faults planted in the true run; passed over are those that change nothing, or nothing that the case judges."""
+    """Faults planted in the true run; those that change nothing, or nothing that the case judges, are passed over."""
     found: list[Mutant] = []
     passed: list[PassedOver] = []
     if true.status != "finished":
@@ -168,7 +168,7 @@ def _answers(what: JudgedVariant, true: Result, stored: ByReference | None) -> t
 
 
 def _rounding(true: Result) -> dict[str, float]:
-    """The rounding (SI) of each family of channels: an axis may be the same in body and World but for that."""
+    """The rounding (SI) of each family of channels, by which body and World components of an axis may differ."""
     sizes: dict[str, float] = {}
     for name in true.channels:
         values = true.values(name)
@@ -178,7 +178,7 @@ def _rounding(true: Result) -> dict[str, float]:
 
 
 def _falsified(true: Result, scene: Scene, fault: AnswerFault, rounding: dict[str, float]) -> dict[str, Real]:
-    """The channels (T, k) that the fault changes by more than their rounding, as it leaves them."""
+    """The channels (T, k) with the fault, those that it changes by more than their rounding."""
     right = {name: true.values(name) for name in true.channels}
     wrong = channels_of(fault.falsify(run_of(true.times, right), scene))
     return {
@@ -189,7 +189,7 @@ def _falsified(true: Result, scene: Scene, fault: AnswerFault, rounding: dict[st
 
 
 def _judged(what: JudgedVariant, true: Result, wrong: dict[str, Real]) -> dict[str, ShownIn]:
-    """What the falsified channels that the case judges say, held against the true ones."""
+    """The findings on the falsified channels that the case judges, compared with the true ones."""
     channels: dict[str, ShownIn] = {}
     for name, values in wrong.items():
         pattern = most_specific(what.goals, name)

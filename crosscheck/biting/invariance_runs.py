@@ -1,7 +1,7 @@
-"""The invariance set of cases: every counterpart of a scene is run like the scene, told back and held against it.
+"""Invariances of cases: the counterparts of a scene are run, transformed back, and compared with the scene's run.
 
-Both take the engine's whole ladder of efforts, so that each has an uncertainty of its own: a boosted or rescaled run
-takes other steps. Telling back adds the rounding of what it subtracts.
+Both use the engine's whole ladder of efforts, so that each has its own uncertainty: a boosted or rescaled run
+has other steps. Transforming back adds the rounding of what it subtracts.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from crosscheck.biting.invariances import INVARIANCES, Counterpart, NotApplicable
 from crosscheck.biting.subject import JudgedVariant, reduced, subject
-from crosscheck.engines.answers import NO_START
+from crosscheck.engines.checked import NO_START
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
 from crosscheck.judging.verdict import Finding, Signal, Status, compare
@@ -35,14 +35,14 @@ from flexmb.scene.check import check_scene
 
 RECORDS = "invariances.jsonl"
 VERDICTS = "invariance.json"
-BOTH = 2.0  # uncertainties of the engine are summed here, where a goal is for one of it and one of a partner
-ANY = 1.0  # the goal where the case sets none: the two must differ by no more than they are uncertain
+BOTH = 2.0  # factor of goals: here the uncertainty of the engine counts twice
+ANY = 1.0  # the goal if the case sets none, so that only E > U is a difference
 
 
 class InvarianceVerdict(msgspec.Struct, frozen=True, kw_only=True):
-    """One invariance of one case: the gravest status of its channels, and in `channel` the one with the largest E/U.
+    """One invariance of one case: the gravest status of its channels; `channel` has the largest E/U.
 
-    `status` is "not applicable" where the invariance says nothing about the scene. `E` and `U` are relative to the
+    `status` is "not applicable" if the invariance does not hold for the scene. `E` and `U` are relative to the
     channel's range. `differing` are all channels that differ.
     """
 
@@ -60,7 +60,7 @@ class InvarianceVerdict(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def ok(self) -> bool:
-        """Whether nothing speaks against the invariance."""
+        """Whether the invariance holds or is not applicable."""
         return self.status in ("agree", "not applicable")
 
 
@@ -73,7 +73,7 @@ class InvarianceFile(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class _Set:
-    """The counterparts of a subject by the name of the invariance, and why there is none of the others."""
+    """The counterparts of a subject by the name of the invariance, and the reasons why others have none."""
 
     what: JudgedVariant
     counterparts: dict[str, Counterpart]
@@ -129,7 +129,7 @@ def _planned(what: JudgedVariant, provider: str, limits: Limits) -> _Set:
 
 
 def _job(true: Job, name: str, counterpart: Counterpart) -> Job:
-    """The counterpart's job. Steps of fixed efforts are told on its clock."""
+    """The counterpart's job. Fixed steps are converted to its clock."""
     times = counterpart.starts_s + counterpart.clock * true.times
     efforts = tuple(
         replace(effort, value=counterpart.clock * effort.value) if effort.kind == "step" else effort
@@ -151,7 +151,7 @@ def _job(true: Job, name: str, counterpart: Counterpart) -> Job:
 
 
 def role(invariance: str) -> str:
-    """The role of an invariance's runs in the records."""
+    """The role of an invariance's runs in records."""
     return f"invariance:{invariance}"
 
 
@@ -183,7 +183,7 @@ def _judged(each: _Set, results: CaseResults) -> list[InvarianceVerdict]:
 
 
 def _findings(what: JudgedVariant, true: Result, other: Result, counterpart: Counterpart) -> dict[str, Finding]:
-    """A finding for every channel of the true run that the counterpart has, told back; the case need not judge it."""
+    """A finding for every channel of the true run that the counterpart has too, whether or not the case judges it."""
     told = _told(other, counterpart)
     found: dict[str, Finding] = {}
     for name in true.channels:
@@ -198,13 +198,13 @@ def _findings(what: JudgedVariant, true: Result, other: Result, counterpart: Cou
             ANY if pattern is None else min(BOTH * what.goals[pattern], ANY),
             None if scale is None else what.scales[scale],
         )
-        if pattern is not None or finding.status != "unresolved":  # what the case does not ask for may be all rounding
+        if pattern is not None or finding.status != "unresolved":  # a channel without a goal may be only rounding
             found[name] = finding
     return found
 
 
 def _told(other: Result, counterpart: Counterpart) -> Result:
-    """The counterpart's result on the true run's clock and in its frame; of coarse runs what they hold in full."""
+    """The counterpart's result on the true run's clock and in its frame, as far as coarse runs store all channels."""
     runs = tuple(_run(run, other, counterpart) for run in other.runs)
     return Result(other.variant, other.engine, other.status, other.message, runs)
 
@@ -223,12 +223,11 @@ def _run(run: RunRecord, other: Result, counterpart: Counterpart) -> RunRecord:
 
 
 def _with_rounding(name: str, told: Result, other: Result, bodies: int) -> Signal:
-    """A channel told back, with the rounding of what was added to it or taken from it, and of what it is the sum of.
+    """A channel transformed back, with the rounding of what was added or subtracted, and of the terms of its sum.
 
-    A load that vanishes is a sum that vanishes: of forces at distances, and of gyroscopic torques, which are of the
-    size of the kinetic energy; so does little work of large forces. In other axes and units this sum rounds otherwise,
-    as do places along a chain of bodies.
-    """
+    A vanishing load is a vanishing sum of moments of forces and of gyroscopic torques, which are of the size of the
+    kinetic energy; likewise the work of large forces. In other axes and units such a sum rounds differently, as do
+    positions along a chain of bodies. """
     signal = told.signal(name, across=False)
     sizes = signal.sizes
     is_sum = name == "work" or name.endswith(".torque")
@@ -243,7 +242,7 @@ def _with_rounding(name: str, told: Result, other: Result, bodies: int) -> Signa
 
 
 def _verdict(head: InvarianceVerdict, findings: dict[str, Finding]) -> InvarianceVerdict:
-    """The verdict on all channels: the gravest of their statuses, shown by the channel where E is most of U."""
+    """The verdict on all channels: the gravest of their statuses, shown by the channel with the largest E/U."""
     if not findings:
         return msgspec.structs.replace(head, status="did not run", reason="no channel could be compared")
 

@@ -1,4 +1,4 @@
-"""The mutants of a subject: which mutations at which targets, and which are passed over and why."""
+"""The mutants of a subject: mutations at targets, and those that are passed over with the reason."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from flexmb.system.compile import compile
 from flexmb.tables.features import asking
 
 OF_THE_START: tuple[MutationKind, ...] = ("initial_place", "initial_unit", "initial_rate", "initial_speed_sign")
-SAME = 1e-12  # of the largest coordinate or speed: what projections leave
+SAME = 1e-12  # of the largest coordinate or speed: rounding of projections
 ROUNDING = 1e-9  # of an eigenproblem and of sums over its modes; the smallest mutation changes 3e-4
 
 
 class PassedOver(msgspec.Struct, frozen=True, kw_only=True):
-    """A mutation of a target that is no mutant, and the reason."""
+    """A mutation of a target that gives no mutant, and the reason."""
 
     mutation: str
     target: str
@@ -45,9 +45,8 @@ class Litter:
 def litter(what: JudgedVariant, all_targets: bool = False) -> Litter:
     """Every applicable mutation at one target of each kind, or at all targets.
 
-    Passed over is what physics says changes nothing, what the variant's transformation does not model, and what makes
-    no scene.
-    """
+    Passed over are mutations that physically change nothing, that the variant's transformation does not model, or that
+    make no valid scene. """
     scene = at_level(what.case.scene(what.variant), what.variant)
     true = variant_scene(scene, what.variant)
     mutants: dict[str, Control] = {}
@@ -70,7 +69,7 @@ def litter(what: JudgedVariant, all_targets: bool = False) -> Litter:
 
 
 def _no_mutant(scene: Scene, kind: MutationKind, target: str, true: Scene, what: JudgedVariant) -> str:
-    """Why the mutated scene is none that could be run and told from the true one; "" if it is."""
+    """Why the mutated scene cannot be run or distinguished from the true one; "" if it can."""
     variant = msgspec.structs.replace(what.variant, level=None)
     try:
         faulty = mutate(scene, kind, target)
@@ -88,26 +87,26 @@ def _no_mutant(scene: Scene, kind: MutationKind, target: str, true: Scene, what:
 
 
 def _begin_alike(one: Scene, other: Scene) -> bool:
-    """Whether two closed chains that differ in the values which they start from begin in the same state."""
+    """Whether two closed chains with different initial values begin in the same state."""
     with asking("general"):
         try:
             a, b = (compile(scene).initial_state for scene in (one, other))
-        except (ValueError, NotImplementedError):  # the engine will say why
+        except (ValueError, NotImplementedError):  # the engine reports it
             return False
     return all(np.max(np.abs(p - q)) <= SAME * np.max(np.abs(q)) for p, q in ((a.q, b.q), (a.u, b.u)) if len(q))
 
 
 def _takes_apart(what: JudgedVariant, scene: Scene, faulty: Scene, target: str) -> bool:
-    """Whether a fault of a beam's modes would stand for the whole beam where the variant has it in parts."""
+    """Whether a mutation concerns modes of a whole beam that the variant divides."""
     in_parts = what.variant.transform in TAKES_APART and what.variant.split_body in (None, target)
     pairs = zip(scene.bodies, faulty.bodies, strict=True)
     return in_parts and any(isinstance(a, BeamBody) and isinstance(b, ModalBody) for a, b in pairs)
 
 
 def same_to_rounding(one: Any, other: Any) -> bool:
-    """Whether two scenes, or parts of them, differ by rounding at most: modes that come by another way are others.
+    """Whether two scenes, or parts of them, differ by rounding at most, as modes computed in another way do.
 
-    Numbers of a vector, or of a row, are held against the largest of them: a zero may come out as a small number.
+    Numbers of a vector, or of a row, are compared relative to the largest of them: zeros may become small numbers.
     """
     if isinstance(one, msgspec.Struct):
         keys = one.__struct_fields__

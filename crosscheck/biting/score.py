@@ -1,4 +1,4 @@
-"""Mutation scores: which share of the deliberate faults a case notices, whole and channel by channel."""
+"""Mutation scores: the share of the deliberate faults that a case notices, in total and by channel."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ENOUGH = 0.95
 
 
 class ShownIn(msgspec.Struct, frozen=True, kw_only=True):
-    """What one channel says of a mutant; `E`, `U` and `goal` relative to the channel's range, as in verdicts."""
+    """The finding on a mutant in one channel; `E`, `U` and `goal` are relative to the channel's range."""
 
     status: Status
     E: float | None
@@ -24,15 +24,15 @@ class ShownIn(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Mutant(msgspec.Struct, frozen=True, kw_only=True):
-    """One deliberate fault, of the scene or planted in the engine's answer, and what came of it.
+    """One deliberate fault, of the scene or planted in the engine's answer, and its outcome.
 
     "noticed": a channel differs, or the run diverged, or was stopped after many times the true run's time. "missed": it
     ran, and nothing differs. "no mutant": the engine refuses or cannot run the faulty scene. "not judged": it crashed,
     was stopped too soon to tell, or did not run. `beyond_goal` says whether it would be noticed also in a code that
     just meets the goals: a channel differs by more than its goal.
 
-    `by_reference` is the outcome where all there is to judge by is the case's stored reference, in the channels
-    `reference`; None where it has no channel that the fault is in, or there is no reference to judge by.
+    `by_reference` is the outcome by the case's stored reference alone, in the channels
+    `reference`; None if none of these has the fault, or there is no reference.
     """
 
     mutation: str
@@ -47,16 +47,16 @@ class Mutant(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ChannelScore(msgspec.Struct, frozen=True, kw_only=True):
-    """How many of the mutants that were judged in a channel it has noticed."""
+    """The numbers of mutants that were judged and noticed in a channel."""
 
     noticed: int
     mutants: int
 
 
 class CaseBite(msgspec.Struct, frozen=True, kw_only=True):
-    """How a case bites: `score` is the share of mutants noticed, None where there is none; `score_at_goals` of those
-    noticed beyond a goal; `score_by_reference` of what the stored reference judges, None with the reason in
-    `no_reference` where it judges nothing."""
+    """The scores of a case: `score` is the share of mutants noticed, None if there are none; `score_at_goals` of those
+    noticed beyond a goal; `score_by_reference` by the stored reference, None with the reason in
+    `no_reference` if it judges nothing."""
 
     case: str
     variant: str
@@ -71,7 +71,6 @@ class CaseBite(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def counted(self) -> tuple[Mutant, ...]:
-        """The mutants that the score is taken over."""
         return tuple(each for each in self.mutants if each.outcome in ("noticed", "missed"))
 
     @property
@@ -84,9 +83,9 @@ class CaseBite(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def outcome(channels: dict[str, ShownIn], patient: bool = False) -> tuple[Outcome, bool]:
-    """What came of a mutant with these verdicts, and whether beyond a goal. Without any verdict it is not judged.
+    """The outcome of a mutant with these verdicts, and whether beyond a goal. Without verdicts it is not judged.
 
-    `patient`: one that did not finish had many times the true run's time, and so has another motion: noticed.
+    `patient`: the time limit was many times the true run's time, so that an unfinished run counts as noticed.
     """
     found = {each.status for each in channels.values()}
     if "differ" in found:
@@ -111,7 +110,6 @@ def bite(
     passed_over: Iterable[PassedOver],
     no_reference: str = "",
 ) -> CaseBite:
-    """The scores of a case from what came of its mutants."""
     counted = [each for each in mutants if each.outcome in ("noticed", "missed")]
     channels: dict[str, ChannelScore] = {}
     for mutant in counted:
@@ -134,13 +132,13 @@ def bite(
 
 
 def mean(scores: Iterable[float | None]) -> float | None:
-    """Mean of the cases' scores, each case counting the same; None without any."""
+    """Mean of the cases' scores with equal weights; None if there are none."""
     known = [score for score in scores if score is not None]
     return sum(known) / len(known) if known else None
 
 
 def _referred(mutant: Mutant) -> bool:
-    """Whether the stored reference has said anything of a mutant."""
+    """Whether the stored reference judges a mutant."""
     return mutant.by_reference in ("noticed", "missed")
 
 

@@ -1,4 +1,4 @@
-"""What of a case is put to the proof: one variant run by one engine, and the goals that its channels are judged by."""
+"""The subject of a campaign in a case: one variant run by one engine, and the goals of its channels."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from crosscheck.library.selection import held
 class JudgedVariant:
     """A case reduced to one variant and one engine.
 
-    `goals` and `scales` are those of the engine's comparisons of the variant that must agree (of others, where it has
-    none), and those by which it is held against the stored reference, if that is of the variant; of two goals for one
+    `goals` and `scales` are those of the engine's comparisons of the variant that must agree (of others if it has
+    none), and those of its comparison with the stored reference, if that is of the variant; of two goals for one
     pattern the stricter counts.
     """
 
@@ -29,7 +29,7 @@ class JudgedVariant:
 
 
 def subject(case: Case, engine: str) -> JudgedVariant:
-    """The variant of the case's reference if a comparison judges it, else the first that one does and the engine runs.
+    """The variant of the case's reference if a comparison judges it, else the first judged one that the engine runs.
 
     CaseError where there is none. An engine that the case does not name (a user's own) runs the first judged variant.
     """
@@ -51,20 +51,11 @@ def subject(case: Case, engine: str) -> JudgedVariant:
 
 def reduced(what: JudgedVariant) -> Case:
     """The case with nothing but the subject's run: no comparison, no control, no chart."""
-    run = msgspec.structs.replace(
-        what.case.run,
-        variants=(what.variant,),
-        comparisons=(),
-        controls=(),
-        conservations=(),
-        charts=(),
-        reference=None,
-    )
-    return replace(what.case, run=run, accepted={})
+    return replace(what.case, run=what.case.run.alone(what.variant), accepted={})
 
 
 def _agreeing(case: Case) -> list[Comparison]:
-    """Comparisons that must agree; where a case has none, all."""
+    """Comparisons that must agree, or all if there are none."""
     return [each for each in case.run.comparisons if each.expect == "agree"] or list(case.run.comparisons)
 
 
@@ -81,9 +72,9 @@ def _engines(case: Case, comparison: Comparison) -> tuple[str, ...]:
 
 
 def _asked(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dict[str, float]]:
-    """Goals and scales of a variant's comparisons: of those with the engine that must agree, where there are such.
+    """Goals and scales of a variant's comparisons: of those with the engine that must agree, if there are any.
 
-    What the stored reference asks of the engine adds to them.
+    Those of the engine's comparison with the stored reference are added.
     """
     goals: dict[str, float] = {}
     scales: dict[str, float] = {}
@@ -99,7 +90,7 @@ def _asked(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dic
 
 
 def _held(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dict[str, float]]:
-    """Goals and scales by which the engine is held against the stored reference of a variant, none if it is not."""
+    """Goals and scales of the engine's comparison with the stored reference of a variant, empty if there is none."""
     recipe = case.run.reference
     if recipe is None or recipe.variant != variant or not has_reference(case.folder):
         return {}, {}

@@ -9,20 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from crosscheck.cli.common import (
-    CaseWords,
-    EngineNames,
-    NoUserCode,
-    Quiet,
-    TimeLimit,
-    app,
-    check_limit,
-    console,
-    found,
-    in_one_line,
-    refuse,
-    verbosity,
-)  # fmt: skip
+from crosscheck.cli import common
 from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.text import words
 from flexmb.output.whole import take_away, write_whole
@@ -34,10 +21,10 @@ Variants = Annotated[
 ]
 
 
-@app.command()
+@common.app.command()
 def bench(
-    cases: CaseWords,
-    engine: EngineNames = None,
+    cases: common.CaseWords,
+    engine: common.EngineNames = None,
     variant: Variants = None,
     rounds: Annotated[int, typer.Option("--rounds", min=1, help="How often each engine is timed.")] = 10,
     accuracy: Annotated[
@@ -46,9 +33,9 @@ def bench(
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write what `pytest-benchmark compare` reads.")
     ] = None,
-    time_limit: TimeLimit = None,
-    quiet: Quiet = False,
-    no_user_code: NoUserCode = False,
+    time_limit: common.TimeLimit = None,
+    quiet: common.Quiet = False,
+    no_user_code: common.NoUserCode = False,
 ) -> None:
     """
     Time the engines of cases against each other, those that agree.
@@ -68,32 +55,32 @@ def bench(
     from crosscheck.timing.bench import bench as bench_case
     from crosscheck.timing.benchmark_json import MISSING, available, benchmark_document
 
-    check_limit(time_limit)
+    common.check_limit(time_limit)
     if not 0.0 < accuracy < inf:
-        refuse(f"--accuracy {accuracy:g}: give a positive number such as 1e-4")
+        common.refuse(f"--accuracy {accuracy:g}: give a positive number such as 1e-4")
     if not available():
-        refuse(MISSING)
-    shown = verbosity(quiet, False)
+        common.refuse(MISSING)
+    shown = common.verbosity(quiet, False)
     benches = []
-    with in_one_line():
+    with common.in_one_line():
         if json_file is not None:
             check_folder(json_file.parent)
             take_away(json_file)
-        for case in found(tuple(cases)):
-            with LiveProgress(console, shown) as live:
+        for case in common.found(tuple(cases)):
+            with LiveProgress(common.console, shown) as live:
                 done = bench_case(
                     case, engine or (), variant or (),
                     rounds=rounds, accuracy=accuracy, limits=Limits(1, time_limit), listener=live.hear,
                 )  # fmt: skip
             benches.append(done)
             if not quiet:
-                print_bench(console, done)
+                print_bench(common.console, done)
         if json_file is not None:
             _write(json_file, benchmark_document(benches))
     empty = [each.case for each in benches if not any(contest.timed for contest in each.contests)]
     last = f"nobody was timed on {', '.join(empty)}" if empty else f"{len(benches)} cases timed"
     where = "" if json_file is None else f"; {json_file}"
-    console.print(words(last + where, "red" if empty else "green"))
+    common.console.print(words(last + where, "red" if empty else "green"))
     raise typer.Exit(int(bool(empty)))
 
 

@@ -7,34 +7,22 @@ from typing import Annotated
 
 import typer
 
+from crosscheck.cli import common
 from crosscheck.cli.bench import Variants
-from crosscheck.cli.common import (
-    CaseWords,
-    EngineNames,
-    NoUserCode,
-    Quiet,
-    TimeLimit,
-    app,
-    check_limit,
-    console,
-    found,
-    sole_writer,
-    verbosity,
-)  # fmt: skip
 from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.text import marked, words
 
 
-@app.command()
+@common.app.command()
 def chart(
-    cases: CaseWords,
-    engine: EngineNames = None,
+    cases: common.CaseWords,
+    engine: common.EngineNames = None,
     variant: Variants = None,
     rounds: Annotated[int, typer.Option("--rounds", min=1, help="How often each effort is timed.")] = 5,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for pictures, data and pages.")] = Path("charts"),
-    time_limit: TimeLimit = None,
-    quiet: Quiet = False,
-    no_user_code: NoUserCode = False,
+    time_limit: common.TimeLimit = None,
+    quiet: common.Quiet = False,
+    no_user_code: common.NoUserCode = False,
 ) -> None:
     """
     Draw error against time: every engine and integrator over its efforts.
@@ -53,25 +41,25 @@ def chart(
     from crosscheck.timing.chart import chart as chart_case
     from crosscheck.timing.page import INDEX, write_case, write_index  # it loads matplotlib
 
-    check_limit(time_limit)
-    shown = verbosity(quiet, False)
+    common.check_limit(time_limit)
+    shown = common.verbosity(quiet, False)
     done = []
-    with sole_writer(out):
+    with common.sole_writer(out):
         (out / INDEX).unlink(missing_ok=True)  # of earlier charts, should this command be killed
-        for case in found(tuple(cases)):
-            with LiveProgress(console, shown) as live:
+        for case in common.found(tuple(cases)):
+            with LiveProgress(common.console, shown) as live:
                 charts = chart_case(
                     case, engine or (), variant or (),
                     rounds=rounds, limits=Limits(1, time_limit), listener=live.hear,
                 )  # fmt: skip
             done.append(charts)
             if charts.problem:
-                console.print(marked("✕", "red", charts.problem), soft_wrap=True)
+                common.console.print(marked("✕", "red", charts.problem), soft_wrap=True)
                 continue
             page = write_case(charts, out)
             if not quiet:
-                console.print(marked("✓", "green", f"{charts.case}: {page}"), soft_wrap=True)
+                common.console.print(marked("✓", "green", f"{charts.case}: {page}"), soft_wrap=True)
         index = write_index(done, out)
     good = not any(each.problem for each in done)
-    console.print(words(f"Index: {index}", "green" if good else "red"), soft_wrap=True)
+    common.console.print(words(f"Index: {index}", "green" if good else "red"), soft_wrap=True)
     raise typer.Exit(int(not good))

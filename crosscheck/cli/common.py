@@ -99,6 +99,7 @@ CaseWords = Annotated[
         autocompletion=_complete_case,
     ),
 ]
+CaseList = Annotated[list[str], typer.Argument(help="Case names, a tag, `all`, or folders that hold a run.toml.")]
 CaseWord = Annotated[str, typer.Argument(help="Case name or folder.", autocompletion=_complete_case)]
 EngineWords = Annotated[
     list[str], typer.Argument(metavar="ENGINE...", help="Names of engines.", autocompletion=_complete_engine)
@@ -117,6 +118,7 @@ Json = Annotated[
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show the last line only, and errors.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every comparison and every run.")]
 
+Fresh = Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")]
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for records, verdicts and report.")]
 TimeLimit = Annotated[
     float | None,

@@ -7,22 +7,22 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import Jobs, NoUserCode, Out, TimeLimit, app, check_limit, console, found, sole_writer
+from crosscheck.cli import common
 from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
 
 
-@app.command()
+@common.app.command()
 def invariance(
-    cases: Annotated[list[str], typer.Argument(help="Case names, a tag, `all`, or folders that hold a run.toml.")],
+    cases: common.CaseList,
     engine: Annotated[str, typer.Option("--engine", "-e", help="The engine that is put to the proof.")] = "native",
-    out: Out = Path("out"),
-    fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
-    jobs: Jobs = None,
-    time_limit: TimeLimit = None,
+    out: common.Out = Path("out"),
+    fresh: common.Fresh = False,
+    jobs: common.Jobs = None,
+    time_limit: common.TimeLimit = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Every verdict with its reason.")] = False,
-    no_user_code: NoUserCode = False,
+    no_user_code: common.NoUserCode = False,
 ) -> None:
     """
     Change what means nothing and say whether the results stay the same.
@@ -42,12 +42,12 @@ def invariance(
     from crosscheck.terminal.invariances import print_invariances
     from crosscheck.terminal.live import LiveProgress
 
-    check_limit(time_limit)
-    chosen = found(tuple(cases))
-    with sole_writer(out):
-        with LiveProgress(console, Verbosity.NORMAL) as live:
+    common.check_limit(time_limit)
+    chosen = common.found(tuple(cases))
+    with common.sole_writer(out):
+        with LiveProgress(common.console, Verbosity.NORMAL) as live:
             limits = Limits(jobs, time_limit)
             verdicts = run_invariances(chosen, out, engine=engine, fresh=fresh, limits=limits, listener=live.hear)
-        code = print_invariances(console, verdicts, verbose)
-    console.print(words(f"Verdicts: {out / VERDICTS}"), soft_wrap=True)
+        code = print_invariances(common.console, verdicts, verbose)
+    common.console.print(words(f"Verdicts: {out / VERDICTS}"), soft_wrap=True)
     raise typer.Exit(code)

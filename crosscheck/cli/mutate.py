@@ -7,25 +7,25 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import Jobs, NoUserCode, Out, TimeLimit, app, check_limit, console, found, sole_writer
+from crosscheck.cli import common
 from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
 
 
-@app.command()
+@common.app.command()
 def mutate(
-    cases: Annotated[list[str], typer.Argument(help="Case names, a tag, `all`, or folders that hold a run.toml.")],
+    cases: common.CaseList,
     engine: Annotated[str, typer.Option("--engine", "-e", help="The engine that runs the faulty scenes.")] = "native",
     all_targets: Annotated[
         bool, typer.Option("--all-targets", help="Every target, not one of each kind (every body, every hinge).")
     ] = False,
-    out: Out = Path("out"),
-    fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
-    jobs: Jobs = None,
-    time_limit: TimeLimit = None,
+    out: common.Out = Path("out"),
+    fresh: common.Fresh = False,
+    jobs: common.Jobs = None,
+    time_limit: common.TimeLimit = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Every channel and every fault.")] = False,
-    no_user_code: NoUserCode = False,
+    no_user_code: common.NoUserCode = False,
 ) -> None:
     """
     Plant deliberate faults and say which share of them each case notices: its mutation score.
@@ -51,14 +51,14 @@ def mutate(
     from crosscheck.terminal.bites import print_bites
     from crosscheck.terminal.live import LiveProgress
 
-    check_limit(time_limit)
-    chosen = found(tuple(cases))
-    with sole_writer(out):
-        with LiveProgress(console, Verbosity.NORMAL) as live:
+    common.check_limit(time_limit)
+    chosen = common.found(tuple(cases))
+    with common.sole_writer(out):
+        with LiveProgress(common.console, Verbosity.NORMAL) as live:
             limits = Limits(jobs, time_limit)
             bites = run_campaign(
                 chosen, out, engine=engine, all_targets=all_targets, fresh=fresh, limits=limits, listener=live.hear
             )
-        code = print_bites(console, bites, verbose)
-    console.print(words(f"Scores: {out / SCORES}"), soft_wrap=True)
+        code = print_bites(common.console, bites, verbose)
+    common.console.print(words(f"Scores: {out / SCORES}"), soft_wrap=True)
     raise typer.Exit(code)

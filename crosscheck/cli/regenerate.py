@@ -6,31 +6,21 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import (
-    Jobs,
-    NoUserCode,
-    SchedulerAddress,
-    TimeLimit,
-    app,
-    check_limit,
-    console,
-    found,
-    in_one_line,
-)
+from crosscheck.cli import common
 from crosscheck.library.case_error import CaseError
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.text import marked, words
 
 
-@app.command()
+@common.app.command()
 def regenerate(
-    cases: Annotated[list[str], typer.Argument(help="Case names, a tag, `all`, or folders that hold a run.toml.")],
+    cases: common.CaseList,
     check: Annotated[bool, typer.Option("--check", help="Compare with what is stored, write nothing.")] = False,
-    jobs: Jobs = None,
-    time_limit: TimeLimit = None,
-    scheduler: SchedulerAddress = LOCAL,
-    no_user_code: NoUserCode = False,
+    jobs: common.Jobs = None,
+    time_limit: common.TimeLimit = None,
+    scheduler: common.SchedulerAddress = LOCAL,
+    no_user_code: common.NoUserCode = False,
 ) -> None:
     """
     Make the stored reference of cases again, by the routes of their table `[reference]`.
@@ -53,23 +43,25 @@ def regenerate(
     from crosscheck.references.regenerate import regenerate as make_again
     from crosscheck.terminal.live import LiveProgress
 
-    check_limit(time_limit)
+    common.check_limit(time_limit)
     good = True
-    with in_one_line():
+    with common.in_one_line():
         runs_on = scheduler_at(scheduler)
-        for case in found(tuple(cases)):
+        for case in common.found(tuple(cases)):
             try:
-                with LiveProgress(console) as live:
+                with LiveProgress(common.console) as live:
                     limits = Limits(jobs, time_limit)
                     done = make_again(case, check=check, limits=limits, scheduler=runs_on, listener=live.hear)
             except CaseError as error:
-                console.print(marked("✕", "red", str(error)), soft_wrap=True)
+                common.console.print(marked("✕", "red", str(error)), soft_wrap=True)
                 good = False
                 continue
             kept = done.done != "would be written"
             good = good and kept
             what = f"{done.case}: {done.done}, {done.channels} channels to {done.horizon_s:g} s"
             remark = f"; {done.remark}" if done.remark else ""
-            console.print(marked("✓" if kept else "!", "green" if kept else "yellow", what + remark), soft_wrap=True)
-    console.print(words("Every reference holds" if good else "Not every reference holds", "green" if good else "red"))
+            sign, colour = ("✓", "green") if kept else ("!", "yellow")
+            common.console.print(marked(sign, colour, what + remark), soft_wrap=True)
+    text, colour = ("Every reference holds", "green") if good else ("Not every reference holds", "red")
+    common.console.print(words(text, colour))
     raise typer.Exit(int(not good))

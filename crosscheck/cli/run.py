@@ -9,30 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from crosscheck.cli.common import (
-    CaseWords,
-    EngineNames,
-    Jobs,
-    Json,
-    NoUserCode,
-    Open,
-    Out,
-    Quiet,
-    SchedulerAddress,
-    SingleFile,
-    Strict,
-    TimeLimit,
-    Verbose,
-    app,
-    check_limit,
-    console,
-    errors,
-    found,
-    refuse,
-    sole_writer,
-    verbosity,
-)
-from crosscheck.running.scheduler import Limits
+from crosscheck.cli import common
+from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
@@ -42,97 +20,77 @@ if TYPE_CHECKING:
     from crosscheck.library.find import Case
 
 
-@app.command()
+@common.app.command()
 def run(
-    cases: CaseWords,
-    engine: EngineNames = None,
+    cases: common.CaseWords,
+    engine: common.EngineNames = None,
     alone: Annotated[
         bool, typer.Option("--alone", help="Hold the engines against the stored references only; no partners run.")
     ] = False,
-    out: Out = Path("out"),
-    fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
-    jobs: Jobs = None,
-    time_limit: TimeLimit = None,
-    scheduler: SchedulerAddress = LOCAL,
+    out: common.Out = Path("out"),
+    fresh: common.Fresh = False,
+    jobs: common.Jobs = None,
+    time_limit: common.TimeLimit = None,
+    scheduler: common.SchedulerAddress = LOCAL,
     accept: Annotated[
         bool, typer.Option("--accept", help="Write the figures reached into each case's accepted.toml, for review.")
     ] = False,
-    strict: Strict = False,
-    single_file: SingleFile = False,
-    open_report: Open = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    no_user_code: NoUserCode = False,
+    strict: common.Strict = False,
+    single_file: common.SingleFile = False,
+    open_report: common.Open = False,
+    as_json: common.Json = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
+    no_user_code: common.NoUserCode = False,
 ) -> None:
     """
     Run cases in all engines, judge them, write the report.
 
     **Writes** into `--out`: `report/` (open its `index.html`, to which `report.html` leads), `results.json` (small and
     sealed, for `crosscheck compare`), `verdicts.json`, `summary.md`, `junit.xml`, `badge.svg`, `badge.json`,
-    `records.jsonl`. With `--single-file`, `report.html` is the whole report.
-    A run that was stopped resumes where it was: what is recorded is not run again, as long as the scene, the effort
-    and everything that made it are the same: sources, libraries, machine. The report shows what this run asked for;
-    `crosscheck report` shows everything that the records hold. One run at a time writes into a folder.
-
-    An engine that takes longer for a scene than `--time-limit` says (or the case, or half an hour), or more than its
-    part of the memory, is stopped: *did not finish*. The others go on.
+    `records.jsonl`. With `--single-file`, `report.html` is the whole report. Until the session ends they say that it is
+    unfinished. A stopped session resumes: what is recorded is not run again if scene, effort, sources, libraries and
+    machine are the same. `crosscheck report` shows everything that the records hold. One session at a time writes into
+    a folder. An engine that exceeds its time or its part of the memory is stopped: *did not finish*. The others go on.
 
     `--accept` writes the E and U that this run has reached into `accepted.toml` beside each case's run.toml, to be
     reviewed and kept like code. Later runs say where E or U has grown to more than 10 times that, *worse than
     recorded*: a warning, and with `--strict` an error, as is a comparison of the library's own engines without
-    accepted figures. Figures accepted with other efforts, scenes, rules or versions of engines are told as *stale*:
-    accept them anew. Nothing is accepted while anything is not as expected.
+    accepted figures. Figures accepted with other efforts, scenes, rules or versions of engines are *stale*: accept them
+    again. Nothing is accepted while anything is not as expected.
 
-    Until the session has come to its end, all that it writes says that it is unfinished.
-
-    **Exit code**: 0 every verdict is the one the case expects and everything asked for gave its result;
-    1 something is not as expected, failed or did not run, an engine asked for was compared in nothing, or `--accept`
-    wrote nothing; 2 the request itself makes no sense. With `--strict` also 1 where figures are worse than recorded or
-    missing, a reference was never made, or a scene is doubtful. `docs/verdicts.md` has the rules.
+    **Exit code**: 0 every verdict is as the case expects, and everything asked for gave its result; 1 something is not
+    as expected, failed or did not run, an engine asked for was compared in nothing, or `--accept` wrote nothing; 2 the
+    request makes no sense. With `--strict` also 1 where figures are worse than recorded or missing, a reference was
+    never made, or a scene is doubtful. `docs/verdicts.md` has the rules.
 
     **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
     `crosscheck run all -e mycode --alone --out results` · `crosscheck run ./my_case --accept` ·
     `crosscheck run all --strict --time-limit 600`
     """
-    from crosscheck.library.selection import without_part
     from crosscheck.records.session import last_session
-    from crosscheck.report import mark_unfinished, write_all
-    from crosscheck.running.sweep import sweep
-    from crosscheck.sealed.seal import FILE
-    from crosscheck.terminal.live import LiveProgress
+    from crosscheck.report import write_all
 
-    check_limit(time_limit)
-    shown = verbosity(quiet, verbose)
-    chosen = found(tuple(cases))
-    if alone:
-        chosen = _alone(chosen)
-    idle = without_part((case.run for case in chosen), tuple(engine or ()))
-    if idle:
-        refuse(idle)
-    with sole_writer(out, strict):
-        runs_on = scheduler_at(scheduler)
-        mark_unfinished(out / "records.jsonl", out)
-        with LiveProgress(console, shown) as live:
-            sweep(
-                chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, limits=Limits(jobs, time_limit),
-                scheduler=runs_on, listener=live.hear,
-            )  # fmt: skip
-        done = not accept or _accept(chosen, out / "records.jsonl", partial=bool(engine))
-        outcome, page = write_all(out / "records.jsonl", out, strict, last_session, single_file)
-    _conclude(outcome, page, shown, results=out / FILE if as_json else None, open_report=open_report, failed=not done)
+    common.check_limit(time_limit)
+    shown = common.verbosity(quiet, verbose)
+    chosen, asked, records = _chosen(cases, engine, alone), tuple(engine or ()), out / "records.jsonl"
+    with common.sole_writer(out, strict):
+        _run(chosen, asked, records, shown, fresh, Limits(jobs, time_limit), scheduler_at(scheduler))
+        done = not accept or _accept(chosen, records, partial=bool(asked))
+        outcome, page = write_all(records, out, strict, last_session, single_file)
+    _conclude(outcome, page, shown, out if as_json else None, open_report, failed=not done)
 
 
-@app.command()
+@common.app.command()
 def report(
     records: Annotated[Path, typer.Argument(help="A records.jsonl of an earlier run, yours or anybody's.")],
-    out: Out = Path("out"),
-    strict: Strict = False,
-    single_file: SingleFile = False,
-    open_report: Open = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    out: common.Out = Path("out"),
+    strict: common.Strict = False,
+    single_file: common.SingleFile = False,
+    open_report: common.Open = False,
+    as_json: common.Json = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
 ) -> None:
     """
     Judge and draw recorded runs again; no engine needs to be installed.
@@ -141,14 +99,38 @@ def report(
     """
     from crosscheck.records.session import standing
     from crosscheck.report import write_all
-    from crosscheck.sealed.seal import FILE
 
     if not records.is_file():
-        refuse(f"{records} is no file")
-    shown = verbosity(quiet, verbose)
-    with sole_writer(out):
+        common.refuse(f"{records} is no file")
+    shown = common.verbosity(quiet, verbose)
+    with common.sole_writer(out):
         outcome, page = write_all(records, out, strict, standing, single_file)
-    _conclude(outcome, page, shown, results=out / FILE if as_json else None, open_report=open_report)
+    _conclude(outcome, page, shown, out if as_json else None, open_report)
+
+
+def _chosen(cases: list[str], engines: list[str] | None, alone: bool) -> tuple[Case, ...]:
+    """The cases asked for; refuses engines that have no part in any of them."""
+    from crosscheck.library.selection import without_part
+
+    chosen = common.found(tuple(cases))
+    chosen = _alone(chosen) if alone else chosen
+    if idle := without_part((case.run for case in chosen), tuple(engines or ())):
+        common.refuse(idle)
+    return chosen
+
+
+def _run(
+    cases: tuple[Case, ...], engines: tuple[str, ...], records: Path, shown: Verbosity, fresh: bool, limits: Limits,
+    scheduler: Scheduler,
+) -> None:  # fmt: skip
+    """Run the cases; until they are judged the outputs say that the session is unfinished."""
+    from crosscheck.report import mark_unfinished
+    from crosscheck.running.sweep import sweep
+    from crosscheck.terminal.live import LiveProgress
+
+    mark_unfinished(records, records.parent)
+    with LiveProgress(common.console, shown) as live:
+        sweep(cases, engines, records, fresh=fresh, limits=limits, scheduler=scheduler, listener=live.hear)
 
 
 def _alone(cases: tuple[Case, ...]) -> tuple[Case, ...]:
@@ -157,9 +139,10 @@ def _alone(cases: tuple[Case, ...]) -> tuple[Case, ...]:
 
     without = [case.name for case in cases if case.run.reference is None or not has_reference(case.folder)]
     if len(without) == len(cases):
-        refuse(f"no stored reference: {', '.join(without)}. `crosscheck regenerate` makes them; or leave --alone out")
+        remedy = "`crosscheck regenerate` makes them; or leave --alone out"
+        common.refuse(f"no stored reference: {', '.join(without)}. {remedy}")
     if without:
-        console.print(words(f"Left out, as there is no stored reference: {', '.join(without)}", "yellow"))
+        common.console.print(words(f"Left out, as there is no stored reference: {', '.join(without)}", "yellow"))
     return tuple(replace(case, alone=True) for case in cases if case.name not in without)
 
 
@@ -169,25 +152,25 @@ def _accept(cases: tuple[Case, ...], records: Path, partial: bool) -> bool:
 
     try:
         for file, count in accept_figures(cases, records, partial):
-            console.print(words(f"{count} figures accepted: review {file}"), soft_wrap=True)
+            common.console.print(words(f"{count} figures accepted: review {file}"), soft_wrap=True)
     except NotAccepted as error:
-        errors.print(words(str(error), "red"), soft_wrap=True)
+        common.errors.print(words(str(error), "red"), soft_wrap=True)
         return False
     return True
 
 
 def _conclude(
-    outcome: SessionOutcome, page: Path, shown: Verbosity, *, results: Path | None, open_report: bool,
-    failed: bool = False,
-) -> None:  # fmt: skip
-    """Show what came out, print the file of `results` if one is given, leave with the exit code: 1 if it `failed`."""
+    outcome: SessionOutcome, page: Path, shown: Verbosity, json_of: Path | None, open_report: bool, failed: bool = False
+) -> None:
+    """Show the outcome, with the results of the folder `json_of` as JSON, and exit; with code 1 if it `failed`."""
+    from crosscheck.sealed.seal import FILE
     from crosscheck.terminal.verdicts import print_outcome
 
-    code = print_outcome(console, outcome, shown)
+    code = print_outcome(common.console, outcome, shown)
     if shown is not Verbosity.QUIET:
-        console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
-    if results is not None:
-        typer.echo(results.read_text(encoding="ascii"), nl=False)
+        common.console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
+    if json_of is not None:
+        typer.echo((json_of / FILE).read_text(encoding="ascii"), nl=False)
     if open_report:
         webbrowser.open(page.resolve().as_uri())
     raise typer.Exit(code or int(failed))

@@ -7,40 +7,29 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import (
-    Jobs,
-    Json,
-    Out,
-    SchedulerAddress,
-    app,
-    check_limit,
-    console,
-    print_json,
-    refuse,
-    sole_writer,
-)
+from crosscheck.cli import common
 from crosscheck.running.scheduler import TIME_LIMIT_S, Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from flexmb.scene.problems import closest
 
 
-@app.command()
+@common.app.command()
 def stability(
     maps: Annotated[list[str], typer.Argument(help="Names of maps, `all`, or `list` to see which there are.")],
-    out: Out = Path("out"),
+    out: common.Out = Path("out"),
     depth: Annotated[
         int | None,
         typer.Option(help="How often cells at a boundary are halved; by default what the map says.", min=0, max=8),
     ] = None,
     pictures: Annotated[Path | None, typer.Option(help="Folder for the pictures and maps.json; default --out.")] = None,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
-    jobs: Jobs = None,
+    fresh: common.Fresh = False,
+    jobs: common.Jobs = None,
     time_limit: Annotated[
         float | None,
         typer.Option("--time-limit", metavar="SECONDS", help=f"Stop a longer cell; default {TIME_LIMIT_S:g}."),
     ] = None,
-    scheduler: SchedulerAddress = LOCAL,
-    as_json: Json = False,
+    scheduler: common.SchedulerAddress = LOCAL,
+    as_json: common.Json = False,
 ) -> None:
     """
     Draw stability maps: where a method or a motion fails, beside the boundary that theory says.
@@ -59,24 +48,24 @@ def stability(
     from crosscheck.terminal.listings import maps_table
     from crosscheck.terminal.map_runs import run_and_draw
 
-    check_limit(time_limit)
+    common.check_limit(time_limit)
     known = maps_of(PROVIDER)
     if maps == ["list"] and as_json:
         axes = {name: {"x": each.x.label, "y": each.y.label} for name, each in known.items()}
-        print_json({name: axes[name] | {"overlay": each.overlay.name} for name, each in known.items()})
+        common.print_json({name: axes[name] | {"overlay": each.overlay.name} for name, each in known.items()})
         return
     if maps == ["list"]:
-        console.print(maps_table(known.values()))
+        common.console.print(maps_table(known.values()))
         return
     chosen = list(known) if maps == ["all"] else maps
     for name in chosen:
         if name not in known:
-            refuse(f'no map "{name}": {closest(name, known)}; `crosscheck stability list` shows them')
-    with sole_writer(out):
+            common.refuse(f'no map "{name}": {closest(name, known)}; `crosscheck stability list` shows them')
+    with common.sole_writer(out):
         limits = Limits(jobs, time_limit)
         runs_on = scheduler_at(scheduler)
         code = run_and_draw(
-            console, chosen, out, pictures or out, depth=depth, fresh=fresh, limits=limits, scheduler=runs_on
+            common.console, chosen, out, pictures or out, depth=depth, fresh=fresh, limits=limits, scheduler=runs_on
         )
     if as_json:
         typer.echo(((pictures or out) / VERDICTS).read_text(encoding="utf-8"), nl=False)

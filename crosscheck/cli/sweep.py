@@ -7,32 +7,22 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import (
-    Jobs,
-    NoUserCode,
-    Out,
-    SchedulerAddress,
-    TimeLimit,
-    app,
-    check_limit,
-    console,
-    sole_writer,
-)
+from crosscheck.cli import common
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.text import words
 from flexmb.output.whole import write_whole
 
 
-@app.command("sweep")
+@common.app.command("sweep")
 def sweep_parameters(
     file: Annotated[Path, typer.Argument(help="The sweep, a TOML file.")],
-    out: Out = Path("out"),
-    fresh: Annotated[bool, typer.Option("--fresh", help="Forget the samples in --out instead of resuming.")] = False,
-    jobs: Jobs = None,
-    time_limit: TimeLimit = None,
-    scheduler: SchedulerAddress = LOCAL,
-    no_user_code: NoUserCode = False,
+    out: common.Out = Path("out"),
+    fresh: common.Fresh = False,
+    jobs: common.Jobs = None,
+    time_limit: common.TimeLimit = None,
+    scheduler: common.SchedulerAddress = LOCAL,
+    no_user_code: common.NoUserCode = False,
 ) -> None:
     """
     Run a scene many times with other parameters: Monte Carlo, a Latin hypercube or a grid.
@@ -51,16 +41,16 @@ def sweep_parameters(
     from crosscheck.sampling.statistics import summarise
     from crosscheck.terminal.sampling import print_summary, sampling_bar
 
-    check_limit(time_limit)
-    with sole_writer(out):
+    common.check_limit(time_limit)
+    with common.sole_writer(out):
         runs_on = scheduler_at(scheduler)
-        with sampling_bar(console) as listener:
+        with sampling_bar(common.console) as listener:
             done = run_sweep(
                 file, out, fresh=fresh, limits=Limits(jobs, time_limit), scheduler=runs_on, listener=listener
             )
         summary = summarise(done)
         target = out / SUMMARY
         write_whole(target, msgspec.json.format(msgspec.json.encode(summary)) + b"\n")
-        print_summary(console, summary)
-        console.print(words("Samples: ") + words(str(out / "samples.csv"), "bold"), soft_wrap=True)
+        print_summary(common.console, summary)
+        common.console.print(words("Samples: ") + words(str(out / "samples.csv"), "bold"), soft_wrap=True)
     raise typer.Exit(0 if summary.ok else 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,10 @@ from crosscheck.cli.common import CaseWord, Json, NoUserCode, SchedulerAddress, 
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.text import words
 from flexmb.output.whole import write_whole
+
+if TYPE_CHECKING:
+    from crosscheck.library.find import Case
+    from crosscheck.verify.against_case import CsvOutcome
 
 
 @app.command()
@@ -53,30 +57,42 @@ def verify(
 
     **Exit code**: 0 every channel in the file agrees; 1 some do not; 2 the file cannot be compared.
     """
-    from crosscheck.terminal.csv_channels import channels_table
-    from crosscheck.terminal.verdicts import print_outcome
-    from crosscheck.verify.against_case import outcome_json, sample_times_csv, verify_csv
-
     with in_one_line():
+        from crosscheck.verify.against_case import outcome_json, verify_csv
+
         cases = found((case,))
         if len(cases) > 1:
             refuse(f'"{case}" is {len(cases)} cases: name one of {", ".join(each.name for each in cases)}')
         (chosen,) = cases
         if template:
-            if csv.exists():
-                refuse(f"{csv} is there already: a template would take its place; name another file")
-            write_whole(csv, sample_times_csv(chosen, variant))
-            console.print(words(f"Fill in {csv}, then run the command again without --template."), soft_wrap=True)
+            _write_template(csv, chosen, variant)
             return
         runs_on = scheduler_at(scheduler)
         outcome = verify_csv(chosen, csv, coarse=coarse, variant=variant, engine=engine, scheduler=runs_on)
+    code = _show(outcome)
+    if as_json:
+        typer.echo(outcome_json(outcome))
+    raise typer.Exit(code)
+
+
+def _write_template(csv: Path, case: Case, variant: str | None) -> None:
+    from crosscheck.verify.against_case import sample_times_csv
+
+    if csv.exists():
+        refuse(f"{csv} exists already, and a template would replace it: name another file")
+    write_whole(csv, sample_times_csv(case, variant))
+    console.print(words(f"Fill in {csv}, then run the command again without --template."), soft_wrap=True)
+
+
+def _show(outcome: CsvOutcome) -> int:
+    """Print the channels and the verdicts; the exit code."""
+    from crosscheck.terminal.csv_channels import channels_table
+    from crosscheck.terminal.verdicts import print_outcome
+
     console.print(channels_table(outcome))
     console.print(words(f"Held against {outcome.against}."), soft_wrap=True)
     if outcome.interpolated:
         console.print(words(f"Your times: {outcome.interpolated}."), soft_wrap=True)
     if outcome.left_out:
         console.print(words(f"Not compared: {', '.join(outcome.left_out)}"), soft_wrap=True)
-    code = print_outcome(console, outcome)
-    if as_json:
-        typer.echo(outcome_json(outcome))
-    raise typer.Exit(code)
+    return print_outcome(console, outcome)

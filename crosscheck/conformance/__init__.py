@@ -1,1 +1,1 @@
-"""Whether an engine keeps the contract: one clause a sentence of it, tried on small scenes with known answers."""
+"""Tests of an engine against the contract: each clause is a sentence, tried on small scenes with known answers."""

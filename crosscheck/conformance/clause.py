@@ -1,4 +1,4 @@
-"""Clauses of the contract: each is a sentence that an engine promises, and a function that tries whether it holds."""
+"""Clauses of the contract: each is a sentence, and a function that tests whether it holds."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import numpy as np
 
 from crosscheck.conformance.contents import to_offer
 from crosscheck.conformance.scenes import simple_scenes
-from crosscheck.engines.answers import checked_model, checked_run, efforts_of, support_of
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Trajectory
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
-# Pointwise results are one linear solve away from the data. Minimal coordinates leave some 1e-14; redundant ones with
-# Euler parameters some 1e-11. A wrong sign or frame is wrong in the first digit.
+# Pointwise results need one linear solve. Minimal coordinates have errors of about 1e-14, redundant ones with
+# Euler parameters of about 1e-11. A wrong sign or frame changes the first digit.
 POINTWISE = 1e-9
 
 
 class ClauseBroken(AssertionError):
-    """The engine does not keep the clause; the message says what was expected and what came."""
+    """The clause does not hold; the message says what was expected and what was found."""
 
 
 class NotOffered(Exception):
-    """The engine says that it cannot represent the clause's scene, or does not offer what the clause is about.
+    """The engine cannot represent the clause's scene, by its own statement, or does not offer the tested output.
 
-    `offer` is what it would have to do for the clause to be tried.
+    `offer` is what it would have to offer for the clause to be tried.
     """
 
     def __init__(self, reason: str, offer: str) -> None:
@@ -37,9 +37,9 @@ class NotOffered(Exception):
 
 @dataclass(frozen=True)
 class Clause:
-    """One sentence of the contract, and the function that raises ClauseBroken, or any other error, if it is not kept.
+    """One sentence of the contract, and the function that raises ClauseBroken, or any other error, if it does not hold.
 
-    `physical`: the clause holds numbers against mechanics, not only against the form of an answer.
+    `physical`: the clause tests numbers against mechanics, not only the form of an answer.
     """
 
     name: str
@@ -67,13 +67,13 @@ class Chapter:
 
 
 def require(condition: bool, message: str) -> None:
-    """ClauseBroken with the message where the condition does not hold."""
+    """Raise ClauseBroken with the message unless the condition holds."""
     if not condition:
         raise ClauseBroken(message)
 
 
 def equal(what: str, found: Any, expected: Any, scale: float = 1.0) -> None:
-    """Hold numbers against what they must be, to POINTWISE of each, and of `scale` (SI) where they must be small."""
+    """Compare numbers with expected ones, within POINTWISE of each, or of `scale` (SI) for small ones."""
     right = np.asarray(expected, dtype=float)
     value = np.asarray(found, dtype=float)
     allowed = POINTWISE * np.maximum(np.abs(right), scale)
@@ -82,56 +82,55 @@ def equal(what: str, found: Any, expected: Any, scale: float = 1.0) -> None:
 
 
 def within(what: str, error: float, bound: float) -> None:
-    """Hold an error against its bound; whatever is not a number is beyond it."""
+    """Compare an error with its bound; NaN exceeds it."""
     require(error <= bound, f"{what} is off by {error:.3g}, where {bound:.3g} can be explained by the engine's efforts")
 
 
 def offered(engine: Engine, scene: Scene) -> Model:
-    """The compiled scene; NotOffered with the engine's reason where it does not represent the scene exactly."""
-    support = support_of(engine, scene)
+    """The compiled scene; NotOffered with the engine's reason unless it represents the scene exactly."""
+    support = CheckedEngine(engine).supports(scene)
     if support.kind != "exact":
         raise NotOffered(support.reason, to_offer(engine, scene))
-    return checked_model(engine.compile(scene))
+    return CheckedEngine(engine).compile(scene)
 
 
 def simplest(engine: Engine, rate: float = 0.4) -> Scene:
-    """The first of the simple scenes that the engine represents in some way: what an answer looks like shows in any."""
+    """The first of the simple scenes that the engine represents, for clauses on the form of an answer."""
     scenes = simple_scenes(rate)
     for scene in scenes:
-        if support_of(engine, scene).kind != "no":
+        if CheckedEngine(engine).supports(scene).kind != "no":
             return scene
-    raise NotOffered(support_of(engine, scenes[0]).reason, f"{to_offer(engine, scenes[0])}, or any other simple scene")
+    reason = CheckedEngine(engine).supports(scenes[0]).reason
+    raise NotOffered(reason, f"{to_offer(engine, scenes[0])}, or any other simple scene")
 
 
 def snapshot(engine: Engine, scene: Scene) -> Snapshot:
-    """What the engine finds at the initial state of a scene."""
     found = offered(engine, scene).evaluate()
     require(isinstance(found, Snapshot), f"evaluate() returned a {type(found).__name__}, not a Snapshot")
     return found
 
 
 def ladder(engine: Engine, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
-    """The efforts of the engine for a run of the scene, held against the contract."""
-    return efforts_of(engine, scene, duration_s)
+    return CheckedEngine(engine, duration_s=duration_s).efforts(scene)
 
 
-def simulated(model: Model, scene: Scene, times: Real, effort: Effort) -> Trajectory:
-    """One run, held against the contract; it may end as it likes."""
-    return checked_run(model.simulate(Run(times.copy()), effort), times, scene)
+def simulated(model: Model, times: Real, effort: Effort) -> Trajectory:
+    """One run of a model from `offered`, whatever its status."""
+    return model.simulate(Run(times), effort)
 
 
 def finest_two(engine: Engine, scene: Scene, times: Real) -> tuple[Trajectory, Trajectory]:
-    """The runs at the last two efforts, which must finish: their difference says how well the finest is converged."""
+    """The runs at the last two efforts, which must finish: their difference bounds the error of the finest."""
     model = offered(engine, scene)
     model.warm_up()
-    coarser, finest = (simulated(model, scene, times, effort) for effort in ladder(engine, scene, times[-1])[-2:])
+    coarser, finest = (simulated(model, times, effort) for effort in ladder(engine, scene, times[-1])[-2:])
     for run in (coarser, finest):
         require(run.status == "finished", f"the run ended as {run.status}: {run.message}")
     return coarser, finest
 
 
 def given(what: str, found: Any) -> Any:
-    """A part of an answer that an engine may leave out: NotOffered where it did."""
+    """An optional part of an answer; NotOffered if the engine left it out."""
     if found is None:
         raise NotOffered(f"it does not offer {what}", f"give {what}")
     return found

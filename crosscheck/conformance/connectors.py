@@ -16,7 +16,7 @@ from flexmb.typing import Real
 
 CONNECTORS = Chapter(physical=True)
 
-# A line from the World origin: its length, its direction, and how fast it grows where B moves along x.
+# A line from the World origin: its length, its direction, and its rate of length if B moves along x.
 PLACE, LENGTH, FREE, SPEED = (0.3, 0.0, 0.4), 0.5, 0.4, 2.0
 ALONG, RATE = np.array([0.6, 0.0, 0.8]), 0.6 * SPEED
 LAW: dict[str, Any] = {"free_length": FREE, "preload": 2.0, "stiffness": 100.0, "stiffening": (300.0, 4000.0)}
@@ -24,7 +24,7 @@ STRETCH = LENGTH - FREE
 TENSION = 2.0 + 100.0 * STRETCH + 300.0 * STRETCH**2 + 4000.0 * STRETCH**3
 STORED = 2.0 * STRETCH + 50.0 * STRETCH**2 + 100.0 * STRETCH**3 + 1000.0 * STRETCH**4
 
-# A bushing: diagonal but for one coupling, and the motion of its frame B, a rotation vector and a place in axes of A.
+# A bushing, diagonal except for one coupling, and its frame B: a rotation vector and a position in axes of A.
 STIFF = np.diag([40.0, 50.0, 30.0, 400.0, 500.0, 600.0])
 STIFF[0, 4] = STIFF[4, 0] = 12.0
 LOSSY = 0.02 * STIFF

@@ -1,11 +1,11 @@
-"""What a scene has, in words: what an engine would have to represent for a clause to be tried."""
+"""The contents of a scene in words: what an engine would have to represent for a clause to be tried."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 
-from crosscheck.engines.answers import LATER
+from crosscheck.engines.checked import LATER
 from crosscheck.engines.contract import Engine
 from flexmb.scene.hinges import AngularCoordinate, LinearCoordinate
 from flexmb.scene.schema import RigidBody, Scene
@@ -20,7 +20,7 @@ def to_offer(engine: Engine, scene: Scene) -> str:
 
 
 def _parts(scene: Scene) -> Iterator[str]:
-    """Kinds of what the scene is made of, in the order in which it declares them; that it has rigid bodies is plain."""
+    """The kinds of the scene's items in the order of their declaration, without rigid bodies."""
     if not all(isinstance(body, RigidBody) for body in scene.bodies):
         yield "flexible bodies"
     for hinge in scene.hinges:
@@ -46,7 +46,7 @@ def _coordinates(hinge: object) -> Iterator[AngularCoordinate | LinearCoordinate
 
 
 def _abilities(part: object) -> Iterator[str]:
-    """What drives, springs and resists a coordinate or a wheel."""
+    """The drives, springs and dampers of a coordinate or a wheel."""
     told = {
         "prescribed": "prescribed motion", "torque": "motors", "force": "motors", "stiffness": "springs",
         "damping": "dampers", "friction": "friction",

@@ -1,4 +1,4 @@
-"""Frames, orders, signs and reference points: where a code that is right in itself is misread."""
+"""Frames, orders, signs and reference points: errors in converting a correct code's results."""
 
 from __future__ import annotations
 

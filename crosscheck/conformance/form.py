@@ -1,4 +1,4 @@
-"""What an answer looks like: names, statuses, shapes, times, reasons, and that it is the same every time."""
+"""The form of an answer: names, statuses, shapes, times, reasons, and reproducibility."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ import psutil
 
 from crosscheck.conformance.clause import Chapter, equal, ladder, require, simplest, simulated
 from crosscheck.conformance.scenes import MASS, simple_scenes
-from crosscheck.engines.answers import RUNGS, checked_model, checked_version, support_of
+from crosscheck.engines.answers import RUNGS
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import ENERGIES, Engine, Model, Snapshot, Trajectory
 from flexmb.run.channels import channels_of, distance
 from flexmb.scene.schema import Scene
@@ -22,20 +23,20 @@ from flexmb.typing import Real
 
 FORM = Chapter(physical=False)
 TIMES = np.linspace(0.0, 0.5, 11)
-LEAST_PART = 1e-4  # of a call is solved: adapters spend more time on converting than one would think, but not all
-PATIENCE_S = 2.0  # for what a run has begun to end
+LEAST_SHARE = 1e-4  # of a call's time that the solve must take: converting takes most of some adapters' time
+CLEANUP_S = 2.0  # within which threads and processes of a run must end
 
 
 @FORM.clause("`version` names the version of the library, or raises EngineMissing where it is not installed.")
 def version_is_text(engine: Engine) -> None:
     require(isinstance(engine, Engine), "it lacks a name or a method of the protocol Engine")
-    checked_version(engine.version())
+    CheckedEngine(engine).version()
 
 
 @FORM.clause("`supports` says how exactly a scene can be represented, and gives its reason where it cannot.")
 def a_refusal_has_a_reason(engine: Engine) -> None:
     for scene in simple_scenes():
-        support = support_of(engine, scene)
+        support = CheckedEngine(engine).supports(scene)
         text = f'supports() of the scene "{scene.name}" is "{support.kind}" without a reason'
         require(support.kind == "exact" or bool(support.reason.strip()), text)
 
@@ -44,14 +45,14 @@ def a_refusal_has_a_reason(engine: Engine) -> None:
 def efforts_are_a_ladder(engine: Engine) -> None:
     simplest(engine)
     for scene in simple_scenes():
-        for duration_s in (1e-3, 1.0, 1e3) if support_of(engine, scene).kind != "no" else ():
+        for duration_s in (1e-3, 1.0, 1e3) if CheckedEngine(engine).supports(scene).kind != "no" else ():
             ladder(engine, scene, duration_s)
 
 
 @FORM.clause("Every effort is another run: to ask for more changes the result, and counts no fewer evaluations.")
 def efforts_make_a_difference(engine: Engine) -> None:
     scene, model = _compiled(engine)
-    runs = [simulated(model, scene, TIMES, effort) for effort in ladder(engine, scene, TIMES[-1])]
+    runs = [simulated(model, TIMES, effort) for effort in ladder(engine, scene, TIMES[-1])]
     paths = [run.markers["tip"].position for run in runs if run.status == "finished"]
     require(len(paths) >= RUNGS, f"of {len(runs)} efforts {len(paths)} finish half a second of the simplest scene")
     for i, path in enumerate(paths):
@@ -68,11 +69,11 @@ def a_solve_takes_time(engine: Engine) -> None:
     taken, told = [], []
     for _ in range(3):
         before = perf_counter()
-        told.append(simulated(model, scene, TIMES, finest).wall_s)
+        told.append(simulated(model, TIMES, finest).wall_s)
         taken.append(perf_counter() - before)
     for each, call_s in zip(told, taken, strict=True):
         clocks = f"wall_s is {each:.3g} s of a call that takes {call_s:.3g} s"
-        require(each > LEAST_PART * min(taken), f"{clocks}: time the solve by a clock, such as time.perf_counter()")
+        require(each > LEAST_SHARE * min(taken), f"{clocks}: time the solve by a clock, such as time.perf_counter()")
         require(each <= 1.01 * call_s + 1e-3, f"{clocks}: compiling and warming up are no part of it")
 
 
@@ -85,7 +86,7 @@ def a_run_leaves_nothing_behind(engine: Engine) -> None:
         before = _holdings()
         for _ in range(4):
             _leave(engine)
-    patience = monotonic() + PATIENCE_S
+    patience = monotonic() + CLEANUP_S
     while (left := _left(known, before)) and monotonic() < patience:
         sleep(0.02)
     require(not left, f"after runs have returned there are {left}: end what a run begins before it returns")
@@ -102,9 +103,9 @@ def a_run_is_what_was_asked_for(engine: Engine) -> None:
 def sample_times_do_not_change_the_motion(engine: Engine) -> None:
     scene, model = _compiled(engine)
     coarser, finest = ladder(engine, scene, TIMES[-1])[-2:]
-    few = channels_of(simulated(model, scene, TIMES[::5], finest))
-    many = channels_of(simulated(model, scene, TIMES, finest))
-    rough = channels_of(simulated(model, scene, TIMES, coarser))
+    few = channels_of(simulated(model, TIMES[::5], finest))
+    many = channels_of(simulated(model, TIMES, finest))
+    rough = channels_of(simulated(model, TIMES, coarser))
     require(set(few) == set(many) == set(rough), "it has other channels with fewer sample times, or another effort")
     for name, values in many.items():
         size = max(1.0, float(np.abs(values).max()))
@@ -126,11 +127,11 @@ def a_run_can_be_repeated(engine: Engine) -> None:
 def runs_do_not_disturb_each_other(engine: Engine) -> None:
     scene = simplest(engine)
     before = msgspec.json.encode(scene)
-    model = checked_model(engine.compile(scene))
+    model = CheckedEngine(engine).compile(scene)
     efforts = ladder(engine, scene, TIMES[-1])
-    first = simulated(model, scene, TIMES, efforts[-1]).markers["tip"].position
+    first = simulated(model, TIMES, efforts[-1]).markers["tip"].position
     for effort in (efforts[0], efforts[-1]):
-        last = simulated(model, scene, TIMES, effort).markers["tip"].position
+        last = simulated(model, TIMES, effort).markers["tip"].position
     require(np.array_equal(first, last), "a run at another effort in between changes the result")
     require(msgspec.json.encode(scene) == before, "the scene is another after the runs")
 
@@ -167,15 +168,15 @@ def a_snapshot_names_what_the_scene_has(engine: Engine) -> None:
 def a_violent_run_has_a_status(engine: Engine) -> None:
     scene = simplest(engine, rate=1e6)
     times = np.linspace(0.0, 1e-3, 3)
-    model = checked_model(engine.compile(scene))
-    run = simulated(model, scene, times, ladder(engine, scene, times[-1])[0])  # where it raises, that is told
+    model = CheckedEngine(engine).compile(scene)
+    run = simulated(model, times, ladder(engine, scene, times[-1])[0])  # where it raises, that is told
     require(run.status == "finished" or bool(run.message.strip()), f"it {run.status} without saying why")
 
 
 def _compiled(engine: Engine) -> tuple[Scene, Model]:
     """The simplest scene that the engine represents, and its model, ready to run."""
     scene = simplest(engine)
-    model = checked_model(engine.compile(scene))
+    model = CheckedEngine(engine).compile(scene)
     model.warm_up()
     return scene, model
 
@@ -183,7 +184,7 @@ def _compiled(engine: Engine) -> tuple[Scene, Model]:
 def _run(engine: Engine) -> Trajectory:
     """Half a second at the finest effort."""
     scene, model = _compiled(engine)
-    return simulated(model, scene, TIMES, ladder(engine, scene, TIMES[-1])[-1])
+    return simulated(model, TIMES, ladder(engine, scene, TIMES[-1])[-1])
 
 
 def _start(engine: Engine) -> Snapshot:
@@ -193,17 +194,17 @@ def _start(engine: Engine) -> Snapshot:
 
 
 def _leave(engine: Engine) -> None:
-    """A run of a model of its own, of which nothing is kept."""
+    """A run of a new model, of which nothing is kept."""
     scene, model = _compiled(engine)
-    simulated(model, scene, TIMES, ladder(engine, scene, TIMES[-1])[0])
+    simulated(model, TIMES, ladder(engine, scene, TIMES[-1])[0])
     del model
     gc.collect()
 
 
 @contextmanager
 def _only_new_garbage() -> Iterator[None]:
-    """`gc.collect` passes over the million objects that are there already, which would take half a second each time."""
-    was_frozen = gc.get_freeze_count() > 0  # by who knows best what it wants to keep
+    """Let `gc.collect` skip the objects that exist already, about a million, which would take 0.5 s each time."""
+    was_frozen = gc.get_freeze_count() > 0  # then the caller has frozen its own objects
     gc.freeze()
     try:
         yield
@@ -213,14 +214,14 @@ def _only_new_garbage() -> Iterator[None]:
 
 
 def _holdings() -> dict[str, int]:
-    """What this process holds, in numbers."""
+    """The numbers of this process's threads, children and open files."""
     me = psutil.Process()
     files = me.num_fds() if hasattr(me, "num_fds") else len(me.open_files())
     return {"threads": me.num_threads(), "processes": len(me.children()), "open files": files}
 
 
 def _left(known: set[threading.Thread], before: dict[str, int]) -> str:
-    """What is there that was not, in words."""
+    """What exists in addition to what was known before, in words."""
     threads = [each.name for each in threading.enumerate() if each not in known]
     more = {what: number - before[what] for what, number in _holdings().items() if number > before[what]}
     told = [f"threads of Python ({', '.join(threads)})"] if threads else []
@@ -228,6 +229,6 @@ def _left(known: set[threading.Thread], before: dict[str, int]) -> str:
 
 
 def _same_side(found: Real, like: Real) -> Real:
-    """The quaternion or its negative, which is the same rotation, whichever is nearer."""
+    """The quaternion or its negative, whichever is nearer to the other."""
     return found if float(np.dot(found, like)) >= 0.0 else -found
 

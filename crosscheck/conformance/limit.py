@@ -1,4 +1,4 @@
-"""How long a clause may take: in a file of its own, from which the command line takes it without the clauses."""
+"""The time limit of a clause, in a file that the command line can import without the clauses."""
 
 from __future__ import annotations
 

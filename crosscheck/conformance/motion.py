@@ -86,7 +86,7 @@ def force_in_world_axes(engine: Engine) -> None:
 @MOTION.clause("A force in node axes turns with the body.")
 def force_in_node_axes(engine: Engine) -> None:
     acceleration = snapshot(engine, _pushed("node")).markers["body"].acceleration
-    # The turned body feels its own x, which is World y, at World (-0.5, 0, 0).
+    # The force is along the turned body's x, which is World y, at World (-0.5, 0, 0).
     equal("the acceleration of the body", acceleration, [0, 0, -2.0 / INERTIA[2], 0, 4.0 / MASS, 0])
 
 
@@ -179,7 +179,7 @@ def velocity_is_the_rate_of_position(engine: Engine) -> None:
     scene = arm().revolute("pivot", "ground", "arm", axis=(0.0, 1.0, 0.0), angle=0.3, rate=1.0).scene()
     model, h = offered(engine, scene), 1e-3
     start = model.evaluate().markers["com"]
-    run = simulated(model, scene, np.array([0.0, h]), ladder(engine, scene, h)[-1])
+    run = simulated(model, np.array([0.0, h]), ladder(engine, scene, h)[-1])
     require(run.status == "finished", f"a millisecond of a pendulum ended as {run.status}: {run.message}")
     predicted = start.position + h * start.velocity[3:] + 0.5 * h * h * start.acceleration[3:]
     path = run.markers["com"]

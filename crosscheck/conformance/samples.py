@@ -1,7 +1,7 @@
-"""What a run says at every sample: loads, momentum and energy belong to the motion that stands beside them.
+"""Outputs of a run at every sample: loads, momentum and energy must belong to the motion at the same sample.
 
-A snapshot shows a sign once. Here bodies turn over and swing, so that every component takes both signs, and each sample
-is held against mechanics at the position, orientation and velocity that the engine itself reports for it.
+In a snapshot each component has one sign. Here bodies turn over and swing, so that it takes both, and each sample
+is compared with mechanics at the position, orientation and velocity that the engine itself reports.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from flexmb.typing import Real
 
 SAMPLES = Chapter(physical=True)
 TIMES = np.linspace(0.0, 2.0, 41)
-CONVERGED = 1e-2  # of a signal: two last efforts that are farther apart say nothing about its sign
+CONVERGED = 1e-2  # of a signal: largest distance of the last two efforts for which a clause can be tested
 TILTED = np.array([1.0, -2.0, 2.0]) / 3.0
 FIELD = np.array([3.0, -4.0, -7.0])  # m/s^2: oblique, as is the axis, so that no component of a load is zero
 COM = np.array([0.2, -0.1, 0.3])
@@ -94,7 +94,7 @@ def connector_loads_of_a_run_hold_at_every_sample(engine: Engine) -> None:
 
 
 def _hold(what: str, found: Iterable[Real], expected: Real) -> None:
-    """The last of two runs (T, k) against what it must be, by as much as the effort before it differs from it."""
+    """Compare the last of two runs (T, k) with the expected values, within their distance from each other."""
     rough, fine = found
     size = float(np.abs(expected).max())
     refinement = float(np.abs(rough - fine).max())

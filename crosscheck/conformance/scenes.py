@@ -1,4 +1,4 @@
-"""The small scenes of the clauses: one body with its mass centre off its origin, on whatever the clause is about."""
+"""The small scenes of the clauses: one body with its mass centre off its origin, with the items of the clause."""
 
 from __future__ import annotations
 

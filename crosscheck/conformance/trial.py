@@ -1,7 +1,7 @@
-"""Trying an engine clause by clause, each in a process of its own: what an engine does to one reaches no other clause.
+"""Trying an engine clause by clause, each in a process of its own, so that clauses cannot affect each other.
 
-A new interpreter for each would cost a second or two, most of it for importing what all of them need. So where that can
-be done they are forked from a process that has imported this package and no engine but the native one, and has called
+A new interpreter for each would take a second or two, most of it for imports. So where the system supports it, they
+are forked from a process that has imported this package and the native engine and has called
 nothing.
 """
 
@@ -17,24 +17,25 @@ from typing import Literal, NamedTuple
 from crosscheck.conformance.catalogue import CLAUSES, SHOWN
 from crosscheck.conformance.clause import Clause, ClauseBroken, NotOffered
 from crosscheck.conformance.limit import CLAUSE_LIMIT_S
-from crosscheck.engines.answers import BrokenContract, clean
+from crosscheck.engines.answers import BrokenContract, clean, describe
 from crosscheck.engines.contract import Engine, EngineMissing
-from crosscheck.running.execute import describe, find_engine
+from crosscheck.running.execute import NoSuchEngine, find_engine
 from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import Work
 from crosscheck.running.sweep import PROVIDER
 from crosscheck.running.worker import SPAWN, Method
 
 FORKED: Method = "forkserver"
-IMPORTED = ("crosscheck.conformance.trial", "crosscheck.engines.native")  # before the processes of clauses are forked
+IMPORTED = ("crosscheck.conformance.trial", "crosscheck.engines.native")  # in the process from which others are forked
 
 ClauseStatus = Literal["holds", "broken", "not offered", "missing"]
 
 
 @dataclass(frozen=True)
 class ClauseOutcome:
-    """What came of a clause.
+    """The outcome of a clause.
 
-    `message` says why it does not hold or was not tried, `offer` what an engine would have to do for it to be tried.
+    `message` says why it does not hold or was not tried, `offer` what the engine would have to offer.
     """
 
     clause: str
@@ -53,7 +54,7 @@ class ClauseTrial(NamedTuple):
 
 
 def try_clause(engine: Engine, clause: Clause) -> ClauseOutcome:
-    """Try one clause in this process. Whatever the engine does but ending the process has an outcome."""
+    """Try one clause in this process. Everything that the engine does, except ending the process, has an outcome."""
     try:
         clause.check(engine)
     except NotOffered as reason:
@@ -72,13 +73,12 @@ def try_clause(engine: Engine, clause: Clause) -> ClauseOutcome:
 def try_engine(
     name: str, clauses: tuple[str, ...] = tuple(CLAUSES), provider: str = PROVIDER, limit_s: float = CLAUSE_LIMIT_S
 ) -> Iterator[ClauseOutcome]:
-    """Try clauses on the engine called `name`, one after the other, each after at most `limit_s` seconds broken."""
+    """Try clauses on the engine called `name`, one after the other; one that takes more than `limit_s` seconds is
+    broken."""
     trials = [ClauseTrial(provider, name, clause) for clause in clauses]
     with tempfile.TemporaryDirectory() as folder:
         log = str(Path(folder) / "log")
-        for event in run_jobs(
-            attempt, trials, 1, log, kind=_clause, time_limit_s=lambda trial: limit_s, method=_start_method()
-        ):
+        for event in run_jobs(Work(attempt, trials, log, 1, _clause, lambda trial: limit_s), _start_method()):
             if event.kind == "emitted":
                 yield event.content
             elif event.kind in ("crashed", "stopped"):
@@ -87,18 +87,18 @@ def try_engine(
 
 
 def attempt(trial: ClauseTrial, emit: Callable[[ClauseOutcome], None]) -> None:
-    """What a worker does with a trial."""
     clause = CLAUSES[trial.clause]
-    found = find_engine(trial.provider, trial.engine)
-    if isinstance(found, str):
-        emit(ClauseOutcome(clause.name, clause.sentence, "missing", found))
+    try:
+        engine = find_engine(trial.provider, trial.engine)
+    except NoSuchEngine as error:
+        emit(ClauseOutcome(clause.name, clause.sentence, "missing", str(error)))
     else:
-        emit(try_clause(found, clause))
+        emit(try_clause(engine, clause))
 
 
 @dataclass(frozen=True)
 class ContractVerdict:
-    """Whether the contract is `kept`, whether the `whole` of it was tried, and that in a sentence."""
+    """Whether the contract is `kept`, whether the `whole` of it was tried, and both in a sentence."""
 
     kept: bool
     whole: bool
@@ -108,8 +108,8 @@ class ContractVerdict:
 def verdict_on(outcomes: list[ClauseOutcome]) -> ContractVerdict:
     """The verdict on an engine.
 
-    Kept means that nothing is broken or missing and that enough was shown: the form of an answer, and a run that is
-    known in closed form. An engine that refuses what these are about has shown nothing, whatever else holds.
+    The contract is kept if no clause is broken or missing and the essential ones were tried: the form of an answer, and
+    a run that is known in closed form.
     """
     counts = {status: sum(each.status == status for each in outcomes) for status in ("holds", "broken", "not offered")}
     missing = next((each for each in outcomes if each.status == "missing"), None)
@@ -128,7 +128,7 @@ def verdict_on(outcomes: list[ClauseOutcome]) -> ContractVerdict:
 
 
 def to_offer(outcomes: list[ClauseOutcome]) -> dict[str, list[str]]:
-    """What an engine would have to do for clauses to be tried, and which: those that need the same together."""
+    """For each thing that an engine would have to offer, the clauses that need it."""
     found: dict[str, list[str]] = {}
     for each in outcomes:
         if each.status == "not offered":
@@ -142,7 +142,7 @@ def _first_offer(outcomes: list[ClauseOutcome]) -> str:
 
 
 def _clause(trial: ClauseTrial) -> str:
-    """Processes serve one kind of trials: so none serves two clauses."""
+    """The kind of a trial: one process for each clause."""
     return trial.clause
 
 

@@ -1,4 +1,4 @@
-"""Wheels: what their motors do to their body, and what their bearings carry."""
+"""Wheels: reactions of their motors on their body, and loads of their bearings."""
 
 from __future__ import annotations
 

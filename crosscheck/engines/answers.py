@@ -1,15 +1,17 @@
-"""An engine's answers are held against the contract before they are recorded; one that breaks it is a failed run.
+"""Checks of an engine's answers against the contract, before they are recorded. An invalid answer is a failed run.
 
-Every function returns the answer in plain types of our own (float64 copies, short clean text), so that nothing an
-engine keeps or changes later reaches a record.
+Every function returns the answer in our own plain types (float64 copies, short clean text), so that what an engine
+changes later does not reach a record.
 """
 
 from __future__ import annotations
 
 import math
 import numbers
+import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields
+from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -18,7 +20,6 @@ from crosscheck.engines.contract import (
     ENERGIES,
     OUTPUTS,
     Effort,
-    Engine,
     MarkerPath,
     Model,
     Status,
@@ -27,13 +28,10 @@ from crosscheck.engines.contract import (
 )
 from crosscheck.engines.trajectories import first_samples
 from flexmb.scene.connectors import BetweenNodes
-from flexmb.scene.schema import Scene, UserLaw
+from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 RUNGS = 3
-LATER = ("connectors", "controllers", "events")
-"""Collections of a scene that came after the first contract: an engine says in `takes` that it knows them."""
-NO_START = "begins all runs at t = 0"
 LOAD_PARTS = {"torque": slice(0, 3), "force": slice(3, 6)}
 LONGEST_TEXT = 4000
 LARGEST_COUNT = 2**63 - 1  # what a record can hold
@@ -42,14 +40,26 @@ UNIT = 8 * float(np.finfo(np.float32).eps)
 
 
 class BrokenContract(ValueError):
-    """An answer that the contract does not allow; the message says what was expected and what came."""
+    """An answer that the contract does not allow; the message says what was expected and what was found."""
 
 
 def clean(text: str) -> str:
-    """Text that can be encoded and is not endless."""
+    """Text of limited length that can be encoded as UTF-8."""
     cut = text[:LONGEST_TEXT]
     more = f" ... ({len(text) - len(cut)} characters more)" if len(cut) < len(text) else ""
     return cut.encode("utf-8", "backslashreplace").decode() + more
+
+
+def describe(error: BaseException) -> str:
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f" ({frames[-1].name}, {Path(frames[-1].filename).name} line {frames[-1].lineno})" if frames else ""
+    try:
+        text = str(error)
+    except Exception:
+        text = "its message cannot be read"
+    if isinstance(error, BrokenContract):
+        return clean(f"broke the contract: {text}")
+    return clean(f"{type(error).__name__}: {text}{place}")
 
 
 def checked_version(found: Any) -> str:
@@ -59,38 +69,11 @@ def checked_version(found: Any) -> str:
     return text
 
 
-def support_of(engine: Engine, scene: Scene, t_start: float = 0.0) -> Support:
-    """What `supports` says; "no" where the scene holds what an adapter that does not know of it would leave out, or
-    where the run begins at another time (s) than the adapter's runs do.
-
-    Laws of controllers that are not in this distribution are refused for all: what they do may change, and records
-    would not know.
-    """
-    known = getattr(engine, "takes", ())
-    if t_start != 0.0 and "t_start" not in known:
-        return Support("no", f"the adapter of engine {engine.name} {NO_START}")
-    for collection in LATER:
-        items = getattr(scene, collection)
-        if items and collection not in known:
-            return Support("no", f'"{items[0].name}": the adapter of engine {engine.name} knows no {collection}')
-    for law in scene.controllers:
-        if isinstance(law, UserLaw) and not law.function.startswith("flexmb."):
-            return Support("no", f'the function "{law.function}" is not of flexmb: a record would not know its changes')
-    return checked_support(engine.supports(scene))
-
-
 def checked_support(found: Any) -> Support:
     """What `supports` returned."""
     _instance(found, Support, "supports()")
     _one_of(found.kind, ("exact", "surrogate", "no"), "the kind of supports()")
     return Support(found.kind, _text(found.reason, "the reason of supports()"))
-
-
-def efforts_of(engine: Engine, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
-    """The engine's ladder for a run of this duration: of its `efforts_for` where it has one, else of its `efforts`."""
-    if (by_duration := getattr(engine, "efforts_for", None)) is not None:
-        return checked_ladder(by_duration(scene, duration_s))
-    return checked_ladder(engine.efforts(scene))
 
 
 def checked_ladder(found: Any) -> tuple[Effort, ...]:
@@ -148,7 +131,8 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
 
 
 def _reached(found: Any, times: Real, finished: bool) -> int:
-    """How many of the samples asked for are there. A clock that adds up T intervals is off by T roundings at most."""
+    """The number of requested samples that were reached. A time summed from T intervals has at most T rounding
+    errors."""
     _require(isinstance(found, np.ndarray) and found.ndim == 1, f"times is {_named(found)} and not an array (T,)")
     taken = _array(found, "times", len(found))
     _require(len(taken) <= len(times), f"times has {len(taken)} samples, more than the {len(times)} asked for")
@@ -172,7 +156,7 @@ def _path(found: Any, where: str, count: int) -> MarkerPath:
 
 
 def _known(scene: Scene) -> dict[str, set[str]]:
-    """Who can have each of the outputs that several items have."""
+    """For each output that is given by item, the names of the items that can have it."""
     hinges, wheels = _names(scene.hinges), _names(scene.wheels)
     return {
         "loads": hinges | _names(scene.closures) | _names(scene.point_masses),
@@ -185,7 +169,7 @@ def _known(scene: Scene) -> dict[str, set[str]]:
 
 
 def _output(found: Any, where: str, count: int, known: set[str] | None) -> Any:
-    """An output of a run in plain arrays: by name where `known` items can have it, else one array or None."""
+    """An output of a run as plain arrays: by name if only `known` items can have it, else one array or None."""
     columns = OUTPUTS[where]
     if known is not None:
         named = _named_by(found, where, known)
@@ -194,7 +178,7 @@ def _output(found: Any, where: str, count: int, known: set[str] | None) -> Any:
 
 
 def _named_by(found: Any, where: str, known: set[str]) -> list[tuple[str, Any]]:
-    """The items of a mapping whose keys are names that are known."""
+    """The items of a mapping all of whose keys must be known names."""
     _require(isinstance(found, Mapping), f"{where} is {_named(found)}, not a mapping")
     there = ", ".join(sorted(known)) or "none"
     for name in found:
@@ -203,7 +187,7 @@ def _named_by(found: Any, where: str, known: set[str]) -> list[tuple[str, Any]]:
 
 
 def _array(found: Any, where: str, count: int, *width: int | None) -> Real:
-    """A float64 copy of an array (count, *width) of real numbers; `None` leaves a width open."""
+    """A float64 copy of an array (count, *width) of real numbers; a width of None may be any."""
     plain = isinstance(found, np.ndarray) and not isinstance(found, np.ma.MaskedArray)
     _require(plain, f"{where} is {_named(found)}, not an array")
     _require(found.dtype.kind in "fiu", f"{where} is of dtype {found.dtype}, not of real numbers")
@@ -214,7 +198,7 @@ def _array(found: Any, where: str, count: int, *width: int | None) -> Real:
 
 
 def _finite_samples(run: Trajectory, finished: bool) -> int:
-    """How many samples from the first are finite throughout; all must be where the run says that it finished."""
+    """The number of samples, from the first, in which everything is finite; in a finished run all must be."""
     count = len(run.times)
     for where, values in _signals(run):
         good = np.all(np.isfinite(values), axis=tuple(range(1, values.ndim)))
@@ -226,7 +210,7 @@ def _finite_samples(run: Trajectory, finished: bool) -> int:
 
 
 def _undetermined(found: Trajectory) -> tuple[str, ...]:
-    """Names of channels of loads and drives that there are."""
+    """The names of undetermined channels, which must be loads or drives of the run."""
     _instance(found.undetermined, tuple, "undetermined")
     there = {f"load:{name}.{part}" for name in found.loads for part in LOAD_PARTS}
     there |= {f"drive:{name}" for name in found.drives}
@@ -237,7 +221,7 @@ def _undetermined(found: Trajectory) -> tuple[str, ...]:
 
 
 def _determined(run: Trajectory, output: str, name: str, values: Real) -> Real:
-    """The columns of a load or drive that the motion determines."""
+    """The columns of an output that the motion determines."""
     if output == "loads":
         known = [part for key, part in LOAD_PARTS.items() if f"load:{name}.{key}" not in run.undetermined]
         return np.hstack([values[:, :0], *(values[:, part] for part in known)])

@@ -1,6 +1,6 @@
-"""Connectors evaluated for the peers, from the schema's definitions: loads on both ends, energy, power.
+"""Connectors evaluated for the peers: loads on both ends, energy and power.
 
-Independent of the native code's compiled evaluation, so that the two check each other.
+This is independent of flexmb's compiled evaluation, so that the two check each other.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ KNOWN = (*get_args(PeerLine), *get_args(PeerAlong))
 """The connectors that adapters know; a scene with another is refused by `crosscheck.engines.links.obstacle`."""
 
 Law = Callable[[float], tuple[float, float]]
-"""Of a displacement: the load that resists it, and the energy stored."""
+"""The resisting load and the stored energy as functions of the displacement."""
 
 
 class Moving(NamedTuple):
-    """A frame in World: position (3,), rotation (3,3), angular velocity (3,), velocity (3,)."""
+    """Motion of a frame in World axes: position (3,), rotation (3,3), angular velocity (3,), velocity (3,)."""
 
     position: Real
     rotation: Real
@@ -49,7 +49,7 @@ class Moving(NamedTuple):
     linear: Real
 
     def carrying(self, inner: Frame) -> Moving:
-        """A frame fixed to this one."""
+        """The motion of a frame fixed in this one."""
         arm = self.rotation @ inner.position
         velocity = self.linear + cross(self.angular, arm)
         return Moving(self.position + arm, self.rotation @ inner.rotation, self.angular, velocity)
@@ -59,7 +59,8 @@ WORLD = Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 
 
 class Exerted(NamedTuple):
-    """[torque; force] (6,) on A about A and on B about B, World axes; energy (J); power of what is not elastic (W)."""
+    """[torque; force] (6,) on A about A and on B about B, World axes; stored energy (J); power of inelastic parts
+    (W)."""
 
     on_a: Real
     on_b: Real
@@ -68,7 +69,7 @@ class Exerted(NamedTuple):
 
 
 class Along(NamedTuple):
-    """Load along a coordinate, or tension of a line; energy (J), power of what is not elastic (W)."""
+    """Load along a coordinate, or tension of a line; stored energy (J), power of inelastic parts (W)."""
 
     load: float
     energy: float
@@ -85,7 +86,7 @@ class Connection:
 
 
 def exerts(connector: PeerLine) -> Callable[[float, Moving, Moving], Exerted]:
-    """What a connector does at time t between frames A and B that move so."""
+    """The function of time and of the motion of frames A and B that gives the connector's loads."""
     on = _law(connector)
 
     def exerted(t: float, a: Moving, b: Moving) -> Exerted:
@@ -108,12 +109,12 @@ def _law(connector: PeerLine) -> Callable[[float, Moving, Moving], tuple[Real, f
 
 
 def connections(scene: Scene, chain: tuple[Link, ...]) -> tuple[Connection, ...]:
-    """Connectors between nodes."""
     return tuple(Connection(scene, chain, each) for each in scene.connectors if isinstance(each, PeerLine))
 
 
 def along_hinges(scene: Scene) -> list[tuple[str, str, int, Callable[[float, float, float], Along]]]:
-    """Of each along a hinge: name, hinge (point mass, wheel), number of the coordinate, load by time, value, rate."""
+    """For each connector along a hinge: its name, the hinge, wheel or point mass, the number of the coordinate, and the
+    load as a function of time, value and rate."""
     found = []
     for connector in scene.connectors:
         if isinstance(connector, PeerAlong):
@@ -132,7 +133,7 @@ def _attached(scene: Scene, chain: tuple[Link, ...], connector: PeerLine, side: 
 
 
 def law_of(stems: dict[str, Any]) -> Law:
-    """The law of a spring by its keys without units."""
+    """The law of a spring, given its parameters by their names without units."""
     if stems["table"]:
         return _by_table(stems["table"], stems["loads"])
     powers = [stems["preload"], stems["stiffness"], *stems["stiffening"]]
@@ -145,7 +146,8 @@ def law_of(stems: dict[str, Any]) -> Law:
 
 
 def _by_table(places: tuple[float, ...], given: tuple[float, ...]) -> Law:
-    """Between the knots its cubics, beyond them straight lines; in plain numbers, for a spline's call takes long."""
+    """Cubics between the knots, straight lines beyond; evaluated in plain Python, which is faster than a SciPy
+    spline."""
     from scipy.interpolate import PchipInterpolator  # few springs have a table, and it takes a fifth of a second
 
     spline = PchipInterpolator(places, given)
@@ -172,7 +174,7 @@ def _by_table(places: tuple[float, ...], given: tuple[float, ...]) -> Law:
 
 
 def tension_of(connector: SpringDamper) -> Callable[[float, float, float], Along]:
-    """Tension, energy and power by time, distance beyond the free length, and its rate."""
+    """Tension, energy and power as functions of time, elongation and its rate."""
     law, push = law_of(by_stem(connector)), connector.force_N and profile(connector.force_N)
     sign = {"both": 0.0, "tension": 1.0, "compression": -1.0}[connector.acts]
     slack = 0.5 * connector.preload_N**2 / connector.stiffness_N_m if sign else 0.0

@@ -1,7 +1,7 @@
-"""What an engine must offer, and the only data engines exchange.
+"""The interface of an engine, and the only data that engines exchange.
 
-Everything crosses this boundary in World axes, SI, at named markers and hinges; quaternions are scalar-first and map
-body components to World components; spatial vectors are angular first. Native coordinates never leave an engine.
+All data are in World axes and SI units, at named markers and hinges; quaternions are scalar-first and map body
+components to World components; spatial vectors have their angular part first. An engine's own coordinates stay in it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol, runtime_checkable
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
-Array = Real  # as engines outside this package import it
+Array = Real  # the name that engines outside this package import
 Status = Literal["finished", "diverged", "failed"]
 ENERGIES = ("kinetic", "strain", "spring", "gravity")  # the kinds of energy that an engine may give
 
@@ -29,8 +29,8 @@ class Support:
 class Run:
     """What to simulate: from the first of `times` (s, strictly increasing) to the last.
 
-    The first is 0, but for engines whose `takes` names "t_start": those may be asked for a run that begins later. The
-    scene's initial state is that at the first time, and functions of time, controllers and events know the time.
+    The first time is 0, unless the engine's `takes` names "t_start". The scene's initial state belongs to the first
+    time; functions of time, controllers and events use the times as given.
     """
 
     times: Real
@@ -43,7 +43,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Effort:
-    """One setting of an engine's accuracy: a relative tolerance or a fixed step (s); `method` names the integrator."""
+    """An accuracy setting of an engine: a relative tolerance or a fixed step (s); `method` names the integrator."""
 
     kind: Literal["tolerance", "step"]
     value: float
@@ -51,7 +51,7 @@ class Effort:
 
     @property
     def label(self) -> str:
-        """How it is named everywhere; different efforts have different labels."""
+        """Its unique name in records and reports."""
         short = f"{self.value:g}"
         exact = short if float(short) == self.value else repr(float(self.value))
         return f"{self.method} {'rtol' if self.kind == 'tolerance' else 'h'}={exact}"
@@ -103,7 +103,7 @@ class MarkerPath:
 
 
 def _by_name(*columns: int | None) -> Any:
-    """An output that several items have, by their names: arrays (T, *columns)."""
+    """An output of several items: arrays (T, *columns) by their names."""
     return field(default_factory=dict, metadata={"columns": columns})
 
 
@@ -114,16 +114,15 @@ def _single(*columns: int | None) -> Any:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """One run. Arrays are cut to the T samples reached: a diverged run keeps its good part and says when and why.
+    """One run. Arrays have the T samples reached: a diverged run keeps its good samples; its message says when and why.
 
-    All this is checked before it is recorded (`crosscheck.engines.answers`); an answer that breaks it counts as
-    *failed*. Names are those of the scene; a marker, a load or an energy that is left out is a channel that the engine
-    does not offer.
+    All answers are checked before they are recorded (`crosscheck.engines.answers`); an invalid one counts as *failed*.
+    Names are those of the scene. A marker, load or energy that is left out is a channel that the engine does not offer.
     `loads`, `wheel_loads`, `connectors` (T,6); `drives` (T,n); `hinge_forces` (T,1); `energy` of each kind (T,);
-    `momentum` (T,6); `work` (T,) is the work done so far by drives, motors, dampers, friction, actuators and loads,
-    where the engine integrates it. `wall_s` times only the solve. `undetermined`: channels, "load:<name>.torque",
-    "load:<name>.force" or "drive:<name>", that the motion leaves open where closures suppress what others suppress
-    already; they may hold NaN, and nobody is compared in them.
+    `momentum` (T,6); `work` (T,): the work done so far by drives, motors, dampers, friction, actuators and loads, if
+    the engine integrates it. `wall_s` is the time of the solve alone. `undetermined`: the channels
+    "load:<name>.torque", "load:<name>.force" or "drive:<name>" that redundant closures leave undetermined; they may
+    hold NaN and are not compared.
     """
 
     status: Status
@@ -146,7 +145,7 @@ class Trajectory:
 OUTPUTS: dict[str, tuple[int | None, ...]] = {
     each.name: each.metadata["columns"] for each in fields(Trajectory) if "columns" in each.metadata
 }
-"""The outputs of a run beside the markers, with the shape that each array has after its T samples; None is any."""
+"""The outputs of a run other than markers, with the shape of each array without its axis of T samples; None is any."""
 
 
 @runtime_checkable
@@ -154,26 +153,25 @@ class Model(Protocol):
     """A scene compiled by one engine."""
 
     def warm_up(self) -> None:
-        """Compile or cache whatever must not be timed."""
+        """Compile or cache everything that must not be timed."""
 
     def evaluate(self) -> Snapshot:
         """Accelerations, energies and loads at the scene's initial state, t = 0."""
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
-        """Integrate; the only timed part. Never raises for a diverging run: that is a status."""
+        """Integrate; only this is timed. A diverging run has a status and raises nothing."""
 
 
 @runtime_checkable
 class Engine(Protocol):
     """An independent multibody code behind one adapter. Entry-point group: `crosscheck.engines`.
 
-    An engine may have a `summary`, one line that `crosscheck engines` shows; and for timing reports an `algorithm`, in
-    a few words, and `settings`, a sentence or two on how it is run so that the race is fair: its best solver, what is
-    switched off, whose loop steps it, and what its `wall_s` contains. `takes` names the collections of a scene beyond
-    the first contract that its adapter knows, such as "connectors" or "controllers"; a scene that has others is refused
-    for it. "t_start" among them says that its runs may begin at another time than 0. `efforts_for(scene, duration_s)`
-    is asked in place of `efforts` where an engine has it: a ladder of fixed steps depends on how long the run is (s),
-    one of tolerances does not (see `crosscheck.engines.steps`).
+    Optional attributes: `summary`, one line for `crosscheck engines`; for timing reports `algorithm`, a few words, and
+    `settings`, a sentence or two on how it is run: its best solver, what is switched off, whose loop steps it, and what
+    its `wall_s` contains. `takes` names what its adapter handles of "connectors", "controllers" and "events" (a scene
+    with others is refused) and "t_start" (runs that begin at another time than 0). `efforts_for(scene, duration_s)`
+    replaces `efforts` for engines with fixed steps, whose ladder depends on the duration (see
+    `crosscheck.engines.steps`).
     """
 
     name: str
@@ -185,10 +183,10 @@ class Engine(Protocol):
         """Whether, and how exactly, this engine can represent the scene."""
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        """A ladder of at least three efforts, coarse to fine, suitable for this scene's work-precision chart."""
+        """A ladder of at least three efforts for this scene, coarse to fine."""
 
     def compile(self, scene: Scene) -> Model:
-        """Convert the scene; every conversion of conventions happens here."""
+        """Convert the scene, including all conventions."""
 
 
 class EngineMissing(RuntimeError):

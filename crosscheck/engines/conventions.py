@@ -1,7 +1,7 @@
-"""The only place that reorders: quaternions, spatial vectors, frames, wrenches and free-joint velocities.
+"""Conversions of quaternions, spatial vectors, frames, wrenches and free-joint velocities; there are no others.
 
 The project's side of every conversion: quaternions scalar-first, spatial vectors angular first, `R_AB` maps B
-components to A components, a wrench [tau; f] acts on the body it is named for.
+components to A components, a wrench [tau; f] acts on the body for which it is named.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from flexmb.scene.schema import Body, Hinge
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
-_LAST, _FIRST = np.array([1, 2, 3, 0]), np.array([3, 0, 1, 2])  # arrays, as a list takes longer than its use
+_LAST, _FIRST = np.array([1, 2, 3, 0]), np.array([3, 0, 1, 2])  # arrays: converting a list takes longer than indexing
 
 
 def scalar_last(quaternion: ArrayLike) -> Real:
@@ -34,7 +34,7 @@ def angular_first(spatial: ArrayLike) -> Real:
 
 
 def cross(a: Real, b: Real) -> Real:
-    """a x b over the last axis (..., 3): `np.cross` without its generality, which costs twenty times as much."""
+    """a x b over the last axis (..., 3); the general `np.cross` takes twenty times as long."""
     return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
 
 

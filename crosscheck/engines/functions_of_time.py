@@ -1,6 +1,6 @@
-"""Functions of time evaluated for the peers: value, rate and acceleration of every kind in `flexmb.scene.functions`.
+"""Functions of time evaluated for the peers: value and two derivatives of every kind in `flexmb.scene.functions`.
 
-Independent of the native code's compiled evaluation, so that the two check each other.
+This is independent of flexmb's compiled evaluation, so that the two check each other.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ class Profile(NamedTuple):
 
 def profile(function: Function) -> Callable[[float], Profile]:
     """The function as a callable t -> Profile. A table gives NaN outside its interval."""
-    return _once_a_time(_evaluated(function))
+    return _with_last_kept(_evaluated(function))
 
 
-def _once_a_time(evaluate: Callable[[float], Profile]) -> Callable[[float], Profile]:
-    """The same function, which evaluates once for calls in a row at the same time.
+def _with_last_kept(evaluate: Callable[[float], Profile]) -> Callable[[float], Profile]:
+    """The same function, evaluated once for successive calls at the same time.
 
-    Engines ask for value and rate apart, in every iteration of Newton's method and in every stage of a step: with
-    prescribed motions this was a third of what they took.
+    Engines ask for value and rate separately, in every Newton iteration and every stage of a step: with prescribed
+    motions the repeated evaluations took a third of their time.
     """
     last, found = nan, Profile(nan, nan, nan)
 
@@ -70,7 +70,7 @@ def _evaluated(function: Function) -> Callable[[float], Profile]:
 
 
 def breaks(function: Function) -> tuple[float, ...]:
-    """Times (s) at which the function or a low derivative is not smooth: an integrator should stop there."""
+    """Times (s) at which the function or a low derivative is not smooth, where an integrator should stop."""
     match function:
         case SmoothStep(start_s=start, duration_s=duration) | Pulse(start_s=start, duration_s=duration):
             return (start, start + duration)
@@ -107,9 +107,9 @@ def scene_functions(scene: Scene) -> list[Function]:
 
 
 def fastest_rate(function: Function, until: float = inf) -> float:
-    """Largest |df/dt| (unit/s) over [0, until], for choosing a step: bounds where they are known, else samples."""
+    """Largest |df/dt| (unit/s) over [0, until], for choosing a step; of a table the largest of samples."""
     match function:
-        case Constant() | Pulse() | ControlSignal():  # of a signal nothing is known before the run
+        case Constant() | Pulse() | ControlSignal():  # a signal is not known before the run
             return 0.0
         case Ramp(rate=rate) | SpinUp(rate=rate):
             return abs(rate)
@@ -125,9 +125,9 @@ def fastest_rate(function: Function, until: float = inf) -> float:
 
 
 def fastest_change(function: Function, until: float = inf) -> float:
-    """Frequency (rad/s) of a sine that changes as fast as the function does within its own range; for choosing a step.
+    """Frequency (rad/s) of the sine of the same range that changes as fast as the function, for choosing a step.
 
-    Jumps count as nothing: integrators stop at them.
+    Jumps do not count, since integrators stop there.
     """
     match function:
         case Constant() | Pulse() | ControlSignal() | Ramp():
@@ -187,7 +187,7 @@ def _spin_up(rate: float, T: float) -> Callable[[float], Profile]:
 
 
 def _table(times: tuple[float, ...], values: tuple[float, ...]) -> Callable[[float], Profile]:
-    from scipy.interpolate import make_interp_spline  # few scenes have a table, and it takes a fifth of a second
+    from scipy.interpolate import make_interp_spline  # takes 0.2 s to import, and few scenes have a table
 
     spline = make_interp_spline(times, values, k=5)
     derivatives = (spline, spline.derivative(1), spline.derivative(2))

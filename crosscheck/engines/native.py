@@ -1,17 +1,17 @@
 """The native adapters: flexmb itself behind the engine contract. Conventions already agree; nothing is converted.
 
 `native` is the O(N) recursion. `native-composite` forms the mass matrix by composite bodies: another solution of the
-same equations, closed chains included. `native-frisch` are the nested-body equations of Frisch (1975), corrected, and
-`native-frisch-as-printed` the same to the letter of the print: other equations for accelerations, loads and drives, on
-the same kinematics. Frisch's are of first order in the deformation, which is what level `linear` asks for.
+same equations, closed chains included. `native-frisch` uses the corrected nested-body equations of Frisch (1975), and
+`native-frisch-as-printed` the same with the errors of the print: other equations for accelerations, loads and drives on
+the same kinematics. They are of first order in the deformation, which is level `linear`.
 
-`native-radau5`, `native-exponential` and `native-generalised-alpha` are `native` with another integrator, for stiff
-scenes: a curve of their own in a work-precision chart.
+`native-radau5`, `native-exponential` and `native-generalised-alpha` are `native` with integrators for stiff scenes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
@@ -52,9 +52,9 @@ class NativeEngine:
     """flexmb with one of its algorithms, at the levels the scene asks for, and one of its integrators."""
 
     settings = (
-        "flexmb's integrator in one compiled loop around its compiled equations of motion, on one thread. Workers take "
-        "general kernels, which serve all scenes, unless FLEXMB_KERNELS says otherwise; those made for one scene are "
-        "faster. Compiling is apart, and outputs are observed after the timed solve."
+        "flexmb's integrator in one compiled loop with its compiled equations of motion, on one thread. Workers use "
+        "general kernels, which serve all scenes, unless FLEXMB_KERNELS says otherwise; kernels made for one scene are "
+        "faster. Compiling is not timed, and outputs are computed after the timed solve."
     )
 
     takes = ("connectors", "controllers", "events", "t_start")
@@ -70,7 +70,7 @@ class NativeEngine:
         self.summary = summary
         self._algorithm: Algorithm = algorithm
         self._method: Method = method
-        self._supported: tuple[Scene, NativeModel] | None = None  # made to see whether it can be; for `compile` to take
+        self._supported: tuple[Scene, NativeModel] | None = None  # made by `supports`, reused by `compile`
 
     @property
     def algorithm(self) -> Algorithm:
@@ -95,17 +95,15 @@ class NativeEngine:
         return self.efforts_for(scene, USUAL_S)
 
     def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
-        """A ladder of tolerances, by which adaptive methods find the steps that fit the scene; or of steps."""
+        """A ladder of tolerances for adaptive methods, of steps for others."""
         if INTEGRATORS[self._method].fixed:
             read = self._prepared(scene).scene
             return ladder(self._method, pace(read, duration_s, _fastest_mode(read)), duration_s, _RUNGS)
         return tuple(Effort("tolerance", value, self._method) for value in _TOLERANCES)
 
     def compile(self, scene: Scene) -> NativeModel:
-        """ValueError where the print does not apply: modes not clamped at the hinge; ClosureError where loops lock.
-
-        NotImplementedError where an algorithm or method has no loops.
-        """
+        """ValueError if the printed equations do not apply (modes not clamped at the hinge), ClosureError for loops
+        that cannot be closed, NotImplementedError if an algorithm or method has no loops."""
         model = self._prepared(scene)
         self._supported = None
         return model
@@ -126,39 +124,21 @@ class NativeEngine:
         return NativeModel(system, self._algorithm, self._method)
 
 
-def composite() -> NativeEngine:
-    """The mass matrix and its Cholesky factors."""
-    return NativeEngine("native-composite", "composite", "flexmb: mass matrix by composite bodies, Cholesky")
-
-
-def frisch() -> NativeEngine:
-    """The corrected equations of 1975."""
-    return NativeEngine("native-frisch", "frisch", "flexmb: Frisch's equations of 1975, first order")
-
-
-def frisch_as_printed() -> NativeEngine:
-    """The same to the letter."""
-    summary = "flexmb: the same as printed, errors included"
-    return NativeEngine("native-frisch-as-printed", "frisch_as_printed", summary)
-
-
-def radau5() -> NativeEngine:
-    """Stiff modes die out where steps are longer than their periods."""
-    return NativeEngine("native-radau5", "articulated", "flexmb, integrated by Radau IIA of order 5", "radau5")
-
-
-def exponential() -> NativeEngine:
-    """Stiff modes are followed exactly as far as they are linear."""
-    return NativeEngine(
-        "native-exponential", "articulated", "flexmb, integrated by exponential collocation", "exponential"
-    )
-
-
-def generalised_alpha() -> NativeEngine:
-    """Fixed steps, spectral radius 0.8."""
-    return NativeEngine(
-        "native-generalised-alpha", "articulated", "flexmb, integrated by generalised-alpha", "generalised_alpha"
-    )
+composite = partial(NativeEngine, "native-composite", "composite", "flexmb: mass matrix by composite bodies, Cholesky")
+frisch = partial(NativeEngine, "native-frisch", "frisch", "flexmb: Frisch's equations of 1975, first order")
+frisch_as_printed = partial(
+    NativeEngine, "native-frisch-as-printed", "frisch_as_printed", "flexmb: the same as printed, errors included"
+)
+radau5 = partial(
+    NativeEngine, "native-radau5", "articulated", "flexmb, integrated by Radau IIA of order 5", "radau5"
+)
+exponential = partial(
+    NativeEngine, "native-exponential", "articulated", "flexmb, integrated by exponential collocation", "exponential"
+)
+generalised_alpha = partial(  # spectral radius 0.8
+    NativeEngine, "native-generalised-alpha", "articulated", "flexmb, integrated by generalised-alpha",
+    "generalised_alpha",
+)  # fmt: skip
 
 
 class NativeModel:
@@ -224,11 +204,10 @@ class NativeModel:
             evaluations=done.statistics.evaluations,
             undetermined=tuple(_undetermined(done)),
         )
-        return first_samples(found, int(np.isin(done.t, run.times).sum()))  # events that chatter end a run in between
+        return first_samples(found, int(np.isin(done.t, run.times).sum()))  # Zeno events end a run between samples
 
 
 def _undetermined(done: NativeTrajectory) -> Iterator[str]:
-    """Channels with a component that the motion leaves open."""
     for name, is_open in done.undetermined.items():
         if name.endswith(".drive") and name not in done.loads:
             yield f"drive:{name.removesuffix('.drive')}"
@@ -239,7 +218,7 @@ def _undetermined(done: NativeTrajectory) -> Iterator[str]:
 
 
 def _approximation(scene: Scene, algorithm: Algorithm) -> str:
-    """What an algorithm leaves out of the scene's levels or does wrong with them, "" if nothing."""
+    """How an algorithm approximates the scene's levels, "" if it is exact."""
     flexible = [body for body in scene.bodies if body.level != "rigid"]
     full = [f'"{body.name}"' for body in flexible if body.level == "full"]
     first_order = f'level "full" of {", ".join(full)} to first order in the modal coordinates' if full else ""
@@ -264,7 +243,7 @@ def _fastest_mode(scene: Scene) -> float:
 
 
 def _status(done: NativeTrajectory, t_start: float) -> Status:
-    """A run that never left its initial state has failed; one that left it has diverged."""
+    """A run that stopped at its initial state has failed; one that stopped later has diverged."""
     if done.finished:
         return "finished"
     return "diverged" if done.stopped_at > t_start else "failed"

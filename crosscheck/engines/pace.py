@@ -1,7 +1,7 @@
-"""How fast a scene goes: what a fixed step must follow, from its rates, its gravity, its springs and its profiles.
+"""The fastest motions of a scene, which a fixed step must resolve: from rates, gravity, springs and profiles.
 
-It is found at the initial state of the scene's rigid links and serves to choose steps, not to predict frequencies: what
-motors bring about later, and what hangs beyond a hinge that is free to move, may be faster by a small factor.
+They are estimated at the initial state of the scene's rigid links, for choosing steps and not for predicting
+frequencies: later motion by motors, and bodies beyond a free hinge, may be faster by a small factor.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from flexmb.scene.tree import coordinate_of
 from flexmb.typing import Real
 
 _ROUNDING = 1e-12  # of a normalised mass matrix: massless directions have no frequency
-_OFF_AXIS = 1e-2  # of a mass centre's distance from a hinge: nearer to its axis it is no pendulum
+_OFF_AXIS = 1e-2  # of a mass centre's distance from a hinge: least distance from its axis to count as a pendulum
 
 
 class Pace(NamedTuple):
@@ -84,7 +84,7 @@ class _Columns:
         self._mass = np.where(beyond, upper, upper.T)
 
     def swinging(self, gravity: float) -> float:
-        """sqrt(m g r / I) of the fastest pendulum (rad/s): everything beyond one axis, however it hangs at t = 0."""
+        """sqrt(m g r / I) of the fastest pendulum (rad/s): everything beyond one axis, at any angle at t = 0."""
         fastest = 0.0
         for column, freedom in enumerate(self._freedoms):
             spatial = self._carried[column]
@@ -98,7 +98,7 @@ class _Columns:
         return float(np.sqrt(fastest))
 
     def poles(self, scene: Scene) -> float:
-        """Of the springs and dampers of hinges, wheels and point masses, and of connectors (rad/s)."""
+        """The fastest pole (rad/s) of the springs and dampers of hinges, wheels, point masses and connectors."""
         count = len(self._freedoms)
         K, C = np.zeros((2, count, count))
         free = np.ones(count, dtype=bool)
@@ -136,7 +136,6 @@ class _Columns:
         return along, _steepest(stems) * np.eye(len(along)), stems["damping"] * np.eye(len(along))
 
     def _frame(self, at: Attachment) -> Frame:
-        """In World."""
         return at.frame if at.link < 0 else self._frames[at.link] @ at.frame
 
     def _motion_of(self, at: Attachment, place: Frame) -> tuple[Real, Real]:
@@ -147,13 +146,13 @@ class _Columns:
 
 
 def _steepest(stems: dict[str, Any]) -> float:
-    """Stiffness of a law at rest, or where its table rises most."""
+    """Stiffness of a law at rest, or the largest slope of its table."""
     rise = np.diff(stems["loads"]) / np.diff(stems["table"]) if stems["table"] else np.zeros(1)
     return max(stems["stiffness"], float(rise.max()))
 
 
 def _fastest(stiffness: Real, mass: Real) -> float:
-    """Root of the largest eigenvalue of K v = λ M v; whatever has no mass has no say."""
+    """Root of the largest eigenvalue of K v = λ M v, without massless directions."""
     massive = np.diag(mass) > 0.0
     if not stiffness[np.ix_(massive, massive)].any():
         return 0.0

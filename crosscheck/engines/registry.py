@@ -29,12 +29,12 @@ BUILT_IN = {
     "basilisk": "crosscheck.engines.basilisk:BasiliskEngine",
 }
 OWN_CODE = tuple(name for name, place in BUILT_IN.items() if place.startswith("crosscheck.engines.native:"))
-# Engines by the one whose library or compiled code they share: a process that serves it serves them, too.
+# For each engine the one whose library or compiled code it shares: both run in the same worker process.
 SERVED_WITH = dict.fromkeys(OWN_CODE, "native") | {"exudyn-beam": "exudyn"}
 
 
 class Engines(Mapping[str, Engine]):
-    """Engines by name; each is loaded when it is asked for, and no other with it."""
+    """Engines by name, each loaded on first use."""
 
     def __init__(self, loaders: dict[str, Callable[[], Engine]]) -> None:
         self._loaders = loaders
@@ -57,7 +57,7 @@ class BrokenPlugIn(RuntimeError):
 
 
 class Broken:
-    """The engine in the place of a plug-in that cannot be loaded: all it does is to say why."""
+    """Stands for a plug-in that cannot be loaded: every call raises the reason."""
 
     summary = ""
 
@@ -81,9 +81,8 @@ class Broken:
 def engines() -> Engines:
     """All engines by name, built-in ones first, whether or not their libraries are installed.
 
-    An engine without its library raises `EngineMissing` from `version`, and so does a plug-in that cannot be imported
-    for want of a module; one that cannot be loaded for another reason raises `BrokenPlugIn`. A plug-in may not take a
-    built-in name.
+    An engine without its library raises `EngineMissing` from `version`, and so does a plug-in that cannot be imported.
+    A plug-in that cannot be loaded for another reason raises `BrokenPlugIn`. Built-in names take precedence.
     """
     found: dict[str, Callable[[], Engine]] = {name: partial(_built_in, path) for name, path in BUILT_IN.items()}
     for name, points in _plug_ins().items():
@@ -92,18 +91,18 @@ def engines() -> Engines:
 
 
 def plug_ins() -> tuple[str, ...]:
-    """Names of the engines that others have plugged in."""
+    """Names of the engines from the entry points of other distributions."""
     return tuple(_plug_ins())
 
 
 def home(name: str) -> str:
-    """The module that makes the engine called `name`, "" if no engine here is called so."""
+    """The module that makes the engine called `name`, "" if there is no such engine."""
     paths = [BUILT_IN[name]] if name in BUILT_IN else [point.value for point in _plug_ins().get(name, ())]
     return paths[0].partition(":")[0].strip() if len(paths) == 1 else ""
 
 
 def engine(name: str) -> Engine:
-    """One engine; KeyError names those there are."""
+    """One engine; KeyError lists the known names."""
     known = engines()
     if name not in known:
         raise KeyError(f'no engine "{name}"; there are {", ".join(known)}')
@@ -117,7 +116,7 @@ def _built_in(path: str) -> Engine:
 
 
 def _plug_ins() -> dict[str, list[EntryPoint]]:
-    """Entry points by name, more than one where distributions quarrel about a name."""
+    """Entry points by name, several if several distributions use the same name."""
     found: dict[str, list[EntryPoint]] = {}
     for point in entry_points(group=GROUP):
         if point.name not in BUILT_IN and point not in found.setdefault(point.name, []):
@@ -126,7 +125,7 @@ def _plug_ins() -> dict[str, list[EntryPoint]]:
 
 
 def _plugged(name: str, points: list[EntryPoint]) -> Engine:
-    """The engine of a plug-in, or a `Broken` one that says why there is none."""
+    """The engine of a plug-in, or a `Broken` one with the reason."""
     what = f'plug-in "{name}" ({", ".join(point.value for point in points)})'
     if len(points) > 1:
         return Broken(name, BrokenPlugIn(f"{what}: several distributions offer this name; uninstall all but one"))
@@ -136,7 +135,7 @@ def _plugged(name: str, points: list[EntryPoint]) -> Engine:
         return Broken(name, EngineMissing(f"{what} cannot be imported: {type(error).__name__}: {error}"))
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # whatever it does, sys.exit among it, it may not take the others with it
+    except BaseException as error:  # a broken plug-in, even one that calls sys.exit, must not affect other engines
         return Broken(name, BrokenPlugIn(f"{what} cannot be loaded: {type(error).__name__}: {error}"))
     if not isinstance(made, Engine):
         lacking = f"it made a {type(made).__name__} without {_lacking(made)}"
@@ -145,5 +144,5 @@ def _plugged(name: str, points: list[EntryPoint]) -> Engine:
 
 
 def _lacking(made: object) -> str:
-    """What of the contract an object has not."""
+    """The members of the contract that an object lacks."""
     return ", ".join(each for each in ("name", "version", "supports", "efforts", "compile") if not hasattr(made, each))

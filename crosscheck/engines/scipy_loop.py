@@ -1,22 +1,70 @@
-"""SciPy's integrators around the equations of motion of peers that have dynamics and no fit integrator of their own."""
+"""SciPy's integrators for peers that have dynamics but no suitable integrator of their own."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from crosscheck.engines.contract import Effort
-from crosscheck.engines.functions_of_time import breaks_between
+from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
+from crosscheck.engines.functions_of_time import breaks_between, scene_functions
+from crosscheck.engines.trajectories import stack
 from flexmb.scene.functions import Function
+from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
-# Angles of elastic chains are a thousandth of a radian: coarser absolute tolerances let their fastest modes ring.
-_SMALL = 1e-3
-# Coordinates and speeds are of order one to a hundred, so below this the error control would chase round-off.
-_ROUND_OFF = 1e-13
+# atol/rtol. Angles of elastic chains are about 1e-3 rad: a coarser absolute tolerance lets their fastest modes ring.
+_ATOL_RATIO = 1e-3
+# Coordinates and speeds are of order 1 to 100: with a smaller atol the error control would react to round-off.
+_LEAST_ATOL = 1e-13
+
+
+RTOL_LADDER = tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-8, 1e-10, 1e-12))
+
+
+class Dynamics(Protocol):
+    """Equations of motion dy/dt = rate(t, y) of a state y whose last number is the work done so far."""
+
+    def initial(self) -> Real: ...
+    def rate(self, t: float, y: Real) -> Real: ...
+    def state(self, t: float, y: Real) -> Any:
+        """y in the terms of the peer, as its observer needs it."""
+
+
+class Observer(Protocol):
+    def observe(self, t: float, state: Any) -> Snapshot: ...
+
+
+class ScipyModel:
+    """A scene compiled for a peer that SciPy's DOP853 steps."""
+
+    def __init__(self, scene: Scene, dynamics: Dynamics, observer: Observer) -> None:
+        self._dynamics, self._observer = dynamics, observer
+        self._functions = scene_functions(scene)
+
+    def warm_up(self) -> None:
+        """Nothing is compiled; touch the code once so that first-call costs are not timed."""
+        self._dynamics.rate(0.0, self._dynamics.initial())
+
+    def evaluate(self) -> Snapshot:
+        return self._observed(0.0, self._dynamics.initial())
+
+    def simulate(self, run: Run, effort: Effort) -> Trajectory:
+        start = time.perf_counter()
+        with np.errstate(over="ignore", invalid="ignore"):  # divergence is a status
+            y = self._dynamics.initial()
+            states, evaluations, message = integrate(self._dynamics.rate, y, self._functions, run.times, effort)
+        wall = time.perf_counter() - start
+        samples = [self._observed(t, y) for t, y in zip(run.times, states, strict=False)]
+        work = np.array([y[-1] for y in states])
+        return stack(run.times, samples, message=message, wall_s=wall, evaluations=evaluations, work=work)
+
+    def _observed(self, t: float, y: Real) -> Snapshot:
+        return self._observer.observe(t, self._dynamics.state(t, y))
 
 
 def integrate(
@@ -24,8 +72,8 @@ def integrate(
 ) -> tuple[list[Real], int, str]:
     """States at the sample times reached, evaluations of the right-hand side, and why it stopped early.
 
-    It restarts wherever a function of time is not smooth, so that the error control never steps over a kink; the
-    right-hand side sees the limit from the left at the end of a stretch.
+    The integrator restarts where a function of time is not smooth, so that no step crosses a kink; at the end of each
+    interval the right-hand side takes the limit from the left.
     """
     ends = [times[0], *breaks_between(functions, times[0], times[-1]), times[-1]]
     states = [y]
@@ -36,7 +84,7 @@ def integrate(
         solved = solve_ivp(
             lambda t, y, last=before_end: rate(min(t, last), y),
             (begin, end), y, method=effort.method, t_eval=np.union1d(inside, [end]),
-            rtol=effort.value, atol=max(_SMALL * effort.value, _ROUND_OFF),
+            rtol=effort.value, atol=max(_ATOL_RATIO * effort.value, _LEAST_ATOL),
         )  # fmt: skip
         evaluations += solved.nfev
         good = np.isfinite(solved.y).all(axis=0)

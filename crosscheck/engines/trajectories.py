@@ -1,4 +1,4 @@
-"""Assembling an engine's samples to the trajectory that engines exchange."""
+"""Putting an engine's samples together into the trajectory that engines exchange."""
 
 from __future__ import annotations
 
@@ -8,25 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.contract import OUTPUTS, MarkerPath, Snapshot, Status, Trajectory
-from flexmb.run.channels import channels_of
+from crosscheck.engines.contract import OUTPUTS, MarkerPath, Snapshot, Trajectory
 from flexmb.typing import Real
 
 
 def stack(
-    times: Real,
-    samples: Sequence[Snapshot],
-    *,
-    status: Status,
-    message: str,
-    wall_s: float,
-    evaluations: int,
-    work: Real | None = None,
+    asked: Real, samples: Sequence[Snapshot], *, message: str, wall_s: float, evaluations: int, work: Real | None = None
 ) -> Trajectory:
-    """One trajectory from the snapshot of each sample time reached; never empty, since t = 0 is always reached."""
-    first = samples[0]
+    """One trajectory from the snapshot of each sample time reached; diverged unless all of `asked` (T,) were reached.
+
+    There is at least one snapshot, since the initial state is always reached.
+    """
+    first, times = samples[0], asked[: len(samples)]
     return Trajectory(
-        status=status,
+        status="finished" if len(samples) == len(asked) else "diverged",
         message=message,
         times=np.asarray(times, dtype=float),
         markers={
@@ -52,13 +47,8 @@ def _stacked(values: Sequence[Any]) -> Any:
     return None if first is None else np.array(values)
 
 
-def determined_channels(run: Trajectory) -> dict[str, Real]:
-    """All signals (T,k) of a run but those that the motion leaves open."""
-    return {name: values for name, values in channels_of(run).items() if name not in run.undetermined}
-
-
 def first_samples(run: Trajectory, count: int) -> Trajectory:
-    """The run up to its sample number `count`, which is left out."""
+    """The first `count` samples of the run."""
 
     def cut(output: Any) -> Any:
         if isinstance(output, dict):
@@ -77,7 +67,7 @@ def first_samples(run: Trajectory, count: int) -> Trajectory:
 
 
 def continuous(quaternions: Real) -> Real:
-    """The same rotations (T,4) with signs chosen so that successive quaternions are near each other."""
+    """The same rotations (T,4), with the signs of successive quaternions chosen so that they are close."""
     steps = np.sign(np.sum(quaternions[1:] * quaternions[:-1], axis=1))
     signs = np.cumprod(np.concatenate([[1.0], np.where(steps < 0.0, -1.0, 1.0)]))
     return quaternions * signs[:, None]

@@ -1,4 +1,4 @@
-"""Accepting: the figures that cases have reached become those that later runs are held against."""
+"""Accepting: the figures that cases have reached become those with which later runs are compared."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from flexmb.output.whole import write_whole
 
 
 class NotAccepted(ValueError):
-    """Something is not as expected: its figures are nothing to hold others against."""
+    """Something is not as expected, so its figures are not accepted."""
 
 
 def accept_figures(cases: Iterable[Case], records: Path, partial: bool) -> list[tuple[Path, int]]:
-    """Write `accepted.toml` of each case from the records; returns the files and how many figures each holds.
+    """Write `accepted.toml` of each case from the records; returns the files and the numbers of their figures.
 
-    `partial`: only some engines were asked for, so the figures of others are kept. The records are told too, so that
-    they are judged by what they reached. Raises NotAccepted, and writes nothing, unless all is as expected.
+    `partial`: only some engines were asked for, so the figures of others are kept. The accepted figures are also
+    appended to the records. Raises NotAccepted and writes nothing unless all is as expected.
     """
     cases = tuple(cases)
     found = last_session(read(records))
     outcome = conclude(collect(found))
     if not outcome.ok:
-        raise NotAccepted(f"Nothing is accepted. {outcome.headline}: put that right first.")
+        raise NotAccepted(f"Nothing is accepted. {outcome.headline}: correct that first.")
     if outcome.idle:
         raise NotAccepted(f"Nothing is accepted: nothing was compared in {', '.join(outcome.idle)}. Leave that out.")
     latest = {record.case: record for record in found if isinstance(record, CaseRecord)}

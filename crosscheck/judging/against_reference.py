@@ -1,7 +1,7 @@
-"""A result against the stored reference of its case: no other engine is needed for these verdicts.
+"""Verdicts on results against the stored reference of their case; they need no other engine.
 
-E is taken at the times of the reference, which are some of the case's, up to its horizon, and U is that of the engine
-up to there and the uncertainty that the reference states. Goals and scales are those of the engine's comparisons, see
+E is taken at the times of the reference, a subset of the case's times up to its horizon. U is the sum of the engine's
+up to there and that of the reference. Goals and scales are those of the engine's comparisons, see
 `crosscheck.library.selection.held`.
 """
 
@@ -26,13 +26,13 @@ from crosscheck.records.packing import unpack
 from flexmb.typing import Real
 
 NAME = "against the reference"
-REFERENCE = "reference"  # who is on the other side of such a verdict
-CLOCK = 1e-9  # relative difference of two clocks that show the same time
+REFERENCE = "reference"  # the name of the other side of such a verdict
+CLOCK = 1e-9  # relative difference up to which two times are the same
 
 
 @dataclass(frozen=True)
 class ReferenceSignals:
-    """What a reference knows: channels (T, k) at `times` (T,), in SI and World axes, with their uncertainties (SI)."""
+    """The channels (T, k) of a reference at `times` (T,), in SI and World axes, with their uncertainties (SI)."""
 
     times: Real
     channels: Mapping[str, Real]
@@ -43,7 +43,7 @@ class ReferenceSignals:
         return Sizes(tuple(self.channels), self.channels.__getitem__)
 
     def signal(self, channel: str) -> Signal:
-        """The channel as a verdict needs it."""
+        """The channel as input of a verdict."""
         rows, known = self.channels[channel], self.uncertainties.get(channel, np.inf)
         doubt = Uncertainty(np.full(len(rows), known), known, "stated by the reference")
         return Signal(rows, doubt, self._sizes.of(channel))
@@ -56,14 +56,13 @@ def of_stored(reference: StoredReference) -> ReferenceSignals:
 
 
 def of_record(reference: RecordedReference) -> ReferenceSignals:
-    """The signals of a reference that a record holds."""
     times = np.zeros(0) if reference.times is None else unpack(reference.times)
     channels = {name: unpack(packed) for name, packed in reference.channels.items()}
     return ReferenceSignals(times, channels, reference.uncertainties)
 
 
 def judge_reference(case: CaseResults) -> Iterator[Verdict]:
-    """The verdicts of a case's engines against its stored reference; none where it has none."""
+    """The verdicts of a case's engines against its stored reference; none if there is no reference."""
     recorded = case.case.reference
     if recorded is None:
         return
@@ -84,11 +83,11 @@ def judge_reference(case: CaseResults) -> Iterator[Verdict]:
 def hold(
     result: Result, reference: ReferenceSignals, asked: Asked, like: Result | None = None
 ) -> Iterator[tuple[str, float, Finding]]:
-    """The finding on every channel of the reference for which there is a goal, with that goal. Never raises.
+    """The finding on every channel of the reference that has a goal, with that goal. Never raises.
 
-    `like` is the result whose U `result` takes, as that of a control is that of the true run. A kind of energy that the
-    engine does not know is left out; any other channel that it does not offer it refuses. A result that did not finish
-    gives its status for each goal.
+    `like` is the result whose U is used: for a control that of the unmutated run. A kind of energy that the engine does
+    not offer is left out; any other channel counts as refused. A result that did not finish has its status for each
+    goal.
     """
     if result.status != "finished":
         ending = result.ending
@@ -117,9 +116,9 @@ def hold(
 
 
 def shared_times(wanted: Real, given: Real) -> np.ndarray | None:
-    """Where the `wanted` times (s) are among those `given`, both rising; None unless all of them are.
+    """The indices of the `wanted` times (s) among those `given`, both rising; None unless all are there.
 
-    Told apart by the size of those wanted: one of 1e308 s that is given besides must not make all others equal.
+    The tolerance is relative to the largest wanted time, since a given time of 1e308 s must not make all others equal.
     """
     if not (len(wanted) and len(given)):
         return None
@@ -130,7 +129,7 @@ def shared_times(wanted: Real, given: Real) -> np.ndarray | None:
 
 
 def at_samples(signal: Signal, places: np.ndarray) -> Signal:
-    """A signal at some of its samples, with the U that it has reached by the last of them."""
+    """A signal at some of its samples, with its U up to the last of them."""
     envelope = signal.uncertainty.envelope[places]
     doubt = Uncertainty(envelope, float(envelope[-1]), signal.uncertainty.how, signal.uncertainty.order)
     return Signal(signal.values[places], doubt, signal.sizes)

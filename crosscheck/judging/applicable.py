@@ -1,10 +1,8 @@
-"""What engines that have joined a case cannot represent of it: *not applicable*, which is no verdict.
+"""What engines that joined a case cannot represent of it: *not applicable*, which is not a verdict.
 
-Nor is there a verdict on what the motion itself leaves open, whoever gives numbers for it: loads of redundant closures.
-
-A case expects something only of the engines that it names. One that it names nowhere has joined by `--engine`; that it
-refuses the scene, or does not offer a channel, is no finding about it, and is listed with its own reason. It stays a
-verdict where somebody expected more: of an engine that the case names, or for which it has accepted figures.
+A case expects something only of the engines that it names. An engine that joins by `--engine` may refuse the scene or
+lack a channel; this is listed with the engine's reason. It remains a verdict for an engine that the case names, or for
+which it has accepted figures. Loads of redundant closures, which the motion does not determine, have no verdict either.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ from flexmb.run.channels import matches
 
 @dataclass(frozen=True)
 class Inapplicable:
-    """What an engine cannot represent; `channel` is "" where that is the whole variant. The reason is the engine's."""
+    """Something that an engine cannot represent, by its own `reason`; `channel` is "" for the whole variant."""
 
     case: str
     variant: str
@@ -31,12 +29,12 @@ class Inapplicable:
 
     @property
     def where(self) -> str:
-        """What of the case it is about, in words."""
+        """The variant and the channel, in words."""
         return f"{self.variant}, {self.channel}" if self.channel else self.variant
 
 
 def set_apart(case: CaseResults, verdicts: Iterable[Verdict]) -> tuple[list[Verdict], tuple[Inapplicable, ...]]:
-    """The verdicts that count, and what is not applicable, each once whatever number of verdicts it would have been."""
+    """The verdicts that count, and what is not applicable, each only once."""
     joined = {engine for engine in case.case.joined if not _has_figures(case, engine)}
     refused = [each for each in case.results.values() if each.status == "refused" and each.engine in joined]
     found = {_inapplicable(case, result, ""): None for result in refused}
@@ -58,13 +56,13 @@ def set_apart(case: CaseResults, verdicts: Iterable[Verdict]) -> tuple[list[Verd
 
 
 def _includes(pattern: Inapplicable, one: Inapplicable) -> bool:
-    """Whether the first says of a pattern what the second says of a channel that it names."""
+    """Whether the pattern of the first includes the channel of the second, of the same variant and engine."""
     same = (pattern.variant, pattern.engine) == (one.variant, one.engine)
     return same and bool(pattern.channel) and matches(pattern.channel, one.channel)
 
 
 def _energies_left_out(case: CaseResults, joined: Collection[str]) -> Iterator[Inapplicable]:
-    """Kinds of energy that are asked for and that somebody knows, and an engine does not: no verdict tells of them."""
+    """Kinds of energy with a goal that other results have and an engine does not offer; they have no verdict."""
     reference = case.case.reference
     for (_, engine, role), result in case.results.items():
         if engine not in joined or role != "main" or result.status != "finished":
@@ -80,9 +78,9 @@ def _energies_left_out(case: CaseResults, joined: Collection[str]) -> Iterator[I
 
 
 def _refusing(case: CaseResults, verdict: Verdict) -> list[Result]:
-    """The results that are why there is nothing to judge: refusals of the scene, or else what lacks the channel.
+    """The results because of which there is nothing to judge: refusals of the scene, or results without the channel.
 
-    None where something graver than a refusal is the reason.
+    Empty if the reason is graver than a refusal.
     """
     sides = [case.results.get((*side, "main")) for side in verdict.sides]
     results = [result for result in sides if result is not None]
@@ -106,6 +104,6 @@ def _inapplicable(case: CaseResults, result: Result, channel: str) -> Inapplicab
 
 
 def _has_figures(case: CaseResults, engine: str) -> bool:
-    """Whether figures of the engine were accepted: it gave results once, and is expected to go on."""
+    """Whether figures of the engine were accepted: then it is expected to give results again."""
     places = (place for table in case.case.accepted.values() for place in table)
     return any(side.startswith(f"{engine} (") for place in places for side in place.split(" | ")[1:])

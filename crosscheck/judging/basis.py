@@ -1,8 +1,8 @@
-"""What an accepted figure was reached with: where that is another now, the figure is stale and no measure.
+"""The basis of an accepted figure: if the basis has changed since, the figure is stale.
 
 Four digests: of the rule by which E and U are found (`crosscheck.judging.rule`); of the scenes, sample times and
-scales; of the efforts; of the versions of engines that are not our own. Our own code is not among them, nor is the
-machine: that a figure grows with these is what acceptance is there to notice.
+scales; of the efforts; of the versions of engines that are not our own. Our own code and the machine are left out:
+growth of a figure with these is what accepted figures are meant to detect.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ UNKNOWN = "-"
 
 
 def basis(variants: Mapping[str, VariantInfo], sides: Iterable[Result], scales: object) -> str:
-    """What a figure that compares results of some `sides` stands on, as `accepted.toml` has it.
+    """The basis of a figure that compares the results `sides`, as written in `accepted.toml`.
 
-    `scales` are those that the case states. A part that records of an older version do not tell is unknown.
+    `scales` are those that the case states. Parts that older records do not contain are unknown.
     """
     sides = tuple(sides)
     scenes = [variants[side.variant].basis if side.variant in variants else "" for side in sides]
@@ -32,14 +32,14 @@ def basis(variants: Mapping[str, VariantInfo], sides: Iterable[Result], scales: 
 
 
 def written(scenes: Iterable[str], efforts: object, versions: object, scales: object) -> str:
-    """The four digests in a row."""
+    """The four digests, joined by dots."""
     scenes = list(scenes)
     of_scene = short_digest(f"{scenes} {scales}") if all(scenes) else UNKNOWN
     return ".".join([rule(), of_scene, short_digest(f"{efforts}"), short_digest(f"{versions}")])
 
 
 def changed(then: str, now: str) -> str:
-    """What is another than when a figure was accepted, in words; "" if nothing is, or nothing is known."""
+    """What has changed since a figure was accepted, in words; "" if nothing is known to have changed."""
     pairs = zip(PARTS, then.split("."), now.split("."), strict=False)
     return ", ".join(part for part, old, new in pairs if UNKNOWN not in (old, new) and old and old != new)
 

@@ -1,4 +1,4 @@
-"""From results to verdicts: every channel of every comparison, control and conservation check of a case."""
+"""The verdicts of a case from its results: every channel of every comparison, control and conservation check."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from crosscheck.judging.basis import basis
 from crosscheck.judging.expectation import outside
 from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
-from crosscheck.judging.verdict import GRAVITY, Finding, Verdict, compare, conserve, not_determined
+from crosscheck.judging.verdict import SEVERITY, Finding, Verdict, compare, conserve, not_determined
 from crosscheck.library.accepted import key
 from crosscheck.library.case import Comparison, ComparisonSide, Conservation, Control
 from crosscheck.library.channels import CONSERVED
 from crosscheck.library.patterns import most_specific
 from flexmb.run.channels import matches, norms
 
-CLOCK = 1e-9  # relative difference of two clocks that show the same time: old records hold the engines' own
+CLOCK = 1e-9  # relative difference up to which two times are the same: old records have the engines' own times
 TRUE_MODEL = "conservation law"
 
 
@@ -56,7 +56,7 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
 def _unused(
     goals: Iterable[str], given: Mapping[str, Iterable[str]], a: Result, b: Result
 ) -> Iterator[tuple[str, Finding]]:
-    """Scales and bands whose pattern names no channel that is judged: a misspelt one must not be ignored silently."""
+    """Scales and bands whose pattern names no judged channel: a misspelt pattern must not be ignored silently."""
     there = _union(_union(a.channels, b.channels), _union(a.undetermined, b.undetermined))
     judged = [name for name in there if most_specific(goals, name) is not None]
     for what, patterns in given.items():
@@ -69,7 +69,7 @@ def _unused(
 def _vanished(
     question: Question, item: Comparison, a: Result, b: Result, case: CaseResults
 ) -> Iterator[tuple[str, Finding]]:
-    """Channels with accepted figures that no engine offers any more, and energies that only one engine still offers."""
+    """Channels with accepted figures that are not judged any more, since an engine ceased to offer them."""
     judged = {channel for channel, _, _ in _channels(item.goals, a, b, case)}
     for place in question.case.accepted.get(item.name, {}):
         channel = place.partition(" | ")[0]
@@ -80,7 +80,7 @@ def _vanished(
 
 
 def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
-    """The faulty run takes its U from the same engine's true run: the same ladder on nearly the same scene."""
+    """The faulty run has the U of the same engine's unmutated run: the same ladder on nearly the same scene."""
     why = f"negative control ({item.mutation} of {item.target or 'the scene'}): the fault must be noticed"
     question = Question(case.case, item.name, "control", item.a, item.b, "differ", why)
     faulty = case.get(item.a.variant, item.a.engine, f"control:{item.name}")
@@ -118,7 +118,7 @@ def _drift(result: Result, channel: str, item: Conservation) -> Finding:
 
 
 def drift_of(result: Result, channel: str) -> tuple[np.ndarray, float]:
-    """Drift (T,) in SI at every sample, and the largest magnitude: of the energy less the work, or of a momentum."""
+    """Drift (T,) (SI) of the energy less the work, or of a momentum, and the largest magnitude."""
     if channel == "energy.total":
         return _energy_drift(result)
     values = result.values(channel)
@@ -138,11 +138,11 @@ def _energy_drift(result: Result) -> tuple[np.ndarray, float]:
 def _channels(
     goals: dict[str, float], a: Result, b: Result, case: CaseResults
 ) -> Iterator[tuple[str, float, Finding | None]]:
-    """Every channel to judge, with its goal, and with the finding where there is nothing to compare.
+    """Every channel to judge, with its goal, and with the finding if there is nothing to compare.
 
-    Where a result is missing, the pattern itself stands for its channels. A kind of energy that only one engine knows
-    is left out, any other channel that only one offers is a refusal of the other. What the motion does not determine is
-    not compared, whatever engines offer.
+    If a result is missing, the pattern itself stands for its channels. A kind of energy that only one engine offers is
+    left out; any other channel that only one offers is a refusal of the other. Channels that the motion does not
+    determine are not compared.
     """
     missing = _missing(a, b) or _elsewhere(a, b)
     undetermined = case.undetermined(a.variant, b.variant)
@@ -180,16 +180,16 @@ def _belongs(channel: str, pattern: str, goals: Iterable[str]) -> bool:
 
 
 def _missing(*results: Result) -> Finding | None:
-    """The gravest of missing results, so that an expected refusal of one cannot hide that the other crashed."""
+    """The gravest ending of missing results, so that an expected refusal of one cannot hide a crash of the other."""
     endings = [result.ending for result in results if result.status != "finished"]
     if not endings:
         return None
-    worst = min(endings, key=lambda ending: GRAVITY.index(ending.status))
+    worst = min(endings, key=lambda ending: SEVERITY.index(ending.status))
     return Finding(worst.status, worst.reason, endings=tuple(each for each in endings if each.status == worst.status))
 
 
 def _elsewhere(a: Result, b: Result) -> Finding | None:
-    """The finding where two results have other times, or are of one variant and have other scenes; else None."""
+    """The finding if two results have different times, or different scenes of one variant; else None."""
     if a.times.shape != b.times.shape or not np.allclose(a.times, b.times, rtol=CLOCK, atol=0.0):
         text = f"the results are at other times: {len(a.times)} samples to {a.times[-1]:g} s"
         return Finding("failed", f"{text}, and {len(b.times)} to {b.times[-1]:g} s")
@@ -200,7 +200,7 @@ def _elsewhere(a: Result, b: Result) -> Finding | None:
 
 
 def _absent(result: Result, channel: str) -> Finding | None:
-    """The finding where a result lacks the channel; None where it has it."""
+    """The finding if a result lacks the channel; None if it has it."""
     if result.status != "finished":
         return _missing(result)
     if channel not in result.channels:

@@ -1,6 +1,6 @@
-"""Bounds of what a case expects: a difference has a size, a divergence a time, a failure and a refusal a reason.
+"""Bounds of an expectation: of the size of a difference, the time of a divergence, the reason of a failure or refusal.
 
-An expectation without them would stay green if the difference grew a hundredfold, or if the run ended at once.
+Without them an expectation would still be met if the difference grew a hundredfold or the run ended at once.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from crosscheck.library.patterns import most_specific
 
 
 def outside(item: Comparison | Conservation, channel: str, finding: Finding) -> str:
-    """How a finding with the expected status is beyond the bounds that `item` sets to it; "" if it is within them."""
+    """How a finding with the expected status is outside the bounds of `item`; "" if it is within them."""
     match item.expect:
         case "differ":
             return _beyond("E", finding.E, _band(item, channel))

@@ -1,14 +1,13 @@
-"""The figures E and U that verdicts reach: which of them are recorded, and when one has grown since.
+"""The figures E and U of verdicts: which of them are accepted, and when one has grown since.
 
 A figure has grown, and its verdict is *worse than recorded*, if
 
     U > 10 max(U_accepted, floor)    or    E > 10 max(E_accepted, U_accepted, floor).
 
-E below U is noise, which may be anything from 0 to U on another machine; therefore E is held against U too. The floor
-is the rounding eps sqrt(N) of a million evaluations: growth below it is growth of rounding. The factor is 10 because an
-estimate of U is no better than a factor of a few: an order is observed or not, and the difference of two runs is large
-or small by chance. A figure that was accepted on another basis (`crosscheck.judging.basis`) is *stale*: that it has
-grown says nothing against what is judged.
+E below U is noise and may be anything from 0 to U on another machine; therefore E is also compared with U. The floor is
+the rounding eps sqrt(N) of a million evaluations. The factor is 10 because an estimate of U is accurate only to a
+factor of a few: whether an order is observed, and the difference of two runs, depend on chance. A figure that was
+accepted on another basis (`crosscheck.judging.basis`) is *stale*: its growth is no evidence of an error.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ def worse(figure: Figure | None, E: float | None, U: float | None) -> str:
 
 
 def figures(verdicts: Iterable[Verdict], engines: Iterable[str]) -> Accepted:
-    """The figures to record of verdicts between the `engines` given, which are the library's own."""
+    """The figures of verdicts between the given `engines`, which are the library's own."""
     own = set(engines)
     found: Accepted = {}
     for verdict in verdicts:
@@ -49,14 +48,14 @@ def figures(verdicts: Iterable[Verdict], engines: Iterable[str]) -> Accepted:
 
 
 def recordable(verdict: Verdict, own: Iterable[str]) -> bool:
-    """Whether a verdict should have a figure: it compares numbers, it is no control, and its engines are our `own`."""
+    """Whether a verdict should have an accepted figure: it compares numbers of our `own` engines and is no control."""
     if verdict.kind == "control" or verdict.E is None:
         return False
     return verdict.engine_a in own and (verdict.kind == "conservation" or verdict.engine_b in own)
 
 
 def key_of(verdict: Verdict) -> str:
-    """How the file names a verdict within its comparison."""
+    """The key of a verdict in accepted.toml, within its comparison."""
     return key(verdict.channel, (verdict.engine_a, verdict.variant_a), (verdict.engine_b, verdict.variant_b))
 
 

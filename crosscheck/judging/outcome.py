@@ -1,4 +1,4 @@
-"""The outcome of a session: its verdicts, what did not run, and the answer whether all is as expected."""
+"""The outcome of a session: its verdicts, what did not run, and whether all is as expected."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FAULTS = ("failed", "crashed", "did not finish")  # of an engine that was asked 
 
 @dataclass(frozen=True)
 class Absence:
-    """A result that was asked for and is not there."""
+    """A missing result that was asked for."""
 
     case: str
     variant: str
@@ -33,10 +33,10 @@ class Absence:
 class SessionOutcome:
     """All verdicts of a session, by case; all absences; broken lines of the records, in words.
 
-    `strict`: figures that are worse than recorded, or not recorded, and references that were never made, are not as
-    expected. `inapplicable` is what engines that have joined a case cannot represent of it. `asked` are the engines
-    that were asked for by name, `unreferenced` the cases with a recipe of a reference and no reference. `unfinished`:
-    the session has begun and not come to its end, so that nothing is judged.
+    `strict`: figures worse than recorded or missing, and references that were never made, are not as expected.
+    `inapplicable`: what engines that joined a case cannot represent of it. `asked`: the engines asked for by name.
+    `unreferenced`: the cases with a recipe of a reference but no reference. `unfinished`: the session has not ended, so
+    nothing is judged.
     """
 
     verdicts: dict[str, list[Verdict]]
@@ -50,29 +50,27 @@ class SessionOutcome:
 
     @property
     def all(self) -> list[Verdict]:
-        """Every verdict."""
         return [verdict for group in self.verdicts.values() for verdict in group]
 
     @property
     def unexpected(self) -> list[Verdict]:
-        """Verdicts that are not what their case expects."""
         return [verdict for verdict in self.all if not verdict.ok]
 
     @property
     def idle(self) -> list[str]:
-        """Cases without any verdict though nothing in them is inapplicable: no engine asked for takes part in them."""
+        """Cases without a verdict and without anything inapplicable: no engine asked for takes part in them."""
         explained = {each.case for each in self.inapplicable}
         return [case for case, group in self.verdicts.items() if not group and case not in explained]
 
     @property
     def uncompared(self) -> list[str]:
-        """Engines that were asked for by name and were judged in nothing at all."""
+        """Engines that were asked for by name and have no verdict."""
         judged = {engine for verdict in self.all if verdict.kind != "control" for _, engine in verdict.sides}
         return [engine for engine in self.asked if engine not in judged]
 
     @cached_property
     def never_applicable(self) -> dict[str, list[str]]:
-        """By engine the cases of which it can represent nothing that it was asked for."""
+        """For each engine the cases of which it can represent nothing."""
         judged = {(verdict.case, engine) for verdict in self.all for _, engine in verdict.sides}
         found: dict[str, dict[str, None]] = {}
         for each in self.inapplicable:
@@ -82,12 +80,12 @@ class SessionOutcome:
 
     @property
     def not_offered(self) -> dict[str, int]:
-        """By engine how many channels it does not offer, of those it would have been judged in."""
+        """For each engine the number of channels that would be judged and that it does not offer."""
         return dict(Counter(each.engine for each in self.inapplicable if each.channel))
 
     @property
     def worse(self) -> list[Verdict]:
-        """Verdicts as expected, whose E or U has grown beyond what was accepted on the same basis."""
+        """Verdicts as expected whose E or U has grown beyond figures that were accepted on the same basis."""
         return [verdict for verdict in self.all if verdict.ok and verdict.worse and not verdict.stale]
 
     @property
@@ -97,7 +95,7 @@ class SessionOutcome:
 
     @property
     def outgrown(self) -> list[Verdict]:
-        """Those of them whose E or U is beyond the accepted one: what that says nobody knows."""
+        """Stale verdicts whose E or U has grown beyond the accepted one."""
         return [verdict for verdict in self.stale if verdict.worse]
 
     @property
@@ -107,9 +105,9 @@ class SessionOutcome:
 
     @cached_property
     def lost(self) -> list[Absence]:
-        """Runs that were asked for and did not happen, or failed where no verdict shows it.
+        """Runs that were asked for and did not run, or that failed without a verdict that shows it.
 
-        An engine that refuses or diverges has answered; a case that compares it with nothing expects nothing of it.
+        Refusing and diverging are answers, and a case without a comparison of the engine expects nothing of it.
         """
         judged = {(verdict.case, *side) for verdict in self.all for side in verdict.sides}
         return [
@@ -121,7 +119,7 @@ class SessionOutcome:
 
     @property
     def ok(self) -> bool:
-        """Every verdict is the expected one, everything asked for ran and was judged in something, nothing is lost."""
+        """Whether every verdict is as expected, everything asked for was judged, and no run is lost."""
         complete = not self.unfinished and bool(self.all) and not self.lost and not self.broken
         sound = complete and not self.unexpected and not self.uncompared
         lacking = self.worse or self.outgrown or self.unrecorded or self.unreferenced
@@ -179,13 +177,12 @@ class SessionOutcome:
         return Counter(verdict.status for verdict in self.all if verdict.kind != "control")
 
     def controls(self) -> tuple[int, int]:
-        """In how many channels the negative controls were noticed, and how many there are."""
+        """The number of channels in which negative controls were noticed, and of all."""
         noticed = [verdict.ok for verdict in self.all if verdict.kind == "control"]
         return sum(noticed), len(noticed)
 
 
 def conclude(session: Session, strict: bool = False) -> SessionOutcome:
-    """Judge every case of a session."""
     verdicts: dict[str, list[Verdict]] = {}
     inapplicable: tuple[Inapplicable, ...] = ()
     for case in session.cases:

@@ -1,4 +1,4 @@
-"""What a case asks of two sides, and how the answer becomes a verdict."""
+"""A comparison of two sides as a case states it, and its verdicts from findings."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from crosscheck.records.kinds import CaseRecord
 
 @dataclass(frozen=True)
 class Question:
-    """What a case asks of two sides: which status it expects of every channel, and why if that is not agreement.
+    """The two sides, the status expected of every channel, and why if that is not agreement.
 
-    `basis` is what the numbers of the answer will have been found with.
+    `basis` is the basis of the figures (`crosscheck.judging.basis`).
     """
 
     case: CaseRecord
@@ -29,7 +29,7 @@ class Question:
     basis: str = ""
 
     def verdict(self, channel: str, goal: float, finding: Finding, beyond: str = "") -> Verdict:
-        """The verdict on one channel; `beyond` says how a finding with the expected status is outside its bounds."""
+        """The verdict on one channel; `beyond` says how a finding of the expected status is outside its bounds."""
         place = key(channel, (self.a.engine, self.a.variant), (self.b.engine, self.b.variant))
         accepted = self.case.accepted.get(self.name, {}).get(place) if self.kind != "control" else None
         infos = self.case.variants

@@ -16,7 +16,7 @@ from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record
 from crosscheck.records.packing import Packed, unpack
 from flexmb.typing import Real
 
-NEEDED = 3  # efforts without a gap; what is before them may help
+NEEDED = 3  # the last efforts, which must all be recorded for an estimate of U
 Key = tuple[str, str, str]  # variant, engine, role
 
 
@@ -41,22 +41,19 @@ class Result:
 
     @cached_property
     def _sizes(self) -> Sizes:
-        """Sizes of the finest run's channels."""
         return Sizes(tuple(self.finest.channels), self.values)
 
     @property
     def finest(self) -> RunRecord:
-        """The run at the finest effort."""
         return self.runs[-1]
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the channels that the finest run has."""
         return tuple(self.finest.channels) if self.status == "finished" else ()
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Names of channels that the finest run says the motion leaves open."""
+        """Names of the channels that the motion does not determine, by the finest run."""
         return self.finest.undetermined if self.status == "finished" else ()
 
     @property
@@ -71,15 +68,15 @@ class Result:
 
     @property
     def ending(self) -> Ending:
-        """How the run ended; only of a run that did not finish."""
+        """How the run ended; only for an unfinished run."""
         assert self.status != "finished"
         return Ending(self.status, f"{self.engine} on {self.variant}: {self.message}", self.reached_s)
 
     def uncertainty(self, channel: str) -> Uncertainty:
         """Numerical U of a channel of the finest run, from the last efforts of its method.
 
-        An effort too coarse to be followed may diverge and is left out. One that is missing for any other reason says
-        nothing about convergence, and neither do the others without it: U is unknown.
+        A coarse effort may diverge and is left out. If one of the last efforts is missing for any other reason, nothing
+        is known about convergence, and U is unknown.
         """
         if channel not in self._estimates:
             self._estimates[channel] = self._estimate(channel)
@@ -97,12 +94,11 @@ class Result:
         return estimate(channel, finest.effort_kind, rungs, self._sizes.magnitude(channel, finest.evaluations))
 
     def _ladder(self) -> list[RunRecord]:
-        """The last efforts of the finest run's method."""
         method = (self.finest.effort_kind, self.finest.effort_method)
         return [run for run in self.runs if (run.effort_kind, run.effort_method) == method][-RUNGS:]
 
     def _gap(self, channel: str) -> str:
-        """What is missing from the ladder, so that it says nothing about convergence; "" if nothing is."""
+        """What is missing from the ladder, so that U cannot be estimated; "" if nothing is."""
         recorded = {run.rung for run in self.runs}
         missing = [rung for rung in range(self.finest.rungs) if rung not in recorded]
         if missing:
@@ -115,9 +111,9 @@ class Result:
         return ""
 
     def doubt(self, channel: str, across: bool) -> Uncertainty:
-        """U of a channel; `across` variants, the spatial discretisation adds to it.
+        """U of a channel; in comparisons `across` variants the spatial discretisation adds to it.
 
-        Where a refined run was asked for and gives no result, its part of U is unknown, and so is U.
+        If a refined run was asked for and gave no result, U is unknown.
         """
         own = self.uncertainty(channel)
         if not across or self.refined is None:
@@ -130,7 +126,7 @@ class Result:
         return Uncertainty(envelope, float(envelope[-1]), f"{own.how}; spatial refinement", own.order)
 
     def _unrefined(self, channel: str, refined: Result) -> str:
-        """Why the refined run says nothing about the channel; "" if it does."""
+        """Why the refined run cannot be used for the channel; "" if it can."""
         if refined.status != "finished":
             return f"{_past(refined.status)}: {refined.message}"
         if channel not in refined.channels:
@@ -140,7 +136,7 @@ class Result:
         return ""
 
     def signal(self, channel: str, across: bool) -> Signal:
-        """The channel as a verdict needs it; `across` variants, the spatial discretisation adds to U."""
+        """The channel as input of a verdict; `across` variants the spatial discretisation adds to U."""
         return self._signal(channel, self.doubt(channel, across))
 
     def control_signal(self, channel: str, like: Result, across: bool) -> Signal:
@@ -168,15 +164,15 @@ class CaseResults:
         return self.results.get((variant, engine, role)) or _never_recorded(variant, engine)
 
     def undetermined(self, *variants: str) -> dict[str, str]:
-        """Channels that the motion of some of these variants leaves open, and an engine that says so: what others give
-        there is one choice out of infinitely many."""
+        """Channels that the motion of these variants does not determine, with an engine that says so: the values of
+        other engines are one choice of infinitely many."""
         said = (result for (variant, _, _), result in self.results.items() if variant in variants)
         return {channel: result.engine for result in said for channel in result.undetermined}
 
 
 @dataclass(frozen=True)
 class Session:
-    """Everything a file of records says; `broken` are its lines that say nothing."""
+    """The contents of a records file; `broken` are its invalid lines."""
 
     environments: tuple[Environment, ...]
     cases: tuple[CaseResults, ...]
@@ -189,7 +185,7 @@ def collect(records: Sequence[Record]) -> Session:
     runs: dict[tuple[str, ...], RunRecord] = {}
     for record in records:
         if isinstance(record, RunRecord):
-            runs.pop(record.key, None)  # so that the order is that of the last records
+            runs.pop(record.key, None)  # the order is that of the last records
             runs[record.key] = record
     return Session(
         environments=tuple(record for record in records if isinstance(record, Environment)),
@@ -243,21 +239,21 @@ def _never_recorded(variant: str, engine: str) -> Result:
 
 
 def _on(ladder: Sequence[tuple[str, str, float]], run: RunRecord) -> bool:
-    """Whether a run is one of the efforts that the case prescribes now, at its place in the ladder."""
+    """Whether a run is one of the efforts that the case prescribes now, at its present rung."""
     place = slice(run.rung, run.rung + 1)
     return run.rungs == len(ladder) and list(ladder[place]) == [(run.effort_kind, run.effort_method, run.effort_value)]
 
 
 def _without_effect(ladder: Sequence[RunRecord]) -> bool:
-    """Whether the last two efforts did the very same work with the very same result.
+    """Whether the last two efforts made as many evaluations and gave the same result.
 
-    Then the engine did not follow the effort (say, a step cut short by the sample times), and equality means nothing.
+    Then the engine ignored the effort (say, since sample times limit the step), and equality means nothing.
     """
     return len(ladder) >= 2 and _same(*ladder[-2:])
 
 
 def _same(one: RunRecord, other: RunRecord) -> bool:
-    """Whether two runs did the very same work with the very same result in every channel of the second."""
+    """Whether two runs made as many evaluations and gave the same result in every channel of the second."""
     return one.evaluations == other.evaluations and all(
         name in one.channels and one.channels[name].data == packed.data for name, packed in other.channels.items()
     )
@@ -269,7 +265,7 @@ def _past(status: RunStatus) -> str:
 
 
 def _result(key: Key, group: list[RunRecord]) -> Result:
-    """A result from the runs of one scene and one origin: those of the record that came last."""
+    """A result from the runs with the same scene and key as the last record."""
     variant, engine, _ = key
     last = group[-1]
     if not last.effort:
@@ -278,7 +274,7 @@ def _result(key: Key, group: list[RunRecord]) -> Result:
         return Result(variant, engine, last.status, last.message, ())
     stamp = (last.scene, last.version, last.rungs, last.made_by)
     same = [run for run in group if run.effort and (run.scene, run.version, run.rungs, run.made_by) == stamp]
-    rungs = {run.rung: run for run in same}  # of two ladders as long as each other, what came last counts
+    rungs = {run.rung: run for run in same}  # of two ladders of the same length the later runs count
     runs = tuple(rungs[rung] for rung in sorted(rungs))
     finest = runs[-1]
     if finest.rung < finest.rungs - 1:

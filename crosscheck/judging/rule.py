@@ -1,8 +1,7 @@
-"""What E and U depend on beside the results: the rules by which they are found, recognised by what they do.
+"""A digest of the rules by which E and U are found, made from what they compute.
 
-A digest of the sources would change with every comment and every rearrangement, and with it all accepted figures would
-be of another rule. So a few made-up ladders and signals are judged, one for each way in which U, a size or E is found,
-and the numbers that come out are what the rule is recognised by.
+A digest of the sources would change with every comment and make all accepted figures stale. Instead, made-up ladders
+and signals are judged, one for each way in which U, a size or E is found, and the resulting numbers are digested.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from crosscheck.judging.verdict import Signal, compare, conserve
 from flexmb.typing import Real
 
 CHANNEL = "marker:m.position"
-# Kind of effort; efforts; how far each run is from the limit; evaluations.
+# Kind of effort; efforts; error of each run; evaluations.
 LADDERS = (
     ("step", (0.04, 0.02, 0.01), (0.113, 0.0283, 0.00709), (0, 0, 0)),  # order 2
     ("step", (0.04, 0.02, 0.01), (0.113, 3.5e-4, 1.1e-6), (100, 200, 400)),  # more than is credited
@@ -44,7 +43,7 @@ LADDERS = (
 
 @cache
 def rule() -> str:
-    """Six digits by which the way is recognised in which E and U are found."""
+    """Six hexadecimal digits that identify the rules for E and U."""
     return short_digest(" ".join(_numbers()))
 
 
@@ -54,7 +53,7 @@ def short_digest(text: str) -> str:
 
 
 def _numbers() -> Iterator[str]:
-    """Four digits of every number that comes out: rounding is no rule."""
+    """Four digits of every resulting number, so that rounding does not matter."""
     times = np.linspace(0.0, 1.3, 27)
     for kind, efforts, errors, evaluations in LADDERS:
         rungs = [
@@ -73,7 +72,7 @@ def _numbers() -> Iterator[str]:
 
 
 def _judged(times: Real, size: float) -> Iterator[str]:
-    """E and U of positions, orientations, forces and energies, where the force is of some size."""
+    """E and U of positions, orientations, forces and energies, with forces of the given size."""
     turned = np.stack([np.cos(0.4 * times), *(0.6 * np.sin(0.4 * times),) * 2, 0.5 * np.sin(0.4 * times)], axis=1)
     channels = {
         CHANNEL: _signal(times, 0.0),

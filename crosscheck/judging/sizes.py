@@ -1,8 +1,8 @@
-"""The sizes by which a signal is measured that is zero within its uncertainty.
+"""Reference sizes for signals that are zero within their uncertainty.
 
-By symmetry a force, a momentum or a rate may vanish; what is left of it is rounding, and a goal relative to the range
-of rounding would mean nothing. Such a signal is measured by its family, and where the whole family vanishes by what the
-scene's other signals say: a linear momentum by 2 T/v, an angular one by 2 T/w, a force by torques over the extent.
+By symmetry a force, a momentum or a rate may vanish; then its range is only rounding, and a goal relative to that would
+mean nothing. Such a signal is measured by the size of its family. If the whole family vanishes, the size follows from
+other signals of the scene: of a linear momentum 2 T/v, of an angular one 2 T/w, of a force a torque over the extent.
 """
 
 from __future__ import annotations
@@ -16,46 +16,48 @@ from flexmb.run.channels import family, magnitude, signal_range
 from flexmb.typing import Real
 
 Measure = Callable[[str, Real], float]  # of a channel's signal: its largest magnitude, its range
-ROUNDING = 2.0**-26  # of its family's size: a signal that is smaller has no digits of its own
-NOTHING = 2.0**-50  # of what the scene says: sums of such numbers leave so much by rounding, as torques of forces do
+LEAST_OF_FAMILY = 2.0**-26  # a range below this part of the family's is not used as a size
+LEAST_OF_SCENE = 2.0**-50  # below this part of the size from other signals, a family is rounding of sums of these
 
 
 def size_of(own: float, further: Sequence[float], doubt: float) -> float:
-    """The size (SI) of a signal: its `own` range, or the first of `further` above `doubt`, its uncertainty (SI).
+    """The size (SI) of a signal: the first of its `own` range and `further` that is above its uncertainty `doubt` (SI).
 
-    `further` are those of `Sizes.of`. A range below `ROUNDING` of the family's is not taken, nor are the range and the
-    family's below `NOTHING` of what the rest of the scene says: the signal is zero.
+    `further` are those of `Sizes.of`. A range below `LEAST_OF_FAMILY` of the family's is skipped, as are the range and
+    the family's below `LEAST_OF_SCENE` of the size from the rest of the scene.
     """
     kin, of_scene = (*further, 0.0, 0.0)[:2]
-    if max(own, kin) < NOTHING * of_scene:
+    if max(own, kin) < LEAST_OF_SCENE * of_scene:
         return of_scene
-    candidates = [own, kin, of_scene] if own > ROUNDING * kin else [kin, of_scene]
+    candidates = [own, kin, of_scene] if own > LEAST_OF_FAMILY * kin else [kin, of_scene]
     return next((size for size in candidates if size > doubt), max(candidates))
 
 
 @dataclass
 class Sizes:
-    """The sizes of the channels (T, k) of one result. Each is found once: every pair of engines, and every channel of a
-    family, asks for it."""
+    """The sizes of the channels (T, k) of one result, each computed once."""
 
     channels: Iterable[str]
     values: Callable[[str], Real]
     _found: dict[tuple[Measure, str], float] = field(default_factory=dict, repr=False)
 
     def of(self, channel: str) -> tuple[float, ...]:
-        """The largest range (SI) in the channel's family, and what the rest of the scene says where that is nothing."""
+        """The largest range (SI) in the channel's family, and the size that follows from the rest of the scene."""
         return self._largest(signal_range, family(channel)), self._of_scene(channel)
 
     def magnitude(self, channel: str, evaluations: int = 0) -> float:
-        """What the rounding of a channel is relative to (SI): the largest magnitude in its family, or what the rest of
-        the scene says where the family is nothing beside that, or beside what so many `evaluations` leave of it by
-        rounding: a momentum that vanishes is a sum of those of the bodies. Exact zeros have no rounding."""
+        """The size (SI) to which the rounding of a channel is relative.
+
+        It is the largest magnitude in the channel's family, or the size from the rest of the scene if the family is
+        only rounding of that, also after so many `evaluations`: a vanishing momentum is a sum of those of the bodies.
+        Exact zeros have no rounding.
+        """
         kin, of_scene = self._largest(magnitude, family(channel)), self._of_scene(channel)
-        nothing = max(NOTHING * of_scene, roundoff_floor(of_scene, max(evaluations, 0)))
-        return of_scene if 0.0 < kin < nothing else kin
+        rounding = max(LEAST_OF_SCENE * of_scene, roundoff_floor(of_scene, max(evaluations, 0)))
+        return of_scene if 0.0 < kin < rounding else kin
 
     def _of_scene(self, channel: str) -> float:
-        """The size (SI) of such a signal by dimensions, from the scene's other signals; 0 where they say nothing."""
+        """The size (SI) of such a signal from the scene's other signals by dimensions; 0 if it does not follow."""
         motion = (".position", ".velocity", ".angular_velocity")
         extent, speed, turning = (self._magnitude_of(ending) for ending in motion)
         action = 2.0 * self._magnitude_of("energy.kinetic")
@@ -86,7 +88,7 @@ class Sizes:
         return found
 
     def _largest(self, measure: Measure, kin: str) -> float:
-        """The largest size in a family; 0 if it has no channel."""
+        """The largest measure in a family; 0 if it has no channel."""
         return self._once(measure, kin, self._families.get(kin, []))
 
     def _magnitude_of(self, ending: str) -> float:
@@ -101,5 +103,5 @@ class Sizes:
 
 
 def _ratio(number: float, other: float) -> float:
-    """The quotient, 0 where there is none."""
+    """The quotient, 0 for a divisor of 0."""
     return number / other if other > 0.0 else 0.0

@@ -10,34 +10,35 @@ The first equation gives the observed order p (for equal ratios p = log(d_12/d_2
 estimate, gives U with the safety factor 1.25 of the grid convergence index for three grids (Roache 1998). It is used
 where p is within `ORDER_BAND` of a whole number: all one-step and multistep methods have whole orders, so a p that is
 not is a sign of being outside the asymptotic range. No credit is given for more than order `ORDER_CREDIT`.
-Outside the band but with p at least 1 - ORDER_BAND, the method is taken to be of order 1: U = 1.25 d_23/(r_23 - 1).
+Outside the band but with p at least 1 - ORDER_BAND, the method is assumed to be of order 1: U = 1.25 d_23/(r_23 - 1).
 With a smaller p the runs have not begun to converge, or have reached round-off: U = 3 max(d_12, d_23), with the factor
 of the grid convergence index for an unproven order.
 
-**Tolerance.** Error is not a power of the tolerance, but it falls. If the finest error is at most half the one before,
-|f_2 - f_3| >= e_2 - e_3 >= e_3: the difference bounds the error. d_12 >= 2 d_23 is the sign of it; without it
-U = 3 max(d_12, d_23) again. How far an error falls scatters: at a finer tolerance it is at most a spread S times what
-the fall q foretells, e_3 <= S/q e_2. With e_2 <= d_23 + e_3, that is
+**Tolerance.** The error is not a power of the tolerance, but it decreases. If the finest error e_3 is at most half the
+one before, d_23 >= e_2 - e_3 >= e_3: the difference bounds the error. This is assumed if d_12 >= 2 d_23; otherwise
+U = 3 max(d_12, d_23) again. The decrease of the error scatters: where a factor q is expected, e_3 <= S/q e_2 with a
+scatter S. With e_2 <= d_23 + e_3 it follows that
 
     U = S/(q - S) d_23,        at most 3 d_23.
 
-At q the lesser of d_12 / d_23 and the tolerances' ratio, S is `SPREAD`. U is at least d_23, because errors may have
-stopped to fall and the differences do not show it. The evaluations N show it, if they are counted. Where they grow by
-no more than `HARDLY_MORE`, something else rules the steps (stability, the samples, a leap): U = `UNRULED` d_23. Else
-p = log(d_12 / d_23) / log(N_2 / N_1) is the order in the mean step. One p may be chance, as errors at the kinks of a
-stop are; four efforts tell it twice. Where both agree within a factor of `SAME_ORDER`, and neither is beyond
-`LARGEST_ORDER_IN_WORK`, which no method has, errors fall evenly: U may be less than d_23, q being the least of
-d_12 / d_23 and (N_3 / N_2)^p. Not so where evaluations grow much more than before, beside the tolerance, in
-logarithms by `MUCH_MORE`: error control fights round-off that the scene magnifies. The spreads are those of the
-library, see docs/verdicts.md.
+q is the smaller of d_12 / d_23 and the ratio of the tolerances, and S is `SCATTER`. U is at least d_23, since errors
+may have ceased to decrease, which the differences do not show. The numbers of evaluations N show it, if they are
+counted. If they grow by at most a factor `NO_GROWTH`, something other than the tolerance determines the steps
+(stability, sample times, a closed chain at a singular position): U = `UNCONTROLLED_SAFETY` d_23. Otherwise
+p = log(d_12 / d_23) / log(N_2 / N_1) is the observed order in the mean step. One value of p may be chance, for example
+by the errors at the kinks of a stop; four efforts give two. If both agree within a factor of `SAME_ORDER` and do not
+exceed `LARGEST_ORDER_IN_WORK`, which no method does, U may be less than d_23, with q the smaller of d_12 / d_23 and
+(N_3 / N_2)^p. The exception are evaluations whose logarithmic growth, relative to the tolerance, exceeds the one before
+by more than a factor `EXCESS_GROWTH`: then the error control reacts to round-off that the scene amplifies. The values
+of these constants were found over the library of cases, see docs/verdicts.md.
 
-**Round-off.** N evaluations, each with relative rounding errors of size eps and random sign, add up to about
-eps sqrt(N) times the size of the signal (Henrici 1962); a systematic growth beyond that shows in the differences. The
-size is that of the largest signal of the same family (all hinge torques, all positions): a backward-stable solve leaves
-errors relative to the norm of everything it solves for.
+**Round-off.** Relative rounding errors of size eps and random sign in N evaluations add up to about eps sqrt(N) times
+the size of the signal (Henrici 1962); systematic growth beyond that shows in the differences. The size is that of the
+largest signal of the same family (all hinge torques, all positions): a backward-stable solve has errors relative to the
+norm of all unknowns.
 
-Estimating is total: whatever is no ladder of finite runs at falling efforts gives an infinite U with the reason, and a
-comparison with it is unresolved.
+Runs that are not a ladder of finite results at decreasing efforts have an infinite U with the reason, and comparisons
+with it are unresolved.
 """
 
 from __future__ import annotations
@@ -54,23 +55,23 @@ from flexmb.typing import Real
 
 SAFETY = 1.25
 UNPROVEN_SAFETY = 3.0
-MOST_COUNTED = 2**63  # evaluations: a record may hold any whole number, and larger ones are no numbers of NumPy
-RUNGS = 4  # of a ladder that can count
+MOST_COUNTED = 2**63  # evaluations: a record may contain larger integers, which NumPy cannot represent
+RUNGS = 4  # the most efforts of a ladder that are used
 ORDER_BAND = 0.1
-SPREAD = 10.0
-UNRULED = 15.0
+SCATTER = 10.0
+UNCONTROLLED_SAFETY = 15.0
 SAME_ORDER = 1.25
 LARGEST_ORDER_IN_WORK = 12.0
-HARDLY_MORE = 1.03  # evaluations at the finer of two tolerances, over those at the coarser
-MUCH_MORE = 1.5  # their growth's logarithm, over that foretold by the growth before
+NO_GROWTH = 1.03  # ratio of the evaluations at two tolerances
+EXCESS_GROWTH = 1.5  # ratio of the logarithm of that ratio to the one expected from the coarser pair
 ORDER_CREDIT = 4.0
 LARGEST_ORDER = 16.0
-LARGEST_RATIO = 1e6  # of two steps: an order seen across more is seen nowhere
+LARGEST_RATIO = 1e6  # of two steps between which an order is estimated
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """U of one channel of one result: `envelope` (T,), never falling; `value`, its maximum; how it was found."""
+    """U of one channel of one result: `envelope` (T,), which never decreases; its maximum `value`; how it was found."""
 
     envelope: Real
     value: float
@@ -80,9 +81,9 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class RungSignal:
-    """One run of a ladder in one channel: the effort's step (s) or relative tolerance, and the signal (T, k).
+    """One channel (T, k) of one run of a ladder; `effort` is its step (s) or relative tolerance.
 
-    `evaluations`: the number of right-hand sides, 0 if not counted.
+    `evaluations` of the right-hand side are 0 if not counted.
     """
 
     effort: float
@@ -91,15 +92,15 @@ class RungSignal:
 
 
 def unknown(samples: int, why: str) -> Uncertainty:
-    """An infinite U: nothing is known, for the reason `why`."""
+    """An infinite U, for the reason `why`."""
     return Uncertainty(np.full(samples, np.inf), float("inf"), f"unknown: {why}")
 
 
 def estimate(channel: str, kind: str, rungs: Sequence[RungSignal], size: float) -> Uncertainty:
     """U of the finest of `rungs` (coarse to fine, all of one method; `kind` is "step" or "tolerance").
 
-    The last three count, of tolerances the last four. `size` is the magnitude of the signal's family. Never raises: U
-    is infinite where the rungs say nothing.
+    The last three are used, of tolerances the last four. `size` is the magnitude of the signal's family. Never raises:
+    U is infinite if it cannot be estimated.
     """
     samples = len(rungs[-1].values) if rungs else 0
     fault = _fault(kind, rungs, size)
@@ -114,7 +115,7 @@ def estimate(channel: str, kind: str, rungs: Sequence[RungSignal], size: float) 
 
 
 def _fault(kind: str, rungs: Sequence[RungSignal], size: float) -> str:
-    """Why nothing can be said from such runs; "" if something can."""
+    """Why U cannot be estimated from the runs; "" if it can."""
     if len(rungs) < 2:
         return "fewer than two efforts finished with different results"
     if kind not in ("step", "tolerance"):
@@ -134,11 +135,11 @@ def _fault(kind: str, rungs: Sequence[RungSignal], size: float) -> str:
 
 
 def _enveloped(factor: float, gap: Real, floor: float, how: str, order: float | None) -> Uncertainty:
-    """U that never falls over time, above the round-off."""
+    """U that never decreases over time, plus the round-off."""
     with np.errstate(over="ignore"):
         envelope = np.maximum.accumulate(factor * gap) + floor
     if not np.all(np.isfinite(envelope)):
-        return unknown(len(envelope), "the runs are so far apart that their distance is no number")
+        return unknown(len(envelope), "the runs are so far apart that their distance is not finite")
     return Uncertainty(envelope, float(envelope[-1]), how, order)
 
 
@@ -150,21 +151,21 @@ def roundoff_floor(size: float, evaluations: int) -> float:
 def spatial(channel: str, coarse: Real, fine: Real, ratio: float, order: float) -> Real:
     """U (T,) of a spatial discretisation, for its *coarse* result: f_c - f = (f_c - f_f) r^p / (r^p - 1), safety 1.25.
 
-    `order` is the known order p of the discretisation and `ratio` r its refinement. Infinite where they say nothing:
-    results of different shapes or with values that are no numbers, a ratio that is none, no order.
+    `order` is the known order p of the discretisation and `ratio` r its refinement. Infinite for results of different
+    shapes or with values that are not finite, and for an invalid ratio or order.
     """
     samples = len(coarse)
     comparable = coarse.shape == fine.shape and coarse.size > 0 and np.all(np.isfinite((coarse, fine)))
     if not (comparable and 1.0 < ratio < np.inf and 0.0 < order < np.inf):
         return np.full(samples, np.inf)
     with np.errstate(all="ignore"):
-        left = -np.expm1(-order * np.log(ratio))  # 1 - r^-p, which no r^p can overflow
+        left = -np.expm1(-order * np.log(ratio))  # 1 - r^-p cannot overflow
         found = np.maximum.accumulate(SAFETY / left * distance(channel, coarse, fine))
     return found if np.all(np.isfinite(found)) else np.full(samples, np.inf)
 
 
 def observed_order(steps: Sequence[float], wider: float, gap: float) -> float | None:
-    """Order p from three steps and the two differences; None where there is none between 0 and LARGEST_ORDER."""
+    """Order p from three steps and the two differences; None if there is none between 0 and LARGEST_ORDER."""
     if not all(0.0 < number < np.inf for number in (*steps, wider, gap)):
         return None
     first, second = steps[0] / steps[1], steps[1] / steps[2]
@@ -189,7 +190,7 @@ def _unproven(gaps: Sequence[Real], why: str) -> Bound:
 
 
 def _by_steps(rungs: Sequence[RungSignal], gaps: Sequence[Real]) -> Bound:
-    """Of at least three fixed steps, by the last three."""
+    """The bound from the last three of at least three fixed steps."""
     steps = [rung.effort for rung in rungs[-3:]]
     order = observed_order(steps, *(float(np.max(gap)) for gap in gaps[-2:]))
     if order is None or order < 1.0 - ORDER_BAND:
@@ -204,28 +205,29 @@ def _by_steps(rungs: Sequence[RungSignal], gaps: Sequence[Real]) -> Bound:
 
 
 def _by_tolerances(rungs: Sequence[RungSignal], gaps: Sequence[Real]) -> Bound:
-    """Of at least three tolerances, by the last three or four."""
+    """The bound from the last three or four of at least three tolerances."""
     sizes = [float(np.max(gap)) for gap in gaps]
     if sizes[-2] < 2.0 * sizes[-1]:
         return _unproven(gaps, "the runs do not converge yet")
     work = [rung.evaluations for rung in rungs[-RUNGS:]]
     growth = [fine / coarse if coarse > 0 else np.nan for coarse, fine in pairwise(work)]
-    if any(more <= HARDLY_MORE for more in growth[-2:]):
+    if any(more <= NO_GROWTH for more in growth[-2:]):
         why = "as a finer one took hardly more evaluations"
-        return UNRULED, gaps[-1], f"{UNRULED:g} x the difference of the two finest tolerances, {why}", None
+        how = f"{UNCONTROLLED_SAFETY:g} x the difference of the two finest tolerances, {why}"
+        return UNCONTROLLED_SAFETY, gaps[-1], how, None
     seen = sizes[-2] / sizes[-1] if sizes[-1] > 0.0 else np.inf
     before, ratio = (coarse.effort / fine.effort for coarse, fine in pairwise(rungs[-3:]))
     factor = max(1.0, _after_scatter(min(seen, ratio)))
-    if growth[-1] <= growth[-2] ** (MUCH_MORE * np.log(ratio) / np.log(before)):
-        factor = min(factor, _after_scatter(_foretold(sizes, growth)))
+    if growth[-1] <= growth[-2] ** (EXCESS_GROWTH * np.log(ratio) / np.log(before)):
+        factor = min(factor, _after_scatter(_expected_decrease(sizes, growth)))
     return factor, gaps[-1], f"{factor:.2g} x the difference of the two finest tolerances", None
 
 
-def _foretold(sizes: Sequence[float], growth: Sequence[float]) -> float:
-    """How far evaluations foretell that the error falls at the last effort; 1, not at all, where they tell no order.
+def _expected_decrease(sizes: Sequence[float], growth: Sequence[float]) -> float:
+    """The factor by which the error is expected to decrease at the last effort; 1 if no order is observed.
 
-    `sizes` of the differences, `growth` of the evaluations, which leads from each difference to the next; its last one
-    leads to the finest effort.
+    `sizes` are those of the differences; `growth` are the ratios of the evaluations of successive efforts, the last one
+    for the finest effort.
     """
     falls = [wide / near if near > 0.0 else np.inf for wide, near in pairwise(sizes)]
     orders = [
@@ -238,5 +240,5 @@ def _foretold(sizes: Sequence[float], growth: Sequence[float]) -> float:
 
 
 def _after_scatter(fall: float) -> float:
-    """Bound of e_3 over d_23, if e_3 is at most SPREAD/fall times e_2 <= d_23 + e_3."""
-    return UNPROVEN_SAFETY if fall <= SPREAD else min(UNPROVEN_SAFETY, SPREAD / (fall - SPREAD))
+    """Bound of e_3 / d_23, if e_3 is at most SCATTER/fall times e_2 <= d_23 + e_3."""
+    return UNPROVEN_SAFETY if fall <= SCATTER else min(UNPROVEN_SAFETY, SCATTER / (fall - SCATTER))

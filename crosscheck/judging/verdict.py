@@ -1,18 +1,17 @@
-"""Verdicts: what can be said about two results on a channel, given their numerical uncertainties.
+"""Verdicts on two results in a channel, given their numerical uncertainties.
 
 E = max |a - b| over the run and U = U_a + U_b. **agree**: E <= U and U within the goal. **differ**: E > U.
-**unresolved**: E <= U but U above the goal, so that sloppiness cannot pass as agreement; or U, goal or scale are none.
-Where there is nothing to compare, the status is that of the graver of the two runs. **refused**: an engine cannot
-represent the scene or does not offer the channel. **diverged**: the engine says so, and how far it got. **failed**: the
-adapter raised, broke the contract, or gave values that are no numbers. **did not finish**: it ran into its limit of
+**unresolved**: E <= U but U above the goal, so that inaccurate runs cannot agree; or U, goal or scale are invalid.
+If there is nothing to compare, the status is that of the graver of the two runs. **refused**: an engine cannot
+represent the scene or does not offer the channel. **diverged**: by the engine's statement, which says when. **failed**:
+the adapter raised, broke the contract, or gave values that are not finite. **did not finish**: it exceeded its limit of
 time or memory. **crashed**: its process died. **did not run**: an engine or a result that was asked for is missing. The
-last three are never what was expected.
-E, U and the goal are relative to the channel's range (or to the scale that the case states). Where that range lies
-below U, the signal is zero as far as can be told, and the range of its family (say, all hinge torques) is used.
+last three are never as expected.
+E, U and the goal are relative to the channel's range (or to the scale that the case states). If that range is below U,
+the signal is zero within its uncertainty, and the range of its family (say, all hinge torques) is used.
 
-Judging is total: every input has an answer, and a number that is not finite, or not positive where it must be, never
-ends as agreement. Conditions therefore ask whether a requirement holds, never whether it fails: every comparison with
-NaN is false.
+Every input has a verdict, and a number that is not finite, or not positive where it must be, never leads to agreement.
+Conditions therefore test whether a requirement holds, never whether it fails: every comparison with NaN is false.
 """
 
 from __future__ import annotations
@@ -43,22 +42,22 @@ Status = Literal[
 ]
 VerdictKind = Literal["comparison", "control", "conservation"]
 STATUSES: tuple[Status, ...] = get_args(Status)
-# The gravest first: what stands for several.
-GRAVITY: tuple[Status, ...] = (
+# From the gravest: the first stands for several.
+SEVERITY: tuple[Status, ...] = (
     "did not run", "crashed", "did not finish", "failed", "diverged", "refused", "differ", "unresolved", "agree",
 )  # fmt: skip
 NEVER_EXPECTED = ("did not finish", "crashed", "did not run")
 WORSE = "worse than recorded"
 STALE = "stale figure ({}; accept anew by crosscheck run {} --accept)"
-WHOLE_RANGE = 1.0  # a goal beyond it resolves nothing
+WHOLE_RANGE = 1.0  # the largest goal
 
 
 class Verdict(msgspec.Struct, frozen=True, kw_only=True):
     """One judged channel of one comparison; the records of verdicts.json. `scale` is in the channel's SI unit.
 
-    `outside` says how a result with the expected status is beyond the bounds that the case sets to it. `accepted` are
-    the figures reached when the case's figures were last accepted, `worse` says how E or U has grown since, and `stale`
-    what is another than it was then. `basis` is what E and U were found with.
+    `outside` says how a result with the expected status is outside the bounds of the case. `accepted` are the accepted
+    figures, `worse` says how E or U has grown since, `stale` what has changed since, and `basis` identifies how E and U
+    were found (`crosscheck.judging.basis`).
     """
 
     case: str
@@ -86,32 +85,31 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def grown(self) -> str:
-        """That E or U is beyond the accepted figure, in words, and whether that is the result's fault; "" if not."""
+        """How E or U has grown beyond the accepted figure, and whether that figure is stale; "" if it has not."""
         if not self.worse:
             return ""
         return f"{STALE.format(self.stale, self.case)}: {self.worse}" if self.stale else f"{WORSE}: {self.worse}"
 
     @property
     def sides(self) -> tuple[tuple[str, str], tuple[str, str]]:
-        """Variant and engine of its two sides."""
+        """Variant and engine of each side."""
         return (self.variant_a, self.engine_a), (self.variant_b, self.engine_b)
 
     @property
     def pair(self) -> str:
-        """Who is compared with whom, in words."""
         if self.variant_a == self.variant_b:
             return f"{self.engine_a} – {self.engine_b}"
         return f"{self.engine_a} ({self.variant_a}) – {self.engine_b} ({self.variant_b})"
 
     @property
     def ok(self) -> bool:
-        """Whether it came out as the case expects, within its bounds; what crashed or did not run never does."""
+        """Whether it is as the case expects, within its bounds; a crash or a missing run never is."""
         return self.status == self.expected and not self.outside and self.status not in NEVER_EXPECTED
 
 
 @dataclass(frozen=True)
 class Ending:
-    """How a run ended that did not finish, and the last sample time (s) that it reached, if it reached any."""
+    """How an unfinished run ended, and the last sample time (s) that it reached, if any."""
 
     status: Status
     reason: str
@@ -120,10 +118,7 @@ class Ending:
 
 @dataclass(frozen=True)
 class Finding:
-    """A status with its numbers (relative) and a reason a reader understands.
-
-    `endings`: of the runs that did not finish, where that is why there is nothing to compare.
-    """
+    """A status with its relative figures and the reason in words; `endings` are those of unfinished runs."""
 
     status: Status
     reason: str
@@ -135,11 +130,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Signal:
-    """One channel of one result: values (T, k), U, and further sizes (SI) for a signal that is zero within U.
-
-    `sizes`: the largest range in the channel's family (say, all hinge torques), then what other signals of the scene
-    say, see `crosscheck.judging.sizes`.
-    """
+    """One channel of one result: values (T, k), U, and the sizes (SI) of `crosscheck.judging.sizes.Sizes.of`."""
 
     values: Real
     uncertainty: Uncertainty
@@ -154,7 +145,7 @@ def compare(channel: str, a: Signal, b: Signal, goal: float, scale: float | None
     error = float(np.max(distance(channel, a.values, b.values)))
     total = a.uncertainty.value + b.uncertainty.value
     if not np.isfinite(error):
-        return Finding("failed", "the results are so large that their distance is no number")
+        return Finding("failed", "the results are so large that their distance is not finite")
     if error == total == 0.0:
         return Finding("agree", "the results are equal to the last digit", 0.0, 0.0, scale)
     size = scale if scale is not None else _size(channel, a, b, total)
@@ -175,8 +166,8 @@ def compare(channel: str, a: Signal, b: Signal, goal: float, scale: float | None
 
 
 def not_determined(engine: str) -> Finding:
-    """A channel that the motion leaves open, by what an engine says: nobody is compared in it."""
-    what = "closures suppress what others suppress already, and infinitely many loads go with the same motion"
+    """The finding on a channel that the motion does not determine, by an engine's statement; it is not compared."""
+    what = "closures are redundant, and infinitely many loads go with the same motion"
     return Finding("refused", f"not determined, as {engine} says: {what}")
 
 
@@ -199,7 +190,7 @@ def conserve(drift: Real, scale: float, limit: float) -> Finding:
 
 
 def _incomparable(a: Real, b: Real) -> Finding | None:
-    """The finding where the values have no distance; None where they have one."""
+    """The finding if the values cannot be subtracted; else None."""
     if a.ndim != 2 or a.shape != b.shape:
         return Finding("failed", f"the results are of different shapes, {a.shape} and {b.shape}: samples by components")
     if a.size == 0:
@@ -210,7 +201,7 @@ def _incomparable(a: Real, b: Real) -> Finding | None:
 
 
 def _unmeasurable(a: Signal, b: Signal, goal: float, scale: float | None) -> Finding | None:
-    """The finding where a distance would mean nothing, as U, goal, scale or sizes are no such numbers; else None."""
+    """The finding if U, goal, scale or sizes are invalid; else None."""
     for uncertainty in (a.uncertainty, b.uncertainty):
         if not uncertainty.value >= 0.0:
             return Finding("unresolved", f"an uncertainty of {uncertainty.value:g} is none: {uncertainty.how}")
@@ -224,9 +215,9 @@ def _unmeasurable(a: Signal, b: Signal, goal: float, scale: float | None) -> Fin
 
 
 def _size(channel: str, a: Signal, b: Signal, total: float) -> float:
-    """Range (SI) of the two signals, or one of their further sizes where it is nothing beside `total`, their U.
+    """Range (SI) of the two signals, or another of their sizes if the range is below `total`, the sum of their U.
 
-    Kinds of energy turn into each other: their size is always that of the largest of them.
+    Kinds of energy are converted into each other: their size is always that of the largest kind.
     """
     own = max(signal_range(channel, a.values), signal_range(channel, b.values))
     further = [max(pair) for pair in zip_longest(a.sizes, b.sizes, fillvalue=0.0)]

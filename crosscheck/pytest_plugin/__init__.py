@@ -1,15 +1,15 @@
-"""The pytest plug-in: `pytest --crosscheck CASES --crosscheck-engine NAME` holds an engine against stored references.
+"""The pytest plug-in: `pytest --crosscheck CASES --crosscheck-engine NAME` tests an engine on stored references.
 
 Every channel of a case for which there is a goal is a test item, `crosscheck::family/case[engine-channel]`, with the
 mark `crosscheck` and the tags of the case as marks. E, U, goal, status and the digest of the reference are properties
 of the item, in junit.xml too. An engine runs a case once in a session, in a process of its own, also under xdist.
 
-An outcome that the case expects, other than agreement, is an expected failure with its reason. What the engine refuses
-is skipped with the engine's reason (with `--crosscheck-strict` it fails), and a session in which an engine was compared
-in nothing is not green. An engine that is missing is an error. Nothing is left out silently.
+An outcome that the case expects, other than agreement, is an expected failure with its reason. What an engine refuses
+is skipped with the engine's reason (with `--crosscheck-strict` it fails), and a session in which an engine was not
+compared at all fails. A missing engine is an error. Nothing is left out silently.
 
-This module is imported by every pytest where crosscheck is installed: it imports nothing else of crosscheck before it
-is asked for something.
+This module is imported by every pytest where crosscheck is installed: it imports other modules of crosscheck only when
+they are needed.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ if TYPE_CHECKING:
 
 REQUEST: pytest.StashKey[Request] = pytest.StashKey()
 TEMPORARY = pytest.StashKey[Path]()
-SHARED = "crosscheck_shared"  # what the controller of xdist tells its workers: folder and session
+SHARED = "crosscheck_shared"  # key of the folder and session that xdist's controller sends to its workers
 
 
 class AsInstalled:
-    """Finds the modules of flexmb and crosscheck as if there were no pytest; other modules are left to the others.
+    """Finds the modules of flexmb and crosscheck as without pytest; other modules are left to other finders.
 
-    pytest rewrites the assertions of every package in a distribution that has a plug-in. Here that is a library, which
-    people want to try as it is: same code, same tracebacks, same start. Who stands first in `sys.meta_path` decides.
+    pytest rewrites the assertions of every package in a distribution that has a plug-in. Here that is a library, whose
+    code, tracebacks and start should be the same under pytest. The first finder in `sys.meta_path` decides.
     """
 
     @staticmethod
     def find_spec(name: str, path: Sequence[str] | None = None, target: Any = None) -> ModuleSpec | None:
-        """What Python itself finds, or None for a module that is not ours."""
+        """The specification that Python itself finds, or None for a module that is not ours."""
         return PathFinder.find_spec(name, path, target) if name.partition(".")[0] in ("flexmb", "crosscheck") else None
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The options, in a group of their own. This is asked first of all, before any conftest.py is imported."""
+    """Add the options in a group of their own. pytest calls this before any conftest.py is imported."""
     sys.meta_path.insert(0, AsInstalled)
     group = parser.getgroup("crosscheck", "hold a multibody engine against the reference cases")
     group.addoption(
@@ -73,7 +73,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Read the request; pytest.UsageError where it makes no sense."""
+    """Read the request; pytest.UsageError if it is invalid."""
     config.addinivalue_line("markers", "crosscheck: a case of the crosscheck library on an engine")
     options = config.option
     if not (options.crosscheck or options.crosscheck_engine or options.crosscheck_contract):
@@ -91,8 +91,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Remove the records, unless they were asked for, and what finds our modules in this session."""
-    with suppress(ValueError):  # a session inside a session restores the path itself
+    """Remove the records, unless they are to be kept, and the finder of our modules."""
+    with suppress(ValueError):  # a nested session may have restored the path already
         sys.meta_path.remove(AsInstalled)
     temporary = config.stash.get(TEMPORARY, None)
     if temporary is not None:
@@ -101,14 +101,14 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
-    """Tell a worker of xdist which folder and session all of them share."""
+    """Send the shared folder and session to a worker of xdist."""
     if REQUEST in node.config.stash:
         runs = node.config.stash[REQUEST].runs
         node.workerinput[SHARED] = [str(runs.folder), runs.session]
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
-    """What was asked for, in a line."""
+    """The request in one line."""
     return config.stash[REQUEST].headline if REQUEST in config.stash else None
 
 
@@ -116,7 +116,7 @@ def pytest_report_header(config: pytest.Config) -> str | None:
 def pytest_make_collect_report(
     collector: pytest.Collector,
 ) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
-    """Add the items asked for to what the session has collected."""
+    """Add the requested items to those that the session has collected."""
     report = yield
     request = collector.config.stash.get(REQUEST, None)
     if request is not None and isinstance(collector, pytest.Session) and report.passed:

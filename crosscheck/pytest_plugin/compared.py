@@ -1,4 +1,4 @@
-"""An engine that was compared in nothing is not green, though every item of its was skipped with a good reason."""
+"""A session fails if an engine was not compared at all, even if each of its items was skipped with a reason."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from crosscheck.pytest_plugin.items import PREFIX
 
 
 class NothingCompared:
-    """Counts, in the process that sees all reports, in how many items each engine was really held against something."""
+    """Counts, in the process that sees all reports, the items in which each engine was really compared."""
 
     def __init__(self) -> None:
         self._compared: dict[str, int] = {}
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Take note of an item: a skip compares nothing, an expected failure does."""
+        """Count an item: a skip is no comparison, an expected failure is one."""
         if not report.nodeid.startswith(f"{PREFIX}::"):
             return
         engine = str(dict(report.user_properties).get("engine"))
@@ -23,17 +23,17 @@ class NothingCompared:
 
     @property
     def idle(self) -> list[str]:
-        """Engines that were asked for and compared in nothing."""
+        """Engines that were asked for and not compared at all."""
         return [engine for engine, count in self._compared.items() if not count]
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
-        """Turn the session red where an engine was compared in nothing."""
+        """Let the session fail if an engine was not compared at all."""
         allowed = session.config.option.crosscheck_allow_missing
         if self.idle and not allowed and exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """Say so."""
+        """Name the engines that were not compared."""
         for engine in self.idle:
             terminalreporter.write_line(f"crosscheck: {engine} was compared in nothing: all its items were skipped")

@@ -26,11 +26,11 @@ class NotAsExpected(Exception):
 
 
 class EngineIsMissing(Exception):
-    """The engine that was asked for is not installed, or gave no result at all."""
+    """The engine that was asked for is not installed, or gave no result."""
 
 
 class CrosscheckItems(pytest.Collector):
-    """All items of a request, below the session."""
+    """The collector of all items of a request."""
 
     def __init__(self, request: Request, **others: Any) -> None:
         super().__init__(**others)
@@ -86,7 +86,7 @@ def reason_of(case: Case, engine: str) -> str:
 
 
 class _EngineItem(pytest.Item):
-    """What all items share: an engine, marks, and properties that junit.xml holds too."""
+    """Base of all items: an engine, marks, and properties, which junit.xml contains too."""
 
     def __init__(self, request: Request, engine: str, **others: Any) -> None:
         super().__init__(**others)
@@ -96,32 +96,29 @@ class _EngineItem(pytest.Item):
         self.tell("engine", engine)
 
     def tell(self, name: str, value: Any) -> None:
-        """A property of the item."""
         self.user_properties.append((name, value))
 
     def missing(self, reason: str) -> None:
-        """The engine is not there: an error, or a skip where that is allowed."""
+        """The engine is missing: an error, or a skip if that is allowed."""
         if self.request.allow_missing:
             pytest.skip(reason)
         raise EngineIsMissing(reason)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """Of what is known here only the text; the frames of this package tell nobody anything."""
+        """Our own exceptions as text only: frames of this package would not help."""
         if isinstance(excinfo.value, NotAsExpected | EngineIsMissing):
             return str(excinfo.value)
         return super().repr_failure(excinfo, style)
 
 
 class _CaseItem(_EngineItem):
-    """An item of a case."""
-
     def __init__(self, case: Case, engine: str, **others: Any) -> None:
         super().__init__(engine=engine, **others)
         self.case = case
         self.tell("case", case.name)
         for tag in marks_of(case):
             self.add_marker(getattr(pytest.mark, tag))
-        # Under `--dist loadgroup` one process gets them all; under other ways of dealing a lock has the others wait.
+        # With `--dist loadgroup` one process runs all items of a group; otherwise a lock makes the others wait.
         self.add_marker(pytest.mark.xdist_group(f"crosscheck {case.name} {engine}"))
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
@@ -130,9 +127,9 @@ class _CaseItem(_EngineItem):
 
 
 class ChannelItem(_CaseItem):
-    """One channel of a case on an engine, held against the stored reference; or what the engine must conserve.
+    """One channel of a case on an engine, compared with the stored reference; or a conserved quantity.
 
-    `wanted` are the channel and, where a run that did not finish has no channels, the pattern that stands for it.
+    `wanted` are the channel and, for an unfinished run, which has no channels, the pattern that stands for it.
     """
 
     def __init__(self, kind: VerdictKind, wanted: tuple[str, ...], reference: str, **others: Any) -> None:
@@ -143,7 +140,7 @@ class ChannelItem(_CaseItem):
         self.tell("reference", reference)
 
     def setup(self) -> None:
-        """Have the engine run, if it has not yet; an engine that is not there is an error, not a failure."""
+        """Run the engine, if it has not run yet; a missing engine is an error, not a failure."""
         outcome = self.request.runs.outcome(self.case, self.engine)
         absent = next((each for each in outcome.absences if each.status == "did not run"), None)
         if absent is not None:
@@ -169,7 +166,7 @@ class ChannelItem(_CaseItem):
             pytest.xfail(f"{verdict.status}, as the case expects: {verdict.expected_reason}")
 
     def _without_verdict(self) -> None:
-        """Not applicable, with the engine's reason; or an energy that it does not know."""
+        """Skip a channel that is not applicable, with the engine's reason, or an energy that it does not offer."""
         apart = self.request.runs.outcome(self.case, self.engine).inapplicable
         reason = next((each.reason for each in apart if each.channel in ("", *self.wanted)), "")
         if reason and self.request.strict:
@@ -177,7 +174,7 @@ class ChannelItem(_CaseItem):
         pytest.skip(f"{self.engine} refuses: {reason}" if reason else f"{self.engine} does not know {self.wanted[0]}")
 
     def _verdict(self) -> Verdict | None:
-        """The verdict on the channel, or the one that stands for it; None where the engine has no such energy."""
+        """The verdict on the channel, or the one that stands for it; None if the engine has no such energy."""
         outcome = self.request.runs.outcome(self.case, self.engine)
         mine = {verdict.channel: verdict for verdict in outcome.all if verdict.kind == self.kind}
         return next((mine[name] for name in self.wanted if name in mine), None)
@@ -199,8 +196,6 @@ class CannotBeHeld(_CaseItem):
 
 
 class ClauseItem(_EngineItem):
-    """A clause of the contract."""
-
     def __init__(self, clause: str, **others: Any) -> None:
         super().__init__(**others)
         self.clause = clause
@@ -208,13 +203,13 @@ class ClauseItem(_EngineItem):
         self.add_marker(pytest.mark.xdist_group(f"crosscheck contract {self.engine}"))
 
     def setup(self) -> None:
-        """Have the clauses tried, if they were not yet; an engine that is not there is an error."""
+        """Try all clauses, if that was not done yet; a missing engine is an error."""
         outcome = self.request.runs.clause(self.engine, self.clause)
         if outcome.status == "missing":
             self.missing(outcome.message)
 
     def runtest(self) -> None:
-        """Hold the engine to the clause."""
+        """Fail unless the clause holds."""
         outcome = self.request.runs.clause(self.engine, self.clause)
         if outcome.status == "not offered":
             pytest.skip(f"{outcome.message}: it is tried if you {outcome.offer}")
@@ -227,7 +222,7 @@ class ClauseItem(_EngineItem):
 
 
 def told(verdict: Verdict) -> str:
-    """A verdict that is not as expected, for people: what, how far, and how far it might have been."""
+    """The text of a verdict that is not as expected, with E, U and goal."""
     figures = {"E": verdict.E, "U": verdict.U, "goal": verdict.goal}
     numbers = ", ".join(f"{name} {value:.3g}" for name, value in figures.items() if value is not None)
     expected = "" if verdict.status == verdict.expected else f", expected {verdict.expected}"

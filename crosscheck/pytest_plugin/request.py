@@ -1,4 +1,4 @@
-"""What was asked for on pytest's command line, read and checked before anything runs."""
+"""The request on pytest's command line, checked before anything runs."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from crosscheck.library.find import Case, resolve, shipped_names
 from crosscheck.pytest_plugin.runs import SessionRuns
 from flexmb.scene.problems import closest
 
-# Marks that mean something to pytest: a tag of that name would be obeyed.
+# Marks with a meaning in pytest, which tags must not have.
 PYTESTS_OWN = {"skip", "skipif", "xfail", "parametrize", "usefixtures", "filterwarnings", "tryfirst", "trylast"}
 
 
 @dataclass(frozen=True)
 class Request:
-    """Cases and engines, the runs that they share, and how strict to be."""
+    """Cases and engines, the runs that they share, and strictness."""
 
     cases: tuple[Case, ...]
     engines: tuple[str, ...]
@@ -38,14 +38,13 @@ class Request:
 
     @property
     def headline(self) -> str:
-        """The request in a line."""
         count = f"{len(self.cases)} case{'' if len(self.cases) == 1 else 's'}"
         parts = [*([count] if self.cases else []), *(["the contract"] if self.contract else [])]
         return f"crosscheck: {' and '.join(parts)} on {', '.join(self.engines)}, records in {self.runs.folder}"
 
 
 def read_request(options: Namespace, folder: Path, session: str) -> Request:
-    """The request of a command line; pytest.UsageError says what is wrong with it and what there is."""
+    """The request of a command line; pytest.UsageError names the error and the choices."""
     names = tuple(dict.fromkeys(options.crosscheck_engine))
     if not names:
         raise pytest.UsageError("--crosscheck needs --crosscheck-engine NAME: `crosscheck engines` shows them")

@@ -1,4 +1,4 @@
-"""Runs that test items share: an engine runs a case once in a session, in whichever process of xdist asks first."""
+"""Runs that test items share: an engine runs a case once in a session, in the first process of xdist that needs it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DONE, LOCK = "session", ".crosscheck.lock"
 
 
 class SessionRuns:
-    """What was run in a session: records below `folder`, a folder for each case and engine, judged when asked for."""
+    """The runs of a session: records below `folder`, in a folder for each case and engine, judged on request."""
 
     def __init__(self, folder: Path, session: str, provider: str = PROVIDER) -> None:
         self.folder = folder
@@ -49,7 +49,7 @@ class SessionRuns:
         return self._outcomes[key]
 
     def clause(self, engine: str, name: str) -> ClauseOutcome:
-        """What came of a clause of the contract; all are tried, one after the other, when the first is asked for."""
+        """The outcome of a clause of the contract; all are tried when the first is requested."""
         if engine not in self._clauses:
             place = self.folder / "contract" / quote(engine, safe="")
             file = place / "clauses.json"
@@ -63,7 +63,7 @@ class SessionRuns:
 
     @contextmanager
     def _once(self, place: Path) -> Iterator[bool]:
-        """Whether this process is the first of the session at a place; others wait until it is done."""
+        """Whether this process is the first of the session; others wait until it is done."""
         place.mkdir(parents=True, exist_ok=True)
         with FileLock(place / LOCK):
             done = place / DONE

@@ -34,10 +34,10 @@ class BrokenRecords(UserWarning):
 
 
 class Archive:
-    """A records file open for appending; every record is on disk when `write` returns."""
+    """A records file open for appending; a record is flushed to the file when `write` returns."""
 
     def __init__(self, file: Path, kind: Any = Written) -> None:
-        """`kind` are the records that the file holds; lines that are none of them are set aside (BrokenRecords)."""
+        """`kind` is the type of the file's records; other lines are moved to another file (BrokenRecords)."""
         folder(file.parent)
         self._file = file
         _set_broken_lines_aside(file, kind)
@@ -45,21 +45,19 @@ class Archive:
         self._encoder = msgspec.json.Encoder()
 
     def write(self, record: msgspec.Struct) -> None:
-        """Append one line."""
         with writing(self._file):
             self._stream.write(self._encoder.encode(record) + b"\n")
             self._stream.flush()
 
     def close(self) -> None:
-        """Close the file."""
         with writing(self._file):
             self._stream.close()
 
 
 def read(file: Path) -> list[Record]:
-    """All records of a file, in order; a last line without its end is skipped, a line that is no record a BrokenLine.
+    """All records of a file, in order; an incomplete last line is skipped, an invalid line becomes a BrokenLine.
 
-    What is returned is sound: arrays unpack, cases can be run. OSError where the file is none or cannot be read.
+    The records returned are consistent: arrays can be unpacked, cases can be run. OSError if the file cannot be read.
     """
     return decoded_lines(file, Written)
 
@@ -81,7 +79,7 @@ def decoded_lines(file: Path, kind: Any) -> list[Any]:
 
 
 def _lines(stream: BinaryIO) -> Iterator[bytes]:
-    """Whole lines with their ends; of a line beyond LONGEST_LINE only its beginning, which is no record."""
+    """Complete lines; of a line longer than LONGEST_LINE only its beginning, which is not a valid record."""
     begun = b""
     while piece := stream.readline(LONGEST_LINE):
         begun = begun[:80] or piece
@@ -91,7 +89,7 @@ def _lines(stream: BinaryIO) -> Iterator[bytes]:
 
 
 def _checked(record: Any, limit: int) -> int:
-    """Bytes of memory that a record's arrays take; ValueError where it contradicts itself or they exceed `limit`."""
+    """Bytes of memory that a record's arrays need; ValueError if it is inconsistent or they exceed `limit`."""
     if isinstance(record, CaseRecord):
         check_recorded(record.run)
         if record.variants.keys() != {variant.name for variant in record.run.variants}:
@@ -107,7 +105,7 @@ def _checked(record: Any, limit: int) -> int:
 
 
 def _checked_arrays(arrays: Sequence[Packed], limit: int) -> int:
-    """Bytes of memory that arrays take; ValueError where one is damaged or they exceed `limit`."""
+    """Bytes of memory that arrays need; ValueError if one is damaged or they exceed `limit`."""
     size = sum(packed_bytes(packed) for packed in arrays)
     if size > limit:
         raise ValueError(f"its arrays would take {size / MIB:.3g} MiB, more than a file of this size can hold")
@@ -134,9 +132,9 @@ def _check_shapes(record: RunRecord) -> None:
 
 
 def _set_broken_lines_aside(file: Path, kind: Any) -> None:
-    """Leave only whole records in a file to append to; broken lines move to `<file>.broken`, with a warning.
+    """Leave only valid records in a file; broken lines move to `<file>.broken`, with a warning.
 
-    The end of a run that was killed is no loss to speak of: it is cut off without a word.
+    An incomplete last line, which a killed session leaves, is removed without a warning.
     """
     if not file.exists():
         return

@@ -1,4 +1,4 @@
-"""What is drawn of a scene: lines, solids and wheels that markers carry, as records hold it."""
+"""The drawing of a scene in records: lines, solids and wheels that move with markers."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import msgspec
 
 from flexmb.scene.bodies import ZERO, Vector
 
-FILM = "film"  # the role of a run that is made to be drawn
+FILM = "film"  # the role of a run that is made for the animation
 
 
 class CarriedPoint(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A marker ("" is the World origin) and an offset in its axes (m); `tangent`, a unit vector in its axes, is the
-    direction in which a bent line passes, zero where it is not known."""
+    direction of a bent line there, zero if unknown."""
 
     marker: str
     offset: Vector
@@ -19,7 +19,7 @@ class CarriedPoint(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
 
 
 class Line(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is drawn of one body or connector, which `body` names; `kind` says how its points are to be taken.
+    """The drawing of one body or connector, which `body` names; `kind` is the meaning of its points.
 
     "solid": the eight corners of a box, the first coordinate's sign changing slowest. "arm": a straight line. "beam": a
     line through its points that bends with their tangents. "ball": a point with mass. "spring": a coil between its two
@@ -33,7 +33,7 @@ class Line(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class DrawnWheel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A disc on a marker (centre and unit axis in its axes), with what its angle follows from.
+    """A disc on a marker (centre and unit axis in its axes), with the data that determine its angle.
 
     The angle is relative to the marker: `angle_rad` at t = 0, where its rate is `speed_rad_s`; later the axial torque
     on the wheel changes its axial rate in World, with `axial_inertia_kg_m2`.
@@ -51,7 +51,7 @@ class DrawnWheel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class Drawing(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """All that is drawn of a scene, the markers that are worth a trail, and where down is (zero without gravity)."""
+    """The drawing of a scene, the markers whose trails are drawn, and the direction of gravity (zero without)."""
 
     lines: tuple[Line, ...]
     trails: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""A stored reference as records hold it, so that they can be judged where the case's folder is not."""
+"""A stored reference inside records, so that they can be judged without the case's folder."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from crosscheck.records.packing import Packed
 
 
 class Asked(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What an engine is asked against the reference: goals and scales by patterns of channels, as in a comparison."""
+    """Goals and scales of an engine's comparison with the reference, by patterns of channels."""
 
     goals: dict[str, float]
     scales: dict[str, float] = {}
 
 
 class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The reference of `variant`: channels (T, k) at `times` (T,), the `uncertainties` of these (SI), and who is held
-    against it (`asked`, by engine). Where the stored files cannot be used, `fault` says why, and there are no arrays.
+    """The reference of `variant`: channels (T, k) at `times` (T,), their `uncertainties` (SI), and the engines that are
+    compared with it (`asked`). If the stored files cannot be used, `fault` says why, and there are no arrays.
     """
 
     variant: str
@@ -28,5 +28,4 @@ class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
 
     @property
     def arrays(self) -> tuple[Packed, ...]:
-        """All of its arrays."""
         return (*self.channels.values(), *([] if self.times is None else [self.times]))

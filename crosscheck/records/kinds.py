@@ -1,4 +1,4 @@
-"""The kinds of records: what one line of a records file says, by its key "record"."""
+"""The kinds of records, which are the lines of a records file; the key "record" names the kind."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class _OneRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 class Environment(_OneRecord, frozen=True, kw_only=True, tag="environment"):
-    """Machine and versions of one session of running, and what was asked for: no engines named means all.
+    """Machine and versions of one session, and the cases and engines asked for; no engines means all.
 
-    A session that `confirms` writes a `Confirmed` for each earlier result that it lets stand; older versions did not.
+    A session that `confirms` writes a `Confirmed` for each earlier result that it reuses; older versions did not.
     """
 
     started: str
@@ -38,10 +38,10 @@ class Environment(_OneRecord, frozen=True, kw_only=True, tag="environment"):
 
 
 class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the report needs of a variant's scene: levels of its bodies, how to draw it, or why it could not be made.
+    """What the report needs of a variant's scene: levels of its bodies, its drawing, or why it could not be made.
 
-    `drawing` is by the markers that every run records, `film` by those of a run made to be drawn, where there is one.
-    `basis` identifies scene, transformation and sample times as the case's files state them ("" in older records).
+    `drawing` uses the markers of every run, `film` those of a run made for the animation. `basis` identifies scene,
+    transformation and sample times as given in the case's files ("" in older records).
     """
 
     level: str
@@ -52,11 +52,11 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
-    """A case as it was run: its run file reduced to the engines asked for, provenance, README, variants, the figures
-    accepted for it, its stored reference if it has one, and digests of the `files` in its folder.
+    """A case as it was run: its run file reduced to the engines asked for, provenance, README, variants, accepted
+    figures, its stored reference if it has one, and digests of the `files` in its folder.
 
-    `asked` are the engines asked for by name, `joined` those among them that the case itself names nowhere.
-    `unreferenced`: it has a recipe of a reference whose files were never made.
+    `asked` are the engines asked for by name, `joined` those of them that the case does not name. `unreferenced`: it
+    has a recipe of a reference, but the reference was never made.
     """
 
     case: str
@@ -75,13 +75,13 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
 class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
     """One run of one engine at one effort, or why there is none (then `effort` is empty).
 
-    `role` is "main", "refined", "control:<name>" or "film". `rung` counts the efforts of the ladder from coarse to fine
-    out of `rungs`. `scene` identifies scene and sample times, `made_by` everything else that the result depends on (see
-    `made_by.py`; records of older versions have none). `compile_s` is conversion and warm-up, `wall_s` the solve alone.
+    `role` is "main", "refined", "control:<name>" or "film". `rung` is the number of the effort, from coarse to fine, of
+    `rungs`. `scene` identifies scene and sample times, `made_by` everything else that the result depends on (see
+    `made_by.py`; "" in older records). `compile_s` is conversion and warm-up, `wall_s` the solve alone.
 
-    `status`: "finished"; "diverged", as the engine says; "failed" where the adapter raised or broke the contract;
-    "crashed" where its process died; "did not finish" within its limits of time and memory; "refused"; "did not run".
-    `undetermined`: channels that the motion leaves open, of which nothing is kept.
+    `status`: "finished"; "diverged", by the engine's statement; "failed" if the adapter raised or broke the contract;
+    "crashed" if its process died; "did not finish" within its limits of time and memory; "refused"; "did not run".
+    `undetermined` are channels that the motion does not determine; they are not stored.
     """
 
     case: str
@@ -109,12 +109,12 @@ class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
 
     @property
     def key(self) -> tuple[str, ...]:
-        """What identifies the run: a later record with the same key replaces an earlier one."""
+        """The identity of the run: a later record with the same key replaces an earlier one."""
         return (self.case, self.variant, self.role, self.engine, self.effort)
 
 
 class Confirmed(_OneRecord, frozen=True, kw_only=True, tag="confirmed"):
-    """Says that what earlier sessions recorded under this key is the result of this session too."""
+    """States that the result which an earlier session recorded under this key is also a result of this session."""
 
     case: str
     variant: str
@@ -126,7 +126,7 @@ class Confirmed(_OneRecord, frozen=True, kw_only=True, tag="confirmed"):
 
 @dataclass(frozen=True)
 class BrokenLine:
-    """A line of a file of records that is none, and why."""
+    """A line of a records file that is not a record, and why."""
 
     file: str
     number: int

@@ -1,4 +1,4 @@
-"""One process at a time writes into a folder; a second one is refused at once and told which process is there."""
+"""A lock on a folder: a second process that wants to write there is refused and told which process holds the lock."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class FolderInUseError(RuntimeError):
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep others out of a folder, which is made if it is not there; raises FolderInUseError where one is in it.
+    """Lock a folder, which is made if needed; raises FolderInUseError if another process holds the lock.
 
-    The lock is the operating system's: it goes with its process, however that ends.
+    The operating system releases the lock when the process ends in any way.
     """
     made(folder)
     lock, holder = FileLock(folder / LOCK), folder / HOLDER

@@ -1,4 +1,4 @@
-"""The machine that runs, and the versions of what runs on it: the first record of every session."""
+"""The first record of every session: the machine and the versions of the software."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PACKAGES = ("flexmb", "numpy", "scipy", "numba", "msgspec")
 
 
 def environment(cases: tuple[str, ...] = (), engines: tuple[str, ...] = (), confirms: bool = False) -> Environment:
-    """This machine and the versions of what runs on it; what was asked for."""
+    """This machine, the versions of the software, and what was asked for."""
     return Environment(
         started=datetime.now(UTC).isoformat(timespec="seconds"),
         python=platform.python_version(),

@@ -1,9 +1,9 @@
-"""What made a result, as one key: a recorded result counts for as long as its key is that of the sources here.
+"""The key of what made a result: a recorded result is reused as long as the key of the present sources is the same.
 
-The key is a digest of the texts of all source files that can take part (`sources`), of the versions and contents of the
-libraries these import and of what those require in turn, of the settings of the compiler, of Python and of the machine.
-Scene, sample times and effort are fields of the record itself. A changed comment changes the key too: running again is
-cheaper than being wrong.
+The key is a digest of all source files that can take part (`sources`), of the versions and contents of the libraries
+that these require, directly or not, and of the compiler's settings, Python and the machine. Scene, sample times and
+effort are fields of the record itself. A changed comment changes the key too: running again is cheaper than a stale
+result.
 """
 
 from __future__ import annotations
@@ -21,9 +21,11 @@ from pathlib import Path
 from crosscheck.records.machine import processor
 from crosscheck.records.sources import owner, sources
 
-# The modules of the harness that have a part in the numbers that are recorded. What else they import serves other ends.
+# The modules of the harness that determine recorded numbers; those that they import do not.
 RECORDING = (
     "crosscheck.running.execute",
+    "crosscheck.running.rung",
+    "crosscheck.engines.checked",
     "crosscheck.engines.answers",
     "crosscheck.engines.contract",
     "crosscheck.engines.trajectories",
@@ -35,7 +37,7 @@ RECORDING = (
 
 
 def made_by(modules: Iterable[str], recording: Iterable[str] = RECORDING) -> str:
-    """The key of results that `modules` compute and the modules `recording` check and store."""
+    """The key of results that `modules` compute and that the modules `recording` check and store."""
     return _key(frozenset(modules), frozenset(recording))
 
 
@@ -51,7 +53,7 @@ def _key(modules: frozenset[str], recording: frozenset[str]) -> str:
     return digest.hexdigest()[:16]
 
 
-@cache  # the first reading counts: what is edited while this process runs is not what it has loaded
+@cache  # read once: later edits of the files are not what this process has loaded
 def _text(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
@@ -85,7 +87,7 @@ def _required(library: Distribution) -> list[Distribution]:
 
 
 def _content(library: Distribution) -> str:
-    """Version, and a digest of the list of its files with theirs: a build of the same version has another."""
+    """Version and digest of the list of its files with their digests: builds of the same version differ in it."""
     record = library.read_text("RECORD") or ""
     return f"{library.name} {library.version} {hashlib.sha256(record.encode()).hexdigest()[:16]}"
 

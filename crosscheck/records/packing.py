@@ -1,4 +1,4 @@
-"""Arrays as text that gives back the same digits: float64, deflated, in base64."""
+"""Arrays as text without loss: float64, deflated, in base64."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ class Packed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 def pack(values: Real) -> Packed:
-    """The array as text, exact to the last bit."""
+    """The array as text."""
     data = np.ascontiguousarray(values, dtype="<f8")
     return Packed(shape=data.shape, data=base64.b64encode(zlib.compress(data.tobytes(), 6)).decode())
 
 
 def unpack(packed: Packed) -> Real:
-    """The array of a text, exact to the last bit. ValueError where the data do not fill the shape just so.
+    """The array of a text, with the same bits. ValueError if the data do not fill the shape.
 
-    It takes no more memory than the shape says, whatever the data would unpack to.
+    It needs no more memory than the shape says, however large the data would be when unpacked.
     """
     size = packed_bytes(packed)
     unpacker = zlib.decompressobj()
@@ -42,7 +42,7 @@ def unpack(packed: Packed) -> Real:
 
 
 def packed_bytes(packed: Packed) -> int:
-    """Size of an array in memory, by its shape. ValueError for a shape that no array has."""
+    """Bytes of an array by its shape. ValueError for an invalid shape."""
     if not 1 <= len(packed.shape) <= 2 or any(length < 0 for length in packed.shape):
         raise ValueError(f"no signal has the shape {packed.shape}")
     return 8 * math.prod(packed.shape)

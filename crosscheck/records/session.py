@@ -1,7 +1,7 @@
-"""Which records of a file count: a result does if it was made, or confirmed, after its case was last asked for.
+"""Which records of a file are current: results that were made or confirmed after their case was last asked for.
 
-A file can hold many sessions. What an earlier one recorded and a later one did not confirm is out of date, or the
-later one was stopped before it came to it; either way it is not a result of what was asked for last.
+A file can contain many sessions. A result that a later session did not confirm is out of date, or the later session was
+stopped before it; in both cases it is not a result of the last request.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from crosscheck.records.kinds import BrokenLine, CaseRecord, Confirmed, Environm
 
 
 def standing(records: Sequence[Record]) -> list[Record]:
-    """The records that count, of all cases that were ever asked for.
+    """The current records of all cases that were ever asked for.
 
-    Sessions of versions that did not confirm what they let stand are taken as they are.
+    Results of older versions, whose sessions confirmed nothing, count as current.
     """
-    asked: dict[str, int] = {}  # where each case was last asked for, if what stands is confirmed there
+    asked: dict[str, int] = {}  # the record of each case's last request, 0 if its session confirms nothing
     confirmed: set[tuple[str, ...]] = set()
     begin, confirms = 0, False
     for place, record in enumerate(records):
         if isinstance(record, Environment):
             begin, confirms = place, record.confirms
-        elif isinstance(record, CaseRecord) and asked.get(record.case, -1) < begin:  # a later one asks for nothing new
+        elif isinstance(record, CaseRecord) and asked.get(record.case, -1) < begin:  # the first of this session
             asked[record.case] = place if confirms else 0
             confirmed = {each for each in confirmed if each[0] != record.case}
         elif isinstance(record, Confirmed):
@@ -35,7 +35,7 @@ def standing(records: Sequence[Record]) -> list[Record]:
 
 
 def last_session(records: Sequence[Record]) -> list[Record]:
-    """The records that count for what was asked for last."""
+    """The current records of the last session's cases."""
     begin = max((place for place, record in enumerate(records) if isinstance(record, Environment)), default=0)
     cases = {record.case for record in records[begin:] if isinstance(record, CaseRecord)}
     found = standing(records)
@@ -44,7 +44,7 @@ def last_session(records: Sequence[Record]) -> list[Record]:
 
 
 def _belongs(record: Record, cases: set[str]) -> bool:
-    """Whether a record is of one of the cases; what a broken line was nobody knows."""
+    """Whether a record belongs to one of the cases; a broken line may."""
     if isinstance(record, BrokenLine):
         return True
     return not isinstance(record, Environment) and record.case in cases

@@ -1,9 +1,9 @@
-"""Which files and which libraries the result of a module can depend on, found from the texts, importing nothing.
+"""The files and libraries on which the result of a module can depend, found from source texts without importing them.
 
-The files are the module's own and all that these import, directly or not, inside the packages that count as sources:
-flexmb, crosscheck, the module's own package, and whatever on the path belongs to no installed distribution, such as a
-package in development. A module named in a string ("flexmb.system.compile", "crosscheck.engines.native:NativeEngine")
-counts as imported. What is installed is a library: it is known by its distribution, and its sources are not read.
+The files are the module's own and all that it imports, directly or not, in packages that count as sources: flexmb,
+crosscheck, the module's own package, and packages on the path that belong to no installed distribution, such as one in
+development. A module named in a string ("flexmb.system.compile", "crosscheck.engines.native:NativeEngine") counts as
+imported. An installed package is a library: its distribution identifies it, and its sources are not read.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class Sources:
 
 
 def sources(modules: Iterable[str], alone: Iterable[str] = ()) -> Sources:
-    """Everything that `modules` reach by imports, and the files of the modules `alone` without what these import.
+    """Everything that `modules` import, directly or not, and the files of the modules `alone` without their imports.
 
-    CaseError where flexmb or crosscheck were not imported from files: a key that leaves them out would match any code.
+    CaseError if flexmb or crosscheck were not imported from files: a key without them would match any code.
     """
     for package in OURS:
         source_folder(package)
@@ -59,18 +59,18 @@ def sources(modules: Iterable[str], alone: Iterable[str] = ()) -> Sources:
         files = _with_parents(module)
         if not files:
             if not _place(top):
-                found.libraries.add(top)  # not installed, and a result can depend on that too
+                found.libraries.add(top)  # a result can also depend on a library being absent
             continue
         found.files.update(files)
         for name, file in files.items():
-            if name not in read and (name != "flexmb" or module == "flexmb"):  # flexmb/__init__.py is for its users
+            if name not in read and (name != "flexmb" or module == "flexmb"):  # flexmb/__init__.py imports everything
                 read.add(name)
                 waiting.extend(imported(name, file))
     return found
 
 
 def imported(module: str, file: Path) -> Iterator[str]:
-    """Modules that a source file imports or names, parents of a package's submodule left out."""
+    """Modules that a source file imports or names in strings, without the parents of submodules."""
     if file.suffix != ".py":
         return
     try:
@@ -96,7 +96,7 @@ def imported(module: str, file: Path) -> Iterator[str]:
 
 @cache
 def owner(top: str) -> Distribution | None:
-    """The installed distribution that a top-level module belongs to; None where its sources are on the path."""
+    """The installed distribution of a top-level module; None if its sources are on the path."""
     spec = _spec(top)
     if spec is None or spec.origin is None:
         return None
@@ -127,7 +127,7 @@ def _absolute(package: str, node: ast.ImportFrom) -> str:
 
 
 def _with_parents(module: str) -> dict[str, Path]:
-    """The file of a module, if there is one, and those of the packages it is in, which Python runs before it."""
+    """The files of a module and of its parent packages, which Python executes before it."""
     parts = module.split(".")
     names = (".".join(parts[: n + 1]) for n in range(len(parts)))
     return {name: file for name in names if (file := _file(name)) is not None}
@@ -135,7 +135,7 @@ def _with_parents(module: str) -> dict[str, Path]:
 
 @cache
 def _file(module: str) -> Path | None:
-    """Where the text (or the compiled extension) of a module is, as far as its place tells."""
+    """The source file or compiled extension of a module, if it is found."""
     top, *rest = module.split(".")
     for place in _place(top):
         path = place.joinpath(*rest)
@@ -163,7 +163,7 @@ def _place(top: str) -> tuple[Path, ...]:
 def _spec(top: str) -> ModuleSpec | None:
     try:
         return find_spec(top)
-    except ValueError:  # a module that was made, not loaded, such as __main__
+    except ValueError:  # a module without a specification, such as __main__
         return None
 
 

@@ -1,1 +1,1 @@
-"""Making the stored reference of a case: routes are run, held against each other, and written with what is known."""
+"""Making the stored reference of a case: routes are run, compared, and written with their uncertainties."""

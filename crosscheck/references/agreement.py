@@ -1,12 +1,12 @@
-"""From routes to a reference: every channel by two independent routes that agree, its uncertainty, and the horizon.
+"""A reference from routes: every channel by two independent routes that agree, its uncertainty, and the horizon.
 
 With E = max |a - b| of the route a that gives the values and another route b, and their numerical U,
 
     E <= U_a + U_b, both finite, is required of all routes,      uncertainty = max(U_a, every E).
 
-E is no less than what the two routes together have got wrong unless they err alike, and U_a is what the first one knows
-of itself. The 17 digits of the file and the rounding of one operation, eps times the size of the channel's family, are
-the least that is stated.
+E is at least the error of a unless both routes err alike, and U_a is the estimate of the first route
+itself. The least stated uncertainty is that of 17 digits and of the rounding of one operation, eps times the
+size of the channel's family.
 
 **Horizon.** In chaotic motion U grows until nothing is known. The reference ends at the last sample before the U of a
 position or an orientation exceeds `KNOWN` of the range that the channel's family has up to there: beyond, the routes
@@ -35,7 +35,7 @@ ADVICE = "ask for finer efforts, or put right what is wrong with one of the two"
 
 @dataclass(frozen=True)
 class Agreed:
-    """What the routes agree on: channels (T, k) at `times` (T,) in SI and World axes, and what is known of each."""
+    """The channels (T, k) on which routes agree at `times` (T,), in SI and World axes, with their uncertainties."""
 
     times: Real
     channels: dict[str, Real]
@@ -61,7 +61,7 @@ def agree(routes: Sequence[RouteSignals], patterns: Sequence[str]) -> Agreed:
 
 
 def _problems(channel: str, routes: Sequence[RouteSignals], until: int) -> Iterator[str]:
-    """Why the routes that offer a channel make no reference of it."""
+    """Why the routes that offer a channel give no reference of it."""
     first, *others = routes
     for other in others:
         if other.channels[channel].shape != first.channels[channel].shape:
@@ -81,7 +81,7 @@ def _problems(channel: str, routes: Sequence[RouteSignals], until: int) -> Itera
 
 
 def _known(channel: str, routes: Sequence[RouteSignals], until: int) -> Known:
-    """What routes that agree know of a channel."""
+    """The uncertainty of a channel on which routes agree."""
     first, *others = routes
     apart = [_distance(channel, first, other, until)[0] for other in others]
     own = _doubt(first, channel, until)
@@ -109,7 +109,7 @@ def _wanted(routes: Sequence[RouteSignals], patterns: Sequence[str]) -> list[str
 
 
 def _horizon(routes: Sequence[RouteSignals], wanted: Iterable[str]) -> int:
-    """The number of samples up to which the motion is known; CaseError where that is none of it."""
+    """The number of samples up to the horizon; CaseError if it is zero."""
     until = len(routes[0].times)
     for channel in wanted:
         if channel.endswith(MOTION):
@@ -126,7 +126,7 @@ def _horizon(routes: Sequence[RouteSignals], wanted: Iterable[str]) -> int:
 
 
 def _family_reach(channel: str, channels: Mapping[str, Real]) -> Real:
-    """How far the channels of the family have got from where they began, (T,)."""
+    """The range (T,) of the family's channels up to each sample."""
     kin = [name for name in channels if family(name) == family(channel)]
     starts = {name: np.broadcast_to(channels[name][:1], channels[name].shape) for name in kin}
     return np.max([distance(name, channels[name], starts[name]) for name in kin], axis=0)
@@ -144,7 +144,7 @@ def _distance(channel: str, one: RouteSignals, other: RouteSignals, until: int) 
 
 
 def _floor(channel: str, channels: Mapping[str, Real], until: int) -> float:
-    """What 17 digits and the rounding of one operation leave open; of a signal that is nothing, eps of its unit."""
+    """The uncertainty by 17 digits and the rounding of one operation; of a zero signal eps of its unit."""
     sizes = [magnitude(name, rows[:until]) for name, rows in channels.items() if family(name) == family(channel)]
     return EPS * (max(sizes) or 1.0)
 

@@ -1,4 +1,4 @@
-"""Published numbers against the reference: each must be met within its uncertainty and the reference's own."""
+"""Comparison of a reference with published numbers, within the uncertainties of both."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ COMPONENTS = {1: ("",), 3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
 def meet(agreed: Agreed, anchors: Iterable[PublishedNumber]) -> None:
     """CaseError names every published number that the reference does not meet.
 
-    Between samples the reference is interpolated by a cubic spline. What that adds is taken to be the difference that
-    every second sample left out makes.
+    Between samples the reference is interpolated by a cubic spline, whose error is estimated by leaving out every
+    second sample.
     """
     problems = [text for place, anchor in enumerate(anchors) if (text := _fault(agreed, anchor, place))]
     if problems:
@@ -49,7 +49,7 @@ def _fault(agreed: Agreed, anchor: PublishedNumber, place: int) -> str:
 
 
 def _at(times: Real, values: Real, when: float) -> tuple[float, float]:
-    """The value at a time, and what interpolation leaves open."""
+    """The value at a time, and the error of interpolation."""
     nearest = int(np.argmin(np.abs(times - when)))
     if abs(times[nearest] - when) <= 1e-9 * times[-1]:
         return float(values[nearest]), 0.0

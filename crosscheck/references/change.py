@@ -1,4 +1,4 @@
-"""What may change in a stored reference: nothing by more than was stated, unless its provenance changes with it."""
+"""Changes of a stored reference: none beyond the stated uncertainty, unless its provenance is changed as well."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from crosscheck.references.agreement import Agreed
 from flexmb.run.channels import distance, unit
 
 CLOCK = 1e-9  # relative difference of times that are the same
-GROWTH = 100.0  # of a stated uncertainty: at other samples a ladder may lose credit for a tenth of its difference
+GROWTH = 100.0  # allowed ratio of uncertainties: at other sample times U may be estimated by a weaker rule
 
 
 def beyond_uncertainty(before: StoredReference, now: Agreed) -> list[str]:
-    """How the reference `now` takes back what `before` had stated; none where it confirms it.
+    """How the reference `now` contradicts what `before` had stated; empty if it confirms it.
 
     A channel that is gone, an earlier horizon, values farther apart than was stated and an uncertainty that has grown
-    by more than `GROWTH` all take something back. More channels, samples and digits do not.
+    by more than `GROWTH` are contradictions. More channels, samples and digits are not.
     """
     return list(_changes(before, now))
 

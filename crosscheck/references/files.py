@@ -1,4 +1,4 @@
-"""Writing a reference: both of its files, or none."""
+"""Writing both files of a reference, or none."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HEADER = "Written by `crosscheck regenerate`, with reference.csv; nobody edits i
 
 
 def knowledge_text(knowledge: Knowledge) -> str:
-    """The text of reference.toml, a table a channel."""
+    """The text of reference.toml."""
     document = tomlkit.document()
     document.add(tomlkit.comment(HEADER))
     for key, value in msgspec.to_builtins(knowledge).items():
@@ -29,9 +29,9 @@ def knowledge_text(knowledge: Knowledge) -> str:
 
 
 def write_both(folder: Path, values: str, knowledge: str) -> None:
-    """Put both files in place; where that fails, neither is there that was not there before. OSError names the file.
+    """Write both files; if one cannot be written, both remain as they were. OSError names the file.
 
-    They take their places one right after the other. Should the process be killed just between, reading says so:
+    They are renamed one right after the other. If the process is killed in between, reading them notices it:
     reference.toml holds the digest of the values that it belongs to.
     """
     texts = {folder / VALUES: values, folder / KNOWLEDGE: knowledge}

@@ -1,4 +1,4 @@
-"""`crosscheck regenerate`: the reference of a case, made again by its routes, and written if it may be."""
+"""`crosscheck regenerate`: the reference of a case, made again by its routes, and written if that is permitted."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ Done = Literal["confirmed", "written", "would be written"]
 
 @dataclass(frozen=True)
 class Regenerated:
-    """What became of a case's reference, in how many channels, until when it holds (s), and what there is to say.
+    """The outcome for a case's reference, the number of its channels, its horizon (s), and a remark.
 
-    "confirmed": the stored files say the same within what they state, and are left as they are.
+    "confirmed": the stored files agree within their stated uncertainties and are left as they are.
     """
 
     case: str
@@ -125,7 +125,7 @@ def _provenance(case: Case) -> str:
 
 
 def _permitted(case: Case, before: StoredReference, agreed: Agreed, knowledge: Knowledge) -> str:
-    """What changes beyond the stated uncertainty, as the provenance changes with it; CaseError where it does not."""
+    """Changes beyond the stated uncertainty, for which the provenance was changed; CaseError if it was not."""
     changes = beyond_uncertainty(before, agreed)
     if changes and before.knowledge.provenance == knowledge.provenance:
         listed = "\n".join(f"  {change}" for change in changes)
@@ -138,7 +138,7 @@ def _permitted(case: Case, before: StoredReference, agreed: Agreed, knowledge: K
 
 
 def _describes_the_same(before: StoredReference, agreed: Agreed, knowledge: Knowledge) -> bool:
-    """Whether variant, scene, routes, times and channels are what they were; digits may have moved within U."""
+    """Whether variant, scene, routes, times and channels are the same as before."""
     return (
         all(getattr(before.knowledge, key) == getattr(knowledge, key) for key in ("variant", "scene", "routes"))
         and before.times.shape == agreed.times.shape

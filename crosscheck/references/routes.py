@@ -1,7 +1,7 @@
 """The routes to a reference: engines that run the variant at their efforts, and closed forms of the case's folder.
 
-Engines go the usual way, through `sweep` and its workers. A closed form is Python of the case's folder: it is loaded
-here and nowhere else.
+Engines run as usual, by `sweep` and its workers. A closed form is Python code of the case's folder, which is executed
+only here.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from crosscheck.judging.results import Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
-from crosscheck.library.case import CaseError, RunFile, Variant
+from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
 from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
 from crosscheck.records.archive import read
@@ -33,9 +33,9 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class RouteSignals:
-    """What one route gave at the reference's times: channels (T, k) with their U, in SI and World axes.
+    """The result of a route at the reference's times: channels (T, k) with their U, in SI and World axes.
 
-    `name` is short, `title` says in words what the route is. `engine` is "" for a closed form, `method` its integrator.
+    `title` describes the route. `engine` and its integrator `method` are "" for a closed form.
     `made_with` is the engine's version.
     """
 
@@ -67,9 +67,9 @@ def run_routes(
     scheduler: Scheduler,
     listener: Listener,
 ) -> list[RouteSignals]:
-    """The signals of every route of the recipe at `times` (T,); CaseError where a route gives none.
+    """The signals of every route of the recipe at `times` (T,); CaseError if a route gives none.
 
-    Closed forms come first: they take no time, and a fault in them needs no engine to be seen.
+    Closed forms are evaluated first, since they are fast and may have errors.
     """
     found = {
         place: _closed_form(case.folder / route.exact, route, times)
@@ -84,7 +84,6 @@ def run_routes(
 
 
 def _name(place: int) -> str:
-    """What the variant of a route is called where it is run."""
     return f"route {place + 1}"
 
 
@@ -105,16 +104,9 @@ def _engine_results(
     )
     if not variants:
         return {}
-    run = RunFile(
-        title=case.run.title,
-        duration_s=case.run.duration_s,
-        samples=case.run.samples,
-        time_limit_s=case.run.time_limit_s,
-        variants=variants,
-    )
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
-        planned = plan(replace(case, run=run), (), provider, limits.time_s)
+        planned = plan(replace(case, run=case.run.alone(*variants)), (), provider, limits.time_s)
         run_planned([planned], (), records, limits=limits, scheduler=scheduler, listener=listener)
         (results,) = collect(read(records)).cases
     return {each.name: results.get(each.name, each.engines[0], MAIN) for each in variants}

@@ -1,4 +1,4 @@
-"""The outputs of a session, made from its records alone.
+"""The outputs of a session, made from its records alone:
 
 verdicts.json, report/, summary.md, junit.xml, results.json and the badge.
 """
@@ -27,12 +27,12 @@ Choice = Callable[[Sequence[Record]], Sequence[Record]]
 def write_all(
     records: Path, out: Path, strict: bool = False, chosen: Choice = standing, single_file: bool = False
 ) -> tuple[SessionOutcome, Path]:
-    """Judge the `chosen` of a file's records and write all outputs into `out`; returns outcome and report's path.
+    """Judge the `chosen` records of a file and write all outputs into `out`; returns outcome and report's path.
 
     `strict`: figures that are worse than recorded, or not recorded, are not as expected. `single_file`: the report is
     one file, `report.html`, instead of a folder of pages.
     """
-    mark_unfinished(records, out)  # until each is written: should this process be killed, none is of an earlier session
+    mark_unfinished(records, out)  # a killed process must leave no outputs of an earlier session
     session = collect(chosen(read(records)))
     outcome = conclude(session, strict)
     write_verdicts(outcome, out / VERDICTS)

@@ -1,4 +1,4 @@
-"""The content of an animation: what is drawn of each body, the motion of the markers that carry it, wheels' angles."""
+"""The content of an animation: the drawing of each body, the motion of its markers, and angles of wheels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flexmb.typing import Real
 
 
 def animations(store: Store, case: CaseResults) -> list[dict[str, Any]]:
-    """One animation for each variant that can be drawn: its film, or else its markers as an engine recorded them."""
+    """One animation for each variant: from its film, else from the markers that an engine recorded."""
     found = []
     for variant in case.case.run.variants:
         info = case.case.variants[variant.name]
@@ -68,8 +68,8 @@ def _wheel(store: Store, result: Result, wheel: DrawnWheel, number: dict[str, in
 def wheel_angle(result: Result, wheel: DrawnWheel) -> Real:
     """Angle of a wheel relative to its marker (T,), rad, from the axial torque on it and its marker's motion.
 
-    With J its axial inertia and a its axis: J (omega . a + spin) changes at the rate torque . a. Where no torque
-    is recorded, the spin stays as it began.
+    With J its axial inertia and a its axis: J (omega . a + spin) changes at the rate torque . a. If no torque
+    is recorded, the spin is constant.
     """
     times = result.times
     torque, turning = f"wheel_load:{wheel.name}.torque", f"marker:{wheel.marker}.angular_velocity"
@@ -102,7 +102,7 @@ def _carriers(drawing: Drawing) -> list[str]:
 
 
 def _drawable(result: Result, drawing: Drawing) -> bool:
-    """Whether the result's last run stored all markers needed; a diverged run is drawn as far as it came."""
+    """Whether the result's last run stored all markers needed; a diverged run is drawn up to its end."""
     if not result.runs or result.finest.times is None:
         return False
     stored = result.finest.channels

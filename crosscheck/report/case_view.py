@@ -1,4 +1,4 @@
-"""What a case's page says in words and tables; its charts are in `charts.py`."""
+"""Texts and tables of a case's page; its charts are in `charts.py`."""
 
 from __future__ import annotations
 
@@ -23,8 +23,6 @@ from crosscheck.report.views import (
 
 @dataclass(frozen=True)
 class CaseView:
-    """A case's page."""
-
     place: CasePlace
     name: str
     title: str
@@ -91,7 +89,6 @@ def transformation(variant: Any) -> str:
 
 
 def _timings(case: CaseResults) -> list[dict[str, Any]]:
-    """Compile and solve time of each finest run."""
     return [
         {
             "engine": engine,

@@ -1,4 +1,4 @@
-"""The numbers behind the charts and the animation of a case's page.
+"""The data of the charts and the animation of a case's page.
 
 Signals are thinned and stored once each (see store.py); distances and drifts are computed here in double precision, and
 thinned by taking the largest of each bin so that no peak is lost. templates/charts.js draws them.
@@ -24,12 +24,12 @@ from flexmb.run.channels import distance, family, matches, signal_range, unit
 from flexmb.typing import Real
 
 COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}
-RUNAWAY = 20.0  # a signal this many times as large as another has run away from it
-STILL, BAND = 1e-3, 0.05  # a signal that moves by less than this part of its size is still, and is shown in such a band
+RUNAWAY = 20.0  # ratio of two signals beyond which the larger one does not determine the scale
+STILL, BAND = 1e-3, 0.05  # a signal whose range is below this part of its size counts as constant; its drawn band
 
 
 def payload(case: CaseResults, verdicts: list[Verdict]) -> dict[str, Any]:
-    """Everything that the scripts of a case's page need: its panels, drifts, charts, animations, and their series."""
+    """The data for the scripts of a case's page: panels, drifts, charts, animations, and their series."""
     store = Store()
     return {
         "panels": _panels(store, case, verdicts),
@@ -41,10 +41,10 @@ def payload(case: CaseResults, verdicts: list[Verdict]) -> dict[str, Any]:
 
 
 def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[dict[str, Any]]:
-    """One panel a comparison and kind of channel; each offers its channels to choose from."""
+    """One panel for each comparison and kind of channel; each has a choice of channels."""
     groups: dict[str, dict[str, list[Verdict]]] = {}
     for verdict in verdicts:
-        if verdict.kind == "comparison" and verdict.engine_b != REFERENCE:  # no run, so nothing of it to draw
+        if verdict.kind == "comparison" and verdict.engine_b != REFERENCE:  # the reference has no run to draw
             for channel in _drawn(case, verdict):
                 groups.setdefault(verdict.comparison, {}).setdefault(channel, []).append(verdict)
     panels = []
@@ -59,7 +59,7 @@ def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[di
 
 
 def _drawn(case: CaseResults, verdict: Verdict) -> list[str]:
-    """Channels to draw for a verdict: its own, or those its pattern names, as far as a failed run got."""
+    """Channels to draw for a verdict: its own, or those of its pattern if the run did not finish."""
     if verdict.E is not None:
         return [verdict.channel]
     stored = [name for result in _sides(case, verdict) if result.runs for name in result.finest.channels]
@@ -71,14 +71,14 @@ def _sides(case: CaseResults, verdict: Verdict) -> tuple[Result, Result]:
 
 
 def _first(views: list[dict[str, Any]]) -> int:
-    """Number of the channel to show first: of those that measure what the first does, the one that moves most."""
+    """Number of the channel to show first: the one with the largest range among those of the first channel's kind."""
     alike = [i for i, view in enumerate(views) if family(view["name"]) == family(views[0]["name"])]
     still = all(views[i]["size"] == 0.0 for i in alike)
     return max(range(len(views)) if still else alike, key=lambda i: views[i]["size"])
 
 
 def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]) -> dict[str, Any]:
-    """Overlay of all sides of a channel, and for each judged pair distance and uncertainty over time (SI)."""
+    """All sides of a channel, and for each judged pair distance and uncertainty over time (SI)."""
     sides: dict[tuple[str, str], Result] = {}
     for verdict in pairs:
         for result in _sides(case, verdict):
@@ -119,10 +119,10 @@ def _pair(store: Store, case: CaseResults, channel: str, verdict: Verdict) -> di
 
 
 def _shown_range(signals: list[Real]) -> list[float] | None:
-    """Limits of the drawing where the automatic ones would hide what matters, else None.
+    """Limits of the drawing if the automatic ones would be misleading, else None.
 
-    Where one signal runs away: twice the smallest signal. Where all stay put: a band about them, not their round-off.
-    """
+    If one signal is much larger: twice the smallest signal. If all are constant: a band about them, not their
+    round-off. """
     sizes = [float(np.max(np.abs(values))) for values in signals]
     smallest, largest = min(sizes), max(sizes)
     if 0.0 < smallest < largest / RUNAWAY:

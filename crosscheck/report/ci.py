@@ -18,12 +18,12 @@ from flexmb.output.whole import whole_file, write_whole
 
 VERDICTS = "verdicts.json"
 SHOWN = 40
-# Characters with a meaning in Markdown: within a line (an underscore only beside a gap), and list signs at its start.
+# Characters with a meaning in Markdown: in a line (an underscore only at a word's edge), and list signs at its start.
 MARKDOWN = re.compile(r"[\\`*\[\]<>|~&$!]|(?<![^\W_])_|_(?![^\W_])|^[#+-]|(?<=^\d)[.)]")
 
 
 def write_verdicts(outcome: SessionOutcome, file: Path) -> None:
-    """verdicts.json: a list with one record a verdict."""
+    """verdicts.json: a list with one record for each verdict."""
     records = [{**msgspec.to_builtins(verdict), "ok": verdict.ok} for verdict in outcome.all]
     write_whole(file, msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
 
@@ -110,7 +110,7 @@ def write_junit(outcome: SessionOutcome, file: Path) -> None:
 
 
 def _not_judged(suite: ElementTree.Element, case: str, outcome: SessionOutcome) -> list[str]:
-    """Tests for what is not applicable in a case, and for a reference that was never made; what they count as."""
+    """Add tests for what is not applicable in a case, and for a missing reference; returns their outcomes."""
     found = []
     for each in outcome.inapplicable:
         if each.case == case:
@@ -135,7 +135,7 @@ def _complaint(outcome: SessionOutcome, verdict: Verdict) -> str:
 
 
 def _test(suite: ElementTree.Element, verdict: Verdict, complaint: str, lost: bool) -> str:
-    """One test case; returns what it counts as. `lost`: the failure of a run that it needs is there already."""
+    """Add one test case; returns its outcome. `lost`: a run that it needs has a failed test already."""
     name = f"{verdict.comparison}: {verdict.channel}, {verdict.pair}"
     test = ElementTree.SubElement(suite, "testcase", classname=f"{verdict.case}.{verdict.kind}", name=name)
     if verdict.ok and verdict.worse:
@@ -154,7 +154,7 @@ def _test(suite: ElementTree.Element, verdict: Verdict, complaint: str, lost: bo
 
 
 def _table(title: str, verdicts: list[Verdict], say: Callable[[Verdict], str]) -> list[str]:
-    """A section with a row for each verdict, up to the number that is shown; nothing if there are none."""
+    """A section with a row for each verdict, up to `SHOWN`; empty if there are none."""
     if not verdicts:
         return []
     lines = ["", f"## {title}", "", "| case | comparison | channel | pair | what |", "|---|---|---|---|---|"]
@@ -184,12 +184,12 @@ def _role(role: str) -> str:
 
 
 def _flat(text: str) -> str:
-    """Text on one line, escaped so that Markdown shows just that text."""
+    """Text on one line, escaped for Markdown."""
     return MARKDOWN.sub(r"\\\g<0>", printable(" ".join(text.split())))
 
 
 def _code(text: str) -> str:
-    """Text as code on one line: between more backticks than it holds itself; a bar would end a table's cell."""
+    """Text as code on one line, between more backticks than it contains; bars are escaped for tables."""
     flat = printable(" ".join(text.split()))
     fence = "`" * (1 + max(map(len, re.findall("`+", flat)), default=0))
     space = " " if flat.startswith("`") or flat.endswith("`") else ""

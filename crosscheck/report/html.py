@@ -1,4 +1,4 @@
-"""Templates of the report, and the ways in which text, markup and data get into a page unharmed."""
+"""Templates of the report, and the escaping of text, markup and data."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flexmb.output.printable import printable
 
 @cache
 def templates() -> Environment:
-    """The templates; what they print is escaped, and without control characters."""
+    """The templates; their output is escaped and has no control characters."""
     found = Environment(
         loader=PackageLoader("crosscheck.report"),
         autoescape=select_autoescape(["html.j2"], default_for_string=True, default=True),
@@ -30,14 +30,13 @@ def templates() -> Environment:
 
 
 def source(name: str) -> Markup:
-    """A file of the templates folder as it is."""
     loader = templates().loader
     assert loader is not None
     return Markup(loader.get_source(templates(), name)[0])
 
 
 def embedded(data: Any) -> Markup:
-    """Data as JSON that is safe in a script element: nothing in it looks like the end of the element or of a line."""
+    """Data as JSON for a script element, without sequences that would end the element or a line."""
     text = msgspec.json.encode(data).decode()
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
@@ -50,7 +49,7 @@ def code(text: str) -> Markup:
 
 
 def _shown(value: Any) -> Any:
-    """Text as a template prints it: plain text without control characters; markup is our own."""
+    """Text without control characters; markup is our own and unchanged."""
     return printable(value) if type(value) is str else value
 
 

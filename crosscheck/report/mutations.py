@@ -20,14 +20,13 @@ class ScoredMutation(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def by(self) -> str:
-        """How many of the channels noticed it."""
         return f"{sum(self.channels.values())} of {len(self.channels)}" if self.channels else ""
 
 
 class CaseScore(msgspec.Struct, frozen=True, kw_only=True):
-    """The part of the applicable mutations that a case noticed, and its stored reference alone, and each of them.
+    """The share of the applicable mutations that a case noticed, and that its stored reference noticed.
 
-    None where none applies, and where there is no reference to judge by.
+    None if no mutation is applicable, or there is no reference.
     """
 
     score: float | None
@@ -36,14 +35,12 @@ class CaseScore(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Scores(msgspec.Struct, frozen=True, kw_only=True):
-    """The scores of the cases by name."""
-
     cases: dict[str, CaseScore] = {}
     error: str = ""
 
 
 class _Shown(msgspec.Struct):
-    """What one channel said of a mutant, as the file has it."""
+    """The status of a mutant in one channel."""
 
     status: str
 
@@ -77,7 +74,7 @@ class _File(msgspec.Struct):
 
 
 def read_scores(out: Path) -> Scores:
-    """The scores in a folder; none where there is no file, and the reason where it cannot be read."""
+    """The scores in a folder; none if there is no file, the error if it cannot be read."""
     file = out / FILE
     if not file.is_file():
         return Scores()

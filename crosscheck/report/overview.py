@@ -14,7 +14,7 @@ from crosscheck.report.views import INAPPLICABLE, VerdictCell, anchor, summary_c
 
 @dataclass(frozen=True)
 class CaseRow:
-    """One case of the matrix; `look` is that of its gravest verdict, `words` what a search finds it by."""
+    """One case of the matrix; `look` is that of its gravest verdict, `words` are for the search."""
 
     name: str
     title: str
@@ -36,7 +36,7 @@ class Matrix:
 
 @dataclass(frozen=True)
 class Unexpected:
-    """A verdict that is not as expected, and where it stands."""
+    """A verdict that is not as expected, with a link to it."""
 
     case: str
     link: str
@@ -47,7 +47,7 @@ class Unexpected:
 
 
 def matrix(session: Session, outcome: SessionOutcome, places: Mapping[str, CasePlace]) -> Matrix:
-    """What every case found with every engine; not as expected first, nothing to judge last."""
+    """The verdicts of every case by engine; unexpected ones first, cases without verdicts last."""
     everything = [verdict for verdict in outcome.all if verdict.kind == "comparison"]
     engines = list(dict.fromkeys(engine for verdict in everything for _, engine in verdict.sides))
     engines += [engine for engine in outcome.never_applicable if engine not in engines]
@@ -94,7 +94,7 @@ def _row(case: CaseResults, outcome: SessionOutcome, engines: list[str], link: s
 
 
 def _engine_cell(name: str, engine: str, outcome: SessionOutcome) -> VerdictCell:
-    """What an engine found in a case."""
+    """The summary of an engine's verdicts in a case."""
     if name in outcome.never_applicable.get(engine, ()):
         return INAPPLICABLE
     found = outcome.verdicts[name]

@@ -1,4 +1,4 @@
-"""Where each case stands in the report: a page of its own, or a section of the single file."""
+"""The place of each case in the report: a page of its own, or a section of the single file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ INDEX = "index.html"
 
 @dataclass(frozen=True)
 class CasePlace:
-    """`page` is the path of the case's page from the index ("" where all stands on one), `anchor` its section there."""
+    """`page` is the path of the case's page from the index ("" in a single file), `anchor` its section there."""
 
     page: str
     anchor: str
@@ -22,7 +22,7 @@ class CasePlace:
 
     @property
     def root(self) -> str:
-        """The way from the case's page back to the folder of the index."""
+        """The relative path from the case's page to the folder of the index."""
         return "../" * self.page.count("/")
 
     @property
@@ -32,13 +32,13 @@ class CasePlace:
 
 
 def places(cases: Iterable[str], single: bool) -> dict[str, CasePlace]:
-    """The place of every case: `<family>/<case>.html`, in letters that every file system and address takes."""
+    """The place of every case: `<family>/<case>.html`, in letters that are valid in all file systems and addresses."""
     found: dict[str, CasePlace] = {}
     taken = {INDEX}
     for number, case in enumerate(cases):
         stem = "/".join(_plain(part) for part in case.split("/")[-2:])
         page = f"{stem}.html"
-        while page.lower() in taken:  # names that differ in what was replaced
+        while page.lower() in taken:  # different names may become the same by replacement
             page = f"{stem}-{number}.html"
             stem += "-"
         taken.add(page.lower())

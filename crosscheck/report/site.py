@@ -1,4 +1,4 @@
-"""The report: an index with a page for each case and its data beside it, or all of it in a single file.
+"""The report: an index, and for each case a page with its data in another file; or all in a single file.
 
 Pages open from a disk as from a server: scripts and data are classic scripts, which a browser loads from `file://` too.
 A page loads its case's data only, and plotly and three.js when a chart or an animation comes into view.
@@ -29,15 +29,13 @@ from flexmb.output.writing import folder
 FOLDER = "report"
 SINGLE = "report.html"
 ASSETS = "assets"
-LISTING = f"{ASSETS}/pages.json"  # what the report consists of, for the next one to clear away
+LISTING = f"{ASSETS}/pages.json"  # the files of the report, which the next report removes
 SCRIPTS = ("data.js", "charts.js", "scene.js", "page.js", "index.js")
 LIBRARIES = ("plotly/plotly-basic.min.js", "three/three.iife.min.js")  # of the folder vendor, loaded when first needed
 
 
 @dataclass(frozen=True)
 class Material:
-    """What the pages show."""
-
     session: Session
     outcome: SessionOutcome
     scores: Scores
@@ -66,7 +64,7 @@ def write_site(material: Material, out: Path) -> Path:
 
 
 def write_single(material: Material, out: Path) -> Path:
-    """Write the whole report into one file that loads nothing, in the place of pages; returns its path."""
+    """Write the whole report into one file that loads no other, instead of pages; returns its path."""
     _clear(out / FOLDER)
     cases = material.session.cases
     where = places((case.case.case for case in cases), single=True)
@@ -85,7 +83,7 @@ def write_single(material: Material, out: Path) -> Path:
 
 
 def write_unfinished(outcome: SessionOutcome, out: Path) -> None:
-    """Have the report say that its session has not come to its end, in the place of the pages of an earlier one."""
+    """Replace an earlier report by a page that says that the session has not ended."""
     text = templates().get_template("unfinished.html.j2").render(outcome=outcome)
     write_whole(out / SINGLE, _encoded(text))
     if _clear(out / FOLDER):
@@ -93,7 +91,7 @@ def write_unfinished(outcome: SessionOutcome, out: Path) -> None:
 
 
 def _write_pages(site: Path, pages: dict[str, str]) -> None:
-    """Write pages by name, the list of them first, so that they can be cleared away however this ends."""
+    """Write pages by name, their list first, so that they can be removed later even if this is interrupted."""
     listing = msgspec.json.encode(sorted([*pages, LISTING])).decode()
     for name, text in {LISTING: listing, **pages}.items():
         folder((site / name).parent)
@@ -105,12 +103,10 @@ def _encoded(text: str) -> bytes:
 
 
 def _page(name: str, material: Material, **more: Any) -> str:
-    """A page by its template."""
     return templates().get_template(name).render(outcome=material.outcome, scripts_of_site=SCRIPTS, **more)
 
 
 def _overview(material: Material, where: dict[str, CasePlace]) -> dict[str, Any]:
-    """What the index shows."""
     session, outcome = material.session, material.outcome
     return {
         "counts": outcome.counts(),
@@ -130,7 +126,7 @@ def _view(case: CaseResults, material: Material, place: CasePlace) -> CaseView:
 
 
 def _registration(case: CaseResults, material: Material, place: CasePlace) -> str:
-    """A script that hands the case's data to the page."""
+    """A script that passes the case's data to the page."""
     data = payload(case, material.outcome.verdicts[case.case.case])
     return f"crosscheck.register({embedded(place.anchor)}, {embedded(data)});\n"
 
@@ -140,7 +136,7 @@ def _library(name: str) -> str:
 
 
 def _clear(site: Path) -> bool:
-    """Remove what an earlier report wrote, and nothing else; whether there was one."""
+    """Remove the files of an earlier report only; whether there was one."""
     try:
         listed = msgspec.json.decode((site / LISTING).read_bytes(), type=list[str])
     except (OSError, ValueError):
@@ -153,7 +149,6 @@ def _clear(site: Path) -> bool:
 
 
 def _engines(session: Session) -> list[tuple[str, str]]:
-    """Engines with the versions that ran."""
     found: dict[str, set[str]] = {}
     for case in session.cases:
         for (_, engine, _), result in case.results.items():

@@ -1,7 +1,7 @@
-"""What stands in a folder while a session runs: that it is unfinished. A session that is killed leaves just that.
+"""The outputs in a folder while a session runs, or after it was killed: they say that it is unfinished.
 
-Whoever looks at the folder then, a reader, `crosscheck compare`, a job of continuous integration, must not find the
-verdicts of the session before.
+Readers, `crosscheck compare` and jobs of continuous integration must not find the
+verdicts of an earlier session.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ UNFINISHED = SessionOutcome(verdicts={}, absences=[], unfinished=True)
 
 
 def mark_unfinished(records: Path, out: Path) -> None:
-    """Have all outputs in `out` say that the session which fills the file `records` is unfinished.
+    """Let all outputs in `out` say that the session which writes the file `records` is unfinished.
 
-    `verdicts.json`, a list of verdicts, is taken away: an empty one would have nothing against it. Nobody else may
+    `verdicts.json` is removed, since an empty list of verdicts would look like success. No other process may
     write into the folder.
     """
     clear_parts(folder(out))

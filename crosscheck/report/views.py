@@ -1,11 +1,11 @@
-"""What a page shows of verdicts: cells that summarise some, tables of cells, and blocks that fold all lines in."""
+"""Verdicts on a page: cells that summarise some, tables of cells, and blocks that contain all lines."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from crosscheck.judging.verdict import GRAVITY, WORSE, Verdict
+from crosscheck.judging.verdict import SEVERITY, WORSE, Verdict
 from crosscheck.library.channels import part_of
 
 SYMBOLS: dict[str, str] = {
@@ -32,7 +32,7 @@ class VerdictCell:
 
     @property
     def symbol(self) -> str:
-        """A sign that does not rely on colour."""
+        """A sign that can be read without colour."""
         return SYMBOLS.get(self.status, "")
 
 
@@ -42,7 +42,7 @@ INAPPLICABLE = VerdictCell("not applicable", "empty", "not applicable", "")
 
 @dataclass(frozen=True)
 class Row:
-    """A row of cells, one a column of its table."""
+    """A row of cells, one for each column of its table."""
 
     label: str
     cells: tuple[VerdictCell, ...]
@@ -50,8 +50,6 @@ class Row:
 
 @dataclass(frozen=True)
 class VerdictTable:
-    """Summaries of verdicts; a table of one column needs no table."""
-
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
 
@@ -83,7 +81,7 @@ class Block:
 
     @property
     def open(self) -> bool:
-        """Whether it asks for attention."""
+        """Whether it is shown open, as something in it is not as expected."""
         return self.cell.look == "bad"
 
 
@@ -91,7 +89,6 @@ Numbered = tuple[int, Verdict]  # a verdict with its number among those of its c
 
 
 def anchor(number: int) -> str:
-    """Where on its page a verdict stands."""
     return f"verdict-{number}"
 
 
@@ -115,7 +112,7 @@ def conservation_block(verdicts: Iterable[Verdict]) -> Block | None:
 
 
 def control_block(verdicts: Iterable[Verdict]) -> Block | None:
-    """Negative controls: which faults were noticed, by whom."""
+    """Negative controls: which faults were noticed by which engines."""
     group = [(number, verdict) for number, verdict in enumerate(verdicts) if verdict.kind == "control"]
     if not group:
         return None
@@ -182,7 +179,7 @@ def summary_cell(group: list[Verdict]) -> VerdictCell:
     if not group:
         return EMPTY
     bad = [verdict for verdict in group if not verdict.ok]
-    worst = min(bad or group, key=lambda verdict: (GRAVITY.index(verdict.status), -(verdict.E or 0.0)))
+    worst = min(bad or group, key=lambda verdict: (SEVERITY.index(verdict.status), -(verdict.E or 0.0)))
     good = worst.status == "agree" or worst.kind == "control"
     look = "bad" if bad else "good" if good else "expected"
     text: str = worst.status

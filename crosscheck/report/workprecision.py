@@ -18,7 +18,7 @@ from crosscheck.library.case import Chart
 from crosscheck.records.kinds import RunRecord
 from flexmb.run.channels import distance, signal_range
 
-RESOLVED = 2.0  # estimates of U are no more accurate than this factor
+RESOLVED = 2.0  # factor to which estimates of U are accurate
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class WorkPrecision:
 
 
 def work_precision(case: CaseResults, chart: Chart) -> WorkPrecision | None:
-    """The chart, or None where no engine finished the reference variant in this observable."""
+    """The chart, or None if no engine finished the reference variant in this observable."""
     reference = _reference(case, chart)
     if reference is None:
         return None

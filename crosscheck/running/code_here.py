@@ -1,4 +1,4 @@
-"""The code that a machine runs, as one digest: workers elsewhere must run the same."""
+"""A digest of the code that this process runs: workers on other machines must run the same."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cache
 from crosscheck.library.own_files import OURS, source_folder
 
 
-@cache  # the first reading counts: what is edited while this process runs is not what it has loaded
+@cache  # computed once: later edits of the files are not what this process has loaded
 def code_here() -> str:
     """Digest of all sources of flexmb and crosscheck that this process has imported from."""
     digest = hashlib.sha256()

@@ -1,10 +1,10 @@
-"""The scheduler of a Dask cluster: a Dask task for each job, done in a process beside the Dask worker.
+"""The scheduler of a Dask cluster: a Dask task for each job, which runs it in a process beside the Dask worker.
 
-Dask finds the machines, survives the death of workers and gives their jobs to others: a job is tried again as often as
-the cluster's `distributed.scheduler.allowed-failures` says. Limits of time and memory, and the end of a job that
-crashes, are those of the local pool (`dask_worker`): a Dask task alone has no limit and shares its process.
+Dask finds the machines, survives the death of workers and gives their jobs to others, as often as the cluster's
+`distributed.scheduler.allowed-failures` says. Limits of time and memory and the handling of crashes are those of the
+local pool (`dask_worker`): a Dask task itself has no limits and shares its process with others.
 
-What scenes and plug-ins name must be where the workers are: the same packages, and files under the same paths.
+The workers' machines need the same packages, and the files that scenes name under the same paths.
 """
 
 from __future__ import annotations
@@ -12,33 +12,32 @@ from __future__ import annotations
 import logging
 import time
 import uuid
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import inf
 from queue import Empty, SimpleQueue
-from typing import Any
 
 from distributed import Client, Future
 from distributed.scheduler import KilledWorker
 
 from crosscheck.running.code_here import code_here
 from crosscheck.running.dask_worker import Crew, do_job
-from crosscheck.running.scheduler import Event, Events, Function, one_kind, usual_limit
+from crosscheck.running.scheduler import Event, Events, Work
 from crosscheck.running.waiting import Waiting
 from crosscheck.running.worker import START_LIMIT_S, TICK_S
 
-ANSWER_S = 10.0  # within which a scheduler answers
-PATIENCE_S = 2 * START_LIMIT_S  # for what a Dask worker does besides the job, after which it is taken for hung
+ANSWER_S = 10.0  # time limit for the answer of a Dask scheduler
+OVERHEAD_S = 2 * START_LIMIT_S  # time that a Dask worker may take besides its job before it counts as hung
 
 
 class ClusterError(OSError):
-    """The cluster cannot be used: nobody answers, no worker is left, or workers run other sources."""
+    """The cluster cannot be used: its scheduler does not answer, it has no workers, or they run other sources."""
 
 
 @dataclass(frozen=True)
 class DaskCluster:
-    """Jobs on the cluster whose scheduler answers at `address`, such as "tcp://10.0.0.1:8786"."""
+    """Runs jobs on the cluster whose scheduler has the `address`, such as "tcp://10.0.0.1:8786"."""
 
     address: str
 
@@ -47,31 +46,17 @@ class DaskCluster:
         with self._client() as client:
             _require_same_sources(client, self.address)
 
-    def __call__(
-        self,
-        function: Function,
-        jobs: Sequence[Any],
-        workers: int | None,
-        log: str,
-        kind: Callable[[Any], str] = one_kind,
-        time_limit_s: Callable[[Any], float] = usual_limit,
-        memory_limit_bytes: float | None = None,
-    ) -> Events:
-        """Run jobs, `workers` at a time (by default as many as the cluster has threads); see `Scheduler`.
-
-        What jobs print stays with the Dask workers, in a file of their local directories.
-        """
+    def __call__(self, work: Work) -> Events:
+        """Run jobs; see `Work`. What they print stays with the Dask workers, in a file of their local directories."""
         with self._client() as client:
             _require_same_sources(client, self.address)
-            dispatch = _Dispatch(
-                client, self.address, function, jobs, workers or inf, kind, time_limit_s, memory_limit_bytes
-            )
+            dispatch = _Dispatch(client, self.address, work)
             with dispatch.session():
                 yield from dispatch.events()
 
     @contextmanager
     def _client(self) -> Iterator[Client]:
-        logging.getLogger("distributed").setLevel(logging.ERROR)  # workers that come and go are no news
+        logging.getLogger("distributed").setLevel(logging.ERROR)  # workers may come and go
         try:
             client = Client(self.address, timeout=ANSWER_S, set_as_default=False)
         except (OSError, ValueError) as error:
@@ -87,7 +72,7 @@ class DaskCluster:
 
 @dataclass
 class _Flight:
-    """A job that was given to the cluster: its task, the worker it was meant for, and until when word is expected."""
+    """A submitted job: its task, the worker for which it is meant, and the time by which it must have ended."""
 
     future: Future
     kind: str
@@ -98,28 +83,24 @@ class _Flight:
 
 @dataclass
 class _Dispatch:
-    """One session: which job goes where, and what comes back."""
+    """One session: distributes the jobs and yields their events."""
 
     client: Client
     address: str
-    function: Function
-    jobs: Sequence[Any]
-    at_most: float
-    kind: Callable[[Any], str]
-    time_limit_s: Callable[[Any], float]
-    memory_bytes: float | None
+    work: Work
     name: str = field(default_factory=lambda: f"crosscheck-{uuid.uuid4().hex}")
     known: int = 0
     waiting: Waiting = field(default_factory=Waiting)
     flights: dict[int, _Flight] = field(default_factory=dict)
     threads: dict[str, int] = field(default_factory=dict)
-    kinds: dict[str, str] = field(default_factory=dict)  # that each worker had last
-    prepared: set[tuple[str, str]] = field(default_factory=set)  # a machine and what a job has compiled there
+    kinds: dict[str, str] = field(default_factory=dict)  # of each worker's last job
+    prepared: set[tuple[str, str]] = field(default_factory=set)  # machines with kinds whose first job has ended there
     news: SimpleQueue[tuple[str, int]] = field(default_factory=SimpleQueue)
 
     @contextmanager
     def session(self) -> Iterator[None]:
-        """Workers have their crews, and tell when jobs begin; in the end nothing of it is left on the cluster."""
+        """Install the processes on the workers, which report when jobs begin; in the end remove all from the
+        cluster."""
         self.client.register_plugin(Crew(self.name), name=self.name)
         self.client.subscribe_topic(self.name, lambda event: self.news.put(("begun", event[1])))
         try:
@@ -132,7 +113,7 @@ class _Dispatch:
 
     def events(self) -> Iterator[Event]:
         looked, somebody = -inf, time.monotonic()
-        while self.known < len(self.jobs) or self.waiting or self.flights:
+        while self.known < len(self.work.jobs) or self.waiting or self.flights:
             now = time.monotonic()
             if now > looked + TICK_S:
                 looked = now
@@ -152,31 +133,31 @@ class _Dispatch:
             if not flight.begun:
                 flight.begun = True
                 yield Event(number, "started")
-            if what == "begun":  # perhaps once more, on another worker
-                flight.deadline = time.monotonic() + self.time_limit_s(self.jobs[number]) + PATIENCE_S
+            if what == "begun":  # possibly for the second time, on another worker
+                flight.deadline = time.monotonic() + self.work.time_limit_s(self.work.jobs[number]) + OVERHEAD_S
             else:
                 yield from self._landed(number, self.flights.pop(number))
 
     def _look(self, now: float) -> None:
-        """See which workers there are, and which jobs have come."""
+        """Update the list of workers and the queue of jobs."""
         if self.client.status != "running":
             raise ClusterError(f"the Dask scheduler at {self.address} is gone; what came from it is recorded")
         self.threads = dict(self.client.nthreads())
-        for number in range(self.known, len(self.jobs)):
-            self.waiting.add(number, self.kind(self.jobs[number]))
-        self.known = len(self.jobs)
+        for number in range(self.known, len(self.work.jobs)):
+            self.waiting.add(number, self.work.kind(self.work.jobs[number]))
+        self.known = len(self.work.jobs)
 
     def _send_out(self) -> None:
-        """Give every free thread a job. Where there is no worker one task is submitted: that calls for one."""
+        """Give every free thread a job. Without workers one task is submitted, for which the cluster may start one."""
         places = self.threads or {"": 1}
         for address, threads in places.items():
             load = sum(flight.address == address for flight in self.flights.values())
             for _ in range(threads - load):
-                if len(self.flights) >= self.at_most or not self._send_to(address):
+                if len(self.flights) >= (self.work.workers or inf) or not self._send_to(address):
                     break
 
     def _send_to(self, address: str) -> bool:
-        """Submit the job that suits a worker best; Dask may choose another, which matters to the speed alone."""
+        """Submit the job that suits a worker best; if Dask chooses another worker, only the speed changes."""
         host = _host(address)
         taken = {flight.kind for flight in self.flights.values() if _host(flight.address) == host}
         prepared = {kind for place, kind in self.prepared if place == host}
@@ -184,11 +165,11 @@ class _Dispatch:
         if chosen is None:
             return False
         number, kind = chosen
-        job = self.jobs[number]
+        job = self.work.jobs[number]
         future = self.client.submit(
-            do_job, self.name, code_here(), number, self.function, job, kind, self.time_limit_s(job),
-            self.memory_bytes, key=f"{self.name}-{number}", pure=False, workers=[address] if address else None,
-            allow_other_workers=bool(address),
+            do_job, self.name, code_here(), number, self.work.function, job, kind, self.work.time_limit_s(job),
+            self.work.memory_limit_bytes, key=f"{self.name}-{number}", pure=False,
+            workers=[address] if address else None, allow_other_workers=bool(address),
         )  # fmt: skip
         self.flights[number] = _Flight(future, kind, address)
         self.kinds[address] = kind
@@ -196,11 +177,12 @@ class _Dispatch:
         return True
 
     def _landed(self, number: int, flight: _Flight) -> Iterator[Event]:
-        """What came back with the task of a job; exactly one of its events is a last one."""
+        """The events of a job whose task has ended; exactly one of them is its last."""
         if flight.future.status == "cancelled":
             raise ClusterError(f"the Dask scheduler at {self.address} has dropped a job; what came before is recorded")
         try:
-            found: list[Event] = flight.future.result(timeout=self.time_limit_s(self.jobs[number]) + PATIENCE_S)
+            limit_s = self.work.time_limit_s(self.work.jobs[number])
+            found: list[Event] = flight.future.result(timeout=limit_s + OVERHEAD_S)
         except KilledWorker as error:
             times = error.allowed_failures + 1
             found = [Event(number, "crashed", f"the Dask worker died, {times} times when it was tried again")]
@@ -212,12 +194,12 @@ class _Dispatch:
         yield from found
 
     def _given_up(self) -> Iterator[Event]:
-        """Jobs whose Dask worker should have stopped them long ago."""
+        """Stop the jobs whose Dask worker should have ended them long ago."""
         for number, flight in list(self.flights.items()):
             if time.monotonic() > flight.deadline:
                 self.client.cancel([flight.future])
                 del self.flights[number]
-                limit = self.time_limit_s(self.jobs[number])
+                limit = self.work.time_limit_s(self.work.jobs[number])
                 yield Event(number, "stopped", f"nothing was heard of it long after its limit of {limit:g} s")
 
 

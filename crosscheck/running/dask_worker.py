@@ -1,7 +1,6 @@
-"""What a Dask worker does for a session: it keeps processes that do the jobs, and watches them as the local pool does.
+"""The part of a session in a Dask worker: processes that run the jobs, supervised as by the local pool.
 
-A job never runs in the Dask worker's own process: what an engine does to its process (crash, eat memory, hang, leave
-threads behind) would end or change the worker and whatever else it holds.
+A job never runs in the Dask worker's own process, which an engine could crash, block, fill or change.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from crosscheck.running.worker import TICK_S, Worker, keep_short
 
 
 class Crew(WorkerPlugin):
-    """The processes of one session on one Dask worker, from when the session begins, or the worker, to its end."""
+    """The processes of one session on one Dask worker."""
 
     def __init__(self, session: str) -> None:
         self.name = session
@@ -41,7 +40,7 @@ class Crew(WorkerPlugin):
         self._memory_bytes = limit / threads if limit else memory_limit(threads)
 
     def teardown(self, worker: DaskWorker) -> None:
-        """End all processes; whoever waits for one of them hears that it died."""
+        """End all processes; their jobs count as crashed."""
         with self._guard:
             self._closed = True
             idle, busy = self._idle, set(self._busy)
@@ -54,7 +53,7 @@ class Crew(WorkerPlugin):
     def events(
         self, number: int, function: Function, job: Any, kind: str, limit_s: float, memory_bytes: float | None
     ) -> Iterator[Event]:
-        """Do a job in a process of its kind; the last event says how it ended."""
+        """Run a job in a process of its kind; the last event says how it ended."""
         worker = self._engage(kind)
         try:
             worker.hand_out(number, job, kind, function, self._log, limit_s)
@@ -72,11 +71,11 @@ class Crew(WorkerPlugin):
             self._release(worker)
 
     def has_begun(self, number: int) -> None:
-        """Tell the session that the job has started here."""
+        """Report to the session that the job has started."""
         self._dask_worker.log_event(self.name, number)
 
     def _engage(self, kind: str) -> Worker:
-        """An idle process of that kind, else any place for one."""
+        """An idle worker of that kind, else any idle or new one."""
         with self._guard:
             of_kind = [worker for worker in self._idle if worker.kind == kind]
             worker = (of_kind or self._idle or [Worker()])[0]
@@ -98,13 +97,14 @@ def do_job(
     session: str, code: str, number: int, function: Function, job: Any, kind: str, limit_s: float,
     memory_bytes: float | None,
 ) -> list[Event]:  # fmt: skip
-    """The Dask task of a job: all that it emitted, and how it ended.
+    """The Dask task of a job: the events of the job.
 
-    Results travel with the end of the task, so a job that is done again after the death of a Dask worker counts once.
+    They are returned at the end of the task, so that a job which is repeated after the death of a Dask worker counts
+    once.
     """
-    if code != code_here():  # a worker that came after the session had looked at all
+    if code != code_here():  # a worker that joined after the session had checked all
         return [Event(number, "crashed", "this Dask worker runs other sources: install the same, and restart it")]
-    current_process().daemon = False  # Dask's workers are daemons, which may not start processes; ours end with them
+    current_process().daemon = False  # daemons, as Dask's workers are, may not start processes; ours end with them
     crew = get_worker().plugins[session]
     assert isinstance(crew, Crew)
     crew.has_begun(number)

@@ -1,13 +1,13 @@
-"""How long jobs will take, from what they took the last time."""
+"""Estimates of how long jobs will take, from how long they took last time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from crosscheck.records.kinds import RunRecord
-from crosscheck.running.execute import solves
+from crosscheck.running.rung import repeats_of
 
-BESIDES_S = 0.05  # of a job besides its runs: reading it, packing and sending what it found
+BESIDES_S = 0.05  # of a job besides its runs: reading it, packing and sending its results
 
 
 def expected_seconds(records: Iterable[object]) -> dict[tuple[str, ...], float]:
@@ -16,17 +16,17 @@ def expected_seconds(records: Iterable[object]) -> dict[tuple[str, ...], float]:
     compiling: dict[tuple[str, ...], float] = {}
     running: dict[tuple[str, ...], float] = {}
     for (*work, _), record in latest.items():
-        repeats = solves(record.wall_s) if record.status == "finished" else 1
+        repeats = repeats_of(record.wall_s) if record.status == "finished" else 1
         compiling[tuple(work)] = max(compiling.get(tuple(work), 0.0), record.compile_s)
         running[tuple(work)] = running.get(tuple(work), BESIDES_S) + repeats * record.wall_s
     return {work: compiling[work] + seconds for work, seconds in running.items()}
 
 
 class Remaining:
-    """An estimate of the time that jobs still need, which learns from those that have ended.
+    """An estimate of the remaining time, scaled by the time that the jobs ended so far have taken.
 
-    What the clock says for the work done so far is taken to hold for the rest: how many jobs run at a time, and how
-    much of it is recorded already, need not be known. A job that nobody knows is taken for an average one.
+    So the number of parallel jobs and the share of recorded runs need not be known. A job without a known time counts
+    as an average one.
     """
 
     def __init__(self) -> None:
@@ -34,14 +34,14 @@ class Remaining:
         self._done = 0.0
 
     def expect(self, jobs: Iterable[tuple[int, float | None]]) -> None:
-        """Take in jobs by number, with the seconds that each is expected to take."""
+        """Add jobs by number, with their expected seconds."""
         given = list(jobs)
         known = [seconds for _, seconds in given if seconds is not None]
         average = sum(known) / len(known) if known else 1.0
         self._open |= {number: average if seconds is None else seconds for number, seconds in given}
 
     def ended(self, job: int) -> None:
-        """A job is through, in whatever way."""
+        """A job has ended in some way."""
         self._done += self._open.pop(job)
 
     def seconds(self, elapsed_s: float) -> float | None:

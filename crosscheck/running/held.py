@@ -1,4 +1,4 @@
-"""The stored reference of a case, as its record takes it along."""
+"""The stored reference of a case, for the record of the case."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from crosscheck.records.packing import pack
 
 
 def held_reference(case: Case, run: RunFile) -> RecordedReference | None:
-    """The case's stored reference with those engines of the reduced run file `run` that are held against it.
+    """The case's stored reference with the engines of the reduced run file `run` that are compared with it.
 
-    None where there is none, or nobody is. Stored files that cannot be used, or that belong to another scene, are a
-    fault that the record tells, so that what should have been judged shows as not run.
+    None if there is no reference or no such engine. If the stored files cannot be used or belong to another scene, the
+    record contains the fault, so that these comparisons show as not run.
     """
     recipe = case.run.reference
     if recipe is None or not has_reference(case.folder):

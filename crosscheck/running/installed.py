@@ -1,4 +1,4 @@
-"""Which engines there are here: what they are, installed or not, in which version, and how to get them."""
+"""The known engines: whether each is installed, in which version, and how to install it."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from crosscheck.engines.answers import checked_version, clean
+from crosscheck.engines.answers import checked_version, clean, describe
 from crosscheck.engines.contract import EngineMissing
 from crosscheck.engines.registry import BUILT_IN, BrokenPlugIn, engine, plug_ins
-from crosscheck.running.execute import describe
 from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import Work
 
 ANSWER_LIMIT_S = 60.0
 
 
 @dataclass(frozen=True)
 class EngineState:
-    """An engine: what it is in a line, its version, or None, what is the matter (`absence`), and how to install it."""
+    """An engine: a one-line summary, its version, or None with the kind of `absence` and how to install it."""
 
     name: str
     version: str | None
@@ -28,13 +28,13 @@ class EngineState:
 
 
 def describe_engines() -> list[EngineState]:
-    """All engines known here, shipped ones and plug-ins; these are asked in processes of their own."""
+    """All engines, built-in ones and plug-ins; plug-ins are asked in their own processes."""
     states = [_state(name) for name in BUILT_IN]
     names = plug_ins()
     found = {name: _useless(name, "it gave no answer") for name in names}
     with tempfile.TemporaryDirectory() as folder:
         log = str(Path(folder) / "log")
-        for event in run_jobs(tell, names, 1, log, kind=str, time_limit_s=lambda name: ANSWER_LIMIT_S):
+        for event in run_jobs(Work(tell, names, log, 1, str, lambda name: ANSWER_LIMIT_S)):
             name = names[event.job]
             if event.kind == "emitted":
                 found[name] = event.content
@@ -44,7 +44,7 @@ def describe_engines() -> list[EngineState]:
 
 
 def tell(name: str, emit: Callable[[EngineState], None]) -> None:
-    """What a worker does to describe an engine."""
+    """The job of a worker that describes an engine."""
     emit(_state(name))
 
 

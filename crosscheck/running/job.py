@@ -1,4 +1,4 @@
-"""What a worker is told to do. It stands by itself, for a worker loads no more than it needs, and starts sooner."""
+"""What a worker is told to do. This file imports little, so that workers start quickly."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from crosscheck.engines.contract import Effort
+from crosscheck.records.kinds import RunRecord
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -14,7 +15,7 @@ MAIN, REFINED = "main", "refined"
 
 
 class Done(NamedTuple):
-    """A run that is recorded: its effort, what made it, and its rung of how many; another ladder is run anew."""
+    """A recorded run: its effort, the key of what made it, and its rung of how many. Another ladder is run anew."""
 
     effort: str
     made_by: str
@@ -26,11 +27,11 @@ class Done(NamedTuple):
 class Job:
     """One engine's work on one scene, done by one worker: compile once, run its efforts from coarse to fine.
 
-    `efforts` replaces the engine's ladder where not empty; `finest_only` runs just its last effort. `kept` are the
-    channels to store of efforts too coarse to matter for U. `provider` is "module:function" returning the engines by
-    name. `done` are the runs already recorded for this very scene. A job with an `error` cannot be run. After
-    `time_limit_s` it is stopped; `expected_s` is what it took the last time, None where nobody knows. A `lean` one is
-    run once, where short runs are repeated for the clock, and stores nothing but `kept`.
+    `provider` is "module:function", which returns the engines by name; `maker` is the module that makes this engine,
+    or "". `efforts` replaces the engine's ladder unless it is empty; `finest_only` runs only the last effort. Efforts
+    too coarse to enter the uncertainty store only the channels `kept`. `done` are the runs already recorded for this
+    very scene. A job with an `error` cannot be run. It is stopped after `time_limit_s`; `expected_s` is what it took
+    the last time, None if unknown. A `lean` job runs each effort once, even a short one, and stores only `kept`.
     """
 
     case: str
@@ -41,6 +42,7 @@ class Job:
     scene_id: str
     times: Real
     provider: str
+    maker: str
     efforts: tuple[Effort, ...] = ()
     finest_only: bool = False
     kept: tuple[str, ...] = ()
@@ -52,11 +54,19 @@ class Job:
 
     @property
     def work(self) -> tuple[str, str, str, str]:
-        """What it is about, whatever its scene and its efforts are."""
+        """What identifies it apart from its scene and its efforts: case, variant, role and engine."""
         return (self.case, self.variant, self.role, self.engine)
 
     @property
+    def blank(self) -> RunRecord:
+        """The record of this job without a run."""
+        return RunRecord(
+            case=self.case, variant=self.variant, role=self.role, engine=self.engine, version="", scene=self.scene_id,
+            status="did not run",
+        )  # fmt: skip
+
+    @property
     def title(self) -> str:
-        """How progress names it."""
+        """Its name in progress reports."""
         role = "" if self.role == MAIN else f" ({self.role})"
         return f"{self.case} · {self.variant}{role} · {self.engine}"

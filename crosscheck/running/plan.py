@@ -1,4 +1,4 @@
-"""From a case to jobs: the scene of every variant, transformed, mutated or refined, for every engine that runs it."""
+"""The jobs of a case: the scene of every variant, transformed, mutated or refined, for every engine that runs it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from crosscheck.drawing.draw import draw
+from crosscheck.drawing.film import EFFORT as FILM_EFFORT
+from crosscheck.drawing.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.engines.contract import Effort
+from crosscheck.engines.registry import home
 from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, RunFile, Variant
 from crosscheck.library.digests import case_digests
 from crosscheck.library.find import Case
@@ -18,9 +22,6 @@ from crosscheck.library.reference import has_reference, scene_digest
 from crosscheck.library.selection import alone, joining, select
 from crosscheck.records.drawing import FILM, Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
-from crosscheck.running.draw import draw
-from crosscheck.running.film import EFFORT as FILM_EFFORT
-from crosscheck.running.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.running.held import held_reference
 from crosscheck.running.job import MAIN, REFINED, Job
 from crosscheck.running.scheduler import TIME_LIMIT_S
@@ -36,7 +37,7 @@ def plan(
 ) -> tuple[CaseRecord, list[Job]]:
     """The record of a case, reduced to the engines asked for, and its jobs; `time_limit_s` replaces the case's own.
 
-    With `films` every variant has a run more, from which its animation is made.
+    With `films` every variant has another run, from which its animation is made.
     """
     run = (alone if case.alone else select)(case.run, asked)
     infos: dict[str, VariantInfo] = {}
@@ -87,7 +88,7 @@ def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None
         case "modal_points":
             return modal_points(scene)
         case "segments":
-            assert variant.segments is not None  # as the rules of a run file demand
+            assert variant.segments is not None  # checked with the run file
             return finite_segments(scene, variant.split_body, variant.segments)
         case "substructures":
             assert variant.pieces is not None
@@ -125,77 +126,51 @@ def scene_identity(scene: Scene, times: Real) -> str:
 def _attempt(
     case: Case, variant: Variant, refined: Refined | None = None, control: Control | None = None
 ) -> tuple[Scene | None, str]:
-    """The checked scene of a variant, or None and the reason: one bad variant must not stop the others."""
+    """The checked scene of a variant, or None and the reason, so that one bad variant does not stop the others."""
     try:
         scene = case.scene(variant)
-        if control is not None:  # a fault in what the variant models, hence at its level
+        if control is not None:  # the mutation changes the scene at the variant's level
             scene = mutate(at_level(scene, variant), control.mutation, control.target)
             variant = msgspec.structs.replace(variant, level=None)
         scene = variant_scene(scene, variant, refined)
-        check = check_and_warn if control is None else check_scene  # a fault that was put in may be doubtful
+        check = check_and_warn if control is None else check_scene  # a mutated scene may be doubtful
         check(scene, t_end=variant.duration_s or case.run.duration_s)
         return scene, ""
-    except (ValueError, NotImplementedError, OSError, SceneWarning) as error:  # a warning where it is made an error
+    except (ValueError, NotImplementedError, OSError, SceneWarning) as error:  # --strict makes warnings errors
         return None, str(error)
 
 
 def _job(
-    case: Case,
-    run: RunFile,
-    variant: Variant,
-    role: str,
-    engine: str,
-    scene: Scene | None,
-    error: str,
-    provider: str,
+    case: Case, run: RunFile, variant: Variant, role: str, engine: str, scene: Scene | None, error: str, provider: str
 ) -> Job:
     times = sample_times(run, variant)
+    scene_id = "" if scene is None else scene_identity(scene, times)
     return Job(
-        case=case.name,
-        variant=variant.name,
-        role=role,
-        engine=engine,
-        scene=scene,
-        scene_id="" if scene is None else scene_identity(scene, times),
-        times=times,
-        provider=provider,
-        efforts=prescribed(variant, engine),
-        finest_only=role != MAIN,
-        kept=tuple(chart.observable for chart in run.charts),
-        error=error,
-    )
+        case.name, variant.name, role, engine, scene, scene_id, times, provider, home(engine),
+        efforts=prescribed(variant, engine), finest_only=role != MAIN,
+        kept=tuple(chart.observable for chart in run.charts), error=error,
+    )  # fmt: skip
 
 
 def _film(case: Case, run: RunFile, variant: Variant, provider: str) -> tuple[Job, Drawing] | None:
-    """The run that the variant's animation is made from; None where it has to do with what is recorded anyway."""
+    """The run for the variant's animation; None if the recorded runs suffice or cannot be supplemented."""
     if ENGINE not in variant.engines:
         return None
-    if variant.transform == "modal_points":  # the beams themselves, in their own modes
+    if variant.transform == "modal_points":  # draw the beams themselves
         variant = msgspec.structs.replace(variant, transform="none")
     scene, _ = _attempt(case, variant)
     made = None if scene is None else film(scene)
     if made is None:
         return None
     filmed, drawing = made
-    times = np.linspace(0.0, variant.duration_s or run.duration_s, FRAMES)
-    return Job(
-        case=case.name,
-        variant=variant.name,
-        role=FILM,
-        engine=ENGINE,
-        scene=filmed,
-        scene_id=scene_identity(filmed, times),
-        times=times,
-        provider=provider,
-        efforts=prescribed(variant, ENGINE)[:1] or (FILM_EFFORT,),
-        finest_only=True,
-        kept=film_channels(drawing),
-        lean=True,
-    ), drawing
+    filmed_as = msgspec.structs.replace(variant, samples=FRAMES)
+    job = _job(case, run, filmed_as, FILM, ENGINE, filmed, "", provider)
+    efforts = job.efforts[:1] or (FILM_EFFORT,)
+    return replace(job, efforts=efforts, kept=film_channels(drawing), lean=True), drawing
 
 
 def prescribed(variant: Variant, engine: str) -> tuple[Effort, ...]:
-    """The efforts that the case prescribes for an engine, none where it leaves them to the engine."""
+    """The efforts that the case prescribes for an engine, empty if they are left to the engine."""
     return tuple(
         Effort(kind=ladder.kind, value=value, method=ladder.method)
         for ladder in variant.efforts
@@ -205,7 +180,7 @@ def prescribed(variant: Variant, engine: str) -> tuple[Effort, ...]:
 
 
 def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> VariantInfo:
-    """Bodies that the variant takes to pieces are drawn whole: their markers keep their names."""
+    """The variant's info; bodies that it divides are drawn whole, since their markers keep their names."""
     if scene is None:
         return VariantInfo(level="", drawing=None, error=error)
     drawn = case.scene(variant) if variant.transform in TAKES_APART else scene
@@ -215,7 +190,7 @@ def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> Vari
 
 
 def scene_basis(case: Case, variant: Variant) -> str:
-    """What accepted figures of a variant stand on: scene, transformation, refinement and times as they are written."""
+    """The basis of accepted figures of a variant: scene, transformation, refinement and times as written in files."""
     times = (variant.duration_s or case.run.duration_s, variant.samples or case.run.samples)
     text = f"{scene_digest(case, variant)} {times} {variant.refined}"
     return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -228,7 +203,7 @@ def _levels(scene: Scene) -> str:
 
 
 def _engines_compared_across(run: RunFile, variant: Variant) -> tuple[str, ...]:
-    """Engines whose result of this variant is compared with another variant: there its discretisation matters."""
+    """Engines whose result of this variant is compared with another variant, so that its discretisation matters."""
     pairs: tuple[Comparison | Control, ...] = (*run.comparisons, *run.controls)
     crossing = [(a, b) for a, b in (pair.sides for pair in pairs) if a.variant != b.variant]
     found = {side.engine for pair in crossing for side in pair if side.variant == variant.name}

@@ -1,4 +1,4 @@
-"""Processes with all that they started: how much memory they hold, and their end."""
+"""Processes with their descendants: measuring their memory, and ending them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CGROUP = Path("/sys/fs/cgroup/memory.max")
 def memory_limit(workers: int) -> float:
     """How many bytes each of the `workers` may hold, so that all of them together fit into the memory."""
     total = float(psutil.virtual_memory().total)
-    with suppress(OSError, ValueError):  # a container has less than its machine; "max" is no number
+    with suppress(OSError, ValueError):  # a container may have less than its machine; "max" means no limit
         total = min(total, float(CGROUP.read_text(encoding="ascii")))
     return USABLE * total / workers
 
@@ -45,7 +45,7 @@ def end(process: BaseProcess) -> None:
         family = psutil.Process(process.pid).children(recursive=True)
     if hasattr(os, "killpg"):
         with suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)  # no such group where it did not become a leader
+            os.killpg(process.pid, signal.SIGKILL)  # fails if the process did not become a group leader
     for each in family:
         with suppress(psutil.Error):
             each.kill()

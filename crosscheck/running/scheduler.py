@@ -1,16 +1,15 @@
-"""What a scheduler is: jobs go in, events come out as they happen, and the end of a worker costs only its job.
+"""The interface of schedulers: they take jobs and yield events; the death of a worker costs only its job.
 
-`pool` runs jobs in processes of this machine, `dask_cluster` on those of a Dask cluster; `schedulers` finds either by
-its address. The case matrix, refinements, controls, stability maps and Monte Carlo all run through this interface.
-"""
+`pool` runs jobs in processes of this machine, `dask_cluster` on those of a Dask cluster; `schedulers` selects one by
+its address. Cases, refinements, controls, stability maps and sweeps all run through this interface. """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
-TIME_LIMIT_S = 1800.0  # of a job, unless it is given; the longest of the shipped cases' takes 14 s, compilation apart
+TIME_LIMIT_S = 1800.0  # default for a job; the longest of the shipped cases takes 14 s without compiling
 
 Emit = Callable[[Any], None]
 Function = Callable[[Any, Emit], None]
@@ -18,9 +17,9 @@ Function = Callable[[Any, Emit], None]
 
 @dataclass(frozen=True)
 class Event:
-    """What happened to job number `job`: it started, emitted `content`, ended, crashed or was stopped at a limit.
+    """Job number `job` started, emitted `content`, ended, crashed, or was stopped at a limit.
 
-    Of the last two `content` says how. One of the last three is the last event of a job, and comes once.
+    For the last two `content` says how. Exactly one of the last three is the last event of a job.
     """
 
     job: int
@@ -30,10 +29,10 @@ class Event:
 
 @dataclass(frozen=True)
 class Limits:
-    """What running many jobs may take; None leaves it to the scheduler, to the case or to `TIME_LIMIT_S`.
+    """Limits of a session; None leaves one to the scheduler, to the case or to `TIME_LIMIT_S`.
 
-    `workers` is the number of jobs at a time (by default one per core, or per thread of a cluster), `time_s` how long a
-    job may take, and `memory_bytes` how much its process may hold (by default an equal part of what there is).
+    `workers` is the number of jobs at a time (by default one per core, or per thread of a cluster), `time_s` the time
+    limit of a job, `memory_bytes` the memory limit of its process (by default an equal part of the memory).
     """
 
     workers: int | None = None
@@ -45,34 +44,37 @@ BY_DEFAULT = Limits()
 
 
 def one_kind(job: Any) -> str:
-    """All jobs are of one kind."""
+    """The kind of a job, where all jobs are of one kind."""
     return ""
 
 
 def usual_limit(job: Any) -> float:
-    """Every job has `TIME_LIMIT_S`."""
+    """The time limit of a job, where all have `TIME_LIMIT_S`."""
     return TIME_LIMIT_S
 
 
 Events = Generator[Event, None, None]
 
 
-class Scheduler(Protocol):
-    """Runs `function(job, emit)` for every job, each in a process where no other job is at work.
+@dataclass(frozen=True)
+class Work:
+    """Jobs, and how they are to be run: `function(job, emit)` for each, where no other job runs in the same process.
 
-    `function` must be importable by name; `jobs` may grow while the events are read, as what one brings to light can
-    ask for more. `kind(job)` names what a process has to load or compile for a job: processes stay with their kind.
-    A job is stopped after `time_limit_s(job)`, or when its process with all that this started exceeds
-    `memory_limit_bytes`. What jobs print on this machine goes to the file `log`. Closing the iterator stops everything.
+    `function` must be importable by name. `jobs` may grow while the events are read, since an outcome can ask for more.
+    What jobs print on this machine goes to the file `log`. `workers` is the number of jobs at a time, by default one
+    per core, or per thread of a cluster. `kind(job)` names what a process has to load or compile for a job: a process
+    serves one kind. A job is stopped after `time_limit_s(job)`, or when its process with all its descendants exceeds
+    `memory_limit_bytes`, by default an equal part of the memory.
     """
 
-    def __call__(
-        self,
-        function: Function,
-        jobs: Sequence[Any],
-        workers: int | None,
-        log: str,
-        kind: Callable[[Any], str] = one_kind,
-        time_limit_s: Callable[[Any], float] = usual_limit,
-        memory_limit_bytes: float | None = None,
-    ) -> Events: ...
+    function: Function
+    jobs: Sequence[Any]
+    log: str
+    workers: int | None = None
+    kind: Callable[[Any], str] = one_kind
+    time_limit_s: Callable[[Any], float] = usual_limit
+    memory_limit_bytes: float | None = None
+
+
+Scheduler = Callable[[Work], Events]
+"""Runs the jobs, and yields what happens to them. Closing the iterator stops everything."""

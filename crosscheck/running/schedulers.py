@@ -8,12 +8,12 @@ LOCAL = "local"
 
 
 def scheduler_at(address: str) -> Scheduler:
-    """The local scheduler for "local", else the Dask cluster whose scheduler answers at `address`.
+    """The local scheduler for "local", else the Dask cluster whose scheduler has this `address`.
 
-    Raises OSError where the cluster cannot be used, and ValueError where Dask is not installed; both say what to do.
+    Raises OSError if the cluster cannot be used, ValueError if Dask is not installed; both name the remedy.
     """
     if address == LOCAL:
-        from crosscheck.running.pool import run_jobs  # command lines take their default from this file
+        from crosscheck.running.pool import run_jobs  # imported here, since command lines import this file
 
         return run_jobs
     try:

@@ -1,4 +1,4 @@
-"""Running cases: plan their jobs, leave out what is already recorded, run the rest, record as results come."""
+"""Running cases: plan their jobs, leave out what is recorded already, run the rest and record every result."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+
+import msgspec
 
 from crosscheck.engines.answers import clean
 from crosscheck.engines.registry import SERVED_WITH
@@ -18,7 +20,7 @@ from crosscheck.running.expected import expected_seconds
 from crosscheck.running.job import Done, Job
 from crosscheck.running.plan import plan
 from crosscheck.running.pool import run_jobs
-from crosscheck.running.scheduler import BY_DEFAULT, Event, Limits, Scheduler
+from crosscheck.running.scheduler import BY_DEFAULT, Event, Limits, Scheduler, Work
 
 PROVIDER = "crosscheck.engines.registry:engines"
 Listener = Callable[[Sequence[Job], Event], None]
@@ -35,13 +37,12 @@ def sweep(
     scheduler: Scheduler = run_jobs,
     listener: Listener = lambda jobs, event: None,
 ) -> None:
-    """Run cases, with films for their report, and append to the file `records`.
+    """Run cases, with the runs for their animations, and append to the file `records`.
 
-    What it already holds is confirmed and not run again, unless `fresh`: it counts where scene, effort and all that
-    made it are the same (`made_by`). `asked` are the engines
-    (none: all). An engine that exceeds one of the `limits` on a scene is stopped; a case may have its own limit of
-    time. `listener` hears every event, with the list of jobs. However this ends, by Ctrl-C or by an error of the
-    scheduler, the records are whole, and the next call goes on from there.
+    Recorded runs with the same scene, effort and `made_by` are confirmed and not repeated, unless `fresh`. `asked` are
+    the engines (none: all). An engine that exceeds one of the `limits` on a scene is stopped; a case may have its own
+    time limit. `listener` is called with the list of jobs and every event. After Ctrl-C or an error of the scheduler
+    the records are valid, and the next call continues from there.
     """
     plans = [plan(case, asked, provider, limits.time_s, films=True) for case in cases]
     run_planned(plans, asked, records, fresh=fresh, limits=limits, scheduler=scheduler, listener=listener)
@@ -57,7 +58,7 @@ def run_planned(
     scheduler: Scheduler = run_jobs,
     listener: Listener = lambda jobs, event: None,
 ) -> None:
-    """Run what is planned already, as `sweep` does; what is not planned, such as films, is not run."""
+    """Run planned jobs, as `sweep` does."""
     if fresh:
         records.unlink(missing_ok=True)
     known = read(records) if records.exists() else []
@@ -65,11 +66,13 @@ def run_planned(
     jobs = [
         replace(job, done=_done(known, job), expected_s=took.get(job.work)) for _, planned in plans for job in planned
     ]
-    log = str(records.with_suffix(".log"))
+    work = Work(
+        execute, jobs, str(records.with_suffix(".log")), limits.workers, _engine, _time_limit, limits.memory_bytes
+    )
     doing: dict[int, str] = {}
     with (
         closing(Archive(records)) as archive,
-        closing(scheduler(execute, jobs, limits.workers, log, _engine, _time_limit, limits.memory_bytes)) as events,
+        closing(scheduler(work)) as events,
     ):
         archive.write(environment(tuple(record.case for record, _ in plans), asked, confirms=True))
         for record, _ in plans:
@@ -86,7 +89,7 @@ def run_planned(
 
 
 def _engine(job: Job) -> str:
-    """The kind of a job: a worker stays with one library, so that it loads it or compiles its kernels once."""
+    """The kind of a job: a worker serves one library, so that it is loaded and its kernels are compiled once."""
     return SERVED_WITH.get(job.engine, job.engine)
 
 
@@ -95,10 +98,9 @@ def _time_limit(job: Job) -> float:
 
 
 def _done(known: Sequence[Record], job: Job) -> frozenset[Done]:
-    """Efforts of the job whose outcome is already known for the same scene, with what made it.
+    """Recorded outcomes of the job's efforts for the same scene.
 
-    A later record without an effort (missing engine, crash) withdraws the earlier ones. A record of an older version,
-    which does not say what made it, is of no use here.
+    A later record without an effort (missing engine, crash) invalidates the earlier ones.
     """
     done: set[Done] = set()
     for record in known:
@@ -112,13 +114,5 @@ def _done(known: Sequence[Record], job: Job) -> frozenset[Done]:
 
 
 def _cut_short(job: Job, event: Event) -> RunRecord:
-    return RunRecord(
-        case=job.case,
-        variant=job.variant,
-        role=job.role,
-        engine=job.engine,
-        version="",
-        scene=job.scene_id,
-        status="crashed" if event.kind == "crashed" else "did not finish",
-        message=clean(event.content),
-    )
+    status = "crashed" if event.kind == "crashed" else "did not finish"
+    return msgspec.structs.replace(job.blank, status=status, message=clean(event.content))

@@ -1,4 +1,4 @@
-"""Jobs that wait, and which of them a free worker takes."""
+"""Waiting jobs, and which of them a free worker takes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 
 class Waiting:
-    """Numbers of waiting jobs by kind, first come first; false when none waits."""
+    """Queues of the numbers of waiting jobs, one for each kind; false if all are empty."""
 
     def __init__(self) -> None:
         self._jobs: dict[str, deque[int]] = {}
@@ -19,10 +19,11 @@ class Waiting:
         self._jobs.setdefault(kind, deque()).append(job)
 
     def take(self, own: str, taken: Collection[str], prepared: Collection[str]) -> tuple[int, str] | None:
-        """The first job of the worker's `own` kind, else of a kind nobody is at, else of a `prepared` kind; its kind.
+        """The next job for a worker, with its kind: of the worker's `own` kind, else of one that no worker runs, else
+        of a `prepared` one.
 
-        None where all that waits is of a kind that another worker has `taken` and that is not prepared: what its first
-        job compiles and leaves on disk is not compiled twice.
+        None if every waiting job is of a kind that another worker runs (`taken`) and that is not prepared: kernels that
+        its first job compiles and caches are not compiled twice.
         """
         open_kinds = [kind for kind, jobs in self._jobs.items() if jobs and (kind in prepared or kind not in taken)]
         if not open_kinds:

@@ -1,8 +1,8 @@
-"""A worker: a process that does one job after the other, told over a pipe, and watched from outside.
+"""A worker: a process that takes jobs over a pipe, one after the other, and is supervised from outside.
 
-It is a fresh process in a session of its own. It serves one kind of jobs, so that nothing which a library
-leaves behind in its process (folder, environment, warnings, threads) reaches another one. A job that exceeds its
-time or its worker its memory is stopped, and whatever the worker started ends with it.
+It is a new process in a session of its own, and it serves one kind of jobs: nothing that a library leaves in its
+process (folder, environment, warnings, threads) reaches another library. A job that exceeds its time limit, or whose
+worker exceeds its memory limit, is stopped together with all processes that the worker started.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ from crosscheck.running.processes import end
 from crosscheck.running.scheduler import Event, Function
 
 Method = Literal["spawn", "forkserver"]  # of multiprocessing
-SPAWN: Method = "spawn"  # a new interpreter for each process, which takes nothing from this one
+SPAWN: Method = "spawn"  # a new interpreter for each process, which inherits no state
 START_LIMIT_S = 120.0  # for a worker to start and to read its job
 TICK_S = 0.25
 LOG_LIMIT_BYTES = 64 * 2**20
 THREAD_LIMITS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-KERNELS = "FLEXMB_KERNELS"  # flexmb's, which compiles for what a scene contains unless it is "general"
+KERNELS = "FLEXMB_KERNELS"  # flexmb compiles kernels for each scene unless it is "general"
 STDIN, STDOUT, STDERR = 0, 1, 2
-_environment = threading.Lock()  # held while it is changed for a process that is started
+_environment = threading.Lock()  # held while os.environ is changed to start a process
 
 
 class Worker:
-    """A place for a process, which it gets with its first job and again when it has lost it.
+    """A slot for a process, which starts with the first job, and again after it has ended.
 
-    `method` is how multiprocessing starts it. `job` is the number of the job at work, None when idle, and `kind` the
-    kind that the process serves.
+    `method` is how multiprocessing starts it, `job` the number of the present job (None when idle), `kind` the kind of
+    jobs that the process serves.
     """
 
     def __init__(self, method: Method = SPAWN) -> None:
@@ -50,25 +50,25 @@ class Worker:
 
     @property
     def pid(self) -> int:
-        """Of its process, 0 where it has none."""
+        """The number of its process, 0 if it has none."""
         return 0 if self._process is None else self._process.pid or 0
 
     def hand_out(self, number: int, job: Any, kind: str, function: Function, log: str, limit_s: float) -> None:
-        """Send it a job; it gets a new process if it has none alive, or one that served another kind."""
+        """Send a job; a new process is started if there is none alive or it served another kind."""
         if self._process is None or self.kind != kind or not self._process.is_alive():
             self.dismiss()
             self._start(function, log)
         self.job, self.kind, self._limit_s = number, kind, limit_s
         self._deadline = time.monotonic() + START_LIMIT_S
         assert self.pipe is not None
-        with suppress(BrokenPipeError):  # a worker that died before its first job is reported when it is read
+        with suppress(BrokenPipeError):  # the death of a worker is reported when its pipe is read
             self.pipe.send(job)
 
     def news(self, ready: bool, held: Mapping[int, int], memory_bytes: float) -> Event | None:
-        """What happened, None where it is just at work; `ready` says that its pipe has something to read.
+        """The next event, None if there is none; `ready` says that the pipe can be read.
 
-        `held` is the memory of processes by pid, as far as it was measured. After the last event of its job the worker
-        is free, and without its process where that did not end well.
+        `held` is the memory of processes by pid, as far as it was measured. After the last event of a job the worker is
+        idle, and its process is ended unless the job ended normally.
         """
         event = self._receive() if ready else self._watch(held, memory_bytes)
         if event is not None and event.kind != "emitted":
@@ -78,7 +78,8 @@ class Worker:
         return event
 
     def kill(self) -> None:
-        """End its process and all that this started, from another thread than the one that listens: it hears of it."""
+        """End its process and all that this started; to be called from another thread than the one that reads events,
+        which is told of the end."""
         if self._process is not None:
             end(self._process)
 
@@ -90,8 +91,8 @@ class Worker:
         self._process = self.pipe = None
 
     def _start(self, function: Function, log: str) -> None:
-        """Get a process; the thread limits are set in the environment it inherits, before it imports anything."""
-        context: Any = get_context(self._method)  # the type that all contexts share lacks what they have
+        """Start a process; the thread limits must be in its environment before it imports anything."""
+        context: Any = get_context(self._method)  # the contexts' common base type declares no Process
         here, there = context.Pipe()
         process = context.Process(target=_serve, args=(there, function, log), daemon=True)
         with _environment:
@@ -110,13 +111,13 @@ class Worker:
         self._process, self.pipe = process, here
 
     def _receive(self) -> Event | None:
-        """What it says; None where it says that it has begun, from when its time counts."""
+        """The event that it sent; None for the message that the job has begun, which starts its time limit."""
         assert self.job is not None and self.pipe is not None
         try:
             kind, content = self.pipe.recv()
         except (EOFError, OSError):
             return self._death()
-        except Exception as error:  # what an engine wrote into the pipe, or an object that cannot be made here
+        except Exception as error:  # an engine wrote into the pipe, or the object cannot be unpickled here
             return Event(self.job, "crashed", f"the worker process sent what cannot be read ({type(error).__name__})")
         if kind == "begun":
             self._deadline = time.monotonic() + self._limit_s
@@ -124,7 +125,7 @@ class Worker:
         return Event(self.job, kind, content)
 
     def _watch(self, held: Mapping[int, int], memory_bytes: float) -> Event | None:
-        """The event that ends its job where it is silent because it is dead, or exceeds a limit."""
+        """The event that ends its job because it exceeds a limit or its process is dead; else None."""
         assert self.job is not None and self._process is not None and self.pipe is not None
         if time.monotonic() > self._deadline:
             return Event(self.job, "stopped", f"it was stopped at its limit of {self._limit_s:g} s")
@@ -132,14 +133,14 @@ class Worker:
         if memory > memory_bytes:
             sizes = f"{memory / 1e9:.3g} GB of memory where {memory_bytes / 1e9:.3g} GB are its part"
             return Event(self.job, "stopped", f"it was stopped when it held {sizes}; fewer --jobs leave more to each")
-        if not self._process.is_alive() and not self.pipe.poll():  # what it started may hold its pipe open
+        if not self._process.is_alive() and not self.pipe.poll():  # a child of it may keep the pipe open
             return self._death()
         return None
 
     def _death(self) -> Event:
         assert self.job is not None and self._process is not None
-        patience = time.monotonic() + TICK_S
-        while self._process.exitcode is None and time.monotonic() < patience:  # `join` waits for ever if it lives on
+        until = time.monotonic() + TICK_S
+        while self._process.exitcode is None and time.monotonic() < until:  # `join` could wait forever
             time.sleep(0.01)
         code = self._process.exitcode
         how = "closed its pipe" if code is None else f"died (exit code {code})"
@@ -147,16 +148,16 @@ class Worker:
 
 
 def keep_short(log: str) -> None:
-    """Empty a log that has become too long; workers append, so they go on at its new end."""
+    """Empty a log that has become too long; workers append, so they continue at its new end."""
     with suppress(OSError):
         if os.path.getsize(log) > LOG_LIMIT_BYTES:
             os.truncate(log, 0)
 
 
 def _serve(pipe: Connection, function: Function, log: str) -> None:
-    """A worker's life: jobs in, events out, until the pipe closes or the parent is gone."""
+    """The main loop of a worker process: jobs in, events out, until the pipe closes or the parent is gone."""
     if hasattr(os, "setsid"):
-        os.setsid()  # Ctrl-C is for the parent, which ends its workers; and a group can be ended as a whole
+        os.setsid()  # Ctrl-C goes to the parent only, and all descendants can be ended as a group
     with open(log, "ab", buffering=0) as stream, open(os.devnull, "rb") as nothing:
         os.dup2(nothing.fileno(), STDIN)
         os.dup2(stream.fileno(), STDOUT)
@@ -165,7 +166,7 @@ def _serve(pipe: Connection, function: Function, log: str) -> None:
     threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
 
     def send(kind: str, content: Any = None) -> None:
-        if os.getpid() != me:  # a process that a job forked and that came back out of it
+        if os.getpid() != me:  # a forked child of a job that returned from it
             os._exit(1)
         pipe.send((kind, content))
 
@@ -182,7 +183,7 @@ def _serve(pipe: Connection, function: Function, log: str) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End this process when the parent is gone: who is killed cannot dismiss its workers."""
+    """End this process when the parent is gone: a killed parent cannot end its workers."""
     while os.getppid() == parent:
         time.sleep(1.0)
     os._exit(1)

@@ -1,4 +1,4 @@
-"""What the file of a sweep says. Unknown keys are refused with their place. A complete one::
+"""The TOML file of a sweep. Unknown keys are refused with their place. A complete file::
 
     title = "Where the tip is after 2 s"
     case = "pendulum/double"          # a case or its folder, with `variant` [its first]; or a scene of your own:
@@ -18,7 +18,7 @@
     [[parameter]]
     name = "stiffness"                # [the path] the column of the table
     path = "bodies.boom.stations.*.EIy_Nm2"
-    relative = true                   # a factor of what stands in the scene
+    relative = true                   # a factor of the scene's value
     distribution = "uniform"
     low = 0.9
     high = 1.1
@@ -57,7 +57,7 @@ MOST_SAMPLES = 1_000_000
 
 
 class _Parameter(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="distribution"):
-    """A number in a scene, or several that move together; `relative` ones are multiplied by the value."""
+    """A number in a scene, or several that vary together; `relative` ones are multiplied by the value."""
 
     path: str | tuple[str, ...]
     name: str = ""
@@ -69,15 +69,15 @@ class _Parameter(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     @property
     def title(self) -> str:
-        """Its column in the table."""
+        """The name of its column in the table."""
         return self.name or ", ".join(self.paths)
 
     def at(self, u: Real) -> Real:
-        """Values below which the part `u` of the distribution lies."""
+        """The quantiles of the distribution at the probabilities `u`."""
         raise NotImplementedError
 
     def faults(self) -> Iterator[str]:
-        """What is wrong with its numbers."""
+        """Problems of its numbers."""
         yield from ()
 
 
@@ -146,7 +146,7 @@ class Values(_Parameter, frozen=True, kw_only=True, tag="values"):
 
 
 class SweptQuantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One number of a run: what a component of a channel, or its norm, comes to in time."""
+    """One number of a run: a reduction over time of a component of a channel, or of its norm."""
 
     name: str
     channel: str
@@ -164,7 +164,7 @@ class SampleEffort(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class SweepFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A sweep, as its file says."""
+    """A sweep."""
 
     title: str
     engines: tuple[str, ...]
@@ -182,10 +182,10 @@ class SweepFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 def load_sweep(file: Path) -> SweepFile:
-    """Read and check the file of a sweep; CaseError names file, place and remedy, OSError a file that is none."""
+    """Read and check the file of a sweep; CaseError names file, place and remedy; OSError if it cannot be read."""
     try:
         sweep = to_struct(parse_toml(read_text(file)), SweepFile, str(file))
-    except SceneError as error:  # it is no scene, whose message would call it one
+    except SceneError as error:  # its message would call the file a scene
         raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
     except (Unreadable, RecursionError, OverflowError) as error:
         raise CaseError(f"{file}: {error}") from None

@@ -1,4 +1,4 @@
-"""The samples of a sweep: what each parameter is in each, whoever runs it and in whatever order."""
+"""The parameter values of all samples of a sweep; they depend on the seed only."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from flexmb.typing import Real
 def sample_values(sweep: SweepFile) -> Real:
     """Values (number of samples, number of parameters).
 
-    Random samples are numbered: sample n has a generator of its own (`SeedSequence.spawn`), so that a larger `number`
-    keeps the samples that there were. A Latin hypercube is one thing, and with another number all its samples differ.
+    Random sample n has a generator of its own (`SeedSequence.spawn`), so that a larger `number`
+    keeps the existing samples. A Latin hypercube with another number has entirely different samples.
     """
     if sweep.sampling == "grid":
         axes = [each.values for each in sweep.parameters if isinstance(each, Values)]
@@ -22,7 +22,7 @@ def sample_values(sweep: SweepFile) -> Real:
     assert sweep.number is not None
     shape = (sweep.number, len(sweep.parameters))
     parts = _latin_hypercube(sweep.seed, *shape) if sweep.sampling == "latin_hypercube" else _random(sweep.seed, *shape)
-    inside = np.clip(parts, np.finfo(float).tiny, None)  # a normal distribution has nothing below which 0 of it lies
+    inside = np.clip(parts, np.finfo(float).tiny, None)  # the normal distribution has no quantile at 0
     return np.column_stack([each.at(inside[:, column]) for column, each in enumerate(sweep.parameters)])
 
 
@@ -33,7 +33,7 @@ def _random(seed: int, number: int, parameters: int) -> Real:
 
 
 def _latin_hypercube(seed: int, number: int, parameters: int) -> Real:
-    """Points of which each n-th part of each axis holds one, (number, parameters)."""
+    """Points (number, parameters) of which exactly one lies in each n-th part of each axis."""
     generator = np.random.default_rng(np.random.SeedSequence(seed))
     strata = generator.permuted(np.tile(np.arange(number), (parameters, 1)), axis=1).T
     return (strata + generator.random((number, parameters))) / number

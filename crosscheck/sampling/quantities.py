@@ -1,4 +1,4 @@
-"""Numbers out of a run: what a component of a channel, or its norm, comes to in time."""
+"""Numbers from a run: reductions over time of a component of a channel, or of its norm."""
 
 from __future__ import annotations
 

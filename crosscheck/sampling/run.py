@@ -1,4 +1,4 @@
-"""Running a sweep: samples become jobs of a scheduler; each outcome is recorded as it comes, and none counts twice."""
+"""Running a sweep: samples are jobs of a scheduler, and each outcome is recorded as it comes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from crosscheck.engines.answers import clean
 from crosscheck.engines.contract import Effort
-from crosscheck.engines.registry import SERVED_WITH
+from crosscheck.engines.registry import SERVED_WITH, home
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import resolve
 from crosscheck.records.archive import Archive, decoded_lines
@@ -23,7 +23,7 @@ from crosscheck.records.made_by import made_by
 from crosscheck.running.job import MAIN, Done, Job
 from crosscheck.running.plan import sample_times, scene_identity
 from crosscheck.running.pool import run_jobs
-from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler
+from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler, Work
 from crosscheck.running.sweep import PROVIDER
 from crosscheck.sampling.file import SweepFile, load_sweep
 from crosscheck.sampling.points import sample_values
@@ -39,12 +39,12 @@ from flexmb.typing import Real
 
 RECORDS, TABLE, SUMMARY = "samples.jsonl", "samples.csv", "summary.json"
 REDUCING = ("crosscheck.sampling.quantities",)
-Listener = Callable[[int, int, int], None]  # how many samples are done, of how many, and how many have no result
+Listener = Callable[[int, int, int], None]  # numbers of samples: done, all, without result
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What is varied: a scene before its variant's transformation, and when it is sampled (s)."""
+    """The scene that is varied, before its variant's transformation, and the sample times (s)."""
 
     base: Scene
     variant: Variant
@@ -72,7 +72,7 @@ def run_sweep(
     """Run the sweep of a file; records go to `samples.jsonl` in the folder `out`, and a table to `samples.csv`.
 
     Samples that are recorded with the same values, quantities, sources and machine are not run again unless `fresh`.
-    Raises CaseError where the file, or a path, a channel, an engine or a method in it, makes no sense, before anything
+    Raises CaseError if the file, or a path, channel, engine or method in it, is invalid, before anything
     runs.
     """
     sweep = load_sweep(file)
@@ -85,21 +85,19 @@ def run_sweep(
     values = sample_values(sweep)
     require_sense(file, sweep, subject.base, subject.times, values, provider)
     records = out / RECORDS
-    for name in (TABLE, SUMMARY):  # of an earlier sweep, should this one be killed
+    for name in (TABLE, SUMMARY):  # files of an earlier sweep must not remain if this one is killed
         take_away(out / name)
     if fresh:
         records.unlink(missing_ok=True)
     known = _known(records)
     jobs = _jobs(sweep, subject, values, known, provider, limits.time_s or TIME_LIMIT_S)
+    log = str(out / "samples.log")
+    work = Work(run_sample, jobs, log, limits.workers, _kind, _time_limit, limits.memory_bytes)
     used: dict[int, SampleRecord] = {}
     with (
         closing(Archive(records, Written)) as archive,
         SamplesTable(out / TABLE, sweep) as table,
-        closing(
-            scheduler(
-                run_sample, jobs, limits.workers, str(out / "samples.log"), _kind, _time_limit, limits.memory_bytes
-            )
-        ) as events,
+        closing(scheduler(work)) as events,
     ):
         archive.write(environment())
         for event in events:
@@ -116,7 +114,7 @@ def run_sweep(
 
 def _subject(sweep: SweepFile, folder: Path) -> Subject:
     if sweep.scene:
-        assert sweep.duration_s is not None and sweep.samples is not None  # as the rules of the file demand
+        assert sweep.duration_s is not None and sweep.samples is not None  # checked with the file
         times = np.linspace(0.0, sweep.duration_s, sweep.samples)
         return Subject(load_scene(folder / sweep.scene), Variant(name="scene", engines=sweep.engines), times)
     beside = folder / sweep.case
@@ -148,8 +146,8 @@ def _jobs(
             done = known.get((engine, scene_id, asked))
             job = Job(
                 case=sweep.title, variant=subject.variant.name, role=MAIN, engine=engine, scene=None, scene_id=scene_id,
-                times=subject.times, provider=provider, efforts=_effort(sweep, engine), finest_only=True,
-                kept=tuple(quantity.channel for quantity in sweep.quantities), done=_done(done),
+                times=subject.times, provider=provider, maker=home(engine), efforts=_effort(sweep, engine),
+                finest_only=True, kept=tuple(quantity.channel for quantity in sweep.quantities), done=_done(done),
                 time_limit_s=time_limit_s, lean=True,
             )  # fmt: skip
             found.append(SampleJob(job, sample, tuple(row.tolist()), sweep, subject.base, subject.variant, asked))
@@ -169,7 +167,7 @@ def _known(records: Path) -> dict[tuple[str, ...], SampleRecord]:
 
 
 def _done(record: SampleRecord | None) -> frozenset[Done]:
-    """What lets a job be confirmed: only a run that went as far as it goes."""
+    """The recorded run by which a job is confirmed: only one that finished or diverged."""
     if record is None or record.status not in ("finished", "diverged"):
         return frozenset()
     return frozenset((Done(record.effort, record.made_by, record.rungs - 1, record.rungs),))
@@ -191,7 +189,7 @@ def _outcome(
 
 
 def _kind(job: SampleJob) -> str:
-    """A worker stays with one library."""
+    """The kind of a job: a worker serves one library."""
     return SERVED_WITH.get(job.job.engine, job.job.engine)
 
 

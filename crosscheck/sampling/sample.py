@@ -1,4 +1,4 @@
-"""One sample in a worker: its scene is made, run by one engine, and reduced to the quantities."""
+"""The job of one sample: its scene is made, run by one engine, and reduced to the quantities."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 import msgspec
 
 from crosscheck.library.case import Variant
-from crosscheck.records.kinds import BrokenLine, Confirmed, Environment, RunRecord, RunStatus
-from crosscheck.records.packing import unpack
-from crosscheck.running.execute import execute
+from crosscheck.records.kinds import BrokenLine, Confirmed, Environment, RunStatus
+from crosscheck.running.execute import solve_job
 from crosscheck.running.job import Job
 from crosscheck.running.plan import variant_scene
+from crosscheck.running.rung import Solved
 from crosscheck.sampling.file import SweepFile
 from crosscheck.sampling.quantities import reduce
 from crosscheck.sampling.scenes import with_values
@@ -26,7 +26,7 @@ class SampleRecord(
 ):
     """The outcome of one sample in one engine; `quantities` are there when it is "finished".
 
-    `scene` identifies the scene with its values and the sample times, `asked` the quantities and how they are found,
+    `scene` identifies the scene with its values and the sample times, `asked` the quantities with their reductions,
     `made_by` everything else that the result depends on, as of a RunRecord.
     """
 
@@ -52,7 +52,7 @@ Read = Written | BrokenLine
 
 @dataclass(frozen=True)
 class SampleJob:
-    """A sample as it is sent to a worker: `job` without its scene, which is made of `base` there."""
+    """A sample as sent to a worker, which makes the scene of the `job` from `base`."""
 
     job: Job
     sample: int
@@ -73,19 +73,19 @@ class SampleJob:
 
 
 def run_sample(sample: SampleJob, emit: Callable[[Any], None]) -> None:
-    """The work of a worker: a SampleRecord, or a Confirmed where the recorded one stands."""
+    """The function of a worker: emits a SampleRecord, or a Confirmed if the recorded one is valid."""
 
-    def reduced(found: RunRecord | Confirmed | str) -> None:
-        if isinstance(found, RunRecord):
+    def reduced(found: Solved | Confirmed | str) -> None:
+        if isinstance(found, Solved):
             emit(_reduced(sample, found))
         elif isinstance(found, Confirmed):
             emit(found)
 
-    execute(_with_scene(sample), reduced)
+    solve_job(_with_scene(sample), reduced)
 
 
 def _with_scene(sample: SampleJob) -> Job:
-    """The job with its scene, or with the reason why there is none: values can make a scene impossible."""
+    """The job with its scene, or with the error if the values make the scene invalid."""
     try:
         scene = variant_scene(with_values(sample.base, sample.sweep, sample.values), sample.variant)
         check_scene(scene, t_end=float(sample.job.times[-1]))
@@ -94,16 +94,16 @@ def _with_scene(sample: SampleJob) -> Job:
     return replace(sample.job, scene=scene)
 
 
-def _reduced(sample: SampleJob, run: RunRecord) -> SampleRecord:
+def _reduced(sample: SampleJob, solved: Solved) -> SampleRecord:
+    run = solved.record
     record = msgspec.structs.replace(
         sample.blank, status=run.status, message=run.message, version=run.version, made_by=run.made_by,
         effort=run.effort, rungs=run.rungs, compile_s=run.compile_s, wall_s=run.wall_s,
     )  # fmt: skip
     if run.status != "finished":
         return record
-    channels = {name: unpack(packed) for name, packed in run.channels.items()}
     try:
-        found = {quantity.name: reduce(quantity, channels) for quantity in sample.sweep.quantities}
+        found = {quantity.name: reduce(quantity, solved.channels) for quantity in sample.sweep.quantities}
     except ValueError as error:
         return msgspec.structs.replace(record, status="failed", message=str(error))
     return msgspec.structs.replace(record, quantities=found)

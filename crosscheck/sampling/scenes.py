@@ -1,4 +1,4 @@
-"""The scene of a sample: the swept one with other numbers, at paths that lead to numbers of the same kind."""
+"""The scene of a sample: the base scene with other numbers at the paths of the parameters."""
 
 from __future__ import annotations
 

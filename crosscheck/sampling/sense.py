@@ -1,4 +1,4 @@
-"""Whether a sweep makes sense in its scene and its engines, found before the first of what may be a million samples."""
+"""Checks of a sweep against its scene and its engines, before the first of possibly a million samples."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import get_args
 
 import numpy as np
 
-from crosscheck.engines.answers import efforts_of
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import part_of
-from crosscheck.running.execute import find_engine
+from crosscheck.running.execute import NoSuchEngine, find_engine
 from crosscheck.sampling.file import SampleEffort, SweepFile, SweptQuantity
 from crosscheck.sampling.quantities import LETTERS
 from crosscheck.sampling.scenes import require_numbers
@@ -21,7 +21,7 @@ from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 SCIPY = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
-# Integrators that engines take besides those of their own ladders, by what an engine's name begins with.
+# Integrators that engines accept besides those of their own ladders, by the beginning of the engine's name.
 BESIDE = {
     "native": get_args(Method),
     "pinocchio": SCIPY,
@@ -55,7 +55,7 @@ def require_sense(file: Path, sweep: SweepFile, scene: Scene, times: Real, value
 
 
 def _require_finite(sweep: SweepFile, values: Real) -> None:
-    """Distributions of finite parameters may still be so wide that what is drawn overflows."""
+    """Distributions with finite parameters may still be so wide that drawn values overflow."""
     for parameter, drawn in zip(sweep.parameters, values.T, strict=True):
         if not np.all(np.isfinite(drawn)):
             what = f'parameter "{parameter.path}": {np.sum(~np.isfinite(drawn))} of {len(drawn)} values drawn overflow'
@@ -74,7 +74,7 @@ def _quantities(sweep: SweepFile, scene: Scene) -> Iterator[Defect]:
 
 
 def _items(scene: Scene) -> dict[str, list[str]]:
-    """By kind of channel, the names that the scene has for it."""
+    """The names of the scene's items by kind of channel."""
     of = {
         "marker": scene.markers, "load": (*scene.hinges, *scene.closures), "wheel_load": scene.wheels,
         "connector": scene.connectors,
@@ -98,16 +98,17 @@ def _component(quantity: SweptQuantity) -> tuple[str, str] | None:
 
 def _engines(sweep: SweepFile, scene: Scene, duration_s: float, provider: str) -> Iterator[Defect]:
     for index, name in enumerate(sweep.engines):
-        engine = find_engine(provider, name)
-        if isinstance(engine, str):
-            yield Defect(str(Place().key("engines", index)), engine, "name one of them")
+        try:
+            engine = CheckedEngine(find_engine(provider, name), duration_s=duration_s)
+        except NoSuchEngine as error:
+            yield Defect(str(Place().key("engines", index)), str(error), "name one of them")
             continue
         for number, effort in enumerate(sweep.efforts):
             if effort.engine != name:
                 continue
             try:
-                own = {each.method for each in efforts_of(engine, scene, duration_s)}
-            except Exception:  # it is not installed, or does not take the scene: every sample says so
+                own = {each.method for each in engine.efforts(scene)}
+            except Exception:  # not installed, or it refuses the scene: every sample reports that
                 continue
             if wrong := _method(effort, own):
                 yield Defect(str(Place().key("efforts", number, "method")), *wrong)

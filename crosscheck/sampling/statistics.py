@@ -1,4 +1,4 @@
-"""What the samples of a sweep say: moments and quantiles with their standard errors, and what gave no result."""
+"""Statistics of a sweep: moments and quantiles with their standard errors, and failures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 
 
 class Estimated(msgspec.Struct, frozen=True, kw_only=True):
-    """A number and its standard error, None where the samples do not say."""
+    """A number and its standard error, None if unknown."""
 
     value: float
     standard_error: float | None
@@ -24,7 +24,7 @@ class Estimated(msgspec.Struct, frozen=True, kw_only=True):
 class Distribution(msgspec.Struct, frozen=True, kw_only=True):
     """A quantity in one engine over the `count` samples that gave a result.
 
-    A grid has extremes and no `mean`, `sd` and `quantiles` (by probability): its samples are no draws. `lowest_at` and
+    A grid has no `mean`, `sd` and `quantiles` (by probability), since its samples are not random. `lowest_at` and
     `highest_at` are the samples of the extremes.
     """
 
@@ -51,7 +51,7 @@ class Failure(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SweepSummary(msgspec.Struct, frozen=True, kw_only=True):
-    """A sweep in short. Statistics are of the samples with a result: with `failures`, they are conditional on it."""
+    """The statistics of a sweep, over the samples with a result, and the failures."""
 
     title: str
     sampling: str
@@ -113,7 +113,8 @@ def _mean(values: Real) -> Estimated:
 
 
 def _standard_deviation(values: Real) -> Estimated | None:
-    """Of the population: var(s^2) = (m4 - s^4 (n - 3)/(n - 1))/n, m4 the fourth central moment, and ds = d(s^2)/2s."""
+    """The population's, with its error: var(s^2) = (m4 - s^4 (n - 3)/(n - 1))/n, m4 the fourth central moment, and ds =
+    d(s^2)/2s."""
     n = len(values)
     if n < 2:
         return None
@@ -125,7 +126,7 @@ def _standard_deviation(values: Real) -> Estimated | None:
 
 def _quantile(values: Real, p: float) -> Estimated:
     """A quantile, with the standard error by Maritz and Jarrett."""
-    from scipy.stats import mstats  # it takes a third of a second, and most commands do without
+    from scipy.stats import mstats  # takes 0.3 s to import, and most commands do not need it
 
     error = float(mstats.mjci(values, [p])[0]) if len(values) > 2 else math.nan
     return _estimated(float(np.quantile(values, p)), error)

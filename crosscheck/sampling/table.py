@@ -1,4 +1,4 @@
-"""The table of samples: a line for each in each engine, added as they come, in order when the table is complete."""
+"""The table of samples: a line for each sample in each engine, appended as they come, sorted at the end."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from flexmb.output.writing import writing
 
 
 class SamplesTable:
-    """A CSV file: sample, engine, status, parameters, quantities (empty where there is no result), message.
+    """A CSV file: sample, engine, status, parameters, quantities (empty without a result), message.
 
-    Until its context ends without an error the lines stand in `<name>.unfinished.csv`, in the order in which they came.
+    Until its context ends without an error the lines are in `<name>.unfinished.csv`, in the order in which they came.
     """
 
     def __init__(self, file: Path, sweep: SweepFile) -> None:
@@ -43,13 +43,13 @@ class SamplesTable:
             self._complete()
 
     def add(self, record: SampleRecord) -> None:
-        """Append a line; it is on disk when this returns."""
+        """Append a line and flush it to the file."""
         self._records.append(record)
         with writing(self._growing):
             self._write(self._stream, self._line(record))
 
     def _complete(self) -> None:
-        """Leave the lines in the order of samples and engines."""
+        """Sort the lines by sample and engine."""
         with whole_file(self._file) as beside, beside.open("w", encoding="utf-8", newline="") as stream:
             self._write(stream, self._header)
             for record in sorted(self._records, key=lambda each: (each.sample, each.engine)):
@@ -63,6 +63,6 @@ class SamplesTable:
 
     @staticmethod
     def _write(stream: TextIO, line: Sequence[object]) -> None:
-        """One line: texts are quoted, numbers in as many digits as give them back."""
+        """One line: texts are quoted, numbers have all their digits."""
         csv.writer(stream, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n").writerow(line)
         stream.flush()

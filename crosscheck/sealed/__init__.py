@@ -1,1 +1,1 @@
-"""results.json: a session in one small file, sealed by its hash; what changed between two; a badge of one."""
+"""results.json: a session in one small file with its own hash; differences of two such files; badges."""

@@ -1,4 +1,4 @@
-"""A badge of the outcome: a file that endpoints of shields.io read, and a picture that needs no server."""
+"""A badge of the outcome: a file for endpoints of shields.io, and a picture that needs no server."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PADDING = 6.0
 
 
 def badge_words(outcome: SessionOutcome) -> tuple[str, str]:
-    """What the badge says, and its colour by the name that shields.io knows."""
+    """The text of the badge, and its colour by the name that shields.io uses."""
     good, count = sum(verdict.ok for verdict in outcome.all), len(outcome.all)
     if outcome.unfinished:
         return "unfinished", "lightgrey"

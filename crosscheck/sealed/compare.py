@@ -1,8 +1,8 @@
 """What changed between two sessions, by case, comparison, channel and engines: worse, better, new, gone.
 
-*Worse*: a verdict was as expected and is not; its status is graver; E or U has grown beyond the factor of accepted
-figures (`crosscheck.judging.figures`); a run that finished does not; the session was green and is not. *Gone*: what was
-judged is not judged any more. Both are regressions. Times are told where they changed a lot, and judge nothing.
+*Worse*: a verdict was as expected and is not; its status is graver; E or U has grown beyond the factor for accepted
+figures (`crosscheck.judging.figures`); a run that finished does not; the session's exit code was 0 and is not. *Gone*:
+something is not judged any more. Both are regressions. Large changes of times are listed, but they are no regression.
 """
 
 from __future__ import annotations
@@ -12,20 +12,20 @@ from dataclasses import dataclass
 from typing import Literal
 
 from crosscheck.judging.figures import worse
-from crosscheck.judging.verdict import GRAVITY
+from crosscheck.judging.verdict import SEVERITY
 from crosscheck.library.accepted import Figure
 from crosscheck.sealed.document import SealedCase, SealedResults, SealedRun, SealedVerdict
 
 Direction = Literal["worse", "gone", "better", "new"]
 DIRECTIONS: tuple[Direction, ...] = ("worse", "gone", "better", "new")
 REGRESSIONS = ("worse", "gone")
-SLOWER = 1.5  # ratio of times from which a change is told
+SLOWER = 1.5  # ratio of times from which a change is listed
 SHORTEST_S = 0.05  # shorter ones change by chance
 
 
 @dataclass(frozen=True)
 class ResultChange:
-    """One thing that changed: of a verdict `what` is its channel with both sides, of a run variant, engine and role."""
+    """A change: of a verdict `what` is its channel with both sides, of a run variant, engine and role."""
 
     direction: Direction
     case: str
@@ -36,7 +36,7 @@ class ResultChange:
 
 @dataclass(frozen=True)
 class TimeChange:
-    """A run whose solve took `ratio` times what it took before."""
+    """A run whose solve took `ratio` times as long as before."""
 
     case: str
     what: str
@@ -50,7 +50,7 @@ class TimeChange:
 
 @dataclass(frozen=True)
 class Differences:
-    """Everything that changed, `same` verdicts that did not, and in `notes` what to know when reading it."""
+    """All changes, the number of verdicts that are the `same`, and `notes` that may explain changes."""
 
     changes: tuple[ResultChange, ...]
     times: tuple[TimeChange, ...]
@@ -71,7 +71,7 @@ class Differences:
 
 
 def compare_results(old: SealedResults, new: SealedResults) -> Differences:
-    """Hold a session against an earlier one."""
+    """Compare a session with an earlier one."""
     changes: list[ResultChange] = []
     times: list[TimeChange] = []
     same = 0
@@ -114,12 +114,12 @@ def _verdicts(case: str, before: SealedCase, now: SealedCase) -> Iterator[Result
 
 
 def _declined(then: SealedVerdict, now: SealedVerdict) -> str:
-    """How a verdict got worse from one to the other; "" if it did not."""
+    """How a verdict became worse; "" if it did not."""
     if then.ok and not now.ok:
         return f"{then.status} -> {now.status}, expected {now.expected}: {now.reason}"
     if then.ok != now.ok:
         return ""
-    if then.kind != "control" and GRAVITY.index(now.status) < GRAVITY.index(then.status):
+    if then.kind != "control" and SEVERITY.index(now.status) < SEVERITY.index(then.status):
         return f"{then.status} -> {now.status}"
     if then.status != now.status or then.kind == "control" or then.E is None:
         return ""
@@ -138,7 +138,7 @@ def _figure(value: float | None) -> str:
 
 
 def _runs(case: str, before: SealedCase, now: SealedCase) -> Iterator[ResultChange]:
-    """Runs that finished and do not any more, or are not there: an engine that no comparison names shows only here."""
+    """Runs that finished and do not any more, or are missing; engines without a comparison show only here."""
     for what, then in before.runs.items():
         current = now.runs.get(what, SealedRun(status="did not run"))
         if then.status == "finished" != current.status:
@@ -146,7 +146,7 @@ def _runs(case: str, before: SealedCase, now: SealedCase) -> Iterator[ResultChan
 
 
 def _times(case: str, before: SealedCase, now: SealedCase) -> Iterator[TimeChange]:
-    """Runs at the same effort that take much longer, or much less long."""
+    """Runs at the same effort that take much longer or much less time."""
     for what, then in before.runs.items():
         current = now.runs.get(what)
         if current is None or current.effort != then.effort or min(then.wall_s, current.wall_s) < SHORTEST_S:
@@ -157,13 +157,13 @@ def _times(case: str, before: SealedCase, now: SealedCase) -> Iterator[TimeChang
 
 
 def _session(old: SealedResults, new: SealedResults) -> Iterator[ResultChange]:
-    """What no verdict shows: runs that were lost, broken records, figures that a strict session asks for."""
+    """Changes that no verdict shows: lost runs, broken records, figures that a strict session requires."""
     if old.exit_code == 0 != new.exit_code:
         yield ResultChange("worse", "the session", "", "", f"exit code 0 -> {new.exit_code}: {new.headline}")
 
 
 def _notes(old: SealedResults, new: SealedResults) -> Iterator[str]:
-    """Differences of what was asked for and with what: they explain changes and are none."""
+    """Differences of the requests, files and versions, which may explain changes."""
     for name in old.cases.keys() & new.cases.keys():
         before, now = old.cases[name].files, new.cases[name].files
         changed = sorted(file for file in before.keys() | now.keys() if before.get(file) != now.get(file))

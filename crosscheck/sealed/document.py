@@ -1,14 +1,14 @@
-"""What results.json holds: verdicts, figures, statuses and times of runs, digests of what they were made from.
+"""The contents of results.json: verdicts, figures, statuses and times of runs, digests of their sources.
 
 The file is one JSON object. Every key:
 
 - ``format`` "crosscheck results" and ``version`` 1; a reader refuses others;
-- ``sha256``: hex digest of the file as it stands without this key and its line end (`crosscheck.sealed.seal`);
-- ``unfinished`` (left out: false): the session has begun and not come to its end, and no verdict is in the file;
+- ``sha256``: hex digest of the file without this key and the line end (`crosscheck.sealed.seal`);
+- ``unfinished`` (left out: false): the session has not ended, and the file contains no verdicts;
 - ``exit_code`` of the session (0 or 1), ``headline`` in words, ``strict``, the ``engines`` asked for (none: all);
 - ``made``: ``at`` (UTC), ``python``, ``system``, ``processor``, ``packages`` and ``engines`` with their versions;
-- ``records``: SHA-256 of the records.jsonl that was judged, "" where there was none yet; ``broken``: how many of its
-  lines are none;
+- ``records``: SHA-256 of the records.jsonl that was judged, "" if there was none; ``broken``: the number of its invalid
+  lines;
 - ``cases``, by name, each with
 
   - ``files``: SHA-256 of the case's files (run.toml, scenes, provenance, reference.csv ...) when it was run;
@@ -43,7 +43,7 @@ FORMAT, VERSION = "crosscheck results", 1
 
 
 class _SealedPart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """Base of the parts of the file: a key that it should not have is an error, defaults are left out."""
+    """Base of the parts of the file: unknown keys are errors, defaults are left out."""
 
 
 class SealedVerdict(_SealedPart, frozen=True, kw_only=True):
@@ -180,5 +180,5 @@ def _run(result: Result) -> SealedRun:
 
 
 def _short(number: float | None, digits: int) -> float | None:
-    """The number with some significant digits; None for what JSON cannot hold."""
+    """The number rounded to some significant digits; None if JSON cannot represent it."""
     return float(f"{number:.{digits}g}") if number is not None and math.isfinite(number) else None

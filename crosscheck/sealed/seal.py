@@ -1,8 +1,8 @@
-"""Writing and reading results.json: the text has one form only, and its digest is in it.
+"""Writing and reading results.json, a canonical text that contains its own digest.
 
 The canonical form is what Python's ``json.dumps`` writes with sorted keys, without spaces, in ASCII. The seal is the
-SHA-256 of that form without the key ``sha256``. A file is accepted if it is the canonical form of what it says, with
-its seal, and one line end: then every changed byte is noticed. To check one by other means::
+SHA-256 of that form without the key ``sha256``. A file is accepted if it is the canonical form of its contents, with
+its seal, and one line end, so that every changed byte is noticed. To check one by other means::
 
     jq -cS 'del(.sha256)' results.json | tr -d '\\n' | sha256sum     # where jq prints numbers as they stand
 """
@@ -42,9 +42,9 @@ def write_results(results: SealedResults, folder: Path) -> None:
 
 
 def read_results(file: Path) -> SealedResults:
-    """The content of a results.json; ResultsError says what is wrong with the file."""
+    """The content of a results.json; ResultsError if the file is invalid."""
     try:
-        data = read_bytes(file, LIMIT)  # as it stands: a byte order mark and other line ends are changes too
+        data = read_bytes(file, LIMIT)  # the very bytes: a byte order mark and other line ends are changes too
         content = json.loads(data.decode("ascii"), parse_constant=_no_number, parse_float=_finite)
     except UnicodeDecodeError as error:
         what = f"byte {error.start} is not ASCII, so another program saved it: fetch it anew"
@@ -77,5 +77,5 @@ def _no_number(word: str) -> NoReturn:
 
 
 def _finite(word: str) -> float:
-    """A number with a point or an exponent; one such as 1e999 overflows, and no figure is that."""
+    """A number with a point or an exponent; one that overflows, such as 1e999, is an error."""
     return float(word) if math.isfinite(float(word)) else _no_number(word)

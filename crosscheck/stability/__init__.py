@@ -1,7 +1,7 @@
-"""Stability maps: where a method or a motion holds and where it fails, beside the boundary that theory says.
+"""Stability maps: where a motion is stable or a method works, compared with a theoretical boundary.
 
-A map is one case (a family of scenes with two parameters), one quantity and two named axes (`map`). Its cells are
-refined where the class or the status changes (`refine`), run through the pool and recorded as they come (`run`),
+A map is a family of scenes with two parameters, one quantity and two named axes (`map`). Its cells are
+refined where the class or the status changes (`refine`), run by a scheduler and recorded (`run`),
 compared with a theoretical or published boundary (`boundary`) and drawn (`picture`). `maps` has one small file for each
 case.
 """

@@ -1,4 +1,4 @@
-"""Does a map's boundary lie where the overlay has it? It agrees within one cell of the finest size."""
+"""The verdict on a map: its boundary must be within one cell of the finest size of the overlay's."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from crosscheck.stability.map_records import CellRecord
 from crosscheck.stability.refine import Cell, CellMesh
 
 ALLOWED = 1  # cells of the finest size
-FAR = 10**6
-WRONG, NO_EVIDENCE = -1, -2  # instead of the number of a class
+UNREACHABLE = 10**6
+WRONG, NO_EVIDENCE = -1, -2  # in place of the number of a class
 
 
 class MapVerdict(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The judgement of a map.
 
-    `status`: "agree", "differ", or "did not run" where some cells did not run or none is evidence. `distance`, in cells
+    `status`: "agree", "differ", or "did not run" if some cells did not run or none is evidence. `distance`, in cells
     of the finest size, is the largest distance between a place and the nearest place to which the overlay gives the
-    same class, in both directions (-1: there is none). `worst` says where that is. `cells` counts cells by class or
+    same class, in both directions (-1: there is none); `worst` is its place. `cells` counts cells by class or
     status.
     """
 
@@ -44,7 +44,7 @@ class MapVerdict(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
 
 def judge(what: StabilityMap, mesh: CellMesh, records: dict[Cell, CellRecord]) -> MapVerdict:
-    """Hold the finished cells of a map against its overlay."""
+    """Compare the finished cells of a map with its overlay."""
     number, cells = mesh.painted()
     measured = np.array([measured_class(what, records[cell]) for cell in cells])[number]
     x, y = np.meshgrid(what.x.centres(mesh.depth), what.y.centres(mesh.depth), indexing="ij")
@@ -61,7 +61,7 @@ def judge(what: StabilityMap, mesh: CellMesh, records: dict[Cell, CellRecord]) -
         map=what.name,
         title=what.title,
         status=status,
-        distance=farthest if farthest < FAR else -1,
+        distance=farthest if farthest < UNREACHABLE else -1,
         worst="" if farthest == 0 else _place(what, x[place], y[place], found[number[place]], int(expected[place])),
         cells=_counts(what, found),
         depth=mesh.depth,
@@ -72,7 +72,7 @@ def judge(what: StabilityMap, mesh: CellMesh, records: dict[Cell, CellRecord]) -
 
 
 def measured_class(what: StabilityMap, record: CellRecord) -> int:
-    """Number of a cell's class; `WRONG` where it has none, `NO_EVIDENCE` where having none means nothing."""
+    """Number of a cell's class; `WRONG` if it has none, `NO_EVIDENCE` if the cell is to be ignored."""
     if record.status == "measured":
         return what.kind(record.value) if record.value is not None and math.isfinite(record.value) else WRONG
     if record.status == "did not finish" and what.skips:
@@ -88,7 +88,7 @@ def label(what: StabilityMap, record: CellRecord) -> str:
 
 
 def _distances(what: StabilityMap, measured: NDArray[np.intp], expected: NDArray[np.intp]) -> NDArray[np.intp]:
-    """For each place, in cells, the larger of two distances: to the nearest place where its class is expected, and from
+    """For each place the larger of two distances in cells: to the nearest place where its class is expected, and from
     its expected class to the nearest place where that was measured. With a bound, only the distance to the nearest
     place where so high a class is allowed.
     """
@@ -96,7 +96,7 @@ def _distances(what: StabilityMap, measured: NDArray[np.intp], expected: NDArray
     if what.overlay.bound:
         for kind in range(len(what.kinds)):
             worst = np.maximum(worst, np.where(measured == kind, _to(expected >= kind, what), 0))
-        return np.where(measured == WRONG, FAR, worst)
+        return np.where(measured == WRONG, UNREACHABLE, worst)
     expected = np.where(measured == NO_EVIDENCE, NO_EVIDENCE, expected)
     for kind in {*measured.ravel().tolist(), *expected.ravel().tolist()}:
         worst = np.maximum(worst, np.where(measured == kind, _to(expected == kind, what), 0))
@@ -105,7 +105,7 @@ def _distances(what: StabilityMap, measured: NDArray[np.intp], expected: NDArray
 
 
 def _to(wanted: NDArray[np.bool_], what: StabilityMap) -> NDArray[np.intp]:
-    """Distance of every place from the nearest wanted one; a diagonal step counts one; never across categories."""
+    """Chessboard distance of every place from the nearest wanted one, not across categories."""
     if what.y.categories or what.x.categories:
         lines = wanted.T if what.y.categories else wanted
         found = np.array([_chessboard(line[None])[0] for line in lines])
@@ -115,7 +115,7 @@ def _to(wanted: NDArray[np.bool_], what: StabilityMap) -> NDArray[np.intp]:
 
 def _chessboard(wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
     if not wanted.any():
-        return np.full(wanted.shape, FAR, np.intp)
+        return np.full(wanted.shape, UNREACHABLE, np.intp)
     return np.asarray(distance_transform_cdt(~wanted, metric="chessboard"), np.intp)
 
 

@@ -1,9 +1,8 @@
-"""The flow of a scene near a motion, found by runs: growth of small disturbances, and amplitudes over long times.
+"""The flow of a scene near a motion, found by runs: the growth of small disturbances.
 
-Each chosen coordinate or speed is disturbed by `SIZE` and followed for some time. The disturbances at the end give the
-transition matrix of the linearised motion, up to SIZE^2 and to rounding over SIZE. Its eigenvalues are Floquet's
-multipliers if that time is a period.
-"""
+Each chosen coordinate or speed is disturbed by `SIZE` and integrated for some time. The disturbances at the end give
+the transition matrix of the linearised motion, up to SIZE^2 and to rounding over SIZE. Its eigenvalues are Floquet's
+multipliers if that time is a period. """
 
 from __future__ import annotations
 
@@ -35,7 +34,7 @@ class StoppedError(ArithmeticError):
 
 
 def flow(system: System, start: Real, time: float) -> Real:
-    """State [q, u, work] at `time` (s) of the motion from `start`; StoppedError where it ends before."""
+    """State [q, u, work] at `time` (s) of the motion from `start`; StoppedError if it ends before."""
     times, out = np.array([0.0, time]), np.empty((2, len(start)))
     counts, accuracy = np.zeros(COUNTS, np.int64), Accuracy(RTOL, ATOL, system.nq + system.nu, MAX_STEPS)
     equations = recursion(system.recursion_constants, system.recursion_workspace())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import msgspec
@@ -15,7 +15,7 @@ from flexmb.typing import Real
 
 CellStatus = Literal["measured", "failed", "did not finish", "did not run"]
 
-NO_PREDICTION = -3  # instead of the number of a class
+NO_PREDICTION = -3  # in place of the number of a class
 STABLE, UNSTABLE = "#9ecae1", "#f4a582"  # colours of maps that ask only whether a motion is stable
 DIGITS = ("#08519c", "#4292c6", "#9ecae1", "#fdae6b", "#e6550d")  # from many digits to few
 
@@ -82,12 +82,17 @@ class Kind:
     colour: str
 
 
+def growth_kinds() -> tuple[Kind, Kind]:
+    """Classes of a map of growth rates."""
+    return Kind("stable", STABLE), Kind("unstable", UNSTABLE)
+
+
 @dataclass(frozen=True)
 class Overlay:
-    """The boundary known from elsewhere: where `predict(x, y)` (arrays of one shape) passes `levels`.
+    """The theoretical or published boundary: where `predict(x, y)` (arrays of one shape) crosses `levels`.
 
-    Below the first level the first class is expected, and so on: as many levels as the map has thresholds. A `bound`
-    only says what the quantity does not exceed, so that classes below the expected one are right too. `source` names
+    Below the first level the first class is expected, and so on; there are as many levels as thresholds of the map. A
+    `bound` limits the quantity only from above, so that classes below the expected one are correct too. `source` names
     the theory or the publication.
     """
 
@@ -98,7 +103,7 @@ class Overlay:
     bound: bool = False
 
     def classes(self, x: Real, y: Real) -> NDArray[np.intp]:
-        """Numbers of the classes expected at x, y; `NO_PREDICTION` where the theory gives no number."""
+        """Numbers of the classes expected at x, y; `NO_PREDICTION` where the prediction is NaN."""
         predicted = self.predict(x, y)
         return np.where(np.isnan(predicted), NO_PREDICTION, np.searchsorted(self.levels, predicted, side="right"))
 
@@ -107,11 +112,11 @@ class Overlay:
 class StabilityMap:
     """One case, one quantity, two axes.
 
-    `scene(x, y)` is the family, `measure(scene, x, y)` finds the quantity in one member; the classes `kinds` lie
-    between the `thresholds` (increasing, one fewer). `depth` halvings are made where class or status changes. A cell
-    that `failed` counts as class number `failure` in the comparison with the overlay; if `failure` is not given, every
-    failed cell is wrong. With `skips`, cells that did not finish are no evidence. `shows` is the text of the gallery.
-    """
+    `scene(x, y)` is the family, `measure(scene, x, y)` finds the quantity in one member; the classes `kinds`, by
+    default stable and unstable, lie between the `thresholds` (increasing, one fewer). `depth` halvings are made where
+    class or status changes. A cell that `failed` counts as class number `failure` in the comparison with the overlay;
+    if `failure` is not given, every failed cell is wrong. With `skips`, cells that did not finish are no evidence.
+    `shows` is the text of the gallery. """
 
     name: str
     title: str
@@ -121,9 +126,9 @@ class StabilityMap:
     x: Axis
     y: Axis
     thresholds: tuple[float, ...]
-    kinds: tuple[Kind, ...]
     overlay: Overlay
     shows: str
+    kinds: tuple[Kind, ...] = field(default_factory=growth_kinds)
     depth: int = 3
     failure: int | None = None
     skips: bool = False
@@ -139,11 +144,6 @@ class StabilityMap:
     def outcome(self, x: float, y: float) -> Measurement:
         """The quantity at one place."""
         return self.measure(self.scene(x, y), x, y)
-
-
-def growth_kinds() -> tuple[Kind, Kind]:
-    """Classes of a map of growth rates."""
-    return Kind("stable", STABLE), Kind("unstable", UNSTABLE)
 
 
 def digit_kinds(*names: str) -> tuple[Kind, ...]:

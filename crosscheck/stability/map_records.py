@@ -1,4 +1,4 @@
-"""Records of maps: one line for the machine, one for the map and one for each cell, each written when it is known."""
+"""Records of maps: one line for the machine, one for the map and one for each cell."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RECORDING = ("crosscheck.stability.map", "crosscheck.stability.run")  # a part o
 
 
 class MapRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="record", tag="map"):
-    """A map as it was run. `identity` changes with its definition, and cells of another identity do not count."""
+    """A map as it was run. `identity` changes with its definition; cells of another identity are not used."""
 
     map: str
     identity: str
@@ -58,7 +58,7 @@ def identity(what: StabilityMap) -> str:
 
 
 def read(file: Path) -> list[Record]:
-    """All records of a file, in order; a line that is no record becomes a BrokenLine, and its cell is run again."""
+    """All records of a file, in order; an invalid line becomes a BrokenLine, and its cell is run again."""
     return decoded_lines(file, Written)
 
 

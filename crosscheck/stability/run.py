@@ -16,17 +16,7 @@ from crosscheck.engines.contract import EngineMissing
 from crosscheck.records.archive import Archive
 from crosscheck.records.machine import environment
 from crosscheck.running.pool import run_jobs
-from crosscheck.running.scheduler import (
-    BY_DEFAULT,
-    TIME_LIMIT_S,
-    Event,
-    Events,
-    Function,
-    Limits,
-    Scheduler,
-    one_kind,
-    usual_limit,
-)
+from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler, Work
 from crosscheck.stability.boundary import MapVerdict, judge, label
 from crosscheck.stability.map import Measurement, StabilityMap
 from crosscheck.stability.map_records import CellRecord, MapRecord, Written, cells_of, identity, read
@@ -102,9 +92,10 @@ def run_map(
         ask(sorted(mesh.waiting))
         time_s = TIME_LIMIT_S if limits.time_s is None else limits.time_s
         log = str(records.with_suffix(".log"))
-        with closing(
-            scheduler(run_cell, jobs, limits.workers, log, one_kind, lambda job: time_s, limits.memory_bytes)
-        ) as events:
+        work = Work(
+            run_cell, jobs, log, limits.workers, time_limit_s=lambda job: time_s, memory_limit_bytes=limits.memory_bytes
+        )
+        with closing(scheduler(work)) as events:
             for event in events:
                 if event.kind in ("emitted", "crashed", "stopped"):
                     record = event.content if event.kind == "emitted" else _cut_short(jobs[event.job], event)
@@ -151,22 +142,3 @@ def _cut_short(job: CellJob, event: Event) -> CellRecord:
         identity=job.identity, level=job.cell.level, i=job.cell.i, j=job.cell.j, x=job.x, y=job.y,
         status="did not run", message=event.content,
     )  # fmt: skip
-
-
-def run_here(
-    function: Function,
-    jobs: Sequence[Any],
-    workers: int | None,
-    log: str,
-    kind: Callable[[Any], str] = one_kind,
-    time_limit_s: Callable[[Any], float] = usual_limit,
-    memory_limit_bytes: float | None = None,
-) -> Events:
-    """A scheduler without processes and limits: one job after the other, here."""
-    number = 0
-    while number < len(jobs):
-        found: list[Any] = []
-        function(jobs[number], found.append)
-        yield from (Event(number, "emitted", content) for content in found)
-        yield Event(number, "ended")
-        number += 1

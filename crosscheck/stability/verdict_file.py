@@ -1,4 +1,4 @@
-"""The verdicts of maps as a file, which several runs of different maps share."""
+"""The file with verdicts of maps, to which several runs of different maps write."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ VERDICTS = "maps.json"
 
 
 def write_verdicts(verdicts: Sequence[MapVerdict], file: Path) -> None:
-    """The verdicts as a JSON file; those of other maps that it holds already are kept.
+    """Write verdicts into a JSON file; those of other maps in it are kept.
 
-    A file with other content is set aside as `<file>.broken`, with a warning, so that the verdicts can still be
+    A file with other content is renamed to `<file>.broken`, with a warning, so that the verdicts can be
     written.
     """
     try:
@@ -32,10 +32,10 @@ def write_verdicts(verdicts: Sequence[MapVerdict], file: Path) -> None:
 
 
 def take_away_verdicts(maps: Sequence[str], file: Path) -> None:
-    """Take the verdicts on maps that are about to run out of the file: of a run that is killed none may be left.
+    """Remove the verdicts on maps that are about to run from the file, so that a killed run leaves none.
 
-    A file with other content stays until there are new ones. With no verdict left the file goes, as an empty list has
-    nothing against it.
+    A file with other content stays until there are new verdicts. Without verdicts the file is removed, since an empty
+    list would look like success.
     """
     try:
         known = {verdict.map: verdict for verdict in read_verdicts(file)} if file.exists() else {}

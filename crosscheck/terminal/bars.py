@@ -1,4 +1,4 @@
-"""Bars of progress: what runs, how many of how many are done, since when, and for how long still."""
+"""Progress bars: description, count, elapsed time and time left."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from rich.progress import (
 )
 from rich.table import Column
 
-WIDE = 80  # columns of a terminal, from which a bar and the time left have a place beside a description
+WIDE = 80  # least columns of a terminal for a bar and the time left beside the description
 
 
 def bars(console: Console, time_left: ProgressColumn, *, quiet: bool = False) -> Progress:
     """Bars that disappear when they end; a narrow terminal shows descriptions and counts only.
 
-    A description that is longer than its place goes on in the next line.
+    A long description is continued in the next line.
     """
     place = Column(overflow="fold")
-    description = TextColumn("{task.description}", markup=False, table_column=place)  # names stand in it
+    description = TextColumn("{task.description}", markup=False, table_column=place)  # it contains names
     counts = MofNCompleteColumn(), TimeElapsedColumn()
     wide = console.width >= WIDE
     rest = (BarColumn(bar_width=24), *counts, time_left) if wide else counts

@@ -1,4 +1,4 @@
-"""Mutation scores on the terminal: a line a case, then every fault that was missed."""
+"""Mutation scores on the terminal: a line for each case, then every fault that was missed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexmb.output.listing import Listing, figures, names
 
 
 def print_bites(console: Console, bites: Sequence[CaseBite], verbose: bool = False) -> int:
-    """Print the scores; the exit code: 1 where the mean score is too low, or where something was not judged."""
+    """Print the scores; the exit code: 1 if the mean score is too low or something was not judged."""
     console.print(_table(bites))
     for each in bites:
         for mutant in each.missed:

@@ -1,4 +1,4 @@
-"""How an engine keeps the contract, on the terminal."""
+"""The outcome of the contract's clauses on the terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What changed between two sessions, on the terminal."""
+"""Differences of two sessions on the terminal."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from crosscheck.terminal.verbosity import Verbosity
 MARKS: dict[Direction, tuple[str, str]] = {
     "worse": ("✕", "red"), "gone": ("–", "red"), "better": ("✓", "green"), "new": ("+", "cyan"),
 }  # fmt: skip
-LINES = 8  # of changes, unless all is asked for
-ASIDE = 3  # of times and of notes
+LINES = 8  # of changes, without --verbose
+FEW_LINES = 3  # of times and of notes
 
 
 def print_differences(console: Console, differences: Differences, verbosity: Verbosity) -> None:
@@ -25,7 +25,8 @@ def print_differences(console: Console, differences: Differences, verbosity: Ver
             for each in differences.times
         ]
         notes = [words(f"note: {note}", "dim") for note in differences.notes]
-        for lines, limit, what in ((changes, LINES, "changes"), (times, ASIDE, "times"), (notes, ASIDE, "notes")):
+        kinds = (changes, LINES, "changes"), (times, FEW_LINES, "times"), (notes, FEW_LINES, "notes")
+        for lines, limit, what in kinds:
             shown = lines if everything else lines[:limit]
             for line in shown:
                 console.print(line, soft_wrap=True)

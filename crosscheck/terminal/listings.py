@@ -1,4 +1,4 @@
-"""Tables of the cases, the engines and the maps that there are."""
+"""Tables of the cases, the engines and the maps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from crosscheck.terminal.text import words
 from flexmb.output.listing import Listing, figures, names, prose
 
-if TYPE_CHECKING:  # a table of one kind needs not what the others are of
+if TYPE_CHECKING:  # a table of one kind does not need the types of the others
     from crosscheck.library.find import Case
     from crosscheck.running.installed import EngineState
     from crosscheck.stability.map import StabilityMap

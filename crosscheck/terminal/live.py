@@ -1,4 +1,4 @@
-"""Progress of a run: a bar over all jobs, a line for each job at work, and a line that stays for each that ended."""
+"""Progress of a session: a bar over all jobs, a line for each running job, and a lasting line for ended ones."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ MARKS = {
 
 
 class LiveProgress:
-    """A context in which `hear` shows the events of a sweep; without a terminal only the lasting lines appear.
+    """A context in which `hear` shows the events of a session; without a terminal only lasting lines are printed.
 
-    A line lasts for every job with VERBOSE, else for none: what did not go well is told at the end. QUIET shows no bar.
+    Only VERBOSE has lasting lines, one for every job; otherwise failures are shown at the end. QUIET shows no bar.
     """
 
     def __init__(self, console: Console, verbosity: Verbosity = Verbosity.VERBOSE) -> None:
@@ -93,10 +93,10 @@ class LiveProgress:
 
 
 def _line(status: str, text: str) -> Text:
-    """The mark of a status, and text as it stands: names and messages may look like markup."""
+    """The mark of a status, and literal text: names and messages may look like markup."""
     return Text.from_markup(MARKS[status]) + Text(" " + printable(text))
 
 
 def _in_short(message: str) -> str:
-    """The headline of a message, its first problem and that one's remedy, on one line; reports have the rest."""
+    """The headline of a message, its first problem and the remedy on one line; reports have the rest."""
     return " ".join(" ".join(message.splitlines()[:3]).split())

@@ -24,7 +24,7 @@ def run_and_draw(
     console: Console, names: Sequence[str], out: Path, pictures: Path, *, depth: int | None, fresh: bool,
     limits: Limits, scheduler: Scheduler,
 ) -> int:  # fmt: skip
-    """Run maps, draw them, write their verdicts; returns the exit code: 0 where all agree, else 1."""
+    """Run maps, draw them, write their verdicts; the exit code: 0 if all agree, else 1."""
     verdicts = []
     folder(pictures)
     take_away_verdicts(names, pictures / VERDICTS)

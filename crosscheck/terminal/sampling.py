@@ -1,4 +1,4 @@
-"""A sweep on the terminal: a bar while it runs, a table of its statistics, and what gave no result."""
+"""A sweep on the terminal: a bar while it runs, a table of its statistics, and failures."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _lines(each: Distribution) -> Iterator[tuple[str, str, str]]:
 
 
 def _digits(estimate: Estimated) -> str:
-    """An estimate in the digits that its standard error leaves it."""
+    """An estimate with the digits that its standard error permits."""
     value, error = estimate.value, estimate.standard_error
     if not error or not value:
         return f"{value:.7g}"

@@ -1,4 +1,4 @@
-"""Text for the terminal, shown literally whatever it contains."""
+"""Text that is shown literally on the terminal."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from flexmb.output.printable import printable
 
 
 def words(text: str, style: str = "") -> Text:
-    """Text shown literally, with brackets and colons: only `Text` is safe from rich's markup and emoji."""
+    """Literal text: only rich's `Text` interprets no markup and emoji."""
     return Text(printable(text), style)
 
 

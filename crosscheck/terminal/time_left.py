@@ -1,4 +1,4 @@
-"""A column of a progress bar: about how long it will still take."""
+"""A column of a progress bar with the approximate time left."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rich.text import Text
 
 
 class TimeLeft(ProgressColumn):
-    """Time to the moment in a task's field `ends_at` (s, of `time.monotonic`); nothing where it has none."""
+    """The time until a task's field `ends_at` (s, of `time.monotonic`); empty if it has none."""
 
     max_refresh = 0.5
 
@@ -19,7 +19,7 @@ class TimeLeft(ProgressColumn):
 
 
 def in_words(seconds: float) -> str:
-    """A duration, as roughly as an estimate deserves; the least is a second."""
+    """A duration, rounded as an estimate; at least one second."""
     seconds = max(seconds, 1.0)
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if seconds >= 1.5 * size:

@@ -1,4 +1,4 @@
-"""The table of a benchmark, and who is not in it."""
+"""The table of a benchmark, and the engines that are not in it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexmb.output.listing import Listing, figures, names
 
 
 def print_bench(console: Console, bench: CaseBench) -> None:
-    """A case: the equals with their ratios, those timed apart, and those that are not timed with the reason."""
+    """Print a case: the equals with their ratios, those timed apart, and those not timed with the reason."""
     levels = " and ".join(sorted({f"{each.rival.job.variant} ({each.rival.level})" for each in bench.contests}))
     title = f"\n{bench.case}, {levels}: equals are within {bench.accuracy:g} of the reference; {bench.rounds} rounds"
     console.print(words(title, "bold"), soft_wrap=True)
@@ -29,7 +29,7 @@ def print_bench(console: Console, bench: CaseBench) -> None:
 
 
 def _table(timed: list[Contest]) -> Listing:
-    """The variant and the level of its bodies stand beside the engine where they are not the same for all."""
+    """The timed engines, with variant and level of the bodies if these are not the same for all."""
     right = figures("min", "quartiles", "ratio", "error", "compile", "again")
     table = Listing(*names("engine and effort"), *right)
     equals = [each.best_s for each in timed if each.standing == "equal" and each.best_s is not None]

@@ -14,13 +14,13 @@ from crosscheck.terminal.text import marked, words
 from crosscheck.terminal.verbosity import Verbosity
 from flexmb.output.listing import Listing, figures, names
 
-LINES = 7  # of what is not in order, unless all is asked for
+LINES = 7  # of problems, without --verbose
 
 
 def print_outcome(console: Console, outcome: SessionOutcome, verbosity: Verbosity = Verbosity.NORMAL) -> int:
-    """Show the verdicts; returns the exit code: 0 where all is as expected, else 1.
+    """Show the verdicts; the exit code: 0 if all is as expected, else 1.
 
-    Some ten lines: what there is, the gravest of what is not in order, the headline. QUIET is the headline alone,
+    About ten lines: counts, the gravest problems, the headline. QUIET is the headline alone,
     VERBOSE all of it, with a table of all comparisons.
     """
     if verbosity is Verbosity.VERBOSE and outcome.all:
@@ -43,7 +43,7 @@ def print_outcome(console: Console, outcome: SessionOutcome, verbosity: Verbosit
 
 
 def _inventory(outcome: SessionOutcome) -> str:
-    """How many cases, and how many channels came out how."""
+    """The number of cases, and the number of channels by status."""
     count = len(outcome.verdicts)
     parts = [f"{number} {status}" for status in STATUSES if (number := outcome.counts()[status])]
     noticed, controls = outcome.controls()
@@ -57,7 +57,7 @@ def _inventory(outcome: SessionOutcome) -> str:
 
 
 def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
-    """A line for each thing that is not as it should be, the gravest first."""
+    """A line for each problem, the gravest first."""
     for group in _groups(outcome.unexpected).values():
         worst = max(group, key=lambda verdict: verdict.E or 0.0)
         channels = worst.channel if len(group) == 1 else f"{len(group)} channels, worst {worst.channel}"
@@ -86,7 +86,7 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
 
 
 def _first_reason(outcome: SessionOutcome, engine: str) -> str:
-    """Why an engine has nothing to compare, where it said so itself."""
+    """Why an engine has nothing to compare, if it gave a reason."""
     reasons = [f": {each.case}: {each.reason}" for each in outcome.inapplicable if each.engine == engine]
     return reasons[0] if reasons else ""
 
@@ -96,7 +96,7 @@ def _place(verdict: Verdict) -> str:
 
 
 def _verdict_table(verdicts: Sequence[Verdict]) -> Listing:
-    """Counts of statuses by case and comparison; green what is as expected, red what is not."""
+    """Counts of statuses by case and comparison; as expected in green, others in red."""
     occurring = [status for status in STATUSES if any(verdict.status == status for verdict in verdicts)]
     table = Listing(*names("case", "comparison"), *figures("as expected", *occurring))
     groups: dict[tuple[str, str], list[Verdict]] = {}
@@ -117,7 +117,7 @@ def _count(group: list[Verdict], status: str) -> Text:
 
 
 def _groups(verdicts: Iterable[Verdict]) -> dict[tuple[str, ...], list[Verdict]]:
-    """Verdicts of one pair in one comparison with one status, together."""
+    """Verdicts grouped by comparison, pair and status."""
     groups: dict[tuple[str, ...], list[Verdict]] = {}
     for verdict in verdicts:
         groups.setdefault((verdict.case, verdict.comparison, verdict.pair, verdict.status), []).append(verdict)

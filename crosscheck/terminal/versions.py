@@ -1,4 +1,4 @@
-"""What `--version` says: this package, Python, the compiler, and the engines that are installed."""
+"""The text of `--version`: this package, Python, the compiler, and the installed engines."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from flexmb.output.versions import version_of
 
 
 def versions_text() -> str:
-    """One line a fact, as a report of a defect needs them. Engines are asked themselves, plug-ins among them."""
+    """One line for each version, for bug reports; all engines are asked, including plug-ins."""
     lines = [f"crosscheck {version_of('flexmb')}", f"Python {platform.python_version()}, numba {version_of('numba')}"]
     engines: dict[str, list[str]] = {}
     for each in describe_engines():

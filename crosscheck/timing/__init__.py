@@ -1,1 +1,1 @@
-"""Timing reports: who agrees is timed in turns (`bench`), and error against time over efforts (`chart`)."""
+"""Timing reports: engines that agree are timed in turns (`bench`); error against time over efforts (`chart`)."""

@@ -1,9 +1,9 @@
-"""Benchmarks of a case: who is as accurate as was asked is timed in turns, and who is not is told apart.
+"""Benchmarks of a case: engines that reach the requested accuracy are timed in turns.
 
-An engine counts as an *equal* where every verdict on it against `reference.csv` is *agree*, and one of its efforts is
-within the accuracy asked for in every channel that is judged; the first such effort is timed, as a user would choose
-it. Others that finished are timed *apart*, at that effort or at their finest: their times stand in no ratio to the
-equals'. Who disagrees on the reference's own variant, or did not finish, is not timed.
+An engine is an *equal* if every verdict on it against `reference.csv` is *agree* and one of its efforts is
+within the requested accuracy in every judged channel; the first such effort is timed, as a user would choose
+it. Others that finished are timed *apart*, at that effort or at their finest, and their times are not compared with the
+equals'. Engines that disagree on the reference's own variant, or did not finish, are not timed.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from crosscheck.timing.rivals import Rival, Rivals, Rung, find_rivals
 from crosscheck.timing.turns import Timed, in_turns
 
 Standing = Literal["equal", "apart", "not timed"]
-ACCURACY = 1e-4  # of the signals' sizes: what peers with fixed steps reach too
+ACCURACY = 1e-4  # of the signals' sizes: peers with fixed steps reach it too
 ROUNDS = 10
 
 
 @dataclass(frozen=True)
 class Contest:
-    """Where a rival stands, why, and its times; `rung` is the effort that is timed, None where none is."""
+    """A rival's standing, the reason, and its times; `rung` is the effort that is timed, None if none is."""
 
     rival: Rival
     facts: EngineFacts
@@ -65,7 +65,7 @@ def bench(
     limits: Limits,
     listener: Listener = lambda jobs, event: None,
 ) -> CaseBench:
-    """Judge the rivals of a case, then time them. What goes wrong is told in what is returned; nothing is raised."""
+    """Judge the rivals of a case, then time them. Problems are part of the result; nothing is raised."""
     try:
         rivals = find_rivals(case, engines, variants, provider=provider, limits=limits, listener=listener)
     except CaseError as error:
@@ -98,7 +98,7 @@ def _entered(rival: Rival, facts: EngineFacts, rivals: Rivals, accuracy: float) 
 
 
 def _ended(each: Contest, timed: Timed | None, rivals: Rivals, accuracy: float) -> Contest:
-    """With its times; a rival that failed while it was timed, or solved something else, has none."""
+    """The contest with its times, unless the rival failed while it was timed or gave another result."""
     if timed is None:
         return each
     if timed.failure or not timed.samples or timed.first is None:

@@ -1,4 +1,4 @@
-"""Benchmarks in the JSON of pytest-benchmark, so that `pytest-benchmark compare` reads them; its statistics, too."""
+"""Benchmarks with the statistics and in the JSON of pytest-benchmark, for `pytest-benchmark compare`."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ MISSING = "pytest-benchmark is not installed, whose statistics and files these a
 
 
 def available() -> bool:
-    """Whether the package is here."""
+    """Whether the package is installed."""
     return find_spec(PACKAGE) is not None
 
 
 def statistics(contest: Contest) -> Stats:
-    """Minimum, quartiles and all else of the solves' seconds; only of a contest that was timed."""
+    """Minimum, quartiles and other statistics of the solves' seconds in a timed contest."""
     from pytest_benchmark.stats import Stats
 
     assert contest.timed is not None
@@ -34,7 +34,7 @@ def statistics(contest: Contest) -> Stats:
 
 
 def benchmark_document(benches: Sequence[CaseBench]) -> dict[str, Any]:
-    """The document: a benchmark for each rival that was timed; who was not, and why, under "not_timed"."""
+    """The document: a benchmark for each timed rival; the others, with the reason, under "not_timed"."""
     from pytest_benchmark import __version__
     from pytest_benchmark.plugin import pytest_benchmark_generate_machine_info
     from pytest_benchmark.utils import get_commit_info

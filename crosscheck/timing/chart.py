@@ -1,7 +1,7 @@
 """Error against time: every engine over its ladder of efforts, per observable, with the Pareto front of each.
 
-Errors are distances from `reference.csv` up to its horizon, relative to the signal's size, of the very solves that are
-timed. Below the reference's own uncertainty, the floor, nothing can be told: among results there only time counts.
+Errors are distances from `reference.csv` up to its horizon, relative to the signal's size, of the timed solves
+themselves. Errors below the reference's own uncertainty, the floor, cannot be distinguished: only their times count.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ROUNDS = 5
 class ChartPoint:
     """One effort of a rival in one observable: the shortest solve (s) and the relative error, or why it has none.
 
-    `quartiles_s` are of the solves. `best` says that no faster point is as accurate, as far as the floor lets one tell.
+    `quartiles_s` are of the solves. `best`: no faster point is as accurate, errors below the floor counting as equal.
     """
 
     variant: str
@@ -40,13 +40,13 @@ class ChartPoint:
 
     @property
     def series(self) -> str:
-        """What it is a point of."""
+        """The name of its line in the chart."""
         return f"{self.engine}, {self.integrator}" if self.integrator else self.engine
 
 
 @dataclass(frozen=True)
 class ChartData:
-    """One chart: an observable, the relative uncertainty of its reference, and all points, those without error too."""
+    """One chart: an observable, the relative uncertainty of its reference, and all points, also those without error."""
 
     observable: str
     floor: float
@@ -55,7 +55,7 @@ class ChartData:
 
 @dataclass(frozen=True)
 class CaseCharts:
-    """The charts of a case; `verdicts` say of each rival how it stands to the reference. `problem`: why none are."""
+    """The charts of a case, and for each rival its verdict on the reference. `problem` says why there are no charts."""
 
     case: str
     title: str
@@ -78,7 +78,7 @@ def chart(
     limits: Limits,
     listener: Listener = lambda jobs, event: None,
 ) -> CaseCharts:
-    """Run, judge and time all efforts of a case. What goes wrong is told in what is returned; nothing is raised."""
+    """Run, judge and time all efforts of a case. Problems are part of the result; nothing is raised."""
     try:
         rivals = find_rivals(case, engines, variants, provider=provider, limits=limits, listener=listener)
         observables = _observables(case, rivals)
@@ -101,7 +101,7 @@ def chart(
 
 
 def _observables(case: Case, rivals: Rivals) -> list[str]:
-    """Those of the case's charts that are judged; where none is, the first channel that is."""
+    """The judged observables of the case's charts; if there are none, the first judged channel."""
     judged = list(dict.fromkeys(name for rival in rivals.found for name in rival.scales))
     if not judged:
         raise CaseError(f"{case.name}: no engine finished, so that there is nothing to draw: {_first(rivals)}")
@@ -148,7 +148,7 @@ def _point(observable: str, rival: Rival, rung: Rung, timed: Timed | None, rival
 
 
 def _without(rival: Rival, rung: Rung | None, message: str) -> ChartPoint:
-    """A point that has no error: a failure, for the margin of the chart."""
+    """A point without error, for the margin of the chart."""
     method, label = (rung.effort.method, rung.effort.label) if rung is not None else ("", "")
     return ChartPoint(rival.job.variant, rival.job.engine, method, label, None, None, None, message)
 
@@ -161,7 +161,7 @@ def _quantile(rising: Sequence[float], part: float) -> float:
 
 
 def with_front(points: Sequence[ChartPoint], floor: float) -> list[ChartPoint]:
-    """The points in their order, with those marked that no faster one equals; below the floor none is better."""
+    """The same points, with `best` set for those on the Pareto front; errors below the floor count as equal."""
     smallest, front = inf, set()
     timed = [each for each in points if each.solve_s is not None and each.error is not None]
     for point in sorted(timed, key=lambda each: (each.solve_s, each.error)):

@@ -1,4 +1,4 @@
-"""The files of charts: a folder for each case with its pictures, its data as JSON and a page, and an index of them."""
+"""The files of charts: for each case a folder with pictures, data as JSON and a page; and an index."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ INDEX, DATA = "index.html", "charts.json"
 def write_case(charts: CaseCharts, out: Path) -> Path:
     """Write the pictures, the data and the page of a case below `out`; returns the page."""
     place = folder(out / folder_name(charts.case))
-    (place / INDEX).unlink(missing_ok=True)  # the page of earlier pictures
+    (place / INDEX).unlink(missing_ok=True)  # an old page must not remain beside new pictures
     pictures = [f"{folder_name(chart.observable)}.svg" for chart in charts.charts]
     for chart, name in zip(charts.charts, pictures, strict=True):
         draw_chart(charts, chart, place / name)
@@ -36,14 +36,14 @@ def write_case(charts: CaseCharts, out: Path) -> Path:
 
 
 def write_index(cases: Sequence[CaseCharts], out: Path) -> Path:
-    """Write the page that leads to all cases; returns it."""
+    """Write the index of all cases; returns its path."""
     entries = [(each, folder_name(each.case)) for each in cases]
     write_whole(folder(out) / INDEX, _page("cases.html.j2", entries=entries, machine=environment()))
     return out / INDEX
 
 
 def folder_name(name: str) -> str:
-    """A name as a file or a folder can have it everywhere."""
+    """A name that is valid for files and folders on all systems."""
     return re.sub(r"[^\w.-]+", "_", name).strip(".") or "_"
 
 
@@ -53,7 +53,7 @@ def _page(template: str, **content: Any) -> bytes:
 
 @cache
 def _templates() -> Environment:
-    """What they print is escaped, and without control characters."""
+    """The templates; their output is escaped and has no control characters."""
     return Environment(
         loader=PackageLoader("crosscheck.timing"),
         autoescape=True,

@@ -13,17 +13,18 @@ from matplotlib.figure import Figure
 from crosscheck.timing.chart import CaseCharts, ChartData, ChartPoint
 from flexmb.output.whole import save_figure
 
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a5c00", "#3f3f8f", "#8c2d04", "#00695c")  # told apart by all
+# distinguishable with colour blindness
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a5c00", "#3f3f8f", "#8c2d04", "#00695c")
 MARKERS = "osD^vPX*"
 STYLE: dict[Any, Any] = {"svg.hashsalt": "crosscheck", "svg.fonttype": "none", "font.size": 9}
-HUGE = 1e30  # a relative uncertainty beyond it says nothing
-ZERO_ERROR = 1e-17  # where an error of zero is drawn if there is no floor: below what numbers can tell
+HUGE = 1e30  # a larger relative uncertainty is not drawn as a floor
+ZERO_ERROR = 1e-17  # position of an error of zero if there is no floor, below the rounding of numbers
 
 
 def draw_chart(charts: CaseCharts, chart: ChartData, path: Path) -> None:
-    """Write the picture as SVG. Errors below the floor stand on it, as no more is known of them.
+    """Write the picture as SVG. Errors below the floor are drawn on it.
 
-    Points without error stand on the margin at the right, by name.
+    Points without error are named on the right margin.
     """
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 5.2), layout="constrained")
@@ -60,10 +61,10 @@ def _series(axes: Axes, chart: ChartData, drawn: list[ChartPoint], several_varia
 
 
 def _front(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
-    """A staircase: within a step nothing faster is more accurate."""
+    """The Pareto front as a staircase."""
     best = sorted((point for point in drawn if point.best), key=lambda point: point.solve_s or 0.0)
     seconds, errors = [point.solve_s or 0.0 for point in best], [_height(chart, point) for point in best]
-    if best:  # the last step goes on to the slowest of all
+    if best:  # the last step extends to the slowest point
         seconds.append(max(point.solve_s or 0.0 for point in drawn))
         errors.append(errors[-1])
     axes.step(
@@ -79,7 +80,7 @@ def _floor(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
 
 
 def _limits(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
-    """Room around the points and the floor; one point has some too."""
+    """Axis limits with a margin around the points and the floor."""
     heights = [_height(chart, point) for point in drawn] or [1e-9, 1.0]
     heights += [chart.floor] if _has_floor(chart) else []
     seconds = [second for point in drawn for second in (point.solve_s, *(point.quartiles_s or ())) if second]

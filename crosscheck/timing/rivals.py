@@ -1,7 +1,7 @@
-"""Rivals: who runs a case, how far each effort is from the stored reference, and whether its results may be compared.
+"""Rivals: the engines of a case, the errors of their efforts against the stored reference, and their verdicts.
 
-Nothing is timed before it is judged. Every engine climbs its efforts in a worker of its own, the usual way, and is
-held against `reference.csv` by the verdicts of any other run.
+Nothing is timed before it is judged. Every engine runs its efforts in a worker as usual, and its results are
+compared with `reference.csv` by the usual verdicts.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from crosscheck.engines.contract import Effort
 from crosscheck.judging.against_reference import ReferenceSignals, hold, of_record, shared_times
 from crosscheck.judging.results import Result, collect
 from crosscheck.judging.verdict import Finding
-from crosscheck.library.case import CaseError, RunFile, Variant
+from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
 from crosscheck.records.archive import read
 from crosscheck.records.held import Asked, RecordedReference
@@ -35,7 +35,7 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class Rung:
-    """One effort of a rival: how it ended, and its relative error in every channel that is judged, if it has one.
+    """One effort of a rival: its status, and its relative errors in the judged channels.
 
     `solve_s` is the engine's own time of that single solve.
     """
@@ -49,16 +49,16 @@ class Rung:
 
     @property
     def error(self) -> float:
-        """The largest of its errors; infinite where it has none."""
+        """The largest of its errors; infinite if it has none."""
         return max(self.errors.values(), default=np.inf)
 
 
 @dataclass(frozen=True)
 class Rival:
-    """One engine on one variant: its efforts, coarse to fine, and what the verdicts say of the finest.
+    """One engine on one variant: its efforts, coarse to fine, and the verdict on the finest.
 
-    `status` is the worst of the verdicts' and `reason` one that explains it. `level` is that of the scene's bodies,
-    `compile_s` what the first compilation took, or the loading of kernels that a cache on disk holds.
+    `status` is the gravest of the verdicts', with its `reason`. `level` is that of the scene's bodies,
+    `compile_s` the time of the first compilation, or of loading cached kernels.
     """
 
     job: Job
@@ -72,7 +72,7 @@ class Rival:
 
     @property
     def name(self) -> str:
-        """How reports name it."""
+        """Its name in reports."""
         return f"{self.job.variant} · {self.job.engine}"
 
     def errors(self, times: Real, channels: Mapping[str, Real], reference: ReferenceSignals) -> dict[str, float]:
@@ -82,7 +82,7 @@ class Rival:
 
 @dataclass(frozen=True)
 class Rivals:
-    """All rivals of a case, and the stored reference that they are held against."""
+    """All rivals of a case, and the stored reference with which they are compared."""
 
     case: Case
     variant: str
@@ -91,7 +91,7 @@ class Rivals:
 
 
 ORDER = ("did not run", "crashed", "did not finish", "failed", "refused", "diverged", "differ", "unresolved", "agree")
-"""Statuses of verdicts from the worst; what an engine does not offer counts only where it offers nothing."""
+"""Statuses of verdicts from the gravest; refused channels count only for an engine that offers none."""
 
 
 def find_rivals(
@@ -105,7 +105,7 @@ def find_rivals(
 ) -> Rivals:
     """Run every engine (`engines`, by default those of the variants) and judge it by the case's reference.
 
-    `variants` are by default the one that the reference is of; all are held against it. CaseError where the case has no
+    `variants` are by default that of the reference; all are compared with it. CaseError if the case has no
     reference that can be used, or no such variant.
     """
     held = _reference(case)
@@ -114,14 +114,7 @@ def find_rivals(
     if not chosen:
         raise CaseError(f"{case.name}: none of {', '.join(engines)} runs {', '.join(variants or (held.variant,))}")
     reference = of_record(held)
-    run = RunFile(
-        title=case.run.title,
-        duration_s=case.run.duration_s,
-        samples=case.run.samples,
-        time_limit_s=case.run.time_limit_s,
-        variants=tuple(chosen),
-    )
-    record, jobs = plan(replace(case, run=run), (), provider, limits.time_s)
+    record, jobs = plan(replace(case, run=case.run.alone(*chosen)), (), provider, limits.time_s)
     jobs = [replace(job, kept=tuple(reference.channels)) for job in jobs]
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
@@ -148,7 +141,7 @@ def _reference(case: Case) -> RecordedReference:
 
 
 def _asked(variant: Variant, engines: Sequence[str]) -> Variant:
-    """The variant with all its engines, charted ones too, or with those asked for; none is compared across models."""
+    """The variant with all its engines, including those in `also`, or with those asked for."""
     everyone = tuple(engines) or (*variant.engines, *variant.also)
     efforts = tuple(ladder for ladder in variant.efforts if ladder.engine in everyone)
     return msgspec.structs.replace(variant, engines=everyone, also=(), efforts=efforts, refined=None)
@@ -173,7 +166,7 @@ def _rival(job: Job, level: str, result: Result, reference: ReferenceSignals, he
 
 
 def _of_all(held: RecordedReference) -> Asked:
-    """What an engine is asked that no comparison expects to agree: what the first of the others is."""
+    """Goals and scales for an engine that no comparison expects to agree: those of the first other engine."""
     return next(iter(held.asked.values()))
 
 
@@ -194,7 +187,7 @@ def _rung(run: RunRecord, result: Result, reference: ReferenceSignals, scales: M
 def _errors(
     times: Real, channels: Mapping[str, Real], reference: ReferenceSignals, scales: Mapping[str, float]
 ) -> dict[str, float]:
-    """The largest distance up to the horizon over the size of the signal; infinite where it is no number."""
+    """The largest distance up to the horizon over the size of the signal; infinite if it is not finite."""
     places = shared_times(reference.times, times)
     if places is None:
         return {}

@@ -1,7 +1,7 @@
-"""Taking turns: each rival has a process of its own, and in every round each is timed once, one after the other.
+"""Timing in turns: each rival has its own process, and in every round each is timed once, one after the other.
 
-What else the machine does then slows all alike, and the order changes from round to round, so that none always runs
-behind the same neighbour. A rival that crashes, hangs or fails loses its place, and the others go on.
+So other load of the machine slows all of them alike. The order changes from round to round, so that no rival always
+follows the same one. A rival that crashes, hangs or fails is left out, and the others continue.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 from typing import Any
 
-from crosscheck.engines.answers import BrokenContract, checked_model, checked_run
+from crosscheck.engines.answers import BrokenContract, checked_model, checked_run, describe
 from crosscheck.engines.contract import Effort, Model, Run
-from crosscheck.running.execute import describe, find_engine
+from crosscheck.running.execute import find_engine
 from crosscheck.running.job import Job
 from crosscheck.running.worker import TICK_S, Worker
 from flexmb.run.channels import channels_of
 from flexmb.typing import Real
 
-TURN_S = 0.02  # a turn has as many solves as last this long together, so that short ones settle in the caches
+TURN_S = 0.02  # least duration of a turn: short solves are repeated in it, so that they run from warm caches
 MOST_SOLVES = 50
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Seconds of one solve: `solve_s` by the engine's own clock, which leaves out what is observed afterwards, `call_s`
-    of the whole call by ours, `cpu_s` of the process in that call."""
+    """Seconds of one solve: `solve_s` by the engine's own clock, which excludes the computation of outputs, `call_s`
+    of the whole call by our clock, `cpu_s` of the process in that call."""
 
     solve_s: float
     call_s: float
@@ -41,7 +41,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class CompileTimes:
-    """A scene that was compiled twice: seconds of the first time in its process, and of the second."""
+    """Seconds of compiling a scene for the first and for the second time in a process."""
 
     first_s: float
     again_s: float
@@ -49,7 +49,7 @@ class CompileTimes:
 
 @dataclass(frozen=True)
 class FirstSolve:
-    """The solve before the timed ones: times (T,) and channels (T, k), and how many solves a turn has."""
+    """The solve before the timed ones: times (T,), channels (T, k), and the number of solves of a turn."""
 
     times: Real
     channels: Mapping[str, Real]
@@ -58,14 +58,14 @@ class FirstSolve:
 
 @dataclass(frozen=True)
 class TurnFailure:
-    """Why a rival is out."""
+    """Why a rival is left out."""
 
     message: str
 
 
 @dataclass(frozen=True)
 class Turn:
-    """What a worker is asked: to compile (`effort` None), to try an effort (`solves` 0), or to time so many solves."""
+    """A request to a worker: to compile (`effort` None), to try an effort (`solves` 0), or to time so many solves."""
 
     job: Job
     effort: Effort | None = None
@@ -74,7 +74,7 @@ class Turn:
 
 @dataclass
 class Timed:
-    """What came of one rival at one effort: its samples, or why there are none."""
+    """The samples of one rival at one effort, or why there are none."""
 
     job: Job
     effort: Effort
@@ -88,7 +88,7 @@ _compiled: dict[tuple[str, str], Model] = {}  # of this worker, which serves one
 
 
 def take_turn(turn: Turn, emit: Callable[[Any], None]) -> None:
-    """What a worker does; whatever goes wrong is emitted as a `TurnFailure`."""
+    """The function of a worker; every error is emitted as a `TurnFailure`."""
     try:
         emit(_done(turn))
     except KeyboardInterrupt:
@@ -112,7 +112,7 @@ def _done(turn: Turn) -> CompileTimes | FirstSolve | list[Sample]:
 
 
 def _sample(model: Model, job: Job, effort: Effort) -> Sample:
-    """One solve, timed by itself: a mean of several would contain whatever disturbed one of them."""
+    """One solve, timed alone: a mean of several would contain every disturbance."""
     start, cpu = perf_counter(), process_time()
     run = model.simulate(Run(times=job.times.copy()), effort)
     call_s, cpu_s = perf_counter() - start, process_time() - cpu
@@ -125,8 +125,6 @@ def _sample(model: Model, job: Job, effort: Effort) -> Sample:
 
 def _compile(job: Job) -> tuple[float, Model]:
     engine = find_engine(job.provider, job.engine)
-    if isinstance(engine, str):
-        raise LookupError(engine)
     engine.version()  # imports its library, which is not compiling
     start = perf_counter()
     model = checked_model(engine.compile(_scene(job)))
@@ -135,7 +133,7 @@ def _compile(job: Job) -> tuple[float, Model]:
 
 
 def _first_solve(model: Model, job: Job, effort: Effort) -> FirstSolve:
-    """Two solves: the first may still load something, the second says how many a turn needs."""
+    """Two solves: the first may still load something, the second determines the number of solves of a turn."""
     for _ in range(2):
         start = perf_counter()
         run = checked_run(model.simulate(Run(times=job.times.copy()), effort), job.times, _scene(job))
@@ -153,7 +151,7 @@ def _scene(job: Job) -> Any:
 
 @contextmanager
 def _uncollected() -> Iterator[None]:
-    """Without Python's garbage collection, whose moment is chance."""
+    """Suspend Python's garbage collection, which runs at random times."""
     gc.collect()
     gc.disable()
     try:
@@ -165,7 +163,7 @@ def _uncollected() -> Iterator[None]:
 def in_turns(entries: Sequence[tuple[Job, Effort]], rounds: int) -> list[Timed]:
     """Time every entry, a rival at an effort, in `rounds` rounds. Efforts of one rival share its process.
 
-    Never raises for what an engine does.
+    An engine's errors are part of the result.
     """
     timed = [Timed(job, effort) for job, effort in entries]
     crew: dict[tuple[str, str], Worker] = {}
@@ -201,7 +199,7 @@ def _prepare(each: Timed, timed: Sequence[Timed], ask: _Asker) -> None:
 
 
 class _Asker:
-    """Asks a rival's worker and waits for the answer; a failure takes the rival out of the rounds."""
+    """Asks a rival's worker and waits for the answer; a failed rival is left out of the rounds."""
 
     def __init__(self, crew: dict[tuple[str, str], Worker], log: str) -> None:
         self._crew = crew

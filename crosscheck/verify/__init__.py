@@ -1,1 +1,1 @@
-"""Holding a CSV of any code against a case, as if an engine had run it."""
+"""Comparing a CSV of any code with a case, as if an engine had run it."""

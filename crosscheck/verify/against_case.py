@@ -1,6 +1,6 @@
-"""Holding a CSV of somebody's code against a case: columns to channels, the stored reference, the usual verdicts.
+"""Verdicts on a CSV of any code: its columns become channels, which are compared with the stored reference of a case.
 
-Where a case has no stored reference, or another variant or an engine is asked for, an engine runs and is the reference.
+If the case has no stored reference, or another variant or an engine is asked for, an engine runs as the reference.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ INTERPOLATION = "interpolation from times of its own"
 
 @dataclass(frozen=True)
 class Detail:
-    """Of one channel: the time (s) at which it is farthest from the reference, and why, if there is a guess."""
+    """For one channel the time (s) of the largest distance from the reference, and a guess of the cause."""
 
     worst_s: float
     cause: str = ""
@@ -53,8 +53,8 @@ class Detail:
 class CsvOutcome(SessionOutcome):
     """The outcome of a CSV, with details by channel; `left_out` are columns that were not compared.
 
-    `against` says what the reference is, `interpolated` how times of the CSV's own were dealt with, "" if it has none.
-    """
+    `against` describes the reference, `interpolated` the interpolation of a CSV with its own times ("" if there is
+    none). """
 
     details: dict[str, Detail] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
@@ -64,7 +64,7 @@ class CsvOutcome(SessionOutcome):
 
 @dataclass(frozen=True)
 class Target:
-    """What a CSV is held against: signals at `times` (T,) s; `engine` gave them, `title` says so in words."""
+    """The reference of a CSV: signals at `times` (T,) s, made by `engine` and described by `title`."""
 
     engine: str
     title: str
@@ -86,8 +86,8 @@ def verify_csv(
 
     An `engine`, or a `variant` of which there is no stored reference, is run instead (by default "native" on the first
     variant). The CSV's own U is 3 x its distance from the `coarse` CSV; without one it is taken to claim just the
-    case's goal. What interpolation from other times leaves open is added. Of a whole trajectory.csv or reference.csv
-    those channels are compared that the case sets a goal for and the reference has.
+    case's goal, plus the error of interpolation from other times. Of a complete trajectory.csv or reference.csv
+    the channels are compared that have a goal and that the reference contains.
     """
     chosen = _variant(case, variant, stored=engine is None)
     target = _target(case, chosen, engine, provider, scheduler)
@@ -121,7 +121,7 @@ def verify_csv(
 
 
 def outcome_json(outcome: CsvOutcome) -> str:
-    """The outcome as JSON: what it was held against, whether all agrees, and each channel with its figures."""
+    """The outcome as JSON: the reference, whether all channels agree, and each channel with its figures."""
     channels = {
         verdict.channel: {
             "status": verdict.status,
@@ -216,16 +216,8 @@ def _target(case: Case, variant: Variant, engine: str | None, provider: str, sch
 
 
 def _run(case: Case, variant: Variant, engine: str, provider: str, scheduler: Scheduler) -> Result:
-    """The engine's result on the variant, run now, in a worker: what hangs or ends its process gives no reference."""
-    run = msgspec.structs.replace(
-        case.run,
-        variants=(msgspec.structs.replace(variant, engines=(engine,), also=(), refined=None),),
-        comparisons=(),
-        controls=(),
-        conservations=(),
-        charts=(),
-        reference=None,
-    )
+    """The engine's result on the variant, run now in a worker process."""
+    run = case.run.alone(msgspec.structs.replace(variant, engines=(engine,), also=(), refined=None))
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
         planned = plan(replace(case, run=run), (), provider)
@@ -271,7 +263,7 @@ def _judge(
 
 
 def _known_as(channel: str, reference: Target) -> str:
-    """The channel's name in the reference: the load of a wheel where no hinge has that name."""
+    """The channel's name in the reference: that of a wheel's load if no hinge has the name."""
     wheel = f"wheel_{channel}"
     return wheel if channel not in reference.signals and wheel in reference.signals else channel
 
@@ -291,9 +283,9 @@ def _detail(reference: Target, channel: str, values: Real, goal: float, finding:
 
 
 def _claimed(channel: str, target: Signal, goal: float, added: float) -> Uncertainty:
-    """The U that, with the reference's, just makes the goal (less a rounding, so that it does), or `added` if larger.
+    """The U that together with the reference's just meets the goal (within rounding), or `added` if larger.
 
-    The goal is relative to what the verdict takes for the signal's size: that of its family where the signal is zero.
+    The goal is relative to the signal's size, as in verdicts.
     """
     size = size_of(signal_range(channel, target.values), target.sizes, target.uncertainty.value)
     allowed = goal * size * (1.0 - 1e-12) - target.uncertainty.value
@@ -303,7 +295,7 @@ def _claimed(channel: str, target: Signal, goal: float, added: float) -> Uncerta
 
 
 def _interpolation(mine: Columns, target: Target) -> str:
-    """How times of the CSV's own were dealt with, in words; "" where it has none."""
+    """The interpolation of a CSV with its own times, in words; "" if there was none."""
     if not mine.doubts:
         return ""
     sizes = {name: target.signals.get(_known_as(name, target)) for name in mine.doubts}

@@ -1,4 +1,4 @@
-"""Guesses why a signal differs: the cause is what, once corrected, makes it agree; without that there is no guess.
+"""Guesses why a signal differs: a correction is tried, and if the corrected signal agrees it is the likely cause.
 
 The corrections tried: a factor (millimetres, degrees, a sign), components exchanged, another order or sense of
 quaternions, the axes of the body instead of the World's, another origin, times shifted by whole samples.
@@ -23,13 +23,13 @@ FACTORS = {
 }
 AXES = "xyz"
 SHIFTS = (1, -1, 2, -2, 3, -3)  # samples
-VISIBLE = 10.0  # the reference moves by so many times what is allowed, else anything small would fit
+VISIBLE = 10.0  # least range of the reference over what is allowed, else any small signal would fit
 
 
 def likely_cause(channel: str, values: Real, reference: Real, allowed: float, markers: Mapping[str, Real]) -> str:
-    """What is wrong with `values` (T,k), in words, or "".
+    """The likely fault of `values` (T,k), in words, or "".
 
-    A guess is made where the values so corrected are within `allowed` (SI) of the reference at all times. `markers`
+    The corrected values must be within `allowed` (SI) of the reference at all times. `markers`
     are the reference's orientations (T,4) by marker.
     """
     if not signal_range(channel, reference) > VISIBLE * allowed:
@@ -81,7 +81,7 @@ def _turned(quaternions: Real, vectors: Real) -> Real:
 
 
 def _shift(channel: str, values: Real, reference: Real, allowed: float) -> str:
-    """Times shifted by some samples: judged where both have some."""
+    """Times shifted by some samples, compared where both have samples."""
     for shift in SHIFTS:
         if abs(shift) + 2 > len(values):
             continue

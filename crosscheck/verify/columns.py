@@ -1,4 +1,4 @@
-"""Columns of somebody's CSV as channels: named as `crosscheck verify` asks for them, or as in a `trajectory.csv`."""
+"""Columns of a CSV as channels: named as `crosscheck verify` requires, or as in a `trajectory.csv`."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from flexmb.typing import Real
 
 MARKER_GROUPS = {part.name: part.letters for part in kind_named("marker").parts}
 LOAD_GROUPS = {part.name: part.letters for part in kind_named("load").parts}
-# What is compared of Trajectory.to_csv: the kind of channels and the part, by what the columns call it.
+# The channels of Trajectory.to_csv that are compared: kind and part by the names of the columns.
 OWN_GROUPS = {part.own: (kind, part) for kind in ("marker", "load") for part in kind_named(kind).parts}
 OWN_HEADER = re.compile(r"(.+) \[([^\]]*)\]")
-STORED = ("marker:", "load:", "wheel_load:", "drive:")  # how a reference.csv calls what items of the scene have
+STORED = ("marker:", "load:", "wheel_load:", "drive:")  # prefixes of items' channels in a reference.csv
 DRIVE = "drive"
 LIMIT = 128 * MIB
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
@@ -41,9 +41,9 @@ class VerifyError(ValueError):
 class Columns:
     """Channels (T, k) of a CSV at the times asked for.
 
-    `own`: it is a whole trajectory.csv of flexmb or a reference.csv, and `left_out` are its other columns.
+    `own`: it is a complete trajectory.csv of flexmb or a reference.csv, and `left_out` are its other columns.
 
-    Where the file has times of its own, of which there are `samples`, `doubts` say what interpolation adds to the U of
+    If the file has its own times, `samples` in number, `doubts` is what interpolation adds to the U of
     each channel (SI); else both are empty.
     """
 
@@ -75,7 +75,7 @@ def read_columns(file: Path, times: Real) -> Columns:
 
 
 def short_names(channel: str, width: int) -> list[str]:
-    """What the columns of a channel are called: "tip.px", "elbow.tz", "elbow.drive", "momentum.linear.x"."""
+    """The names of a channel's columns: "tip.px", "elbow.tz", "elbow.drive", "momentum.linear.x"."""
     kind, _, named = channel.partition(":")
     if kind == "drive":
         return [f"{named}.{DRIVE}"] if width == 1 else [f"{named}.{DRIVE}.{i}" for i in range(width)]
@@ -158,7 +158,7 @@ def _columns(header: list[str], numbers: list[int], rows: Real, times: Real) -> 
 
 
 def _check_times(numbers: list[int], given: Real, times: Real) -> None:
-    """The times must be numbers that rise, and be the case's or cover them."""
+    """The times must rise, and be the case's or cover them."""
     asked = (
         f"the case has {len(times)} samples, every {times[1] - times[0]:.10g} s from 0 to {times[-1]:g} s; --template "
         "writes a file with them"
@@ -181,7 +181,7 @@ def _check_times(numbers: list[int], given: Real, times: Real) -> None:
 
 
 def _channels(filled: dict[str, Real]) -> dict[str, Real]:
-    """Whole groups of filled columns as channels; VerifyError for a column that belongs to no whole group."""
+    """Complete groups of filled columns as channels; VerifyError for a column of no complete group."""
     found: dict[str, Real] = {}
     left = dict(filled)
     for channel in _whole(left):
@@ -202,7 +202,7 @@ def _channels(filled: dict[str, Real]) -> dict[str, Real]:
 
 
 def _whole(columns: Iterable[str]) -> list[str]:
-    """Channels that columns may be of which are no vector of an item: energies, momentum, work, and drives."""
+    """Possible channels that are no vectors of items: energies, momentum, work, and drives."""
     drives = dict.fromkeys(name.partition(f".{DRIVE}")[0] for name in columns if f".{DRIVE}" in name)
     known = [kind for kind in KINDS if not kind.of_items]
     named = [f"{kind.name}.{part.name}" if part.name else kind.name for kind in known for part in kind.parts]

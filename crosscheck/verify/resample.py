@@ -1,8 +1,8 @@
-"""Signals at other times than one's own: taken over where the times are there, interpolated where they are not.
+"""Signals at other times: taken over where the times are the same, interpolated elsewhere.
 
-Every channel is interpolated by itself, by a spline of degree 5; the largest distance from that of degree 3 is what is
-added to its U: it is the error of the lower degree, and bounds that of the higher. No channel helps another, as
-velocities could help positions: a fault in one must not spread to its neighbour. Quaternions are first given signs that
+Every channel is interpolated separately, by a spline of degree 5; the largest distance from that of degree 3 is
+added to its U: it is the error of the lower degree and bounds that of the higher. Velocities are not used for
+positions, so that an error in one channel does not spread to another. Quaternions are first given signs that
 do not jump, as q and -q are one orientation, then interpolated and normalised.
 """
 

@@ -1,9 +1,10 @@
-"""Which model of every flexible body, and which method, are good enough for what the user wants to know?
+"""Selection of the cheapest model of every flexible body, and method, that give a quantity to a tolerance.
 
-`advise` answers with evidence. `quantity` says what the user cares about and measures its error. `models` and `ladder`
-list the rungs of every body with their predicted error and cost. `modal_response`, `contribution` and `indicators`
-predict, from one run of the rigid scene. `bench` and `confirm` run models and measure their error against the finest
-models and their cost in operations. `search` walks the ladder. `advice_tables` prints the result in a terminal.
+The candidate models of a body are its *ladder*, one model is a *rung*. `advise` selects with evidence. `quantity`
+defines what is measured, and its error. `models` and `ladder` list the rungs of every body with predicted error and
+cost. `modal_response`, `contribution` and `indicators` predict from one run of the rigid scene. `bench` and `confirm`
+run models, and measure their error against the finest models and their cost in operations. `search` looks for the
+cheapest adequate combination. `advice_tables` prints the result in a terminal.
 """
 
 from flexmb.advisor.advice import Advice as Advice

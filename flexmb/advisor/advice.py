@@ -23,16 +23,16 @@ from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
 
 BUDGET = 4e10
-"""The walk down ends when the runs of the walk have taken this many operations (about 20 s)."""
+"""The search for cheaper models ends when its runs have taken this many operations (about 20 s)."""
 REFERENCE = 1e10
-"""A reference that is predicted to cost more operations than this is not run."""
-STIRRED = 1e-3
-"""A family of modes that adds less than this part of the tolerance counts as not excited."""
+"""A reference whose predicted cost exceeds this number of operations is not run."""
+_EXCITED = 1e-3
+"""A family of modes that contributes less than this fraction of the tolerance counts as not excited."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A model that was run: predicted and measured error (U included), operations of its fine run, verdict."""
+    """A model that was run: predicted and measured error (U included), operations of its fine run, and the verdict."""
 
     model: Model
     predicted: float
@@ -43,7 +43,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class BodyAdvice:
-    """The rung of one body, its own predicted error, and why: the indicators in words."""
+    """The rung of one body, its predicted error, and the reason: the indicators in words."""
 
     body: str
     rung: BodyModel
@@ -53,13 +53,13 @@ class BodyAdvice:
 
 @dataclass(frozen=True)
 class Advice:
-    """What to simulate, and how this is known.
+    """The advised model and method, with the evidence.
 
-    If `accepted`, it has `bodies`, `method` and the reduced `scene`. Errors are parts of the scale of `quantities`: the
-    `predicted` one, and the one `measured` over the whole horizon by the chosen method, which includes the reference's
-    `uncertainty`. Operations of the run are `predicted_operations` and the counted `operations`; `seconds` of
-    integration are shown but decide nothing. Otherwise `refusal` says why no model is known to be adequate. `trials`
-    lists every model that was run, `notes` further remarks.
+    If `accepted`, it has `bodies`, `method` and the reduced `scene`. Errors are fractions of the scale of `quantities`:
+    the `predicted` one, and the one `measured` over the whole horizon with the chosen method, which includes the
+    `uncertainty` of the reference. Operations of the run are `predicted_operations` and the counted `operations`; the
+    `seconds` of integration are shown but not used. If not accepted, `refusal` says why no model is known to be
+    adequate. `trials` lists all models that were run, `notes` are further remarks.
     """
 
     name: str
@@ -94,10 +94,10 @@ def advise(
 ) -> Advice:
     """The cheapest model of every flexible body, and method, that give `quantity` to `tolerance` up to `t_end` (s).
 
-    `quantity`: one or several as in `flexmb.advisor.quantity`, by default all markers' positions; `tolerance`: largest
-    error, relative to its scale. Everything is run to the end of the horizon, and the cost is counted operations, so
-    the advice is the same wherever it is asked for. Raises SceneError for a scene that is wrong, ValueError for a
-    quantity that is not there; where no model is adequate, the advice says so in `refusal`.
+    `quantity`: one or several as in `flexmb.advisor.quantity`, by default the positions of all markers; `tolerance`:
+    largest error, relative to its scale. All runs go to the end of the horizon, and cost is measured in counted
+    operations, so that the advice does not depend on the machine. Raises SceneError for an invalid scene, ValueError
+    for a quantity that does not exist; if no model is adequate, `refusal` of the advice says why.
     """
     refuse_feedback(scene, "advise")
     asked = prepare(scene, tolerance, quantity, t_end)
@@ -111,11 +111,11 @@ def advise(
     steps = {(name, step.rung): step for name, each in ladders.items() for step in each}
     trials = tuple(_trial(model, steps, confirmation) for model in confirmation.measured)
     if found is None:
-        sure = _sure(confirmation.reference)
-        return replace(advice, refusal=_nothing(trials, tolerance), trials=trials, reference=sure)
+        described = _described(confirmation.reference)
+        return replace(advice, refusal=_none_adequate(trials, tolerance), trials=trials, reference=described)
     run = bench.run(found.model, found.method)
     if found.exhausted:
-        notes += ("the search for something cheaper ended at its budget of operations",)
+        notes += ("the search for cheaper models ended at its budget of operations",)
     return replace(
         advice,
         bodies=tuple(
@@ -129,15 +129,15 @@ def advise(
         uncertainty=confirmation.reference.uncertainty,
         predicted_operations=model_cost(scene, found.model, asked.cost),
         operations=run.operations, evaluations=run.evaluations, seconds=run.seconds,
-        reference=_sure(confirmation.reference), trials=trials, notes=notes,
+        reference=_described(confirmation.reference), trials=trials, notes=notes,
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A question together with what is predicted before any candidate runs.
+    """A question and the predictions that are made before any candidate runs.
 
-    `known`: the indicators of each body, empty where the rigid scene does not run; `cost` and `hidden` as for
+    `known`: the indicators of each body, empty if the rigid scene does not run; `cost` and `hidden` as for
     `Confirmation`; `ladders`: the steps of each body; `notes`: why there are no indicators.
     """
 
@@ -150,7 +150,7 @@ class Prepared:
     notes: tuple[str, ...]
 
     def confirmation(self) -> Confirmation:
-        """The measurements; this runs the references. Raises NoReference."""
+        """Run the references; returns what measures candidates against them. Raises NoReference."""
         return Confirmation(self.bench, self.tolerance, self.hidden, self.cost, REFERENCE)
 
 
@@ -174,7 +174,7 @@ def prepare(
 
 
 def _indicators(base: RigidRun, scene: Scene, wanted: tuple[Quantity, ...]) -> dict[str, Indicators]:
-    """Of every flexible body, by name. A quantity that does not change in the rigid run has the scale 1 (SI)."""
+    """The indicators of every flexible body, by name. A quantity that is constant in the rigid run has the scale 1."""
     signals = measured(wanted, base.own())
     try:
         scale = scales(wanted, signals)
@@ -186,7 +186,7 @@ def _indicators(base: RigidRun, scene: Scene, wanted: tuple[Quantity, ...]) -> d
 
 
 def _hidden(scene: Scene, known: dict[str, Indicators]) -> float:
-    """Predicted error of the finest modes of bodies that have no finer model: raw ones and beams that start bent."""
+    """Predicted error of the finest models of bodies that cannot be refined: raw ones and beams that start bent."""
     bent = {state.body for state in scene.modal_states}
     return sum(
         of_level(levels(body)[-1], known[body.name])
@@ -196,19 +196,19 @@ def _hidden(scene: Scene, known: dict[str, Indicators]) -> float:
 
 
 def _ladders(scene: Scene, known: dict[str, Indicators], tolerance: float) -> dict[str, tuple[Step, ...]]:
-    """Of every flexible body, by name: the rungs that fit it."""
+    """The steps of every flexible body, by name, for the rungs that are possible for it."""
     found = {}
     for body in flexible_bodies(scene):
         of = known.get(body.name)
-        stirred = frozenset(_stirred(of, STIRRED * tolerance)) if of else frozenset[str]()
-        every = rungs(scene, body, stirred)
+        excited = frozenset(_excited(of, _EXCITED * tolerance)) if of else frozenset[str]()
+        every = rungs(scene, body, excited)
         steps = [step(scene, body.name, rung, predicted(rung, of) if of else 0.0) for rung in every]
         found[body.name] = tuple(each for each in steps if each is not None)
     return found
 
 
-def _stirred(body: Indicators, least: float) -> list[str]:
-    """Families of modes that add more than `least`, a part of the scale."""
+def _excited(body: Indicators, least: float) -> list[str]:
+    """Families of modes that contribute more than `least`, a fraction of the scale."""
     return [name for i, name in enumerate(FAMILIES) if np.any(body.static[body.family == i] > least)]
 
 
@@ -222,15 +222,15 @@ def _trial(model: Model, steps: dict[tuple[str, BodyModel], Step], confirmation:
     )
 
 
-def _nothing(trials: tuple[Trial, ...], tolerance: float) -> str:
+def _none_adequate(trials: tuple[Trial, ...], tolerance: float) -> str:
     best = min(trials, key=lambda trial: trial.measured)
     names = ", ".join(f"{name}: {rung}" for name, rung in best.model)
     return (
-        f"no model of the ladder is within {tolerance:g}: the best of {len(trials)}, {names}, is off by "
+        f"no model of the ladder is within {tolerance:g}: the best of {len(trials)}, {names}, has the error "
         f"{best.measured:.2g}"
     )
 
 
-def _sure(reference: Reference) -> str:
+def _described(reference: Reference) -> str:
     steps = "; ".join(reference.history)
     return reference.name + (f" ({steps})" if steps else "")

@@ -1,4 +1,4 @@
-"""Advice in a terminal: what to simulate, why, and what else was tried; or why no model is known to be adequate."""
+"""Tables of advice for a terminal: the model, the reasons and the trials; or why no model is known to be adequate."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _asked(advice: Advice) -> Text:
 
 
 def _bodies(advice: Advice) -> Listing:
-    columns = (*names("body", "model"), *figures("error by itself, predicted"), *prose("because"))
+    columns = (*names("body", "model"), *figures("its error, predicted"), *prose("because"))
     table = Listing(*columns, title="\nModel of each flexible body")
     for each in advice.bodies:
         table.add(each.body, str(each.rung), _number(each.predicted), each.reason)
@@ -44,11 +44,11 @@ def _bodies(advice: Advice) -> Listing:
 def _run(advice: Advice) -> Listing:
     caption = f"Measured against: {advice.reference}" if advice.reference else ""
     table = Listing(*names(""), *figures("predicted", "measured"), title="\nThe whole run", caption=caption)
-    table.add("error, of the scale", _number(advice.predicted), _number(advice.measured))
-    table.add("of that, uncertainty of the reference", "", _number(advice.uncertainty))
+    table.add("error, relative to the scale", _number(advice.predicted), _number(advice.measured))
+    table.add("of which uncertainty of the reference", "", _number(advice.uncertainty))
     table.add("operations", _number(advice.predicted_operations), _number(advice.operations))
     table.add("evaluations", "", str(advice.evaluations))
-    table.add("seconds here (nothing depends on it)", "", f"{advice.seconds:.2g}")
+    table.add("seconds on this machine (not used)", "", f"{advice.seconds:.2g}")
     table.add("method", "", str(advice.method))
     return table
 

@@ -1,8 +1,8 @@
 """Runs of models by methods, each made only once: their signals and their cost in counted operations.
 
-Costs decide, so they are counted and not timed: the operations of one evaluation of the model's accelerations, closures
-included (`flexmb.jit.counting`), times the evaluations of the run. So advice is the same on every machine. Times are
-only shown.
+The cost is the number of operations of one evaluation of the accelerations, closures included (`flexmb.jit.counting`),
+times the number of evaluations. It is counted and not timed, so that advice is the same on every machine. Times are
+only displayed.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from flexmb.tables.status import Status
 SAMPLES = 401
 MAX_STEPS = 400_000
 EXACT = tuple(each.name for each in ALGORITHMS.values() if each.route is not None and not each.is_first_order)
-"""Algorithms that run what the model says."""
-AROUND = 4e8
-"""Time to compile a model and to evaluate the output of its run (0.2 s), expressed in operations."""
+"""Algorithms that solve the equations of a model without further truncation."""
+_OVERHEAD = 4e8
+"""Time to compile a model and to evaluate the outputs of its run (0.2 s), expressed in operations."""
 
 
 @dataclass(frozen=True)
 class BenchRun:
-    """One run. `signals` as far as it got; `message`: why it stopped, or "" if it finished. `operations` counted,
-    `seconds` measured of the integration alone. `cut`: it would have taken more operations than it was allowed."""
+    """One run: its `signals` up to its end; `message`: why it stopped early, or ""; counted `operations` and measured
+    `seconds` of the integration alone. `cut`: it was stopped at the allowed number of operations."""
 
     signals: Signals
     message: str
@@ -52,7 +52,7 @@ class BenchRun:
 
 
 class Bench:
-    """A scene, a horizon (s) and what is measured; every model is compiled once, every run made once."""
+    """A scene, a horizon (s) and quantities; every model is compiled once, and every run is made once."""
 
     def __init__(self, scene: Scene, t_end: float, wanted: tuple[Quantity, ...], samples: int = SAMPLES) -> None:
         self.scene, self.t_end, self.wanted = scene, t_end, wanted
@@ -63,11 +63,11 @@ class Bench:
         self._operations: dict[tuple[Model, Algorithm], int] = {}
 
     def system(self, model: Model) -> System | str:
-        """The compiled model, or why there is none."""
+        """The compiled model, or the reason why it cannot be compiled."""
         if model not in self._systems:
             try:
                 system = compile(built(self.scene, model))
-                _ = system.initial_state  # a closed chain may have none
+                _ = system.initial_state  # a closed chain may have no initial state
                 self._systems[model] = system
             except (ClosureError, ValueError, NotImplementedError) as error:
                 self._systems[model] = str(error)
@@ -87,11 +87,11 @@ class Bench:
         return min(EXACT, key=lambda algorithm: self.operations(model, algorithm))
 
     def run(self, model: Model, method: RunMethod, most: float = np.inf) -> BenchRun:
-        """The run, made at the first call; it ends where it has executed about `most` operations."""
+        """The run, made at the first call and stopped after about `most` operations."""
         found = self._outcomes.get((model, method))
         if found is None or (found.cut and most > found.operations):
             found = self._outcomes[model, method] = self._run(model, method, most)
-            self.spent += found.operations + AROUND
+            self.spent += found.operations + _OVERHEAD
         return found
 
     def _run(self, model: Model, method: RunMethod, most: float) -> BenchRun:
@@ -102,7 +102,7 @@ class Bench:
         steps = steps_within(method, each, most)
         try:
             done = simulated(system, self.times, method, min(steps, MAX_STEPS))
-        except ClosureError as error:  # a mechanism that cannot move
+        except ClosureError as error:  # for example a mechanism that is locked
             return BenchRun({}, str(error), 0, 0.0, 0.0)
         cost = done.statistics
         return BenchRun(

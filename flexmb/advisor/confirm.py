@@ -1,10 +1,10 @@
-"""Measured errors: candidates against the finest models that can be run, integration errors by refinement.
+"""Measured errors: of candidates against the finest models that can be run, of integrators by refinement.
 
 The references are run from coarse to fine until two successive ones agree within a quarter of the tolerance. Their
-difference is the uncertainty U of the finer one. Where halving the pieces is seen to shrink the difference by a ratio r
-< 1/2, U is the rest of the geometric series instead: r/(1 - r) times the last difference, with r taken as 1/4 at least.
-The change under ten times tighter integration is part of U. A candidate is adequate if its distance to the finest
-reference, plus U, plus the error of its integrator, is within the tolerance: that is the triangle inequality.
+difference is the uncertainty U of the finer one. If halving the pieces reduces the difference by a ratio r < 1/2, U is
+instead the remainder of the geometric series, r/(1 - r) times the last difference, with r at least 1/4. The change
+under ten times tighter integration is added to U. A candidate is adequate if its distance to the finest reference, plus
+U, plus the error of its integrator, is within the tolerance; by the triangle inequality this bounds its error.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from flexmb.advisor.quantity import Signals, error, scales
 from flexmb.integrate.catalogue import INTEGRATORS
 
 AGREED = 0.25
-"""Two references are good enough if they differ by less than this part of the tolerance."""
+"""References are refined until two differ by less than this fraction of the tolerance."""
 SECOND_ORDER = 0.25
-"""The ratio r of successive differences counts as this at least: that of order 2, the least of halved pieces."""
+"""Lower limit of the ratio r of successive differences, that of convergence of order 2 under halving."""
 MOST = 0.5
-"""With an uncertainty above this part of the tolerance, no candidate can be judged."""
+"""With an uncertainty above this fraction of the tolerance no candidate can be judged."""
 FINE, TIGHTER, LOOSEST = 1e-3, 0.1, 1e-5
-"""Relative tolerance of a fine run: first this part of the tolerance, then tightened by this factor; never looser."""
+"""Relative tolerance of a fine run: FINE times the tolerance, at most LOOSEST, tightened by the factor TIGHTER."""
 INTEGRATION, ROOM = 0.1, 0.05
-"""Parts of the tolerance: the largest integration error of a reference; what a model must leave to its method."""
-FEW = 1000
-"""Methods that linearise are not tried where the fine run takes fewer evaluations than this."""
+"""Fractions of the tolerance: largest integration error of a reference; part that is reserved for the integrator."""
+_FEW_EVALUATIONS = 1000
+"""Methods that linearise are not tried if the fine run takes fewer evaluations than this."""
 
 
 class NoReference(ValueError):
-    """No model that is known to be right can be run; the message says why."""
+    """There is no reference with a small uncertainty; the message says why."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """The finest model that was run: its name, signals, scales and uncertainty U (part of the scale)."""
+    """The finest model that was run: its name, signals, scales and uncertainty U (a fraction of the scale)."""
 
     name: str
     model: Model
@@ -51,11 +51,11 @@ class Reference:
 
 
 class Confirmation:
-    """Measures errors on a bench, relative to references that it finds first."""
+    """Measures errors of models relative to references, which it determines first."""
 
     def __init__(self, bench: Bench, tolerance: float, hidden: float, cost: Cost, budget: float) -> None:
-        """`hidden`: predicted error that no reference can show; `cost`: predictions; `budget`: operations that one
-        reference may be predicted to cost at most.
+        """`hidden`: predicted error that all references have in common; `cost`: predictions; `budget`: largest
+        predicted number of operations of one reference.
         """
         self.bench, self.tolerance, self.cost = bench, tolerance, cost
         self.fine, self.drift = min(FINE * tolerance, LOOSEST), 0.0
@@ -63,15 +63,15 @@ class Confirmation:
         self.reference = self._reference(hidden, budget)
 
     def run(self, model: Model) -> BenchRun:
-        """The model integrated so finely that only the model's own error is left."""
+        """The run of the model with an integration error that is negligible beside the error of the model."""
         return self.bench.run(model, self.finely(model))
 
     def finely(self, model: Model) -> RunMethod:
-        """The method of fine runs, whose own error does not matter."""
+        """The method of fine runs."""
         return RunMethod("dop853", max(FINEST, self.fine), self.bench.algorithm(model))
 
     def error(self, model: Model) -> float:
-        """Error of a model, U included; infinite where it does not exist or does not finish."""
+        """Error of a model, U included; infinite if it cannot be compiled or does not finish."""
         if model not in self.measured:
             self.measured[model] = np.inf
             if not isinstance(self.bench.system(model), str) and self.run(model).finished:
@@ -84,34 +84,35 @@ class Confirmation:
         return self._distance(done) + self.reference.uncertainty if done.finished else np.inf
 
     def run_cost(self, model: Model) -> float:
-        """Operations of the model's fine run, infinite where there is none."""
+        """Operations of the model's fine run, infinite if it cannot be compiled."""
         return np.inf if isinstance(self.bench.system(model), str) else self.run(model).operations
 
     def _distance(self, done: BenchRun) -> float:
         return error(done.signals, self.reference.signals, self.reference.scale)
 
     def adequate(self, model: Model) -> bool:
-        """Whether the model leaves the integrator its share of the tolerance."""
+        """Whether the error of the model leaves the fraction ROOM of the tolerance to the integrator."""
         return self.error(model) <= (1.0 - ROOM) * self.tolerance
 
     def integration_error(self, model: Model, method: RunMethod) -> float:
-        """How far a run is from the same model integrated finely."""
+        """Distance of a run from the fine run of the same model."""
         done = self.bench.run(model, method)
         return error(done.signals, self.run(model).signals, self.reference.scale) if done.finished else np.inf
 
     def cheapest_method(self, model: Model) -> RunMethod:
-        """The method with the fewest operations whose error fits beside the model's.
+        """The method with the fewest operations whose error plus that of the model is within the tolerance.
 
-        In the ladder of every integrator, from loose to tight, it takes the first method that fits and whose successor
-        fits as well. A ladder ends where a method costs more than the best one found, because tighter ones cost even
-        more.
+        In the ladder of every integrator, from loose to tight, it takes the first method that is accurate enough and
+        whose successor is, too; a single small error may be accidental. A ladder ends at a method that costs more than
+        the best one found, because tighter ones cost even more.
         """
         room = self.tolerance - self.error(model)
         scene, algorithm = self.bench.scene, self.bench.algorithm(model)
         highest, slow = highest_frequency(scene, model), self.cost.slow / (STAGES * self.bench.t_end)
-        best, least, steady = self.finely(model), self.run(model).operations, self.run(model).evaluations < FEW
+        best, least = self.finely(model), self.run(model).operations
+        short = self.run(model).evaluations < _FEW_EVALUATIONS
         for ladder in ladders(highest, slow, algorithm, not scene.closures):
-            if steady and INTEGRATORS[ladder[0].integrator].linearises:
+            if short and INTEGRATORS[ladder[0].integrator].linearises:
                 continue
             before: RunMethod | None = None
             for method in ladder:
@@ -161,7 +162,7 @@ class Confirmation:
         if last is None:
             models = "the finest models of this scene do not run" if len(known) > 1 else "this does not run"
             raise NoReference(f"{models} to the end: {'; '.join(history)}")
-        if len(known) == 1:  # only rigid bodies, or raw ones, which have no finer model
+        if len(known) == 1:  # all bodies are rigid or raw, and have no finer model
             last = replace(last, uncertainty=hidden + self.drift)
         if last.uncertainty > MOST * self.tolerance:
             alone = [f"{last.name} alone can be run"] if np.isinf(last.uncertainty) else []
@@ -169,7 +170,7 @@ class Confirmation:
         return last
 
     def _refine(self, model: Model) -> None:
-        """Tighten fine runs until ten times tighter ones change the reference by less than its share; sets `drift`."""
+        """Tighten fine runs until ten times tighter ones change the reference by less than INTEGRATION; set `drift`."""
         while self.fine > FINEST:
             coarse, method = self.run(model), self.finely(model)
             tighter = self.bench.run(model, replace(method, value=max(FINEST, TIGHTER * self.fine)))
@@ -184,5 +185,5 @@ class Confirmation:
     def _unresolved(self, hidden: float, history: list[str]) -> str:
         text = "; ".join(history)
         if hidden > AGREED * self.tolerance:
-            text += f"; what none of its models shows (second-order deflection) is estimated as {hidden:.2g}"
+            text += f"; the second-order deflection, which none of its models has, is estimated as {hidden:.2g}"
         return f"the finest models of this scene are not known to {self.tolerance:g} of the quantity: {text}"

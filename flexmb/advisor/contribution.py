@@ -1,8 +1,8 @@
-"""The contribution of each mode of a body to a quantity, to first order, on top of the rigid scene's run.
+"""First-order contribution of each mode of a body to a quantity, in addition to the run of the rigid scene.
 
-The deflection of the nodes carries markers on the body and outboard of it. The loads of hinges inboard of it change by
-the inertia of the elastic motion. A freely flying scene recoils so that its momentum stays. Where the first order says
-nothing (loads of wheels, work) the contribution is zero.
+The deflection of nodes moves the markers on the body and outboard of it. The loads of inboard hinges change by the
+inertia forces of the elastic motion. A free-flying scene recoils, so that its momentum is conserved. Quantities without
+a first-order contribution (loads of wheels, work) get zero.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class Moved:
-    """The response of one body in World axes: momenta of its modes about its origin, (T,3,m), and where it is."""
+    """The response of one body in World axes: momenta of its modes about its origin (T,3,m), and its pose."""
 
     response: ModalResponse
     position: Real
@@ -30,7 +30,7 @@ class Moved:
 
 
 def moved(rigid: RigidRun, response: ModalResponse) -> Moved:
-    """Momentum shapes sum m phi and sum m r x phi of the modes, turned to World."""
+    """Momenta sum m phi and sum m r x phi of the modes, in World axes."""
     model = response.model
     shapes, centre = mass_shapes(model), model.position + model.com_offset
     position, turn = rigid.frame(response.body.name)
@@ -40,7 +40,7 @@ def moved(rigid: RigidRun, response: ModalResponse) -> Moved:
 
 
 def contribution(channel: str, rigid: RigidRun, scene: Scene, part: Moved) -> Real:
-    """What the modes add to a channel over time, (T,k,m), in the channel's unit; rotation vectors for orientations."""
+    """Contributions of the modes to a channel over time (T,k,m), in its unit; rotation vectors for orientations."""
     kind, _, rest = channel.partition(":")
     r = part.response
     if kind == "marker":
@@ -80,9 +80,9 @@ def _carried(rigid: RigidRun, scene: Scene, marker: Marker, part: Moved) -> tupl
 
 
 def _recoil(rigid: RigidRun, scene: Scene, marker: Marker, part: Moved) -> tuple[Real, Real]:
-    """Rotation and translation (T,3,m) of a freely flying scene, per unit coordinate, that keep momentum as it was.
+    """Rotation and translation (T,3,m) of a free-flying scene, per unit coordinate, that conserve its momentum.
 
-    The rest of the scene turns and moves as one rigid body, with its inertia at the start.
+    The rest of the scene is taken for one rigid body, with its initial inertia.
     """
     base = _base(scene, part.response.body.name)
     count = part.response.model.mode_count
@@ -100,7 +100,7 @@ def _recoil(rigid: RigidRun, scene: Scene, marker: Marker, part: Moved) -> tuple
 
 
 def _load(rigid: RigidRun, scene: Scene, name: str, what: str, part: Moved) -> Real:
-    """Change of the load that a hinge inboard of the body transmits, (T,3,m), for a drive (T,3,m) of its torque."""
+    """Change (T,3,m) of the force or torque across a hinge inboard of the body; for a drive that of the torque."""
     r = part.response
     at: str = r.body.name
     while at != GROUND:
@@ -119,7 +119,7 @@ def _load(rigid: RigidRun, scene: Scene, name: str, what: str, part: Moved) -> R
 
 
 def free_share(rigid: RigidRun, scene: Scene, body: str) -> float:
-    """How much of the inertia that moves with the base is the body's: 0 where the base does not give way to it."""
+    """Fraction of the body in the inertia that moves with the base; 0 if the base cannot react to the body."""
     base = _base(scene, body)
     whole = sum(b.mass_kg for b in rigid.scene.bodies if isinstance(b, RigidBody))
     own = next(b.mass_kg for b in rigid.scene.bodies if isinstance(b, RigidBody) and b.name == body)
@@ -130,7 +130,7 @@ def free_share(rigid: RigidRun, scene: Scene, body: str) -> float:
 
 
 def _base(scene: Scene, body: str) -> Hinge | None:
-    """The hinge that joins the tree of the body to the ground."""
+    """The hinge between the ground and the tree that contains the body."""
     hinge = _inboard(scene, body)
     while hinge is not None and hinge.parent != GROUND:
         hinge = _inboard(scene, hinge.parent)
@@ -146,5 +146,5 @@ def _inboard(scene: Scene, body: str) -> Hinge | None:
 
 
 def _into(turn: Real, vectors: Real) -> Real:
-    """World components (T,3,m) in the axes of `turn` (T,3,3), body -> World."""
+    """World components (T,3,m) turned to body axes; `turn` (T,3,3) is body -> World."""
     return np.asarray(np.swapaxes(turn, 1, 2) @ vectors)

@@ -1,15 +1,16 @@
-"""Predicted error of a rung, that is of the effects its body would leave out, from a single run of the rigid scene.
+"""Predicted error of a rung, from a single run of the rigid scene.
 
-Every figure is a part of the quantity's scale. With the modal response to the rigid motion (`response`) they are:
+The error is that of the effects which the rung omits, as a fraction of the quantity's scale. It is predicted from these
+indicators, which use the modal response to the rigid motion:
 
-    participation   what the modes that a rung leaves out add to the quantity; attachment modes carry their static part
-    stiffening      kappa_n = sum_j N-weighted slopes: the axial force of spin, gravity and tip loads against the modal
-                    stiffness, K_G,nn / omega_n^2; -1 is buckling. Levels without second-order shapes leave it out
-    spin            (w / omega_1)^2, the softening that `ruthless` leaves out; where it reaches 1, `full` fails
-    deflection      the largest deflection over the length: what each order of a level leaves out
-    equivalence     mismatch of effective inertia of the best spring hinge, (149)-(151)
+    participation   contribution of omitted modes to the quantity; attachment modes include its static part
+    stiffening      kappa_n = K_G,nn / omega_n^2: geometric stiffness by the axial force of spin, gravity and tip loads,
+                    relative to the modal stiffness; -1 is buckling. Levels without second-order shapes omit it
+    spin            (w / omega_1)^2, the softening that `ruthless` omits; at 1 and above, `full` is unstable
+    deflection      the largest deflection relative to the length: each order of it is omitted by some levels
+    equivalence     mismatch of effective inertia of the best spring hinge, (149)-(151) of Frisch
 
-They order the ladder and choose where to begin; the runs decide.
+Predictions order the ladder and select the start of the search; the decisions are based on runs.
 """
 
 from __future__ import annotations
@@ -33,21 +34,21 @@ from flexmb.typing import Real
 
 _TINY = np.finfo(float).tiny
 SEGMENT_ERROR = 4.5
-"""Phase error of the first modes of a chain of n segments after some periods: this part of the response over n^2."""
+"""Phase error of the first modes of a chain of n segments after some periods: SEGMENT_ERROR / n^2 of the response."""
 
 
 STRAIGHT = 0.1
-"""Distance between a straight rigid body on the best hinge and the bent body it stands for, as part of the response."""
+"""Distance between a straight rigid body on the best hinge and the bent body, as a fraction of the response."""
 
 
 @dataclass(frozen=True)
 class Indicators:
-    """The prediction of the rigid run for one body. Ratios have no unit.
+    """Predictions for one body, all dimensionless.
 
-    `flexibility`: error of the rigid body, part of the scale; `static`, `dynamic` (m,): what each mode adds at most,
-    and what it adds beyond its quasi-static deflection; `stiffening`: largest |kappa| of the lowest modes;
-    `compression`: its most negative value; `spin`; `deflection`; `shortening`: second-order shortening, part of the
-    scale; `share` of the inertia that gives way; `mismatch` of the best spring hinge, infinite where there is none.
+    `flexibility`: error of the rigid body, relative to the scale; `static`, `dynamic` (m,): largest contribution of
+    each mode, and that beyond its quasi-static deflection; `stiffening`: largest |kappa| of the lowest modes;
+    `compression`: most negative kappa; `spin`; `deflection`; `shortening`: second-order shortening, relative to the
+    scale; `share`: see `free_share`; `mismatch` of the best spring hinge, infinite if there is none.
     """
 
     flexibility: float
@@ -63,7 +64,7 @@ class Indicators:
     mismatch: float
 
     def reason(self) -> str:
-        """The figures that matter, in words."""
+        """The relevant indicators in words."""
         parts = [f"bends by {self.deflection:.2g} of its length, {self.flexibility:.2g} of the quantity"]
         if self.spin > 1e-6:
             parts.append(f"(spin / first frequency)^2 = {self.spin:.2g}")
@@ -75,7 +76,7 @@ class Indicators:
 
 
 def indicators(rigid: RigidRun, scene: Scene, response: ModalResponse, scale: dict[str, float]) -> Indicators:
-    """All indicators of one body for the channels of `scale`, which maps them to what their error is relative to."""
+    """All indicators of one body for the channels of `scale`, which maps them to the scales of their errors."""
     part = moved(rigid, response)
     modes = response.model.mode_count
     static, dynamic, whole, shortening = np.zeros(modes), np.zeros(modes), 0.0, 0.0
@@ -101,7 +102,7 @@ def indicators(rigid: RigidRun, scene: Scene, response: ModalResponse, scale: di
 
 
 def predicted(rung: BodyModel, body: Indicators) -> float:
-    """Error of a rung, part of the scale; infinite where it would fail."""
+    """Predicted error of a rung, relative to the scale; infinite if it would be unstable."""
     whole = body.flexibility
     if rung.kind == "rigid":
         return whole
@@ -117,14 +118,14 @@ def predicted(rung: BodyModel, body: Indicators) -> float:
     chosen = np.isin(body.family, [FAMILIES.index(name) for name in rung.families if name in FAMILIES])
     among = chosen if rung.families else np.ones(len(body.static), dtype=bool)
     kept = among & (np.cumsum(among) <= rung.modes)
-    if rung.static:  # the static shapes of a family stand for two more modes, but follow without delay
+    if rung.static:  # the attachment modes of a family replace two more modes, but only quasi-statically
         kept = among & (np.cumsum(among) <= rung.modes + 2 * len(set(body.family[among].tolist())))
     left = np.where(among & rung.static, body.dynamic, body.static)
     return float(left[~kept].sum()) + of_level(rung.level, body)
 
 
 def of_level(level: str, body: Indicators) -> float:
-    """What a level leaves out of the response, part of the scale."""
+    """Predicted error of a level, relative to the scale."""
     whole, bent = body.flexibility, body.deflection
     third_order = whole * bent**2
     if level == "stiffened":
@@ -148,7 +149,7 @@ def _axis(body: BeamBody) -> tuple[Real, Real, Real]:
 
 
 def _geometric(response: ModalResponse) -> Real:
-    """kappa (T,m'): axial force against the modal stiffness, for the two lowest modes of a beam."""
+    """kappa (T,m') of the two lowest modes of a beam."""
     body = response.body
     if not isinstance(body, BeamBody):
         return _like_a_cantilever(response)
@@ -166,10 +167,10 @@ def _geometric(response: ModalResponse) -> Real:
 
 
 def _like_a_cantilever(response: ModalResponse) -> Real:
-    """|kappa| (T,1) of a raw body, whose slopes are unknown, taken as that of a uniform cantilever of the same length.
+    """|kappa| (T,1) of a raw body, whose slopes are unknown: that of a uniform cantilever of the same length.
 
-    Of its first mode: 1.1933 w^2 by spin, 1.5709 a / L by acceleration and 4.6478 P / (m L) by a force at the tip, all
-    taken as if along it.
+    For its first mode with all loads along it: 1.1933 w^2 by spin, 1.5709 a / L by acceleration and 4.6478 P / (m L) by
+    a force at the tip.
     """
     model = response.model
     length, mass = _length(model), float(model.mass.sum())
@@ -180,8 +181,8 @@ def _like_a_cantilever(response: ModalResponse) -> Real:
 
 
 def _shortening(response: ModalResponse) -> float:
-    """Half the integral of the squared slope (m); of a raw body that of a cantilever's first mode, 0.58 of the squared
-    deflection over the length."""
+    """Half the integral of the squared slope (m); for a raw body that of a cantilever's first mode, 0.58 times the
+    squared deflection over the length."""
     if not isinstance(response.body, BeamBody):
         return 0.58 * _deflection(response) ** 2 * _length(response.model)
     x, _, slopes = _axis(response.body)
@@ -205,5 +206,5 @@ def _length(model: FlexibleModel) -> float:
 def _mismatch(scene: Scene, body: str) -> float:
     try:
         return coupling_error(appendage_of(scene, body), fitted_hinge(scene, body))
-    except ValueError:  # not an appendage, or no mode that a hinge can follow
+    except ValueError:  # the body is not an appendage, or no mode turns it
         return np.inf

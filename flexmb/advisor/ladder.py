@@ -1,4 +1,4 @@
-"""The ladder of a body: every rung worth trying, with predicted error and cost; and the references above it."""
+"""The ladder of a body: all rungs that are tried, with predicted error and cost; and the references."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from flexmb.scene.bodies import BeamBody, Body, ModalBody
 from flexmb.scene.schema import Scene
 
 STEP_AT_HIGHEST = 3.4
-"""Step of DOP853 times the highest frequency, where that frequency limits the step (measured)."""
+"""Step of DOP853 times the highest frequency when that frequency limits the step (measured)."""
 STAGES = 12
 ZIGZAG = 6.93
-"""Highest frequency of a chain of n rigid segments: sqrt(48) n^2 sqrt(EI / (m L^4)), neighbours turning against each
-other."""
+"""Highest frequency of a chain of n rigid segments, in which neighbours turn in opposite directions: ZIGZAG n^2
+sqrt(EI / (m L^4)), ZIGZAG = sqrt(48)."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """A rung with what is predicted of it: error as a part of the scale, operations of one evaluation of the body's
-    part of the scene, highest frequency (rad/s)."""
+    """A rung with its predictions: error relative to the scale, operations that the body adds to one evaluation,
+    highest frequency (rad/s)."""
 
     rung: BodyModel
     error: float
@@ -39,8 +39,8 @@ class Step:
 
 @dataclass(frozen=True)
 class Cost:
-    """Predicted operations of a run to `t_end` (s). `rigid`: operations of one evaluation of the bodies that are rigid
-    in the scene; `slow`: evaluations that the rigid scene needs, which no run falls below.
+    """Prediction of the operations of a run to `t_end` (s). `rigid`: operations of the bodies that are rigid in the
+    scene, for one evaluation; `slow`: evaluations of the run of the rigid scene, the least of any run.
     """
 
     t_end: float
@@ -56,7 +56,7 @@ class Cost:
 
 
 def rungs(scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str]) -> tuple[BodyModel, ...]:
-    """Every rung of one body, in no order. `moving`: families of a beam that something excites, as far as known."""
+    """All rungs of one body, in no particular order. `moving`: families of a beam that are predicted to be excited."""
     if isinstance(body, ModalBody):
         every = flexible_model(body).mode_count
         counts = sorted({n for n in COUNTS if n < every} | {every})
@@ -79,11 +79,11 @@ def rungs(scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str]) -> t
 
 
 def references(scene: Scene) -> tuple[tuple[str, Model], ...]:
-    """Models that every candidate is measured against, coarse to fine; two successive ones show how certain they are.
+    """Models against which candidates are measured, from coarse to fine; successive ones show their uncertainty.
 
-    First all bodies with the modes that the scene gives them, and four more where it has no static shapes; then beams
+    First all bodies with the modes that the scene gives them, and four more if it has no attachment modes; then beams
     in pieces, which converge to the geometrically exact beam. A raw body has no other modes than its own. A beam that
-    starts bent is not taken apart; it gets four more modes, then another four.
+    starts bent cannot be divided; it gets four more modes, then another four.
     """
     bodies = flexible_bodies(scene)
     bent = {state.body for state in scene.modal_states}
@@ -104,8 +104,8 @@ def references(scene: Scene) -> tuple[tuple[str, Model], ...]:
 
 
 def step(scene: Scene, name: str, rung: BodyModel, error: float) -> Step | None:
-    """The predictions for one rung, operations by the polynomials of Jain & Rodriguez' section VII; None where it does
-    not fit the body."""
+    """The predictions for one rung, operations by the polynomials of Jain & Rodriguez' section VII; None if the rung is
+    not possible for the body."""
     try:
         whole = built(scene, ((name, rung),))
         before = {b.name for b in scene.bodies if b.name != name}
@@ -119,19 +119,19 @@ def step(scene: Scene, name: str, rung: BodyModel, error: float) -> Step | None:
 
 
 def cost(scene: Scene, t_end: float, slow: int) -> Cost:
-    """The part of the cost that is known before any rung is chosen."""
+    """The part of the cost that does not depend on the rungs."""
     rigid = len(scene.bodies) + len(scene.point_masses) - len(flexible_bodies(scene))
     return Cost(t_end, float(articulated([0] * rigid).total), slow)
 
 
 def model_cost(scene: Scene, model: Model, known: Cost) -> float:
-    """Predicted operations of a run of that model, infinite where a rung does not fit its body."""
+    """Predicted operations of a run of that model, infinite if a rung is not possible for its body."""
     steps = [step(scene, name, rung, 0.0) for name, rung in model]
     return np.inf if None in steps else known.of(each for each in steps if each)
 
 
 def highest_frequency(scene: Scene, model: Model) -> float:
-    """Highest frequency (rad/s) of any body by itself, its base fixed; 0 where all are rigid."""
+    """Highest frequency (rad/s) of any body with its base fixed; 0 if all are rigid."""
     steps = [step(scene, name, rung, 0.0) for name, rung in model]
     return max((each.fastest for each in steps if each), default=0.0)
 
@@ -141,7 +141,7 @@ def _mode_count(body: Body) -> int:
 
 
 def _fastest(body: Body, rung: BodyModel, parts: list[Body]) -> float:
-    """Highest frequency (rad/s) of the bodies that a rung makes of one body."""
+    """Highest frequency (rad/s) of the bodies that replace one body in a rung."""
     if rung.kind == "segments" and isinstance(body, BeamBody):
         return ZIGZAG * rung.pieces**2 * _beam_rate(body)
     return max(
@@ -152,7 +152,7 @@ def _fastest(body: Body, rung: BodyModel, parts: list[Body]) -> float:
 
 
 def _squares(body: BeamBody | ModalBody) -> tuple[float, ...]:
-    """Squares of the frequencies of a body with its base fixed; bodies of other names are the same."""
+    """Squares of the frequencies of a body with its base fixed; cached for equal bodies of any name."""
     return _squares_of(replace(body, name="body", level="full"))
 
 

@@ -1,4 +1,4 @@
-"""Ways to run a model: algorithm, integrator, tolerance or step; ladders of them, loose to tight."""
+"""Methods to run a model (algorithm, integrator, tolerance or step), and ladders of them from loose to tight."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Integrator
+from flexmb.run.run_arrays import Statistics
 from flexmb.run.simulate import simulate
-from flexmb.run.trajectory import Statistics, Trajectory
+from flexmb.run.trajectory import Trajectory
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
 
 ABSOLUTE = 1e-2
-"""Absolute over relative tolerance, SI: modal coordinates and small rates are of the order of hundredths."""
+"""Ratio of absolute and relative tolerance, SI: modal coordinates and small rates are of the order of hundredths."""
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 FINEST = 1e-12
@@ -25,7 +26,7 @@ STEPS = (2.5, 1.25, 0.6, 0.3, 0.15, 0.075)
 
 
 COMPLEX = 4
-"""Operations of an evaluation in complex numbers against one in real ones."""
+"""Operations of an evaluation in complex numbers relative to one in real numbers."""
 
 
 @dataclass(frozen=True)
@@ -64,15 +65,15 @@ def simulated(system: System, times: NDArray[np.float64], method: RunMethod, max
 
 
 def steps_within(method: RunMethod, each: int, most: float) -> int:
-    """Steps after which a run has executed `most` operations, `each` for an evaluation."""
+    """Number of steps after which a run has executed `most` operations, with `each` for an evaluation."""
     return int(min(most / (each * INTEGRATORS[method.integrator].evaluations), 1e9)) + 1
 
 
 def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tuple[tuple[RunMethod, ...], ...]:
-    """For each integrator its methods from loose to tight, those that linearise first.
+    """For each integrator its methods from loose to tight; integrators that linearise come first.
 
-    Fixed steps follow the frequency `highest` (rad/s), those of implicit methods `slow`, the frequency of the scene
-    with all bodies rigid. Methods that linearise are tried on trees only, and by the recursion.
+    Fixed steps are chosen by the frequency `highest` (rad/s), those of implicit methods by `slow`, the frequency of the
+    scene with all bodies rigid. Integrators that linearise are tried on trees only, with the recursion.
     """
     chosen = [each for each in INTEGRATORS.values() if tree or not each.linearises]
     return tuple(
@@ -82,7 +83,7 @@ def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tu
 
 
 def _ladder(integrator: Integrator, frequency: float, algorithm: Algorithm) -> tuple[RunMethod, ...]:
-    """Loose to tight; those that linearise are slow at tight tolerances."""
+    """Methods from loose to tight, without the tightest ones for integrators that linearise, which are slow there."""
     if integrator.fixed:
         return tuple(RunMethod(integrator.name, step / frequency, algorithm) for step in STEPS)
     tolerances = TOLERANCES[:-3] if integrator.linearises else TOLERANCES
@@ -92,8 +93,8 @@ def _ladder(integrator: Integrator, frequency: float, algorithm: Algorithm) -> t
 def operations(method: RunMethod, each: int, size: int, done: Statistics) -> float:
     """Operations of a run: `each` for an evaluation of the accelerations, `size` entries of the state.
 
-    A Jacobian is an evaluation in complex numbers for each of its columns; linear algebra is counted by its leading
-    terms, substitutions with every evaluation.
+    A Jacobian counts as one evaluation in complex numbers for each of its columns. Linear algebra is counted by its
+    leading terms, with one substitution for each evaluation.
     """
     cubic, square = INTEGRATORS[method.integrator].algebra
     evaluations = done.evaluations + COMPLEX * size * done.jacobians

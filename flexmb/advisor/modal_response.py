@@ -1,13 +1,13 @@
-"""The response of the modes of flexible bodies to the motion that the scene makes with all of them rigid.
+"""Response of the modes of flexible bodies to the motion of the scene with all bodies rigid.
 
 One run of the rigid scene gives the motion of every body and the loads at its nodes. In body axes, with the body's
 motion w, alpha, a (less gravity) and loads tau, f at its nodes, mode n is driven by
 
     Q_n = -sum_j m phi_jn . (a + alpha x r_j + w x (w x r_j)) + sum_nodes (psi_n . tau + phi_n . f)
 
-and follows etadd + 2 zeta omega etad + omega^2 eta = Q_n, solved exactly for Q_n linear between the output times. So it
-accounts for effective masses, participation and the bandwidth of the excitation. It leaves out the reaction of the
-body's bending on the rest of the scene, and second-order effects.
+and obeys etadd + 2 zeta omega etad + omega^2 eta = Q_n, which is solved exactly for Q_n linear between the output
+times. This accounts for effective masses, participation and the bandwidth of the excitation. It neglects the reaction
+of the deformation on the rest of the scene, and second-order effects.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class RigidRun:
     run: Trajectory
 
     def own(self) -> Trajectory:
-        """The run with the scene's own markers alone."""
+        """The run without the additional markers."""
         extra = {_body(b.name) for b in self.scene.bodies} | {_hinge(h.name) for h in self.scene.hinges}
         return changed(self.run, markers={k: path for k, path in self.run.markers.items() if k not in extra})
 
@@ -88,7 +88,7 @@ class ModalResponse:
 
 
 def rigid_run(scene: Scene, times: Real) -> RigidRun | str:
-    """The run of the rigid scene, or why there is none: a mechanism that locks without flexibility."""
+    """The run of the rigid scene, or the reason why it fails: a mechanism may be locked without flexibility."""
     still = rigidify(scene)
     extra = [Marker(name=_body(b.name), body=b.name) for b in still.bodies]
     extra += [
@@ -103,7 +103,7 @@ def rigid_run(scene: Scene, times: Real) -> RigidRun | str:
 
 
 def modal_response(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody) -> ModalResponse:
-    """The response of the eigenmodes of `body`, the lowest `MODES` of a beam, all of a raw body."""
+    """The response of the eigenmodes of `body`: the lowest `MODES` of a beam, all of a raw body."""
     model = eigenmodes(body)
     path = rigid.run.markers[_body(body.name)]
     _, turn = rigid.frame(body.name)
@@ -128,7 +128,7 @@ def modal_response(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody) ->
 
 
 def eigenmodes(body: BeamBody | ModalBody) -> FlexibleModel:
-    """The body's eigenmodes with unit modal mass, lowest first: of a beam up to `MODES` whatever its scene keeps."""
+    """The body's eigenmodes with unit modal mass, lowest first; of a beam up to `MODES`, whatever its scene has."""
     if isinstance(body, BeamBody):
         return _beam(replace(body, name="beam", level="full"))
     model = flexible_model(body)
@@ -168,7 +168,7 @@ def _combined(model: FlexibleModel, X: Real) -> FlexibleModel:
 
 
 def _families(model: FlexibleModel) -> NDArray[np.intp]:
-    """Along which body axis each mode moves most mass."""
+    """The body axis along which each mode moves most mass."""
     moved = np.einsum("p,pim->im", model.mass, mass_shapes(model) ** 2)
     return np.argmax(moved, axis=0)
 
@@ -214,7 +214,7 @@ def _loads(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody, turn: Real
 
     for hinge in scene.hinges:
         if hinge.parent == body.name:
-            across = np.nan_to_num(rigid.run.loads[hinge.name])  # what rigid bodies leave open only deformation decides
+            across = np.nan_to_num(rigid.run.loads[hinge.name])  # NaN: statically indeterminate with rigid bodies
             add(hinge.parent_node, rigid.hinge_point(hinge.name), across, -1.0)
     for key, loads in (("point_masses", rigid.run.loads), ("wheels", rigid.run.wheel_loads)):
         for item in getattr(scene, key):
@@ -237,7 +237,7 @@ def _loads(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody, turn: Real
 
 
 def _acting_on(rigid: RigidRun, scene: Scene, connector: BetweenNodes) -> Real:
-    """World positions (T,3) of frame B of a connector, about which its load is."""
+    """World positions (T,3) of frame B of a connector, to which its load refers."""
     offset = np.array(connector.position_b_m)
     if connector.body_b == GROUND:
         return np.tile(offset, (len(rigid.run.t), 1))
@@ -257,7 +257,7 @@ def _given(load: Load, times: Real, turn: Real) -> Real:
 
 
 def _into(turn: Real, vectors: Real) -> Real:
-    """World components (T,3) in body axes."""
+    """World components (T,3) turned to body axes."""
     return np.einsum("tji,tj->ti", turn, vectors)
 
 

@@ -1,7 +1,7 @@
-"""The models that can replace a flexible body; each turns a scene into another scene.
+"""The models that can replace a flexible body, as transformations of scenes.
 
-A `BodyModel` is one model of one body, a rung of its ladder; a `Model` has one for every flexible body. Which rung is
-cheaper or finer is not decided here but in `flexmb.advisor.ladder`.
+A `BodyModel` is one model of one body, a rung of its ladder; a `Model` has one for every flexible body.
+`flexmb.advisor.ladder` predicts their errors and costs.
 """
 
 from __future__ import annotations
@@ -65,12 +65,12 @@ Model = tuple[tuple[str, BodyModel], ...]
 
 
 def flexible_bodies(scene: Scene) -> tuple[BeamBody | ModalBody, ...]:
-    """Bodies with modes that their scene does not make rigid already."""
+    """Bodies with modes whose level is not "rigid"."""
     return tuple(b for b in scene.bodies if isinstance(b, BeamBody | ModalBody) and b.level != "rigid")
 
 
 def levels(body: BeamBody | ModalBody) -> tuple[Level, ...]:
-    """Levels that the body has data for: raw bodies seldom have a second-order field."""
+    """Levels for which the body has the data; raw bodies seldom have a second-order field."""
     if isinstance(body, BeamBody):
         return LEVELS
     stiffened = replace(body, level="stiffened")
@@ -78,7 +78,7 @@ def levels(body: BeamBody | ModalBody) -> tuple[Level, ...]:
 
 
 def built(scene: Scene, model: Model) -> Scene:
-    """The scene with every body modelled by its rung. Raises ValueError where a rung does not fit its body."""
+    """The scene with every body modelled by its rung. Raises ValueError if a rung is not possible for its body."""
     for name, rung in model:
         scene = _applied(scene, name, rung)
     return scene

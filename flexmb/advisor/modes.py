@@ -1,4 +1,4 @@
-"""A flexible body with other modes: fewer or more for a beam, the lowest for a raw body; its initial state is kept."""
+"""A flexible body with other modes: fewer or more for a beam, the lowest for a raw body; with its initial state."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def with_modes(scene: Scene, name: str, count: int, level: Level, static: bool, 
     """The scene with `count` modes of the body `name`, at `level`.
 
     A beam gets its `count` lowest modes of `families` (its own if empty), and attachment modes if `static`; a raw body
-    the `count` lowest of the eigenmodes that its own modes contain, or its own modes if that is all of them. An initial
-    modal state is projected onto the modes, in the norm of kinetic energy. Raises ValueError where there are not so
-    many modes.
+    gets the `count` lowest eigenmodes in the span of its modes, or these modes themselves if `count` is their number.
+    An initial modal state is projected onto the modes in the norm of kinetic energy. Raises ValueError if there are
+    fewer modes.
     """
     body = next(each for each in scene.bodies if each.name == name)
     if isinstance(body, BeamBody):
@@ -39,14 +39,14 @@ def with_modes(scene: Scene, name: str, count: int, level: Level, static: bool, 
 
 
 def mode_count(body: BeamBody | ModalBody) -> int:
-    """How many modes the scene gives the body, attachment modes included."""
+    """The number of modes of the body, attachment modes included."""
     return flexible_model(body).mode_count
 
 
 def _beam(beam: BeamBody, count: int, level: Level, static: bool, families: tuple[str, ...]) -> BeamBody:
     modes = replace(beam.modes, count=count, static=static, families=families or beam.modes.families)
     ratio = beam.modes.damping_ratio
-    if isinstance(ratio, tuple):  # modes beyond those listed are damped as the last
+    if isinstance(ratio, tuple):  # modes beyond those listed have the damping of the last
         total = mode_count(replace(beam, modes=replace(modes, damping_ratio=0.0)))
         modes = replace(modes, damping_ratio=(*ratio, *[ratio[-1]] * total)[:total])
     return replace(beam, modes=modes, level=level)
@@ -61,7 +61,7 @@ def _raw(body: ModalBody, count: int, level: Level) -> ModalBody:
         return replace(body, level=level)
     mass = modal_integrals(flexible_model(body)).spatial_mass[:every, :every]
     X = eigh(arrays.stiffness, mass)[1][:, :count]
-    X = X * np.sign(X[np.argmax(np.abs(X), axis=0), np.arange(count)])  # the sign of its largest part
+    X = X * np.sign(X[np.argmax(np.abs(X), axis=0), np.arange(count)])  # the largest component is positive
     nodes = tuple(
         ModalNode(
             name=node.name, position_m=node.position_m, quaternion=node.quaternion,
@@ -100,7 +100,7 @@ def _nested(array: Real) -> tuple[Any, ...]:
 
 
 def _square(array: Real | None, X: Real) -> Any:
-    """Values for each pair of modes (...,m,m) transformed to the modes X (m,k): (...,k,k)."""
+    """Values for pairs of modes (...,m,m) transformed to the modes X (m,k): (...,k,k)."""
     return None if array is None else X.T @ array @ X
 
 
@@ -115,7 +115,7 @@ def _rows(matrix: Real) -> tuple[tuple[float, ...], ...]:
 
 def _projected(old: BeamBody | ModalBody, new: BeamBody | ModalBody, state: ModalState) -> ModalState:
     """The initial state in the new modes that is nearest in the norm of kinetic energy."""
-    # at level full both have the points of the elements; at stiffened each would have masses of its own
+    # At level full both models have the same inertia points; at stiffened each has its own equivalent masses.
     before, after = (flexible_model(replace(each, level="full")) for each in (old, new))
     onto = np.linalg.solve(_products(after, after), _products(after, before))
     rates = np.array(state.rates or [0.0] * before.mode_count)
@@ -127,7 +127,7 @@ def _projected(old: BeamBody | ModalBody, new: BeamBody | ModalBody, state: Moda
 
 
 def _products(a: FlexibleModel, b: FlexibleModel) -> Real:
-    """Kinetic energy's products (m_a, m_b) of the modes of two models of one body with the same inertia points."""
+    """Inner products (m_a, m_b), in the norm of kinetic energy, of the modes of two models with the same points."""
     moved_a, moved_b = _centres(a), _centres(b)
     turning = np.einsum("pim,pij,pjn->mn", a.rotation, a.inertia, b.rotation, optimize=True)
     return np.einsum("p,pim,pin->mn", a.mass, moved_a, moved_b, optimize=True) + turning

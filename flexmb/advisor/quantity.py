@@ -1,11 +1,11 @@
-"""The quantities that the user cares about: channels of a run, and the distance of two runs in them.
+"""Quantities: channels of a run, and the distance of two runs in them.
 
 A quantity names channels as in `flexmb.run.channels`: `marker:tip.position`, `marker:*.orientation`, `load:hub.torque`,
-`drive:hub`, `energy.total`; "energy" or "load:hub" names all channels that begin like this. Its error is the largest
-distance of two runs over the output times and over its channels, relative to a scale: the one given after "@" in SI
-units (`load:hub.torque@50`), or the range of the signal: its largest distance from its start for positions and
-orientations, its largest magnitude for everything else. Channels of one kind that are named by one word share the
-largest range, so that a marker which hardly moves is not judged relative to almost nothing.
+`drive:hub`, `energy.total`; "energy" or "load:hub" names all channels with this prefix. Its error is the largest
+distance of two runs over the output times and over its channels, relative to a scale. The scale is given after "@" in
+SI units (`load:hub.torque@50`), or it is the range of the signal: the largest distance from its initial value for
+positions and orientations, the largest magnitude for all others. Channels of one kind in one quantity share the largest
+range, so that the error of a marker that hardly moves is not relative to its own small range.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from flexmb.typing import Real
 
 Signals = dict[str, Real]
 
-_STILL = 1e-12  # part of its magnitude; a signal that changes by less counts as constant
+_STILL = 1e-12  # a signal that changes by less than this fraction of its magnitude counts as constant
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """Channels named by `pattern`, and what their error is relative to (SI): `scale`, or None for their range."""
+    """Channels named by `pattern`, and the scale (SI) of their error, or None for their range."""
 
     pattern: str
     scale: float | None = None
@@ -42,7 +42,7 @@ class Quantity:
         except ValueError:
             value = np.nan
         if not (np.isfinite(value) and value > 0.0):
-            raise ValueError(f"quantity {word!r}: after @ stands the size that errors are relative to, such as @0.5")
+            raise ValueError(f"quantity {word!r}: give the scale of errors after @ as a positive number, such as @0.5")
         return cls(pattern, value)
 
     def __str__(self) -> str:
@@ -50,11 +50,11 @@ class Quantity:
 
 
 def quantities(words: str | Quantity | Sequence[str | Quantity] | None, scene: Scene) -> tuple[Quantity, ...]:
-    """Quantities of the words; by default the positions of all markers. ValueError where there are none."""
+    """Quantities from words; by default the positions of all markers. ValueError if there are no markers."""
     if not words:
         if not scene.markers:
             raise ValueError(
-                f'scene "{scene.name}" has no markers, so there is no default for what matters: name a quantity, such '
+                f'scene "{scene.name}" has no markers, whose positions are the default quantity: name a quantity, such '
                 'as "energy.total" or "load:HINGE.torque"'
             )
         return (Quantity("marker:*.position"),)
@@ -63,7 +63,7 @@ def quantities(words: str | Quantity | Sequence[str | Quantity] | None, scene: S
 
 
 def measured(wanted: tuple[Quantity, ...], run: Recorded) -> Signals:
-    """The channels of a run that the quantities name, each (T,k). ValueError for a quantity that names none."""
+    """The channels of a run that the quantities name, each (T,k). ValueError for a quantity without channels."""
     channels = channels_of(run)
     found: Signals = {}
     for quantity in wanted:
@@ -75,15 +75,15 @@ def measured(wanted: tuple[Quantity, ...], run: Recorded) -> Signals:
 
 
 def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Real]) -> dict[str, float]:
-    """The scale of each channel's error, in the channel's unit. Raises ValueError where a signal has no range."""
+    """The scale of each channel's error, in the channel's unit. Raises ValueError for a signal without a range."""
     found: dict[str, float] = {}
     for quantity in wanted:
         named = [name for name in reference if matches(quantity.pattern, name)]
         for name in named:
             if np.any(np.isnan(reference[name])):
                 raise ValueError(
-                    f"{name} is not determined by the motion: closures suppress what others suppress already, and "
-                    "infinitely many loads go with it; ask for another quantity, or let bodies bend"
+                    f"{name} is not determined by the motion: closures are redundant, and the loads are statically "
+                    "indeterminate; choose another quantity, or make bodies flexible"
                 )
             if quantity.scale is not None:
                 found[name] = quantity.scale
@@ -92,16 +92,16 @@ def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Real]) -> dict[
             size = max(signal_range(other, reference[other]) for other in alike)
             if size <= _STILL * max(magnitude(other, reference[other]) for other in alike):
                 raise ValueError(
-                    f"{name} does not change, so no error is relative to its range: give a size in {unit(name)}, such "
-                    f"as {quantity.pattern}@1"
+                    f"{name} does not change, so that its range is not a scale of errors: give a scale in "
+                    f"{unit(name)}, such as {quantity.pattern}@1"
                 )
             found[name] = size
     return found
 
 
 def error(a: Mapping[str, Real], b: Mapping[str, Real], scale: Mapping[str, float]) -> float:
-    """Largest distance of two runs over channels and times, relative to the scales; infinite if one is shorter, or
-    does not determine a load that the other does."""
+    """Largest distance of two runs over channels and times, relative to the scales; infinite if one is shorter, or if
+    a load is determined in only one of them."""
     worst = 0.0
     for name, size in scale.items():
         if len(a[name]) != len(b[name]):

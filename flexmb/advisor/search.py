@@ -1,11 +1,11 @@
-"""The cheapest adequate model: up the ladder until one fits, then down to cheaper ones as long as they fit.
+"""Search for the cheapest adequate model: up the ladder until one is adequate, then down to cheaper adequate ones.
 
-The cost of a run follows from the highest frequency in it, and then from the operations of an evaluation. So the way up
-allows one highest frequency after the other, lowest first, and gives every body the best rung below it. The way down
-first leaps to models that are predicted to be much cheaper, however many bodies change, and then changes one body at a
+The cost of a run depends on the highest frequency in it, and then on the operations of an evaluation. The way up
+therefore raises a limit of the frequency step by step, and gives every body the best rung below it. The way down first
+tries models that are predicted to be much cheaper, in which several bodies may change, and then changes one body at a
 time.
 
-Every decision is a run of the whole scene; nothing is random and nothing is timed.
+Every decision is based on a run of the whole scene; nothing is random and nothing is timed.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ HOPELESS = 20.0
 MISSED = 2.0
 """A rung that missed the tolerance by this factor is not tried again when other bodies have become coarser."""
 SLACK, WORTH = 1.5, 0.9
-"""On the way down a rung is tried if its predicted cost is below this part of the cost of what fits: the first for a
-scene with one flexible body, as predictions may be off; the second for several, where trials are many.
+"""On the way down a rung is tried if its predicted cost is below this multiple of that of the adequate one: the first
+for a scene with one flexible body, because predictions are inaccurate; the second for several, to limit the trials.
 """
 LEAP, LEAPS, MANY = 0.75, 15, 20_000
-"""Leaps go to choices predicted to cost at most this part of the present one; so many are tried; beyond so many
-combinations only pairs of bodies change.
+"""LEAP: choices with at most this fraction of the predicted cost are tried first; LEAPS: at most so many of them; MANY:
+with more combinations than this, only pairs of bodies change.
 """
 FINALISTS = 3
-"""For so many adequate models, the cheapest by their fine runs, the best method is sought."""
+"""Number of adequate models, the cheapest by their fine runs, for which the best method is determined."""
 
 Choice = dict[str, Step]
 
 
 @dataclass(frozen=True)
 class Found:
-    """A model and its cheapest method; `exhausted`: whether the budget ended the walk down."""
+    """A model and its cheapest method; `exhausted`: whether the budget ended the search."""
 
     model: Model
     method: RunMethod
@@ -50,10 +50,10 @@ class Found:
 
 
 def search(ladders: dict[str, tuple[Step, ...]], confirmation: Confirmation, budget: float) -> Found | None:
-    """The cheapest adequate model that the walk finds, or None where no choice of rungs is adequate.
+    """The cheapest adequate model that the search finds, or None if no choice of rungs is adequate.
 
-    `ladders`: the steps of each body. `budget`: the walk down ends when its runs, compilation and output included, have
-    taken this many operations.
+    `ladders`: the steps of each body. `budget`: the search for cheaper models ends when its runs, compilation and
+    output included, have taken this many operations.
     """
     walk = _Walk(ladders, confirmation, budget)
     choice = walk.up()
@@ -75,7 +75,7 @@ class _Walk:
     def __init__(self, ladders: dict[str, tuple[Step, ...]], confirmation: Confirmation, budget: float) -> None:
         self.confirmation = confirmation
         known = highest_frequency(confirmation.bench.scene, confirmation.reference.model)
-        self.ladders = {  # a model finer than the reference costs more
+        self.ladders = {  # models with higher frequencies than the reference cost more than it
             name: tuple(step for step in steps if step.fastest <= known) for name, steps in ladders.items()
         }
         self.most = confirmation.bench.spent + budget
@@ -90,9 +90,9 @@ class _Walk:
         return self.confirmation.bench.spent > self.most
 
     def up(self) -> Choice | None:
-        """The first choice on the way up that fits.
+        """The first choice on the way up that is adequate.
 
-        If none fits, the choices that were predicted to be hopeless are tried, and then every rung of every body.
+        If none is, the choices with a large predicted error are tried, and then every rung of every body.
         """
         way = list(self.way())
         hopeful = [choice for choice in way if _error(choice) <= self.hopeless]
@@ -109,8 +109,8 @@ class _Walk:
             before = choice
 
     def finest_below(self, highest: float, levels: tuple[str, ...]) -> Choice:
-        """For every body the rung of one of the levels with the least predicted error and no higher frequency;
-        among equals, as where nothing is predicted, the most expensive.
+        """For every body the rung of one of the levels with the least predicted error and no higher frequency; among
+        equal ones, for example without predictions, the most expensive.
         """
         return {
             name: min(
@@ -128,8 +128,8 @@ class _Walk:
                 yield dearest | {name: step}
 
     def down(self, choice: Choice) -> None:
-        """Go to cheaper choices that fit until there are none or the budget is spent: simpler levels for all bodies,
-        the same rung for all, leaps, body by body.
+        """Try cheaper choices until none is adequate or the budget is spent: simpler levels for all bodies, the same
+        rung for all, much cheaper combinations, body by body.
         """
         highest = max((step.fastest for step in choice.values()), default=0.0)
         simpler = (self.finest_below(highest, LEVELS[:n]) for n in range(1, len(LEVELS)))
@@ -144,7 +144,7 @@ class _Walk:
             choice = settled
 
     def settled(self, choice: Choice) -> Choice:
-        """Give body after body the cheapest rung with which the scene still fits, until nothing changes."""
+        """Give one body after the other the cheapest rung with which the scene is adequate, until nothing changes."""
         changed = True
         while changed:
             changed = False
@@ -155,7 +155,7 @@ class _Walk:
         return choice
 
     def cheaper(self, choice: Choice, name: str) -> Choice | None:
-        """The choice with a cheaper rung for one body: of those that fit, the one whose run is the cheapest."""
+        """The choice with a cheaper rung for one body: of the adequate ones the one with the cheapest run."""
         slack = SLACK if len(self.ladders) == 1 else WORTH
         enough, best, least = self.expected(choice), None, self.confirmation.run_cost(model_of(choice))
         others = [choice | {name: step} for step in self.steps(name)]
@@ -170,14 +170,14 @@ class _Walk:
         return best
 
     def leap(self, choice: Choice) -> Choice | None:
-        """A much cheaper choice that fits, with other rungs for several bodies; the least predicted errors first."""
+        """A much cheaper adequate choice, with other rungs for several bodies; small predicted errors come first."""
         if len(self.ladders) < 2:
             return None
         others = sorted(self.leaps(choice), key=lambda each: (_error(each), self.expected(each)))
         return self.first_cheaper(choice, others[:LEAPS])
 
     def first_cheaper(self, choice: Choice, others: list[Choice]) -> Choice | None:
-        """The first of the others that fits and whose run takes fewer operations."""
+        """The first of the others that is adequate and whose run takes fewer operations."""
         least = self.confirmation.run_cost(model_of(choice))
         for other in others:
             if self.exhausted:
@@ -199,8 +199,8 @@ class _Walk:
                     yield other
 
     def leaps(self, choice: Choice) -> Iterator[Choice]:
-        """Choices predicted to be much cheaper, made of rungs that no other beats in error, operations and frequency
-        together; for all bodies at once or, where these are too many, for every two.
+        """Choices predicted to be much cheaper, of rungs that are Pareto-optimal in error, operations and frequency;
+        for all bodies at once or, if these combinations are too many, for every pair.
         """
         best = {name: _best(self.steps(name)) for name in self.ladders}
         many = prod(map(len, best.values())) > MANY
@@ -212,11 +212,11 @@ class _Walk:
                     yield other
 
     def steps(self, name: str) -> list[Step]:
-        """Rungs of a body that may fit: neither predicted to be hopeless nor seen to miss."""
+        """Rungs of a body that may be adequate: with no large predicted error and no large measured one."""
         return [s for s in self.ladders[name] if s.error <= self.hopeless and s.rung not in self.missed[name]]
 
     def expected(self, choice: Choice) -> float:
-        """Predicted operations."""
+        """Predicted operations of a choice."""
         return self.confirmation.cost.of(choice.values())
 
 
@@ -226,7 +226,7 @@ def _error(choice: Choice) -> float:
 
 
 def _best(steps: list[Step]) -> list[Step]:
-    """The steps that no other step equals or beats in everything."""
+    """The Pareto-optimal steps in error, operations and frequency; of equal ones the first."""
     merits = np.array([(step.error, step.operations, step.fastest) for step in steps]).reshape(-1, 3)
     found = []
     for i, step in enumerate(steps):

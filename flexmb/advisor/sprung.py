@@ -1,4 +1,4 @@
-"""A flexible body at a limb end as a rigid body on a spring hinge, by Frisch's equivalence relations."""
+"""Replacement of an outermost flexible body by a rigid body on a spring hinge, by Frisch's equivalence relations."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from flexmb.scene.schema import AngularCoordinate, Hinge, Revolute, Scene, Unive
 from flexmb.surrogate.lumping import rigid_equivalent, vector
 from flexmb.typing import Real
 
-_ACROSS = 1e-6  # cosine of axes that count as being at right angles
+_ACROSS = 1e-6  # axes count as orthogonal if the cosine of their angle is below this
 _CLAMP = ("origin", "root")
 
 
 def spring_hinged(scene: Scene, name: str) -> Scene:
     """The scene with the flexible body `name` rigid, on a spring hinge.
 
-    Its inboard hinge carries a clamp without mass, `<name>.clamp`, and the hinge `<name>.spring` joins the body to it:
-    about one axis, or two where low modes bend in two planes, at the point where the mismatch of (149)-(151) is least.
-    Springs give each axis the frequency of its mode with the base fixed, dampers its damping. Everything attached at
-    the clamp stays there. Raises ValueError where the body is not clamped at a limb end, starts deformed, or where its
-    modes do not turn it.
+    Its inboard hinge carries a clamp without mass, `<name>.clamp`, to which the hinge `<name>.spring` joins the body.
+    It has one axis, or two if low modes bend in two planes, at the point with the least mismatch of (149)-(151).
+    Springs and dampers give each axis the frequency and the damping of its mode with the base fixed. Loads and markers
+    at the clamp remain there. Raises ValueError if the body is not clamped, carries other bodies, or starts deformed,
+    or if its modes do not turn it.
     """
     body = next((each for each in scene.bodies if each.name == name), None)
     if not isinstance(body, BeamBody | ModalBody):
@@ -49,7 +49,7 @@ def spring_hinged(scene: Scene, name: str) -> Scene:
 
 
 def fitted_hinge(scene: Scene, name: str) -> Fit:
-    """The best hinge for the lowest mode, or for the lowest two that turn the body about axes across each other."""
+    """The best hinge for the lowest mode, or for the lowest two that turn the body about orthogonal axes."""
     body = appendage_of(scene, name)
     one = best_hinge(body)
     for mode in range(1, min(body.mode_count, 4)):
@@ -63,7 +63,7 @@ def fitted_hinge(scene: Scene, name: str) -> Fit:
 
 
 def _spring(body: BeamBody | ModalBody, fit: Fit) -> Hinge:
-    """From the clamp to the body: frames at the hinge's point, x (and y) along its axes while the body is at rest."""
+    """The hinge between clamp and body, with its frames at the fitted point, x (and y) along its axes at rest."""
     first = fit.hinge.axes[0]
     second = fit.hinge.axes[1] if len(fit.hinge.axes) == 2 else _across(first)
     frame = Rotation.from_matrix(np.column_stack([first, second, np.cross(first, second)]))
@@ -84,13 +84,13 @@ def _spring(body: BeamBody | ModalBody, fit: Fit) -> Hinge:
 
 
 def _across(axis: Real) -> Real:
-    """A unit vector at right angles to `axis`."""
+    """A unit vector orthogonal to `axis`."""
     other = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     return np.asarray(other / np.linalg.norm(other))
 
 
 def _damping_rate(body: BeamBody | ModalBody) -> float:
-    """Damping over stiffness (s) of the lowest mode."""
+    """Ratio (s) of damping and stiffness of the lowest mode."""
     model = flexible_model(body)
     if model.mode_count == 0 or not np.any(model.damping):
         return 0.0

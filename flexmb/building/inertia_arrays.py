@@ -22,14 +22,24 @@ def inertia_arrays(chain: list[BodyLink], m: int) -> tuple[dict[str, Any], dict[
     """Inertia at rest and modal integrals by body, slopes of level linear; the points left to sum at run time, and the
     second-order field of each."""
     body = np.zeros(len(chain), a.BODY)
-    pairs = {name: strip_zeros((len(chain), m, m)) for name in ("mff", "stiffness", "damping")}
-    modes = {name: strip_zeros((len(chain), 6, m)) for name in ("mfr", "gyration")}
-    body["orthogonal"] = body["uncoupled"] = True
     rigid = [k for k, link in enumerate(chain) if link.is_rigid and link.wheels == 0]
     alone = [chain[k] for k in rigid]
     body["rigid"][rigid] = rigid_inertia_rows(alone, outboard_frames(alone))
     summed = sorted(set(range(len(chain))).difference(rigid))
     bodies = {k: _tables(chain[k].level, chain[k].model, chain[k].wheels) for k in summed}
+    modes = _modal_arrays(chain, bodies, body, m)
+    integrals = _integrals(bodies, body, m)
+    points, seconds = _points(bodies, body, m)
+    return {"body": body, **modes, **integrals}, points, seconds
+
+
+def _modal_arrays(
+    chain: list[BodyLink], bodies: dict[int, InertiaTables], body: a.Record, m: int
+) -> dict[str, NDArray[Any]]:
+    """Inertia at rest, stiffness and damping; notes which of them are diagonal."""
+    pairs = {name: strip_zeros((len(chain), m, m)) for name in ("mff", "stiffness", "damping")}
+    modes = {name: strip_zeros((len(chain), 6, m)) for name in ("mfr", "gyration")}
+    body["orthogonal"] = body["uncoupled"] = True
     for k, each in bodies.items():
         model, n = chain[k].model, len(each.mff)
         body["rigid"][k], pairs["mff"][k, :n, :n] = each.rigid, each.mff
@@ -37,29 +47,40 @@ def inertia_arrays(chain: list[BodyLink], m: int) -> tuple[dict[str, Any], dict[
         modes["mfr"][k, :, :n], modes["gyration"][k, :, :n] = each.mfr, each.gyration
         body["orthogonal"][k] = _is_diagonal(each.mff)
         body["uncoupled"][k] = _is_diagonal(model.stiffness) and _is_diagonal(model.damping)
-    for name in ("product", "slope", "mass_slope"):
-        body[name] = -1
-    body["product"][summed], product = _rows(
-        [each.product for each in bodies.values()], strip_zeros((m // ROW, 1 + m, NUMBERS * ROW))
-    )
-    slopes = [each.slope for each in bodies.values()]
+    return pairs | modes
+
+
+def _integrals(bodies: dict[int, InertiaTables], body: a.Record, m: int) -> dict[str, NDArray[Any]]:
+    """Modal integrals of the bodies that have some; notes the row of each."""
     most = max((len(each.mff) for each in bodies.values()), default=0)  # no strips: these grow fast
-    mass_slopes = [each.mass_slope for each in bodies.values()]
-    body["slope"][summed], slope = _rows(slopes, np.zeros((most, most), a.SLOPE))
-    body["mass_slope"][summed], mass_slope = _rows(mass_slopes, np.zeros((most, most, most)))
+    empty = {
+        "product": strip_zeros((m // ROW, 1 + m, NUMBERS * ROW)),
+        "slope": np.zeros((most, most), a.SLOPE),
+        "mass_slope": np.zeros((most, most, most)),
+    }
+    found = {}
+    for name, one in empty.items():
+        body[name] = -1
+        body[name][list(bodies)], found[name] = _rows([getattr(each, name) for each in bodies.values()], one)
+    return found | {"moves": moving_columns(found["product"])}
+
+
+def _points(
+    bodies: dict[int, InertiaTables], body: a.Record, m: int
+) -> tuple[dict[str, NDArray[Any]], list[SecondOrder | None]]:
+    """The points left to sum at run time, and the second-order field of each; notes whose they are."""
+    counts = np.zeros(len(body), int)
+    counts[list(bodies)] = [0 if each.summed is None else len(each.summed.mass) for each in bodies.values()]
+    group(body, "point", counts)
     turning = [(p, i) for p in (each.summed for each in bodies.values()) if p is not None for i in range(len(p.mass))]
-    points = np.zeros(len(chain), int)
-    points[summed] = [0 if each.summed is None else len(each.summed.mass) for each in bodies.values()]
-    group(body, "point", points)
     point = np.zeros(len(turning), a.POINT)
     for row, (p, i) in zip(point, turning, strict=True):
         row["mass"], row["position"], row["offset"] = p.mass[i], p.position[i], p.com_offset[i]
         row["inertia"] = six(p.inertia[i])
         row["turning"] = bool(np.any(p.com_offset[i]) or np.any(p.inertia[i]))
     shapes = shape_rows([(p.rotation[i], p.translation[i]) for p, i in turning], m)
-    integrals = {"product": product, "moves": moving_columns(product), "slope": slope, "mass_slope": mass_slope}
     seconds = [None if p.second is None else p.second.map(lambda G, i=i: G[i]) for p, i in turning]
-    return {"body": body, **pairs, **modes, **integrals}, {"point": point, "point_mode": shapes}, seconds
+    return {"point": point, "point_mode": shapes}, seconds
 
 
 @lru_cache(maxsize=64)

@@ -7,7 +7,6 @@ from typing import assert_never
 
 import numpy as np
 
-from flexmb.building.numbering import wheels_by_body
 from flexmb.levels.body import BY_NAME
 from flexmb.levels.level import FidelityLevel
 from flexmb.modal.flexible import flexible_model
@@ -72,6 +71,14 @@ class Models:
         for wheel in self.wheels.get(name, ()):
             model = _with_wheel(model, wheel)
         return model
+
+
+def wheels_by_body(scene: s.Scene) -> dict[str, list[s.Wheel]]:
+    """Wheels of every body that has some, in the scene's order."""
+    found: dict[str, list[s.Wheel]] = {}
+    for wheel in scene.wheels:
+        found.setdefault(wheel.body, []).append(wheel)
+    return found
 
 
 def level_of(body: s.Body) -> FidelityLevel:

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from flexmb.building.links import BodyLink
+from flexmb.building.models import wheels_by_body
 from flexmb.scene import schema as s
 from flexmb.tables.state import Layout
-
-if TYPE_CHECKING:
-    from flexmb.building.links import BodyLink
 
 
 class Numbering:
     """Places of all coordinates in q and speeds in u, Jain & Rodriguez (3), (4): body by body hinge, modes, wheels."""
 
-    def __init__(self, chain: list[BodyLink], wheels: dict[str, list[s.Wheel]]) -> None:
+    def __init__(self, chain: list[BodyLink], scene: s.Scene) -> None:
         self.q: dict[str, slice] = {}
         self.u: dict[str, slice] = {}
         self.nq = self.nu = 0
         self.hinges: list[tuple[int, int]] = []  # by link, where its coordinates begin in q and its speeds in u
         self.modes: list[tuple[int, int]] = []  # likewise
-        quaternions = list[int]()
+        quaternions, wheels = list[int](), wheels_by_body(scene)
         for link in chain:
             if link.kind.quaternion >= 0:
                 quaternions.append(self.nq + link.kind.quaternion)
@@ -42,11 +39,3 @@ class Numbering:
         self.u[name] = slice(self.nu, self.nu + nu)
         self.nq += nq
         self.nu += nu
-
-
-def wheels_by_body(scene: s.Scene) -> dict[str, list[s.Wheel]]:
-    """Wheels of every body that has some, in the scene's order."""
-    found: dict[str, list[s.Wheel]] = {}
-    for wheel in scene.wheels:
-        found.setdefault(wheel.body, []).append(wheel)
-    return found

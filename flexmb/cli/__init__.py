@@ -1,6 +1,7 @@
-"""The command `flexmb`: thin, it only reads words and shows results.
+"""The command `flexmb`: it parses arguments and prints results; all else is in other rooms.
 
-What a command does is imported when it runs: `--help`, completion and a mistyped word load neither scenes nor NumPy.
+The code of a command is imported when it runs: `--help`, completion and mistyped arguments load neither scenes nor
+NumPy.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ Run it, write CSV and charts: `flexmb simulate scene.toml --t-end 10 --out resul
 
 def _show_version(asked: bool) -> None:
     if asked:
-        from flexmb.cli.versions import versions_text  # it asks the installed distributions
+        from flexmb.cli.versions import versions_text  # it reads the metadata of installed distributions
 
         typer.echo(versions_text())
         raise typer.Exit
@@ -48,12 +49,12 @@ def everything(
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show versions and end.")
     ] = False,
 ) -> None:
-    """Has no words of its own: the application's help stands above."""
+    """No text: the help of the application is above."""
 
 
 for command in (simulate, check, mass, equivalence, advise, linearize, campbell, export, reduce, schema, warmup):
     app.command()(command)
-app.command("import")(import_)  # as a function it cannot have this name
+app.command("import")(import_)  # `import` is a keyword and cannot be the name of a function
 
 
 def main() -> None:

@@ -14,10 +14,10 @@ from flexmb.output.writing import check_folder, folder
 
 def advise(
     scene: SceneFile,
-    tol: Annotated[float, typer.Option("--tol", help="Error allowed, a part of the quantity's scale.")] = 1e-2,
+    tol: Annotated[float, typer.Option("--tol", help="Allowed error, relative to the quantity's scale.")] = 1e-2,
     quantity: Annotated[
         list[str] | None,
-        typer.Option("--quantity", "-q", help="What matters; give it several times. Default: all markers' positions."),
+        typer.Option("--quantity", "-q", help="Quantity; may be repeated. Default: the positions of all markers."),
     ] = None,
     t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s; it starts at 0.")] = 10.0,
     out: Annotated[Path, typer.Option("--out", "-o", help="File of the reduced scene.")] = Path("out/advised.toml"),
@@ -25,10 +25,10 @@ def advise(
     no_user_code: NoUserCode = False,
 ) -> None:
     """
-    Which model of each flexible body, and which method, are good enough? Run the candidates; print why.
+    Find the cheapest model of each flexible body, and method, that give a quantity to a tolerance; print the reasons.
 
-    Rigid, rigid on a spring hinge, so many modes at some level, pieces: the cheapest that gives the quantity to the
-    tolerance, measured against the finest models that can be run, up to the same end. Writes the reduced scene.
+    Candidates are rigid bodies, rigid bodies on spring hinges, modes at several levels, and pieces. They are run up to
+    the given end, and measured against the finest models that can be run. Writes the reduced scene.
 
     **Examples**
 
@@ -38,7 +38,7 @@ def advise(
 
     **Quantities** are `marker:NAME.position`, `.orientation`, `.velocity`, `.angular_velocity`, `load:HINGE.torque`,
     `.force`, `wheel_load:WHEEL.torque`, `drive:NAME`, `energy.total`, `momentum.angular`, patterns such as
-    `marker:*.position`, and beginnings such as `energy`. Errors are relative to the range of the signal, or to the size
+    `marker:*.position`, and prefixes such as `energy`. Errors are relative to the range of the signal, or to the scale
     after @, in SI units.
 
     **Exit code**: 0 advised, 1 no model known to be adequate, 2 the scene or an option is wrong.

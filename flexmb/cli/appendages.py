@@ -1,4 +1,4 @@
-"""`flexmb equivalence`: modes or a rigid body on a spring hinge."""
+"""`flexmb equivalence`: modes compared with a rigid body on a spring hinge."""
 
 from __future__ import annotations
 
@@ -16,27 +16,28 @@ def equivalence(
     body: Annotated[str, typer.Argument(help="Name of the flexible body.", metavar="BODY", show_default=False)],
     accuracy: Annotated[float, typer.Option(help="Relative difference that counts as equal, such as 0.05.")] = 0.05,
     modes: Annotated[
-        int | None, typer.Option(help="How many modes to look at; default all good ones.", show_default=False)
+        int | None, typer.Option(help="Number of modes; by default all accurate ones.", show_default=False)
     ] = None,
     axis: Annotated[
         list[str] | None,
-        typer.Option(help="Hinge axis, `y` or `0,0.6,0.8`, body axes; give it twice or thrice for more axes."),
+        typer.Option(help="Hinge axis, `y` or `0,0.6,0.8`, body axes; may be repeated for two or three axes."),
     ] = None,
     mode: Annotated[
-        list[int] | None, typer.Option(help="Mode that the hinge stands for, from 1; one for each axis.")
+        list[int] | None, typer.Option(help="Mode that the hinge replaces, from 1; one for each axis.")
     ] = None,
     point: Annotated[
-        str | None, typer.Option(help="A hinge to be judged as well, m from the clamp: `0.4,0,0`.", show_default=False)
+        str | None, typer.Option(help="A further hinge, m from the clamp: `0.4,0,0`.", show_default=False)
     ] = None,
     angle: Annotated[float, typer.Option(help="Hinge angle in rad for the displacement forms (47), (49).")] = 0.1,
     picture: Annotated[Path, typer.Option("--picture", "-o", help="Picture file.")] = Path("out/equivalence.png"),
     no_user_code: NoUserCode = False,
 ) -> None:
     """
-    Modes or a rigid body on a spring hinge? Compare both models of an appendage; print tables, write a picture.
+    Compare two models of an appendage, modes and a rigid body on a spring hinge; print tables, write a picture.
 
-    The appendage is a flexible body at a limb end, clamped at its hinge. Frisch's three equivalence relations as
-    numbers, the best hinge and its spring, how many modes are needed, and which model is better for which question.
+    The appendage is a flexible body that carries nothing and is clamped at its hinge. The tables have the differences
+    in Frisch's three equivalence relations, the best hinge and its spring, the number of modes that are needed, and
+    which model is better for which question.
 
     **Examples**
 

@@ -1,4 +1,4 @@
-"""`flexmb warmup`: compile the special kernels of scenes ahead."""
+"""`flexmb warmup`: compile the special kernels of scenes in advance."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from flexmb.cli.terminal import NoUserCode, console, no_traceback
 def warmup(
     scenes: Annotated[
         list[Path] | None,
-        typer.Argument(help="Scene files; none: general kernels, where the installation has none.", metavar="SCENE"),
+        typer.Argument(help="Scene files; without any, general kernels if they are not installed.", metavar="SCENE"),
     ] = None,
     method: Annotated[
-        list[str] | None, typer.Option(help="Beside `dop853` and `rk4`; may be repeated.", show_default=False)
+        list[str] | None, typer.Option(help="In addition to `dop853`, `rk4`; may be repeated.", show_default=False)
     ] = None,
     algorithm: Annotated[
-        list[str] | None, typer.Option(help="Beside `articulated`; may be repeated.", show_default=False)
+        list[str] | None, typer.Option(help="In addition to `articulated`; may be repeated.", show_default=False)
     ] = None,
     no_user_code: NoUserCode = False,
 ) -> None:
     """
-    Compile the special kernels of scenes ahead: those of what the scenes contain, faster than the general ones.
+    Compile the special kernels of scenes in advance; they contain only what these scenes need, and are faster.
 
         flexmb warmup robot.toml
         flexmb warmup robot.toml --method radau5
 
-    From then on all runs of scenes that contain the same take them, in this process and in later ones, unless they are
-    asked for general ones (`FLEXMB_KERNELS=general`, or `flexmb.compile(scene, kernels="general")`).
+    From then on all runs of scenes with the same features use them, unless general kernels are requested
+    (`FLEXMB_KERNELS=general`, or `flexmb.compile(scene, kernels="general")`).
 
     **Exit code**: 0 compiled, 2 a scene is wrong, or a name does not exist.
     """

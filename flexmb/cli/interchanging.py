@@ -1,4 +1,4 @@
-"""`flexmb import`, `flexmb export` and `flexmb reduce`: models of other programs, and bodies for them."""
+"""`flexmb import`, `flexmb export` and `flexmb reduce`: models from other programs, and bodies for them."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.", show_de
 def import_(
     model: Annotated[Path, typer.Argument(help="URDF, MJCF (.xml) or SID file.", metavar="MODEL", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Scene file to write.")] = Path("scene.toml"),
-    free_base: Annotated[bool, typer.Option("--free-base", help="Of a URDF: the root link floats.")] = False,
+    free_base: Annotated[bool, typer.Option("--free-base", help="URDF: the root link is free.")] = False,
     repair: Annotated[
         bool,
-        typer.Option("--repair", help="Of a URDF: change tensors that no mass has as little as makes them possible."),
+        typer.Option("--repair", help="URDF: change impossible inertia tensors by the least amount."),
     ] = False,
 ) -> None:
     """
-    Make a scene of a robot (URDF, MJCF) or of a flexible body (SID).
+    Convert a robot (URDF, MJCF) or a flexible body (SID) to a scene.
 
-    What of the model the scene leaves out is printed. A SID body is held at its first node, ready to be copied.
+    Notes list what the scene omits of the model. A SID body is welded to the ground at its first node.
 
     **Examples**
 
@@ -74,7 +74,8 @@ def export(
             each.name: each for each in with_sid_bodies(loaded).bodies if isinstance(each, BeamBody | ModalBody)
         }
         if body not in flexible:
-            raise ValueError(f'"{body}" is no flexible body of the scene; these are: {", ".join(flexible) or "none"}')
+            names = ", ".join(flexible) or "none"
+            raise ValueError(f'"{body}" is not a flexible body of the scene; these are: {names}')
         folder(out.parent)
         write_sid(sid_of(flexible[body]), out)
     console.print("wrote", str(out), soft_wrap=True)
@@ -84,20 +85,20 @@ def reduce(
     stiffness: Annotated[
         Path, typer.Argument(help="K: .mtx, .hb, .rb, .op4 or .pch.", metavar="K", show_default=False)
     ],
-    mass: Annotated[Path, typer.Argument(help="M, or the file of K once more.", metavar="M", show_default=False)],
+    mass: Annotated[Path, typer.Argument(help="M, or the file of K again.", metavar="M", show_default=False)],
     nodes: Annotated[Path, typer.Argument(help="CSV: id,x,y,z[,dofs].", metavar="NODES", show_default=False)],
     interface: Annotated[
-        str, typer.Option(help="Numbers of the nodes for hinges, loads and markers: `1,12`.", show_default=False)
+        str, typer.Option(help="Numbers of the interface nodes, for hinges, loads and markers.", show_default=False)
     ],
     out: Out,
-    modes: Annotated[int, typer.Option(help="Modes of the structure held at these nodes.")] = 8,
+    modes: Annotated[int, typer.Option(help="Number of fixed-interface modes.")] = 8,
     free: Annotated[bool, typer.Option("--free", help="Free-free modes about the mass centre.")] = False,
     damping: Annotated[float, typer.Option(help="Damping ratio of every mode.")] = 0.0,
 ) -> None:
     """
     Reduce finite-element matrices to a flexible body (Craig and Bampton): a SID file, or a scene with the body.
 
-    Without `--free` the first interface node is the body's frame, and the modes are clamped there.
+    Without `--free` the first interface node is the body's frame, at which the modes are clamped.
 
     **Examples**
 
@@ -154,7 +155,7 @@ def _imported(model: Path, free_base: bool, repair: bool) -> tuple[Scene, tuple[
 
         imported = imported_sid(read_sid(model), model.stem)
         return _held(imported.body), imported.notes
-    raise ValueError(f'{model}: "{model.suffix}" is no known model: give .urdf, .xml (MJCF) or .sid')
+    raise ValueError(f'{model}: "{model.suffix}" is not a known kind of model: give .urdf, .xml (MJCF) or .sid')
 
 
 def _held(body: ModalBody | SidBody) -> Scene:

@@ -1,7 +1,9 @@
-"""`flexmb linearize` and `flexmb campbell`: linear models, and frequencies against a spin rate."""
+"""`flexmb linearize` and `flexmb campbell`: linear models, and frequencies as functions of a spin rate."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +16,8 @@ from flexmb.output.writing import check_folder
 
 if TYPE_CHECKING:
     from flexmb.linear.linear_model import LinearModel
+    from flexmb.system.tree_system import System
+    from flexmb.typing import Real
 
 
 def linearize(
@@ -22,9 +26,9 @@ def linearize(
         "equilibrium"
     ),
     spin: Annotated[
-        str | None, typer.Option(help="Hinge or wheel that spins steadily instead, at `--rate`.", show_default=False)
+        str | None, typer.Option(help="Hinge or wheel in a steady spin at `--rate`.", show_default=False)
     ] = None,
-    rate: Annotated[float, typer.Option(help="Its rate in rad/s.")] = 0.0,
+    rate: Annotated[float, typer.Option(help="Rate of the spin in rad/s.")] = 0.0,
     cut: Annotated[
         bool,
         typer.Option("--truncation/--no-truncation", help="Linearise again with twice the modes of every beam."),
@@ -37,8 +41,8 @@ def linearize(
     """
     Linearise a scene by exact derivatives; print frequency, damping and dominant coordinates of every mode.
 
-    At `equilibrium` and for a spin, functions of time stand still at their values at t = 0; at the `initial` state
-    prescribed motions go on as their functions have them.
+    At `equilibrium` and for a spin, functions of time have their constant values at t = 0; at the `initial` state
+    prescribed motions continue by their functions.
 
     **Examples**
 
@@ -46,8 +50,8 @@ def linearize(
         flexmb linearize gyrostat.toml --at initial --export gyrostat.npz
         flexmb linearize rotor.toml --spin shaft --rate 30
 
-    **Truncation** is the relative change of each eigenvalue when every beam has twice its modes: how far a frequency
-    may still fall. Motions that nothing holds are listed as rigid-body motions.
+    **Truncation** is the relative change of each eigenvalue when every beam has twice its modes, an estimate of the
+    truncation error. Motions without stiffness are listed as rigid-body motions.
 
     **Exported** are A, B, C, D of x' = A x + B f, y = C x + D f with x = [displacements; speeds], their names and
     units, the mass matrix and the eigenvalues.
@@ -55,39 +59,12 @@ def linearize(
     **Exit code**: 0 linearised, 1 no equilibrium was found, 2 the scene or an option is wrong.
     """
     with no_traceback():
-        from flexmb.linear.equilibrium import EquilibriumError, equilibrium
         from flexmb.linear.linear_tables import modes_table
-        from flexmb.linear.linearize import linearize as linearized
-        from flexmb.linear.spin import steady_spin
-        from flexmb.linear.truncation import truncation
-        from flexmb.scene.bodies import BeamBody
-        from flexmb.scene.files import load_scene
-        from flexmb.system.compile import compile
-        from flexmb.system.tree_system import System
-
-        def linear(system: System) -> LinearModel:
-            if spin is not None:
-                return steady_spin(system, spin, rate).linearize()
-            if at == "equilibrium":
-                return linearized(system, equilibrium(system), held=True)
-            return linearized(system)
 
         if at not in ("equilibrium", "initial"):
             raise ValueError(f"--at is equilibrium or initial, not {at!r}")
-        loaded = load_scene(scene)
-        try:
-            with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
-                model = linear(compile(loaded))
-                bends = any(isinstance(body, BeamBody) and body.level != "rigid" for body in loaded.bodies)
-                missing, note = None, ""
-                if cut and bends:
-                    try:
-                        missing = truncation(model, loaded, linear)
-                    except ArithmeticError as error:  # no equilibrium, or no accelerations: more modes may buckle
-                        note = f"truncation is not known, for with twice the modes of every beam: {error}"
-        except EquilibriumError as error:
-            errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
-            raise typer.Exit(EXIT_STOPPED) from None
+        with _no_steady_state(), console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
+            model, missing, note = _linearised(scene, at, spin, rate, cut)
         console.print(modes_table(model, missing))
         if note:
             console.print(Text(printable(note), style="yellow"))
@@ -95,22 +72,63 @@ def linearize(
             console.print("wrote", str(model.save(export)), soft_wrap=True)
 
 
+def _linearised(
+    scene: Path, at: str, spin: str | None, rate: float, cut: bool
+) -> tuple[LinearModel, Real | None, str]:
+    """The linear model, the truncation of its eigenvalues if asked for and known, and why it is not known."""
+    from flexmb.linear.equilibrium import equilibrium
+    from flexmb.linear.linearize import linearize as linearized
+    from flexmb.linear.spin import steady_spin
+    from flexmb.linear.truncation import truncation
+    from flexmb.scene.bodies import BeamBody
+    from flexmb.scene.files import load_scene
+    from flexmb.system.compile import compile
+
+    def linear(system: System) -> LinearModel:
+        if spin is not None:
+            return steady_spin(system, spin, rate).linearize()
+        if at == "equilibrium":
+            return linearized(system, equilibrium(system), held=True)
+        return linearized(system)
+
+    loaded = load_scene(scene)
+    model = linear(compile(loaded))
+    if not cut or not any(isinstance(body, BeamBody) and body.level != "rigid" for body in loaded.bodies):
+        return model, None, ""
+    try:
+        return model, truncation(model, loaded, linear), ""
+    except ArithmeticError as error:  # no equilibrium, or no accelerations: more modes may buckle
+        return model, None, f"the truncation is not known; with twice the modes of every beam: {error}"
+
+
+@contextmanager
+def _no_steady_state() -> Iterator[None]:
+    """Show the error of a search for an equilibrium or a steady spin, and exit with code 1."""
+    from flexmb.linear.newton import EquilibriumError
+
+    try:
+        yield
+    except EquilibriumError as error:
+        errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
+        raise typer.Exit(EXIT_STOPPED) from None
+
+
 def campbell(
     scene: SceneFile,
     hinge: Annotated[str, typer.Argument(help="Revolute hinge or wheel that spins.", metavar="HINGE")],
     rates: Annotated[str, typer.Option(help="Rates in rad/s: `from:to:count`.", show_default=False)],
     modes: Annotated[
-        int | None, typer.Option(help="How many of the lowest modes to draw; default all.", show_default=False)
+        int | None, typer.Option(help="Number of modes to draw, lowest first; by default all.", show_default=False)
     ] = None,
     picture: Annotated[Path, typer.Option("--picture", "-o", help="Picture file.")] = Path("out/campbell.png"),
     csv: Annotated[Path | None, typer.Option(help="File for the numbers.", show_default=False)] = None,
     no_user_code: NoUserCode = False,
 ) -> None:
     """
-    Frequencies and growth rates against a spin rate: a table and a picture.
+    Frequencies and growth rates as functions of a spin rate (Campbell diagram): a table and a picture.
 
-    At each rate the deformation is found in which nothing accelerates, and the scene linearised about it by exact
-    derivatives. Modes are seen from the turning bodies and followed by their shapes.
+    At each rate the scene is linearised about its steady state by exact derivatives. Frequencies are those in the
+    rotating frame, and modes are tracked by their shapes.
 
     **Examples**
 
@@ -121,22 +139,16 @@ def campbell(
     """
     with no_traceback():
         from flexmb.linear.campbell import campbell as diagram
-        from flexmb.linear.campbell_picture import write_campbell_plot
-        from flexmb.linear.equilibrium import EquilibriumError
         from flexmb.linear.linear_tables import campbell_table
         from flexmb.scene.files import load_scene
 
         loaded, values = load_scene(scene), range_of("rates", rates)
         for file in (picture, *([] if csv is None else [csv])):
             check_folder(file.parent)
-        try:
-            with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
-                result = diagram(loaded, hinge, values)
-        except EquilibriumError as error:
-            errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
-            raise typer.Exit(EXIT_STOPPED) from None
+        with _no_steady_state(), console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
+            result = diagram(loaded, hinge, values)
         console.print(campbell_table(result))
-        written = [write_campbell_plot(result, picture, modes)]
+        written = [result.plot(picture, modes)]
         if csv is not None:
             written.append(result.to_csv(csv))
     console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)

@@ -28,8 +28,8 @@ def mass(
         flexmb mass satellite.toml
         flexmb mass satellite.toml --body panel
 
-    Of the **scene**, centre and inertia are in World axes; of a **body**, in its own frame. Inertia is about the mass
-    centre: xx, yy, zz, xy, xz, yz. Wheels and point masses count as parts of what carries them.
+    Mass centre and inertia of the **scene** are in World axes, those of a **body** in its own frame. Inertia is about
+    the mass centre: xx, yy, zz, xy, xz, yz. Wheels and point masses are parts of the bodies that carry them.
 
     **Exit code**: 0 printed, 2 the scene is wrong, or has no such body.
     """
@@ -44,7 +44,7 @@ def mass(
         console.print(_table(system.scene.name, rows))
 
 
-_AXES = "Of the scene in World axes, of bodies in their own frames; inertia about the mass centre."
+_AXES = "Scene: World axes; bodies: their own frames; inertia about the mass centre."
 
 
 def _table(scene: str, rows: list[tuple[str, MassProperties]]) -> Listing:
@@ -59,7 +59,7 @@ def _table(scene: str, rows: list[tuple[str, MassProperties]]) -> Listing:
 
 
 def _numbers(values: Iterable[float]) -> str:
-    """Six digits; what rounding has left of the largest is zero."""
+    """Numbers with six digits; those that are rounding errors of the largest are printed as zero."""
     found = [float(value) for value in values]
     largest = max(map(abs, found))
     kept = [0.0 if abs(value) < 1e-14 * largest else value for value in found]

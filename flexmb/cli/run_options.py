@@ -1,4 +1,4 @@
-"""The options of `flexmb simulate`, one type each: what typer reads, and `--help` shows."""
+"""The options of `flexmb simulate`, one type for each."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from flexmb.integrate.integrator import Method
 METHODS = ", ".join(f"`{name}`" for name in get_args(Method))
 
 EndTime = Annotated[float, Option("--t-end", help="End of the run in s.", show_default=False)]
-StartTime = Annotated[float | None, Option("--from-time", help="Start of the run in s; 0.", show_default=False)]
+StartTime = Annotated[float | None, Option("--from-time", help="Start of the run in s; default 0.", show_default=False)]
 Samples = Annotated[int, Option(help="Output times, equally spaced, both ends included.")]
 
-MethodName = Annotated[str, Option(help=f"{METHODS}: see docs/integrators.md. Methods of equal steps need `--step`.")]
-Relative = Annotated[float, Option(help="Relative error allowed in a step.")]
-Absolute = Annotated[float, Option(help="Absolute error allowed in a step, SI units.")]
+MethodName = Annotated[str, Option(help=f"{METHODS}: see docs/integrators.md. Fixed-step methods need `--step`.")]
+Relative = Annotated[float, Option(help="Relative tolerance for the error of a step.")]
+Absolute = Annotated[float, Option(help="Absolute tolerance for the error of a step, SI units.")]
 Step = Annotated[float | None, Option(help="Step in s (rk4, generalised_alpha).", show_default=False)]
 SpectralRadius = Annotated[
-    float | None, Option(help="What generalised_alpha leaves of unresolved modes in a step; 0.8.", show_default=False)
+    float | None, Option(help="Spectral radius of generalised_alpha; default 0.8.", show_default=False)
 ]
 AlgorithmName = Annotated[
     str,
@@ -35,13 +35,13 @@ Values = Annotated[
     Option("--set", help="A value in the scene, `rod.mass_kg=2.0`; may be repeated.", show_default=False),
 ]
 RestartFile = Annotated[
-    Path | None, Option(help="Go on from this `restart.npz` of another run, to the last bit.", show_default=False)
+    Path | None, Option(help="Resume from `restart.npz` of another run, bit-identically.", show_default=False)
 ]
 
 Folder = Annotated[Path, Option("--out", "-o", help="Folder for trajectory.csv and charts.")]
 Also = Annotated[
     list[str] | None,
-    Option(help="Besides the CSV: `npz`, `parquet`, or `rrd` for the viewer rerun; may be repeated."),
+    Option(help="In addition to the CSV: `npz`, `parquet`, or `rrd` for the viewer rerun; may be repeated."),
 ]
 Plots = Annotated[bool, Option("--plots/--no-plots", help="Write charts beside the CSV.")]
 Sections = Annotated[
@@ -49,5 +49,5 @@ Sections = Annotated[
     Option(help="Loads across a beam's sections, to sections-BEAM.csv: `BEAM`, or `BEAM:x,x,...` in m."),
 ]
 ErrorEstimate = Annotated[
-    bool, Option("--error-estimate", help="Run again, tighter, and print the largest error of each channel.")
+    bool, Option("--error-estimate", help="Run again with tighter tolerances; print each channel's largest error.")
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.text import Text
@@ -17,7 +17,7 @@ from flexmb.output.writing import check_folder, folder
 
 if TYPE_CHECKING:
     from flexmb.run.trajectory import Trajectory
-    from flexmb.scene.schema import Scene
+    from flexmb.scene.bodies import BeamBody
 
 FORMATS = {"npz": "to_npz", "parquet": "to_parquet", "rrd": "to_rerun"}
 """Endings, and the methods of a trajectory that write them."""
@@ -67,48 +67,67 @@ def simulate(
     **Exit code**: 0 finished, 1 stopped before the end (what was reached is written), 2 the scene or an option is
     wrong, or the scene is doubtful with `--strict`, 130 interrupted by Ctrl-C (what was reached is written).
     """
-    interrupted = False
     with no_traceback(strict):
-        from flexmb.run.interruption import Interrupted
-        from flexmb.run.restart import Restart
-        from flexmb.run.section_table import write_sections
-        from flexmb.run.simulate import simulate as run  # after the words are understood: it loads the compiler
-        from flexmb.run.summary import errors_table, summary
-        from flexmb.scene.files import load_scene
-        from flexmb.scene.values import parsed
-
         check_folder(out)
         strange = [word for word in also or () if word not in FORMATS]
         if strange:
             raise ValueError(f"--also is one of {', '.join(FORMATS)}; got {strange[0]!r}")
-        loaded = load_scene(scene)
-        wanted = dict(_sections(loaded, word) for word in sections or ())
+        wanted = _sections(scene, sections or ())
+        settings = {
+            "method": method, "t_start": from_time, "rtol": rtol, "atol": atol, "step": step, "samples": samples,
+            "algorithm": algorithm, "spectral_radius": spectral_radius,
+        }  # fmt: skip
         with console.status(Text(f"simulating {scene} (the first run after an update compiles)")):
-            changed = load_scene(scene).with_values(dict(map(parsed, values or ())))
-            begin = None if restart is None else Restart.load(restart)
-            try:
-                trajectory = run(
-                    changed, t_end, method, t_start=from_time, state=begin,  # type: ignore[arg-type]
-                    rtol=rtol, atol=atol, step=step, samples=samples, algorithm=algorithm,  # type: ignore[arg-type]
-                    spectral_radius=spectral_radius,
-                )  # fmt: skip
-            except Interrupted as stopped:
-                trajectory, interrupted = stopped.trajectory, True
-        console.print(summary(trajectory))  # first: a full disk takes the files only
-        written = _written(trajectory, out, also or (), plots)
-        console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
-        for name, x in wanted.items():  # from here on the run itself is safe
-            loads, path = trajectory.section_loads(name, x), out / f"sections-{name}.csv"
-            write_sections(path, trajectory.t, loads)
-            console.print("wrote", str(path), soft_wrap=True)
+            trajectory, interrupted = _run(scene, t_end, values or (), restart, settings)
+        _report(trajectory, out, also or (), plots, wanted)
         if error and not interrupted:
-            with console.status(Text("running again, tighter")):
-                estimated = errors_table(trajectory, trajectory.error_estimate())
-            console.print(estimated)
+            _estimate_error(trajectory)
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
     if not trajectory.finished:
         raise typer.Exit(EXIT_STOPPED)
+
+
+def _run(
+    scene: Path, t_end: float, values: Sequence[str], restart: Path | None, settings: dict[str, Any]
+) -> tuple[Trajectory, bool]:
+    """The trajectory of the scene with other values, and whether Ctrl-C interrupted it."""
+    from flexmb.run.interruption import Interrupted
+    from flexmb.run.restart import Restart
+    from flexmb.run.simulate import simulate as run  # only now, since it loads the compiler
+    from flexmb.scene.files import load_scene
+    from flexmb.scene.values import parsed
+
+    changed = load_scene(scene).with_values(dict(map(parsed, values)))
+    state = None if restart is None else Restart.load(restart)
+    try:
+        return run(changed, t_end, state=state, **settings), False
+    except Interrupted as stopped:
+        return stopped.trajectory, True
+
+
+def _report(
+    trajectory: Trajectory, out: Path, also: Sequence[str], plots: bool, sections: dict[str, list[float]]
+) -> None:
+    """Print the summary first, since a full disk then costs the files only; write the files, section loads last."""
+    from flexmb.run.section_table import write_sections
+    from flexmb.run.summary import summary
+
+    console.print(summary(trajectory))
+    written = _written(trajectory, out, also, plots)
+    console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
+    for name, x in sections.items():
+        path = out / f"sections-{name}.csv"
+        write_sections(path, trajectory.t, trajectory.section_loads(name, x))
+        console.print("wrote", str(path), soft_wrap=True)
+
+
+def _estimate_error(trajectory: Trajectory) -> None:
+    from flexmb.run.summary import errors_table
+
+    with console.status(Text("running again with tighter tolerances")):
+        estimated = errors_table(trajectory, trajectory.error_estimate())
+    console.print(estimated)
 
 
 def _written(trajectory: Trajectory, out: Path, also: Sequence[str], plots: bool) -> list[Path]:
@@ -127,12 +146,18 @@ def _written(trajectory: Trajectory, out: Path, also: Sequence[str], plots: bool
     return [*writers, *(trajectory.plot(out) if plots else ())]
 
 
-def _sections(scene: Scene, word: str) -> tuple[str, list[float]]:
-    """A beam and positions along it (m), by default equally spaced ones; ValueError where there is no such beam."""
+def _sections(scene: Path, words: Sequence[str]) -> dict[str, list[float]]:
+    """Positions (m) along beams of the scene by the beams' names."""
     from flexmb.scene.bodies import BeamBody
+    from flexmb.scene.files import load_scene
 
+    beams = {body.name: body for body in load_scene(scene).bodies if isinstance(body, BeamBody)}
+    return dict(_section(beams, word) for word in words)
+
+
+def _section(beams: dict[str, BeamBody], word: str) -> tuple[str, list[float]]:
+    """A beam and positions along it (m), equally spaced by default; ValueError if there is no such beam."""
     name, _, places = word.rpartition(":") if ":" in word else (word, "", "")
-    beams = {body.name: body for body in scene.bodies if isinstance(body, BeamBody)}
     if word in beams:  # a name may hold a colon
         name, places = word, ""
     if name not in beams:

@@ -10,7 +10,7 @@ from rich.text import Text
 from flexmb.cli.terminal import NoUserCode, SceneFile, Strict, console, no_traceback
 from flexmb.output.printable import printable
 
-End = Annotated[float | None, typer.Option("--t-end", help="Check that profiles cover the run up to here, in s.")]
+End = Annotated[float | None, typer.Option("--t-end", help="End of the run in s, which functions must cover.")]
 
 
 def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_code: NoUserCode = False) -> None:
@@ -20,8 +20,8 @@ def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_c
         flexmb check boom.toml --t-end 60
         flexmb check boom.toml --strict
 
-    What is doubtful is a warning, on stderr: numbers that no usual structure has, as after a slip of units. A scene
-    that means it says so under `allow`.
+    Doubtful values, which usually result from an error of units, cause warnings on stderr. A scene declares them as
+    intended under `allow`.
 
     **Exit code**: 0 sound, 2 wrong, or with `--strict` doubtful.
     """

@@ -1,4 +1,4 @@
-"""Common parts of all commands: consoles, exit codes, options that are read from text, and errors as messages."""
+"""Common parts of all commands: consoles, exit codes, parsing of options, and errors as messages."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from flexmb.output.writing import in_words
 from flexmb.scene.problems import SceneError, SceneWarning
 from flexmb.scene.user_code import forbid_user_code
 
-MOST_STEPS = 10_000  # of a range: each is a steady state that is sought
+MOST_STEPS = 10_000  # of a range; each step computes a steady state
 EXIT_STOPPED = 1
 EXIT_USAGE = 2
-EXIT_INTERRUPTED = 130  # as of shells: 128 and the number of the signal
+EXIT_INTERRUPTED = 130  # the convention of shells: 128 plus the number of the signal
 
 console = Terminal()
 errors = Terminal(stderr=True)
@@ -43,7 +43,7 @@ NoUserCode = Annotated[
 
 
 def vector(option: str, text: str) -> tuple[float, ...]:
-    """Three numbers, or the unit vector of x, y, z."""
+    """Three numbers, or the unit vector along x, y or z."""
     if text in ("x", "y", "z"):
         return tuple(float(text == name) for name in "xyz")
     try:
@@ -56,7 +56,7 @@ def vector(option: str, text: str) -> tuple[float, ...]:
 
 
 def range_of(option: str, text: str) -> list[float]:
-    """`from:to:count`, ends included."""
+    """Equally spaced numbers from `from:to:count`, both ends included."""
     try:
         first, last, count = text.split(":")
         start, stop, steps = float(first), float(last), int(count)
@@ -69,7 +69,7 @@ def range_of(option: str, text: str) -> list[float]:
 
 @contextmanager
 def no_traceback(strict: bool = False) -> Iterator[None]:
-    """Warnings, and errors that the user can put right, are shown as messages on stderr, not as tracebacks.
+    """Print warnings, and errors that the user can correct, as messages on stderr, without tracebacks.
 
     `strict`: warnings about the scene are errors.
     """
@@ -93,6 +93,6 @@ def _messages() -> Iterator[None]:
         text = in_words(error) if isinstance(error, OSError) else str(error)
         errors.print(Text("error: ", style="bold red") + Text(printable(text)), soft_wrap=True)
         raise typer.Exit(EXIT_USAGE) from None
-    except ArithmeticError as error:  # there are no accelerations, or they overflow
+    except ArithmeticError as error:  # the accelerations do not exist, or overflow
         errors.print(Text("error: ", style="bold red") + Text(str(error)), soft_wrap=True)
         raise typer.Exit(EXIT_STOPPED) from None

@@ -1,4 +1,4 @@
-"""What `flexmb --version` says."""
+"""The output of `flexmb --version`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ from flexmb.output.versions import version_of
 
 
 def versions_text() -> str:
-    """This package, Python, and the libraries that decide what comes out and how fast."""
+    """Versions of this package, Python, and the libraries on which results and speed depend."""
     lines = [f"flexmb {version_of('flexmb')}", f"Python {platform.python_version()}"]
     return "\n".join([*lines, *(f"{name} {version_of(name)}" for name in ("numba", "numpy", "scipy"))])

@@ -21,7 +21,7 @@ from flexmb.scene.schema import Closure
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.state import Layout
 from flexmb.tables.status import CLOSURE_SINGULAR, OUT_OF_RANGE
-from flexmb.typing import Index, Real
+from flexmb.typing import Flags, Index, Real
 
 STIFF = 100.0  # periods of the slowest mode, over 2 pi, for which bodies resist being bent by the closing of loops
 BESIDE = 2.0**-11  # sizes of the mechanism, from a singular position to where its closure loads are found
@@ -307,9 +307,20 @@ class Closures:
         dynamics.count_rows(self._chain.cc, self._own)
         self._counted[0] = _Counted(self._own.rank.copy(), self._own.size.copy())
 
-    def count_as(self, other: Closures) -> None:
-        """As many independent rows as the same closures have on a tree of the same freedom."""
-        self._counted[0] = other._counted[0]
+    def begin_at(self, t: float, y: Real, before: Closures | None = None) -> None:
+        """Count the independent rows at y = [q, u, work], which closes all closures, where the scene's values may not.
+
+        `before`: the same closures in the scene before; their rows are taken where the same speeds were prescribed.
+        """
+        if before is not None and np.array_equal(self._is_prescribed, before._is_prescribed):
+            self._counted[0] = before._counted[0]
+        else:
+            self.linearise(t, y)
+            self.count_rows()
+
+    @property
+    def _is_prescribed(self) -> Flags:
+        return self.constants[0].speed["prescribed"] >= 0
 
     @property
     def rank(self) -> int:

@@ -1,1 +1,1 @@
-"""What connectors exert, from the motion of what they join: laws of loads, lines, bushings, springs and friction."""
+"""Loads of connectors from the motion of the frames that they join: load laws, lines, bushings, springs, friction."""

@@ -14,7 +14,7 @@ from flexmb.tables.features import COORDINATE_LAWS, HINGE_ACTUATORS, HINGE_SPRIN
 
 @helper
 def add_loads_along_hinges(c, w):
-    """Loads of all springs and laws along coordinates, added to w.speed.applied."""
+    """Add the loads of all springs and laws along coordinates to w.speed.applied."""
     evaluate_along_hinges(c, w)
     for i in range(c.hinge_spring.shape[0]):
         w.speed[c.hinge_spring[i].speed].applied += w.hinge_spring[i].load
@@ -24,7 +24,7 @@ def add_loads_along_hinges(c, w):
 
 @helper
 def evaluate_along_hinges(c, w):
-    """The same into w.hinge_spring and w.coordinate_law, with energy and power."""
+    """Write loads, energies and powers of all springs and laws to w.hinge_spring and w.coordinate_law."""
     if has(c, HINGE_SPRINGS):
         for i in range(c.hinge_spring.shape[0]):
             _spring(c, w, i)
@@ -64,7 +64,7 @@ def _law(c, w, i):
 
 @helper
 def stored_along_hinges(c, w):
-    """Energy (J) at the last evaluation."""
+    """Energy in J at the last evaluation."""
     total = 0.0
     for i in range(c.hinge_spring.shape[0]):
         total += w.hinge_spring[i].energy
@@ -76,7 +76,7 @@ def stored_along_hinges(c, w):
 
 @helper
 def power_along_hinges(c, w):
-    """Power (W) of dampers, stops, actuators and laws at the last evaluation."""
+    """Power in W of dampers, stops, actuators and laws at the last evaluation."""
     total = 0.0
     for i in range(c.hinge_spring.shape[0]):
         total += w.hinge_spring[i].power

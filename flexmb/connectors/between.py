@@ -1,4 +1,4 @@
-"""Connectors between two frames: which kind it is, what all of them store, and what they lose."""
+"""Connectors between two frames: dispatch by kind, and sums of energy and power."""
 
 from flexmb.connectors.bushings import load_of_bushing
 from flexmb.connectors.line import load_along_line
@@ -10,7 +10,10 @@ from flexmb.tables.features import BUSHINGS
 
 @helper
 def load_between(c, w, i, A, B):
-    """Load of connector i on B about B into w.connector[i], from (position, rotation, velocity) of A and B in World."""
+    """Write the load of connector i on B about B to w.connector[i].
+
+    A and B are (position, rotation, velocity) of the two frames, World axes.
+    """
     if has(c, BUSHINGS) and c.connector[i].kind == BUSHING:
         load_of_bushing(c, w, i, A, B)
     else:
@@ -19,7 +22,7 @@ def load_between(c, w, i, A, B):
 
 @helper
 def stored_in_connectors(w):
-    """Energy (J) at the last evaluation."""
+    """Energy in J at the last evaluation."""
     total = 0.0
     for i in range(w.connector.shape[0]):
         total += w.connector[i].energy
@@ -28,7 +31,7 @@ def stored_in_connectors(w):
 
 @helper
 def connector_power(w):
-    """Power (W) of dampers and actuators at the last evaluation."""
+    """Power in W of dampers and actuators at the last evaluation."""
     total = 0.0
     for i in range(w.connector.shape[0]):
         total += w.connector[i].power

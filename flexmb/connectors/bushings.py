@@ -1,13 +1,13 @@
-"""Bushings: six stiffnesses and more between two frames, for any rotation below half a turn.
+"""Bushings: linear stiffness and damping (6,6) between two frames, for any rotation below half a turn.
 
-The displacement of B seen from A is xi = [theta; x], theta = log(R_A'R_B) and x = R_A'(p_B - p_A), in axes of A. With
-the angular velocity w_rel = J theta' of B relative to A, J the left Jacobian of the exponential, its rate is
+The displacement of B relative to A is xi = [theta; x], theta = log(R_A'R_B) and x = R_A'(p_B - p_A), in axes of A. The
+angular velocity of B relative to A is w_rel = J theta', J the left Jacobian of the exponential. The rate of xi is
 
     theta' = J^-1 w_rel        x' = R_A'(v_B - v_A) - w_A x x
 
-Generalised loads g = K xi + D xi' do the work g . xi'; hence the load on B about B is -[J'^-1 g_theta; g_x], and that
-of the springs is exactly the derivative of the energy 1/2 xi . K xi, however far B has turned. At half a turn theta
-jumps to the other side, and the energy with it: a bushing ends the run ten degrees before.
+The generalised loads g = K xi + D xi' have the power g . xi'; hence the load on B about B is -[J'^-1 g_theta; g_x]. The
+elastic part is exactly the derivative of the energy 1/2 xi . K xi at any rotation. At half a turn theta jumps, and the
+energy with it: a run ends ten degrees before.
 """
 
 from math import cos, radians
@@ -30,7 +30,10 @@ LEAST_UPRIGHT = cos(0.5 * radians(170.0)) ** 2
 
 @helper
 def load_of_bushing(c, w, i, A, B):
-    """Load, energy and power of connector i into w.connector[i], from (position, rotation, velocity) of A and B."""
+    """Write load, energy and power of connector i to w.connector[i].
+
+    A and B are (position, rotation, velocity) of the two frames, World axes.
+    """
     R_A, arm, row = A[1], sub(B[0], A[0]), c.connector[i].row
     q = quaternion_of_matrix(matmul(transpose(R_A), B[1]))
     theta, x = rotation_vector(q[0], q[1], q[2], q[3]), times_t(R_A, arm)
@@ -53,7 +56,10 @@ def load_of_bushing(c, w, i, A, B):
 
 @helper
 def overturned(c, w):
-    """A bushing that is turned beyond its range, or -1. Of lanes: of all of them; what goes on of some is NaN."""
+    """A bushing that is turned beyond its range, or -1.
+
+    In lanes, one that is so in all copies; the copies in which it is so alone have loads NaN and end by that.
+    """
     for i in range(c.connector.shape[0]):
         if c.connector[i].kind == BUSHING and every(w.connector[i].upright.real <= LEAST_UPRIGHT):
             return i

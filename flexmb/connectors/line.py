@@ -1,8 +1,8 @@
 """Springs, dampers and actuators along the line from A to B.
 
-With d = p_B - p_A, length L = sqrt(d.d + s^2) and direction n = d/L, whose rate is L' = n . (v_B - v_A), the tension is
-T = F(L - L0) + c L' - f, and the load on B is -T n. The smoothing s, a hundred-millionth of the free length, gives the
-line a direction where its ends meet: the load vanishes there, and stays the derivative of the energy.
+With d = p_B - p_A, the length L = sqrt(d.d + s^2), its rate L' = n . (v_B - v_A) and n = d/L, the tension is
+T = F(L - L0) + c L' - f, and the load on B is -T n. The smoothing length s (`flexmb.building.connector_arrays`) makes n
+continuous where the ends meet: the load vanishes there, and its elastic part remains the derivative of the energy.
 """
 
 from flexmb.connectors.laws import resistance
@@ -18,7 +18,10 @@ from flexmb.tables.features import ACTUATORS, ONE_SIDED
 
 @helper
 def load_along_line(c, w, i, A, B):
-    """Load, energy and power of connector i into w.connector[i], from (position, rotation, velocity) of A and B."""
+    """Write load, energy and power of connector i to w.connector[i].
+
+    A and B are (position, rotation, velocity) of the two frames, World axes.
+    """
     d, smoothing = sub(B[0], A[0]), c.connector[i].smoothing
     length = sqrt(dot(d, d) + smoothing * smoothing)
     n = scale(1.0 / length, d)
@@ -40,7 +43,7 @@ def load_along_line(c, w, i, A, B):
 
 @helper
 def _while_loaded(acts, elastic, tension):
-    """The tension of what neither damps while it is slack nor pushes where it may only pull."""
+    """The tension of a one-sided connector: zero while it is slack, and where damping would reverse its sign."""
     if acts == TENSION:
         return select((elastic.real > 0.0) & (tension.real > 0.0), tension, 0.0)
     if acts == COMPRESSION:

@@ -59,7 +59,7 @@ class Feedback:
         self._plant, self._algorithm, self._tables = plant, algorithm, tables
         self._wiring = wired(plant)
         constants, workspace = tables
-        self._outputs = plant._observation.outputs()
+        self._outputs = plant.observation.outputs()
         self._tree, self._tree_workspace = plant.constants, plant.workspace()
         where = np.zeros(a.ADDRESSES, np.int64)
         where[a.MOTION], where[a.CONSTANTS], where[a.WORKSPACE] = addresses(
@@ -82,7 +82,7 @@ class Feedback:
         self._called = self._callbacks()
         self._loads, self._drives = self._outputs.loads, self._outputs.drives
         if np.any(self._wiring.sensor["kind"] >= a.LOAD) and not where[a.OBSERVING]:
-            self._loads = np.zeros((len(plant._observation.names.hinges) + len(plant.scene.closures), 6))
+            self._loads = np.zeros((len(plant.observation.names.hinges) + len(plant.scene.closures), 6))
             self._called.append(Called(self._find_loads, ()))
             where[a.ASKING] = self._called[-1].address
         self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # that of others is for Python to ask for
@@ -132,7 +132,8 @@ class Feedback:
             posed = problem(*kernels, leaps)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
         ends = _with_instants(ends, table["time"][table["time"] > start], t_end)
-        return Begun(posed, y, Clock(clock.times, ends), controlled)
+        farthest = clock.farthest if len(table) == 0 else t_end  # a leap crosses no instant
+        return Begun(posed, y, Clock(clock.times, ends, farthest), controlled)
 
     def _start_after_samples(self, t: float, y: Real, made: a.Loop) -> None:
         """What sampled controllers say from the first instant on is there when continuous ones start."""
@@ -210,7 +211,7 @@ class Feedback:
         loop.project(begin.state.t, y, self.running)  # by which closures learn where they are
         status = loop.rhs(begin.state.t, y, slope, self.running, self.running)
         self.raise_trouble()
-        self._plant._check(status, int(self._tables[1].fault[0]))
+        self._plant.check_status(status, int(self._tables[1].fault[0]))
         return slope[nq : nq + nu]
 
     def _only_at(self, begin: Starting) -> Real:
@@ -306,15 +307,15 @@ class Feedback:
         )
 
     @property
-    def _observation(self) -> Any:
+    def observation(self) -> Any:
         """As of the system: what is observed has the same names."""
-        return self._plant._observation
+        return self._plant.observation
 
-    def _observe_row(self, t: float, y: Real, algorithm: Any, row: Real) -> None:
+    def observe_row(self, t: float, y: Real, algorithm: Any, row: Real) -> None:
         """As of the system, with what the controllers said at t."""
         loop.hold(t, y, self.running)
         self.raise_trouble()
-        self._plant._observe_row(t, self.running.y.copy(), algorithm, row)
+        self._plant.observe_row(t, self.running.y.copy(), algorithm, row)
 
     @property
     def _has_markers(self) -> bool:
@@ -324,10 +325,10 @@ class Feedback:
 
     def _find_loads(self, t: float) -> None:
         """Loads at s.y as outputs have them; NaN where there are none, which ends a run that uses them."""
-        observation = self._plant._observation
+        observation = self._plant.observation
         row = np.zeros((1, observation.width))
         try:
-            self._plant._observe_row(t, self.running.y.copy(), self._algorithm.name, row[0])
+            self._plant.observe_row(t, self.running.y.copy(), self._algorithm.name, row[0])
         except DynamicsError:
             row[:] = np.nan
         found = observation.columns_of(row)

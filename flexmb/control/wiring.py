@@ -128,7 +128,7 @@ def _sensors(system: System) -> tuple[Record, Record, Real, dict[str, slice]]:
 
 def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
     """Kind, place, width and axes."""
-    observed = system._observation.names
+    observed = system.observation.names
     match sensor:
         case CoordinateSensor(of=of, quantity="value"):
             place = system.coordinate(of)

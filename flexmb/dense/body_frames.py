@@ -1,4 +1,4 @@
-"""Where every body, inertia point and site is along a motion, as jets in World axes."""
+"""Frames of all bodies, inertia points and sites along a motion, as jets (`flexmb.dense.jets`) in World axes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Motions(NamedTuple):
     rates: Real
 
     def hinge(self, member: Member) -> Jet:
-        """Coordinates of a hinge whose speeds are their rates, (B,1,n)."""
+        """Coordinates (B,1,n) of a hinge whose speeds are the rates of its coordinates."""
         return self._part(member.q_hinge, member.u_hinge)
 
     def modes(self, member: Member) -> Jet:
@@ -37,7 +37,7 @@ class Motions(NamedTuple):
         return self._part(member.q_modes, member.u_modes)
 
     def spin(self, rotor: Rotor) -> Jet:
-        """Angle of a wheel, (B,1)."""
+        """Angle (B,1) of a wheel."""
         return self._part(slice(rotor.q, rotor.q + 1), slice(rotor.u, rotor.u + 1))[..., 0]
 
     def _part(self, q: slice, u: slice) -> Jet:
@@ -64,7 +64,7 @@ def points(tree: DenseTree) -> InertiaPoints:
 
 
 def member_frames(tree: DenseTree, motion: Motions) -> list[MovingFrame]:
-    """Body frames in World, base to tip: World -> inboard seat -> hinge -> back through the outboard seat."""
+    """Body frames in World, base to tip: World -> inboard seat -> hinge -> inverse of the outboard seat."""
     frames: list[MovingFrame] = []
     for member in tree.members:
         inboard = seat_frame(tree, frames, member.parent, member.inboard, motion)
@@ -98,7 +98,7 @@ def on_body(seat: Seat, eta: Jet) -> MovingFrame:
     node = seat.node
     moved = eta.map(lambda x: x @ node.translation.T)
     rotation = constant(node.rotation[None, None])
-    if eta.value.shape[-1]:  # rigid bodies are many, and the exponential is dear
+    if eta.value.shape[-1]:  # most bodies are rigid, and the exponential is expensive
         turned = eta.map(lambda x: x @ node.rotation_modes.T)
         if node.second is not None:
             moved = moved + quadratic(node.second.translation, eta[..., None, :])
@@ -109,7 +109,7 @@ def on_body(seat: Seat, eta: Jet) -> MovingFrame:
 
 
 def field(member: Member, motion: Motions) -> MovingFrame:
-    """Mass centres and axes of a member's inertia points seen from its body: Jain & Rodriguez (2), turned exactly."""
+    """Mass centres and axes of a member's inertia points in its body frame: Jain & Rodriguez (2) at finite rotation."""
     model, eta = member.model, motion.modes(member)[:, 0]
     moved = eta.map(lambda x: np.einsum("pam,bm->bpa", model.translation, x))
     turned = eta.map(lambda x: np.einsum("pam,bm->bpa", model.rotation, x))

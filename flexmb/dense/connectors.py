@@ -1,7 +1,7 @@
-"""Connectors by the dense route: loads on both ends, loads along coordinates, and the energy stored.
+"""Connectors in the dense route: loads on both ends, loads along coordinates, and stored energy.
 
-Directly from the schema's definitions: rotations by SciPy, tables by its interpolator. A zero length has no direction
-here.
+Directly from the definitions in the schema, with rotations and table interpolation by SciPy. A line of zero length,
+which the compiled connectors smooth, is not defined here.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from flexmb.typing import Real
 
 
 class Grip(NamedTuple):
-    """What a connector does at one instant: [torque; force] (6,) on A about A and on B about B, World; energy (J)."""
+    """Loads of a connector at one instant: [torque; force] (6,) on A about A, on B about B, World axes; energy (J)."""
 
     on_a: Real
     on_b: Real
@@ -28,7 +28,7 @@ class Grip(NamedTuple):
 
 
 class Hold(NamedTuple):
-    """What a connector does along the coordinate with places q and u: load, and energy (J)."""
+    """Load of a connector along the coordinate whose speed has the index u, and its energy (J)."""
 
     u: int
     load: float
@@ -36,7 +36,7 @@ class Hold(NamedTuple):
 
 
 def grip(connector: BetweenNodes, a: MovingFrame, b: MovingFrame, t: float) -> Grip:
-    """Of a connector between two frames in World, at time t."""
+    """Loads of a connector between two frames in World at time t."""
     arm = b.position.value - a.position.value
     match connector:
         case s.SpringDamper():
@@ -50,7 +50,7 @@ def grip(connector: BetweenNodes, a: MovingFrame, b: MovingFrame, t: float) -> G
 
 
 def hold(scene: s.Scene, tree: DenseTree, connector: AlongHinge, q: Real, u: Real, t: float) -> Hold:
-    """Of a connector along a coordinate of a hinge, point mass or wheel, at time t."""
+    """Load of a connector along a coordinate of a hinge, point mass or wheel at time t."""
     item, number = coordinate_of(scene, connector)
     x = [scalar for scalar in tree.scalars if scalar.owner == item.name][number]
     match connector:
@@ -83,7 +83,7 @@ def _spring(law: dict[str, Any], value: float, rate: float) -> tuple[float, floa
 
 
 def resistance(law: dict[str, Any], x: float) -> tuple[float, float]:
-    """The load of a law at x, and the energy stored since x = 0."""
+    """The load of a law at x, and its energy relative to x = 0."""
     if law["table"]:
         from scipy.integrate import quad  # slow to import, as is the interpolator
 
@@ -112,7 +112,7 @@ def _line(connector: s.SpringDamper, a: MovingFrame, b: MovingFrame, t: float) -
     elastic, energy = resistance(law, length - connector.free_length_m)
     sign = {"both": 0.0, "tension": 1.0, "compression": -1.0}[connector.acts]
     tension = elastic + connector.damping_Ns_m * rate
-    if sign:  # the energy counts from where the spring goes slack
+    if sign:  # the energy is relative to the length at which the spring becomes slack
         energy += 0.5 * connector.preload_N**2 / connector.stiffness_N_m
         if sign * elastic <= 0.0:
             elastic, energy, tension = 0.0, 0.0, 0.0
@@ -144,7 +144,7 @@ def _bushing(connector: s.Bushing, a: MovingFrame, b: MovingFrame) -> tuple[Real
 
 
 def _left_jacobian(theta: Real) -> Real:
-    """(3,3) the sum of skew(theta)^n / (n+1)!, to round-off below a whole turn."""
+    """(3,3): the sum of skew(theta)^n / (n+1)!; 48 terms are exact to round-off for |theta| < 2 pi."""
     term = total = np.eye(3)
     for n in range(1, 48):
         term = term @ skew(theta) / (n + 1)

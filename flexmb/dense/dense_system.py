@@ -1,8 +1,8 @@
 """Mass matrix, bias, accelerations, loads, energy and momentum of a scene as sums over its inertia points.
 
-At level ruthless everything but elasticity and damping is taken at eta = etadot = 0 of the ruthless bodies (Jain and
-Rodriguez, Appendix B); markers move with the true deformation. Bodies of level linear are not summed point by point:
-each has a modal mass matrix and bias of first order (`flexmb.dense.first_order_bodies`).
+Bodies of level ruthless have eta = etadot = 0 in everything except elasticity and damping (Jain and Rodriguez, Appendix
+B); markers move with the true deformation. Bodies of level linear are not summed point by point: each has a modal mass
+matrix and bias of first order (`flexmb.dense.first_order_bodies`).
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ from flexmb.typing import Real
 
 
 class Jacobian(NamedTuple):
-    """Velocities per speed of K frames: angular (K,3,nu), linear (K,3,nu), World axes."""
+    """Velocities of K frames at unit speeds: angular (K,3,nu), linear (K,3,nu), World axes."""
 
     angular: Real
     linear: Real
 
 
 class Wrenches(NamedTuple):
-    """On each of K points: torque (K,3) about it, force (K,3), and where it is (K,3); World."""
+    """Torque (K,3) about each of K points, force (K,3) at it, and its position (K,3); World axes."""
 
     torque: Real
     force: Real
     position: Real
 
     def about(self, origin: Real, chosen: NDArray[np.bool_]) -> Real:
-        """Sum (6,) [torque; force] of the chosen ones about `origin`."""
+        """Sum (6,) [torque; force] of the chosen points about `origin`."""
         force = self.force[chosen]
         torque = self.torque[chosen] + np.cross(self.position[chosen] - origin, force)
         return np.concatenate([torque.sum(axis=0), force.sum(axis=0)])
@@ -61,7 +61,7 @@ class Instant:
 
     @property
     def first_order(self) -> dict[int, FirstOrderBody]:
-        """Members of level linear by number."""
+        """Members of level linear by their numbers."""
         tree = self._tree
         return {k: first_order_body(tree, k, self._frames[k], self._motion) for k in tree.linear}
 
@@ -96,7 +96,7 @@ class DenseSystem:
 
     @cached_property
     def _summed(self) -> InertiaPoints:
-        """The same without bodies of level linear, of which only the rotary inertia of their wheels is left."""
+        """The points that are summed: of bodies of level linear only the rotary inertia of their wheels."""
         truncated = np.isin(self.points.member, self.tree.linear)
         elements = truncated & (np.arange(len(truncated)) < len(truncated) - len(self.tree.rotors))
         inertia = np.where(elements[:, None, None], 0.0, self.points.inertia)
@@ -111,9 +111,9 @@ class DenseSystem:
         return M + sum((S[k].T @ body.M @ S[k] for k, body in now.first_order.items()), start=np.zeros_like(M))
 
     def bias(self, q: Real, u: Real, t: float = 0.0) -> Real:
-        """c (nu,) in M udot + c = tau: gyroscopic and centrifugal forces, gravity, elasticity, loads at nodes.
+        """c (nu,) in M udot + c = tau.
 
-        And of connectors between nodes.
+        Gyroscopic and centrifugal forces, gravity, elasticity, loads at nodes, connectors between nodes.
         """
         J, S, now = self._jacobian(q), self._body_jacobians(q), self._seen(q, u, np.zeros(self.nu))
         inertial = self._inertial(now, self._summed)
@@ -148,7 +148,7 @@ class DenseSystem:
         return tau
 
     def grips(self, q: Real, u: Real, t: float = 0.0) -> dict[str, Grip]:
-        """What connectors between nodes do, by name."""
+        """Loads of the connectors between nodes, by name."""
         now, found = self._at(q, u), {}
         for connector in self.scene.connectors:
             if isinstance(connector, BetweenNodes):
@@ -284,7 +284,7 @@ class DenseSystem:
         return q
 
     def _seen(self, q: Real, u: Real, rates: Real) -> Instant:
-        """The motion as inertia sees it: eta = etadot = 0 for ruthless bodies."""
+        """The motion in the inertia forces: eta = etadot = 0 for ruthless bodies."""
         u = u.copy()
         for member in self.tree.members:
             if member.level == "ruthless":
@@ -300,23 +300,23 @@ class DenseSystem:
         return Motions(self._undeformed(q), np.eye(self.nu), np.zeros((self.nu, self.nu)))
 
     def _jacobian(self, q: Real) -> Jacobian:
-        """Of all inertia points."""
+        """Jacobian of all inertia points."""
         motion = self._unit_motions(q)
         return _columns(point_frames(self.tree, member_frames(self.tree, motion), motion))
 
     def _body_jacobians(self, q: Real) -> dict[int, Real]:
-        """Of the bodies of level linear by number, (m+6,nu)."""
+        """Jacobians (m+6,nu) of the bodies of level linear by their numbers."""
         frames = member_frames(self.tree, self._unit_motions(q)) if self.tree.linear else []
         return {k: body_jacobian(self.tree.members[k], frames[k], self.nu) for k in self.tree.linear}
 
     def _site_jacobian(self, name: str, q: Real) -> Jacobian:
-        """Of one load's node."""
+        """Jacobian of the frame of one site."""
         motion = self._unit_motions(q)
         frames = member_frames(self.tree, motion)
         return _columns(seat_frame(self.tree, frames, *self.tree.sites[name], motion))
 
     def _inertial(self, now: Instant, chosen: InertiaPoints) -> Wrenches:
-        """The wrench that the motion of each point needs beyond gravity: m (a - g), J alpha + w x J w."""
+        """The wrench that causes the motion of each point in addition to gravity: m (a - g), J alpha + w x J w."""
         frames = now.points
         J, w, alpha = _turned(chosen, frames), frames.angular_velocity(), frames.angular_acceleration()
         torque = np.einsum("pab,pb->pa", J, alpha) + np.cross(w, np.einsum("pab,pb->pa", J, w))
@@ -338,7 +338,7 @@ class DenseSystem:
         return found
 
     def _outboard(self, k: int) -> list[int]:
-        """Member k and everything that hangs on it."""
+        """Member k and all members outboard of it."""
         found = [k]
         for i, member in enumerate(self.tree.members):
             if member.parent in found:

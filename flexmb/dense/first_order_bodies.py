@@ -1,11 +1,11 @@
-"""Bodies of level linear: modal mass matrix and bias cut off after the first order in (eta, etadot), by a complex step.
+"""Bodies of level linear: modal mass matrix and bias to first order in (eta, etadot), by a complex step.
 
 The sum over a body's points is an entire function of eta and etadot. At (i h eta, i h etadot) its real part is the term
-of order zero and its imaginary part h times the term of order one; all further terms are smaller by h^2 and vanish in
-rounding.
+of order zero and its imaginary part h times the term of order one; all other terms are smaller by a factor h^2 and are
+lost in rounding.
 
 Order of rows: [modes; angular; linear], about the body origin in body axes. The elements of a body are its inertia
-points and the masses of its wheels; the rotary inertia of wheels is not truncated and so does not belong here.
+points and the masses of its wheels. The rotary inertia of wheels is not truncated, and therefore summed elsewhere.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from flexmb.dense.jets import Jet, MovingFrame, constant, join, skew, vector
 from flexmb.dense.members import DenseTree, Member, Rotor
 from flexmb.typing import Real
 
-STEP = 2.0**-200
+STEP = 2.0**-200  # h: its square is lost beside the terms of order zero and one, but does not underflow
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,13 @@ class FirstOrderBody:
         return 0.5 * float(self.speeds @ self.M @ self.speeds)
 
     def force(self, gravity: Real) -> Real:
-        """Force (m+6,) that this motion needs beyond gravity (3,), which is in World axes: M (rates - g) + bias."""
+        """Force (m+6,) that causes this motion in addition to gravity (3,) in World axes: M (rates - g) + bias."""
         rates = self.rates.copy()
         rates[-3:] -= self.rotation.T @ gravity
         return self.M @ rates + self.bias
 
     def mass_moment(self) -> Real:
-        """sum m x (3,) in World: the coupling of angular and linear velocity is s~."""
+        """sum m x (3,) in World; s is read from the coupling block of M, which is s~."""
         s = vector(self.M[-6:-3, -3:])
         return np.asarray(self.M[-1, -1] * self.position + self.rotation @ s)
 
@@ -73,7 +73,10 @@ def first_order_body(tree: DenseTree, k: int, frame: MovingFrame, motion: Motion
 
 
 def body_jacobian(member: Member, frame: MovingFrame, nu: int) -> Real:
-    """(m+6,nu): a member's modal speeds and the velocity of its frame, body axes, for u = e_j; `frame` along those."""
+    """(m+6,nu): modal speeds of a member and velocity of its frame, body axes, for u = e_j.
+
+    `frame` is the member's frame along these nu motions.
+    """
     modes = np.eye(nu)[member.u_modes]
     R = frame.rotation.value[0, 0]
     linear = np.broadcast_to(frame.position.rate, (nu, 1, 3))
@@ -81,7 +84,7 @@ def body_jacobian(member: Member, frame: MovingFrame, nu: int) -> Real:
 
 
 def _mass_and_bias(tree: DenseTree, k: int, eta: Real, etad: Real, w: Real) -> tuple[Real, Real]:
-    """M and bias at the body's own state, the sum over its elements made twice real."""
+    """M and bias of first order at a state of the body: sums over its elements, evaluated at a complex step."""
     member, rotors = tree.members[k], [rotor for rotor in tree.rotors if rotor.member == k]
     model, m = member.model, member.model.mode_count
     mass = np.append(model.mass, [rotor.wheel.mass_kg for rotor in rotors])
@@ -102,7 +105,7 @@ def _mass_and_bias(tree: DenseTree, k: int, eta: Real, etad: Real, w: Real) -> t
 def _elements(
     tree: DenseTree, member: Member, rotors: list[Rotor], eta: Real, etad: ArrayLike, w: Real, v: Real
 ) -> MovingFrame:
-    """Elements at i h eta along B motions: etad (B,m), w and v (B,3) of the body frame, none of which changes."""
+    """Elements at i h eta along B motions with constant etad (B,m), and w and v (B,3) of the body frame."""
     count = len(w)
     q, u = np.zeros(tree.nq, complex), np.zeros((count, tree.nu), complex)
     q[member.q_modes], u[:, member.u_modes] = 1j * STEP * eta, etad
@@ -118,5 +121,5 @@ def _elements(
 
 
 def _first_order(x: NDArray[np.complex128]) -> Real:
-    """Orders zero and one of what was evaluated at i h times its argument."""
+    """The sum of the terms of orders zero and one of a function evaluated at i h times its argument."""
     return np.asarray(x.real + x.imag / STEP)

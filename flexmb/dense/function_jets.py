@@ -39,7 +39,7 @@ def profile(function: Function, t: float) -> Jet:
         case Pulse(value=value, start_s=start, duration_s=duration):
             return constant(value if start <= t < start + duration else 0.0)
         case ControlSignal():
-            return constant(0.0)  # at one state, by itself: the loop is open
+            return constant(0.0)  # a single evaluation has no controllers
         case Table(times_s=times, values=values):
             from scipy.interpolate import make_interp_spline  # slow to import, and few scenes have tables
 

@@ -1,7 +1,7 @@
-"""Second-order jets: the value of an array and its first and second time derivative along a motion.
+"""Second-order jets: the value of an array and its first and second time derivatives along a motion.
 
-Products follow Leibniz, functions the chain rule; rotations are matrix-valued jets, from which angular velocity and
-acceleration are read. Leading axes are shared: (B, K, ...), K points along B motions that start from one configuration.
+Products follow Leibniz' rule, functions the chain rule. Rotations are matrix-valued jets, which contain the angular
+velocity and acceleration. Leading axes are shared: (B, K, ...), K points along B motions from one configuration.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from flexmb.typing import Real
 
-TERMS = 24  # of power series, which are exact to round-off for |x| <= 2 pi
+TERMS = 24  # of the power series below: exact to round-off for |x| <= 2 pi
 SERIES = np.zeros((TERMS, 2, 3))
 """sin(x)/x and (1 - cos(x))/x^2 as power series in x^2, and their first and second derivatives by x^2."""
 for _i in range(2):
@@ -48,7 +48,7 @@ class Jet:
         return self.map(lambda x: x[key])
 
     def map(self, linear: Callable[[Real], Real]) -> Jet:
-        """A constant linear operation."""
+        """The jet of a constant linear function of x."""
         return Jet(linear(self.value), linear(self.rate), linear(self.acceleration))
 
     @property
@@ -64,17 +64,17 @@ class MovingFrame:
     rotation: Jet
 
     def carry(self, inner: MovingFrame) -> MovingFrame:
-        """`inner`, seen from this frame, seen from where this frame is seen."""
+        """`inner`, given relative to this frame, relative to the frame that this one is given in."""
         return MovingFrame(self.position + turn(self.rotation, inner.position), self.rotation @ inner.rotation)
 
     def inverse(self) -> MovingFrame:
-        """The frame this one is seen from, seen from this one."""
+        """The frame that this one is given in, relative to this one."""
         back = self.rotation.transpose
         return MovingFrame(-turn(back, self.position), back)
 
     @property
     def first(self) -> MovingFrame:
-        """Along the first of B motions."""
+        """The frames along the first of B motions."""
         return MovingFrame(self.position[0], self.rotation[0])
 
     def angular_velocity(self) -> Real:
@@ -82,18 +82,18 @@ class MovingFrame:
         return vector(self.rotation.rate @ np.swapaxes(self.rotation.value, -1, -2))
 
     def angular_acceleration(self) -> Real:
-        """alpha = dw/dt (...,3): the skew part of d2R/dt2 R' (what is left, dR/dt dR/dt', is symmetric)."""
+        """alpha = dw/dt (...,3): the skew part of d2R/dt2 R', whose symmetric part is -dR/dt dR'/dt."""
         return vector(self.rotation.acceleration @ np.swapaxes(self.rotation.value, -1, -2))
 
 
 def constant(value: ArrayLike) -> Jet:
-    """A jet that does not change."""
+    """A jet with zero derivatives."""
     array = np.asarray(value, dtype=float)
     return Jet(array, np.zeros_like(array), np.zeros_like(array))
 
 
 def join(jets: list[Jet], motions: int) -> Jet:
-    """Jets of the points of several bodies, (1 or B, K, ...), as one along K."""
+    """Jets of the points of several bodies, (1 or B, K, ...), concatenated along K."""
 
     def along(parts: list[Real]) -> Real:
         return np.concatenate([np.broadcast_to(x, (motions, *x.shape[1:])) for x in parts], axis=1)
@@ -102,7 +102,7 @@ def join(jets: list[Jet], motions: int) -> Jet:
 
 
 def product(operation: Callable[[Real, Real], Real], a: Jet, b: Jet) -> Jet:
-    """Leibniz for a bilinear operation."""
+    """The jet of a bilinear operation, by Leibniz' rule."""
     return Jet(
         operation(a.value, b.value),
         operation(a.rate, b.value) + operation(a.value, b.rate),
@@ -144,7 +144,7 @@ def skew(v: Real) -> Real:
 
 
 def vector(A: Real) -> Real:
-    """v of the skew part of A, (...,3,3) -> (...,3)."""
+    """v with v~ the skew part of A, (...,3,3) -> (...,3)."""
     return 0.5 * np.stack(
         [A[..., 2, 1] - A[..., 1, 2], A[..., 0, 2] - A[..., 2, 0], A[..., 1, 0] - A[..., 0, 1]], axis=-1
     )

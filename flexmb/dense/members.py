@@ -1,6 +1,6 @@
-"""What the dense route needs of a scene: members base to tip, their inertia points, and the places of coordinates.
+"""A scene for the dense route: members from base to tip, their inertia points, and the indices of their coordinates.
 
-The order of q and u, body by body (depth-first, point masses last): hinge, modes, wheels of the body.
+The order of q and u is body by body (depth-first, point masses last), in each body hinge, modes, wheels.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Seat:
 
 @dataclass(frozen=True)
 class Member:
-    """One body or point mass, and the hinge that holds it; `parent` is -1 for the ground."""
+    """One body or point mass, and the hinge that connects it to its parent, -1 for the ground."""
 
     name: str
     parent: int
@@ -53,7 +53,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Rotor:
-    """A wheel on a member: its centre's frame, and its places in q and u."""
+    """A wheel on a member: the frame of its centre, and its indices in q and u."""
 
     wheel: s.Wheel
     member: int
@@ -71,7 +71,7 @@ class Rotor:
 
 @dataclass(frozen=True)
 class ScalarSpeed:
-    """A speed that is the rate of one coordinate, with what acts on it; `q`, `u` are its places."""
+    """A speed that is the rate of one coordinate, with the forces on it; `q`, `u` are the indices of both."""
 
     owner: str
     q: int
@@ -85,7 +85,7 @@ class ScalarSpeed:
 
 @dataclass(frozen=True)
 class DenseTree:
-    """The scene in the dense route's terms."""
+    """A scene as the dense route uses it."""
 
     members: list[Member]
     rotors: list[Rotor]
@@ -174,7 +174,7 @@ def _model(body: s.Body, folder: Path | None) -> FlexibleModel:
             model = flexible_model(body, folder)
             return _stiff(model) if body.level == "rigid" else model
         case s.BeamBody() | s.ModalBody() | s.SidBody():
-            raise NotImplementedError(f'body "{body.name}": the dense route knows levels {", ".join(LEVELS)}')
+            raise NotImplementedError(f'body "{body.name}": the dense route has levels {", ".join(LEVELS)}')
         case _:
             assert_never(body)
 
@@ -182,7 +182,7 @@ def _model(body: s.Body, folder: Path | None) -> FlexibleModel:
 def rigid_model(
     mass: float, com: Real, inertia: Real, frames: Mapping[str, tuple[Vector, Quaternion]]
 ) -> FlexibleModel:
-    """A body without modes: one point at its centre of mass."""
+    """A body without modes: one inertia point at its mass centre."""
     none = np.zeros((3, 0))
     nodes = {
         name: FlexibleNode(np.array(position, dtype=float), rotation_of(quaternion), none, none)
@@ -196,7 +196,7 @@ def rigid_model(
 
 
 def _stiff(model: FlexibleModel) -> FlexibleModel:
-    """The same points without modes."""
+    """The same body without modes."""
     nodes = {
         name: replace(node, translation=node.translation[:, :0], rotation_modes=node.rotation_modes[:, :0])
         for name, node in model.nodes.items()

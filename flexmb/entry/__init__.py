@@ -1,1 +1,1 @@
-"""Entry points: kernels that Python and the integrators call, one file for each thing that is asked for."""
+"""Entry points: the kernels that Python and the integrators call, one file for each purpose."""

@@ -14,13 +14,13 @@ from flexmb.tables.status import OK
 
 @kernel
 def rhs(t, y, dy, c, w):
-    """dy/dt of y = [q, u, work] at time t; returns a status code. `work` collects the non-conservative power."""
+    """dy/dt of y = [q, u, work] at time t; returns a status code. `work` integrates the non-conservative power."""
     return slope(t, y, dy, c, w)
 
 
 @written_out
 def slope(t, y, dy, c, w):
-    """The same within other kernels."""
+    """`rhs` as a part of other kernels."""
     load_state(t, y, c, w)
     status = forward_dynamics(c, w)
     if status != OK:
@@ -32,7 +32,7 @@ def slope(t, y, dy, c, w):
 
 @kernel
 def accelerations(t, y, c, w):
-    """udot into w.speed.acceleration; returns a status code."""
+    """udot to w.speed.acceleration; returns a status code."""
     load_state(t, y, c, w)
     return forward_dynamics(c, w)
 
@@ -41,7 +41,7 @@ def accelerations(t, y, c, w):
 def inverse_dynamics(t, y, rates, c, w, tau, loads):
     """tau (nu,) = M rates + c: inertia, gravity, elasticity and node loads.
 
-    loads (N,6): what each hinge then transmits, [torque; force] on the body about O, World axes.
+    loads (N,6) receives the loads that the hinges then transmit, [torque; force] on the body about O, World axes.
     """
     load_state(t, y, c, w)
     for j in range(rates.shape[0]):
@@ -53,7 +53,7 @@ def inverse_dynamics(t, y, rates, c, w, tau, loads):
 
 @helper
 def world_loads(c, w, loads):
-    """w.body.load of every body in World axes."""
+    """Write w.body.load of all bodies, turned to World axes, to loads (N,6)."""
     for k in range(c.body.shape[0]):
         R = mat3(w.body[k].pose_rotation, 0)
         store6(loads[k], 0, times6(R, vec6(w.body[k].load, 0)))

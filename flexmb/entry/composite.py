@@ -1,4 +1,4 @@
-"""Entry points of the composite-body route: mass matrix, accelerations, right-hand side of the motion."""
+"""Entry points of the composite-body algorithm: mass matrix, accelerations, right-hand side."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flexmb.typing import Index
 
 @bundle
 class CompositeWorkspace:
-    """What an evaluation by composite bodies writes."""
+    """The arrays that an evaluation by composite bodies writes."""
 
     sweeps: Workspace
     matrices: Matrices
@@ -42,14 +42,14 @@ def mass_matrix(t, y, c, w, m, M):
 
 @kernel
 def accelerations(t, y, c, w, m):
-    """udot into w.speed.acceleration, drive loads into w.speed.drive; returns a status code."""
+    """udot to w.speed.acceleration, drive loads to w.speed.drive; returns a status code."""
     load_state(t, y, c, w)
     return composite.forward_dynamics(c, w, m)
 
 
 @kernel
 def rhs(t, y, dy, c, w):
-    """dy/dt of y = [q, u, work] at time t; returns a status code. `work` collects the non-conservative power."""
+    """dy/dt of y = [q, u, work] at time t; returns a status code. `work` integrates the non-conservative power."""
     load_state(t, y, c, w.sweeps)
     status = composite.forward_dynamics(c, w.sweeps, w.matrices)
     if status != OK:

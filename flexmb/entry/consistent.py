@@ -1,7 +1,7 @@
-"""Entry point of the underactuated problem: hinges and wheels move at given rates, and the modes follow.
+"""Entry point of the underactuated problem: modal accelerations for given accelerations of hinges and wheels.
 
-Jain & Rodriguez, after (45): generalised forces act on hinges only, hence T^f = 0 decides the modal accelerations. It
-is the articulated recursion with every hinge and wheel prescribed, O(N).
+Jain & Rodriguez, after (45): generalised forces act on hinges only, so that T^f = 0 determines the modal accelerations.
+They follow from the articulated recursion with every hinge and wheel prescribed, O(N).
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from flexmb.tables.arrays import FUNCTION, Constants, Workspace
 
 @kernel
 def consistent_accelerations(t, y, rates, scene, held, w):
-    """Modal accelerations that need no modal force, w.speed.acceleration, for hinges and wheels at `rates` (nu,).
+    """Modal accelerations without modal forces to w.speed.acceleration, for hinges and wheels at `rates` (nu,).
 
-    `held` and w: of `held_hinges`. Returns a status code.
+    `held` and w are those of `held_hinges`. Returns a status code.
     """
     load_state(t, y, scene, w)
     for j in range(rates.shape[0]):
@@ -29,7 +29,7 @@ def consistent_accelerations(t, y, rates, scene, held, w):
 
 
 def held_hinges(c: Constants, w: Workspace) -> tuple[Constants, Workspace]:
-    """The constants c with every hinge and wheel prescribed, and a copy of w that holds a rate for each."""
+    """The constants c with every hinge and wheel prescribed, and a copy of w with a function for each of them."""
     speeds, functions = len(c.speed), len(c.function)
     speed = c.speed.copy()
     speed["prescribed"] = functions + np.arange(speeds)

@@ -9,7 +9,7 @@ from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 
 @kernel
 def factorise(t, y, scene, c, w):
-    """Factors into w: the state with the functions of `scene`, free speeds as in c; returns a status code."""
+    """Factors to w, with the functions of time of `scene` and the free speeds of c; returns a status code."""
     load_state(t, y, scene, w)
     return OK if innovations.factorise(c, w) else NOT_POSITIVE_DEFINITE
 
@@ -68,6 +68,6 @@ def log_determinant(c, w):
 
 @helper
 def _enter(c, x, b):
-    """A right side, and no other forces."""
+    """Set the response x to the right-hand side b and no other forces."""
     clear(c, x)
     read_speeds(x, b)

@@ -1,11 +1,11 @@
-"""A gate between Python and the kernel of an algorithm's accelerations: one call that checks, evaluates and checks.
+"""A fast path from Python to the accelerations of an algorithm: one compiled call that checks, evaluates and checks.
 
-Compiled once for all algorithms and scenes: the kernel behind it is called by address, and the gate itself is a
-function of the interpreter. Whatever is not plainly right, it leaves to a function of Python, which finds out what to
-say.
+The gate is a builtin function of the interpreter, compiled once for all algorithms and scenes; it calls the kernel by
+address. If any check fails, it calls a Python function (`careful`) with the same arguments, which evaluates again and
+raises the appropriate error.
 
-What is behind the gate belongs to one thread, as the kernel lets others run while it writes: the gate asks for the
-number of the thread that calls (2 ns), and leaves those that it does not know to the function of Python too.
+The workspace behind a gate belongs to one thread, because a long kernel releases the interpreter's lock while it
+writes. The gate compares the number of the calling thread (2 ns), and passes calls of other threads to `careful`.
 """
 
 from __future__ import annotations
@@ -46,36 +46,36 @@ from flexmb.typing import Index, Real, Record
 
 NOBODY = -1  # no thread has this number
 
-# While `builtin` notes down a kernel that it meets for the first time; nothing that is done meanwhile takes a lock. No
-# process is forked off meanwhile: there it would stay held.
+# Held while `builtin` registers a kernel that is new to it. Nothing in between takes another lock. Forking waits for
+# it, because a lock that is held during a fork is never released in the child.
 _making = RLock()
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(before=_making.acquire, after_in_parent=_making.release, after_in_child=_making.release)
 
-_LONG = 50  # speeds from which other threads may run meanwhile: letting them costs 50 ns
+_LONG = 50  # number of speeds from which the kernel releases the interpreter's lock, which costs 50 ns
 
 
 @bundle
 class Gate:
-    """What passes the gate; speed and doubt are those of the workspace of the kernel behind it."""
+    """The data of a gate; speed and doubt are arrays of the workspace of its kernel."""
 
     quaternions: Index  # (k,) where each starts in q
     y: Real  # (nq+nu+1,) [q, u, 0]
     rates: Real  # (nu,) udot
     speed: Record  # (nu,) SPEED_STATE, where the kernel leaves udot
     doubt: Index  # (1,)
-    behind: Index  # (3 or 4,) addresses of the kernel, and of the bundles that it takes after t and y
-    owner: Index  # (1,) number of the thread that passes, or NOBODY
-    returned: Index  # (1,) address of the array that is returned
-    careful: Index  # (1,) address of the function that is called instead
+    behind: Index  # (3 or 4,) addresses of the kernel and of its arguments after t and y
+    owner: Index  # (1,) number of the thread that may pass, or NOBODY
+    returned: Index  # (1,) address of the array object that is returned
+    careful: Index  # (1,) address of the Python function that is called if a check fails
     python: Index  # `flexmb.jit.objects.interpreter`
 
 
 class GateNotes(NamedTuple):
-    """What the gate and the function of Python that it leaves calls to tell each other.
+    """State shared by a gate and its Python function.
 
-    owner (1,): number of the thread that it is for, or NOBODY; returned (1,): address of the array that is returned, a
-    view of the rates, which the function holds.
+    owner (1,): number of the thread that the gate is for, or NOBODY; returned (1,): address of the array that is
+    returned, a view of the rates to which the Python function holds a reference.
     """
 
     owner: Index
@@ -86,9 +86,9 @@ def gate(
     quaternions: Index, rates: Real, nq: int, speed: Record, doubt: Index, behind: Sequence[int], notes: GateNotes,
     careful: Any,
 ) -> Callable[..., Real]:  # fmt: skip
-    """(t, q, u): an array of the rates (nu,), which every call writes anew, or what `careful` makes of these arguments.
+    """A function of (t, q, u) that returns the rates (nu,), in an array that every call overwrites.
 
-    speed and doubt are those of the workspace of the kernel behind the gate.
+    If a check fails, it returns careful(t, q, u). speed and doubt are arrays of the workspace of the kernel.
     """
     passed = _gate(quaternions, rates, nq, speed, doubt, behind, notes, id(careful))
     address = _address()
@@ -98,7 +98,7 @@ def gate(
 
 @cache
 def _address() -> int:
-    """Of `evaluate`, compiled once for all gates."""
+    """The address of `evaluate`, compiled once for all gates."""
     signature = STATUS(*[STATUS] * 4)
     evaluate.compile(signature.args)
     return HOOKS.address(evaluate, signature)
@@ -123,7 +123,7 @@ gate_at = at_address(_gate(_NOTHING, np.zeros(0), 0, np.zeros(0, SPEED_STATE), _
 
 @kernel
 def evaluate(place, arguments, count, names):
-    """A builtin of t, q (nq,) and u (nu,): the rates of the gate at this place."""
+    """The builtin function of t, q (nq,) and u (nu,) that returns the rates of the gate at this address."""
     g = gate_at(bundle_of(place))
     passes = _is_owner(g) and count == 3 and names == 0 and _admitted(arguments, g)
     if passes and _evaluated(arguments, g) and _sound(g) and _is_plain(g.returned[0], g):
@@ -133,7 +133,7 @@ def evaluate(place, arguments, count, names):
 
 @helper
 def _is_owner(g):
-    """Whether the thread that calls is the first one that did: here it holds the interpreter's lock, no other comes."""
+    """Whether the calling thread is the first that called this gate. It holds the interpreter's lock: no race here."""
     this = this_thread(g.python)
     if g.owner[0] == NOBODY:
         g.owner[0] = this
@@ -142,13 +142,13 @@ def _is_owner(g):
 
 @helper
 def _is_plain(x, g):
-    """Whether an array that was shown to others still has its shape: they may have given it another."""
+    """Whether the returned array still has its shape, which the user could change in place."""
     return is_vector(g.python, x) and vector(x).shape[0] == g.rates.shape[0]
 
 
 @helper
 def _admitted(arguments, g):
-    """Whether time and state can be used; they are in g.y then."""
+    """Whether time and state are valid; if so, the state is in g.y."""
     t, q, u = word_at(arguments, 0), word_at(arguments, 1), word_at(arguments, 2)
     if not (is_float(g.python, t) and is_vector(g.python, q) and is_vector(g.python, u)):
         return False
@@ -165,7 +165,7 @@ def _admitted(arguments, g):
 
 @helper
 def _evaluated(arguments, g):
-    """Whether the kernel says that all went well."""
+    """Whether the kernel returns OK."""
     t = value(word_at(arguments, 0))
     if g.rates.shape[0] < _LONG:
         return _status(t, g) == OK
@@ -177,7 +177,7 @@ def _evaluated(arguments, g):
 
 @helper
 def _status(t, g):
-    """Of the kernel."""
+    """The status that the kernel returns."""
     function, c, w = g.behind[0], g.behind[1], g.behind[2]
     if g.behind.shape[0] == 3:
         return status_at(function, (t, g.y, c, w))
@@ -186,7 +186,7 @@ def _status(t, g):
 
 @helper
 def _sound(g):
-    """Whether the rates, which are in g.rates then, are finite and beyond doubt."""
+    """Whether the rates are finite and no pivot was doubtful; copies the rates to g.rates."""
     sound = g.doubt[0] == 0
     for j in range(g.rates.shape[0]):
         rate = g.speed[j].acceleration

@@ -19,30 +19,30 @@ from flexmb.spatial.vector import mat3, store3, store9, vec3
 from flexmb.tables.status import NONFINITE, OK
 from flexmb.typing import Index
 
-DOUBTFUL = -1  # a status: among the copies of a block one met a pivot that may be rounding
+DOUBTFUL = -1  # a status: a copy of the block met a pivot that may consist of rounding errors
 
 
 @kernel
 def rhs(s, c, w):
-    """Slopes (n,) of the states s.trial (n,) at the times s.time; returns a status code of all copies."""
+    """dy/dt (n,) of the states s.trial (n,) at the times s.time; returns one status code for all copies."""
     return articulated.slope(s.time[0], s.trial, s.k[s.stage[0]], c, w)
 
 
 @bundle
 class LaneGate:
-    """What a thread passes when it asks for accelerations: who is called, on what, and what it reads and writes.
+    """The arrays and addresses with which one thread evaluates accelerations.
 
-    `blocks`: addresses of the constants of each LANES copies, or of those that all share.
+    `blocks`: addresses of the constants of each block of LANES copies, or of the constants that all copies share.
     """
 
     stages: LaneStages
-    entries: LaneEntries  # the same numbers
+    entries: LaneEntries  # the same memory as `stages`, as arrays of single numbers
     calls: Index  # (4,) addresses: `rhs`, `begin` or 0 where all copies share their constants; stages, workspace
     blocks: Index  # (blocks of copies,) or (1,)
 
 
 def lane_gate(stages: LaneStages, entries: LaneEntries, calls: Sequence[int], blocks: Sequence[int]) -> LaneGate:
-    """Of what the caller holds."""
+    """A gate of arrays to which the caller holds references."""
     return LaneGate(stages, entries, np.array(calls, np.int64), np.array(blocks, np.int64))
 
 
@@ -58,8 +58,8 @@ gate_at = at_address(_an_example())
 def accelerations(gate, start, stop, q, u, t, found, status):
     """udot (n,nu) of copies `start` to stop - 1 at q (n,nq), u (n,nu), t (n,) or (1,), and a status (n,) for each.
 
-    Returns how many of them have none, by the gate at an address. Where fewer copies are left, the last one is in the
-    empty lanes too. By the right-hand side of runs: there is one kernel for both.
+    `gate` is the address of a `LaneGate`. Returns the number of copies whose status is not OK. The last copy also fills
+    the unused lanes of the last block. Evaluated by the right-hand side of runs, so that one kernel serves both.
     """
     g = gate_at(gate)
     rhs, begin, stages, w = g.calls[0], g.calls[1], g.calls[2], g.calls[3]
@@ -93,7 +93,7 @@ def accelerations(gate, start, stop, q, u, t, found, status):
 
 @helper
 def _gather(first, copies, rows, lanes):
-    """lanes (n,LANES) = so many rows (n,) from `first` on; where there are fewer than LANES, the last one again."""
+    """lanes (n,LANES) = `copies` rows (n,) from `first` on; the last row also fills the lanes beyond."""
     n = rows.shape[1]
     if copies == LANES and n >= LANES:
         for i in range(0, n, LANES):
@@ -106,7 +106,7 @@ def _gather(first, copies, rows, lanes):
 
 @helper
 def _scatter(first, copies, lanes, rows):
-    """The rows of so many copies = lanes (n,LANES)."""
+    """`copies` rows from `first` on = lanes (n,LANES)."""
     n = rows.shape[1]
     if copies == LANES and n >= LANES:
         for i in range(0, n, LANES):
@@ -119,14 +119,14 @@ def _scatter(first, copies, lanes, rows):
 
 @kernel
 def project(s, c):
-    """Put the states s.trial (n,) back on the manifold at the times s.time."""
+    """Project the states s.trial (n,) to the configuration manifold at the times s.time."""
     coordinates.put_back(s.time[0], s.trial, c)
 
 
 @kernel
 def begin(c, w):
-    """What a workspace holds of the constants, of copies with constants of their own: before they are evaluated."""
-    w.displaced[0] = 1  # bodies at rest are put there again
+    """Set the parts of a workspace that are copies of constants, before a block with its own constants is evaluated."""
+    w.displaced[0] = 1  # the next sweep computes the ports of undeformed bodies again
     store3(w.ground, 0, vec3(c.ground, 0))
     for i in range(c.rest.shape[0]):
         store3(w.port[i].r, 0, vec3(c.rest[i].r, 0))

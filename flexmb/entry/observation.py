@@ -1,7 +1,7 @@
-"""Entry points of what is observed at one state: markers, loads, energy and momentum, by any algorithm.
+"""Entry points of the outputs at one state: markers, loads, energy and momentum, for any algorithm.
 
-A new output starts here: a member of `Outputs`, its shape in `shapes`, and the lines of a kernel that fill it. Its
-names are given in `flexmb.system.observables`, its course through time in `flexmb.run.trajectory`.
+A new output begins here, with a member of `Outputs`, its shape in `shapes`, and the lines of a kernel that fill it. Its
+names are given in `flexmb.system.observables`, its values over time in `flexmb.run.trajectory`.
 """
 
 from __future__ import annotations
@@ -32,26 +32,26 @@ Places = dict[str, tuple[slice, tuple[int, ...]]]
 
 @bundle
 class Outputs:
-    """What an observation writes, World axes, but for which marker is where; numbers are parts of `every`."""
+    """The outputs at one state, World axes. All numbers except `drives` are views of `every`."""
 
-    marker_body: Index  # (K,)
-    marker_port: Index  # (K,)
-    drives: Real  # (nu,) loads of prescribed speeds; no part of `every`, for those of free speeds mean nothing
-    every: Real  # all of what follows, in a row
+    marker_body: Index  # (K,) input: the markers' bodies
+    marker_port: Index  # (K,) input: the markers' ports
+    drives: Real  # (nu,) loads of prescribed speeds; not in `every`, because the entries of free speeds are undefined
+    every: Real  # all of the following, as one row
     rates: Real  # (nu,) accelerations
     markers: Real  # (K,24) position, R_World_marker (9), velocity (6), classical acceleration (6), true deformation
-    loads: Real  # (N,6) [torque; force] of hinges, those of the model: a ruthless body shows them at its rest shape
+    loads: Real  # (N,6) [torque; force] of hinges, at level ruthless those of the undeformed body
     wheel_loads: Real  # (W,6)
     energy: Real  # (4,) as in flexmb.jain.balance
     momentum: Real  # (6,) likewise
     connectors: Real  # (C,6) [torque; force] of connectors between nodes, on B about B
-    hinge_forces: Real  # (S,) loads of springs, then of friction, along coordinates
+    hinge_forces: Real  # (S,) loads of springs, then of other laws, along coordinates
 
 
 def shapes(
     speeds: int, markers: int, hinges: int, wheels: int, connectors: int = 0, hinge_forces: int = 0
 ) -> dict[str, tuple[int, ...]]:
-    """Of the parts of `Outputs.every`, in their order."""
+    """Shapes of the parts of `Outputs.every`, in their order."""
     return {
         "rates": (speeds,),
         "markers": (markers, 24),
@@ -65,7 +65,7 @@ def shapes(
 
 
 def places(of: Mapping[str, tuple[int, ...]]) -> Places:
-    """Where parts of these shapes lie in a row."""
+    """The slices of parts of these shapes in one row."""
     found, start = {}, 0
     for name, shape in of.items():
         stop = start + math.prod(shape)
@@ -74,8 +74,10 @@ def places(of: Mapping[str, tuple[int, ...]]) -> Places:
 
 
 def parts(every: Real, of: Places) -> dict[str, Real]:
-    """Views of a row of numbers, by name."""
-    return {name: every[place].reshape(shape) for name, (place, shape) in of.items()}
+    """Views of the parts of a row, by name."""
+    return {
+        name: every[place] if len(shape) == 1 else every[place].reshape(shape) for name, (place, shape) in of.items()
+    }
 
 
 def outputs(of: Mapping[str, tuple[int, ...]], marker_body: Index, marker_port: Index) -> Outputs:
@@ -86,22 +88,28 @@ def outputs(of: Mapping[str, tuple[int, ...]], marker_body: Index, marker_port: 
 
 @kernel
 def observe(c, w, out):
-    """Everything observable where the right-hand side of the recursion was just evaluated, with status OK.
+    """All outputs at the state at which the right-hand side of the recursion was just evaluated, with status OK.
 
-    Not by itself at a state: a run needs the right-hand side compiled anyway, and the recursion in it is most of both.
+    It does not evaluate the right-hand side itself: a run needs that kernel anyway, and most of the code is in it.
     """
+    observe_free_motion(c, w, out)
+    _observe_motion(c, w, out)
+
+
+@helper
+def observe_free_motion(c, w, out):
+    """Accelerations, drives and loads of hinges that the right-hand side of the recursion has left."""
     pose_sweep(c, w)
     hinge_loads(c, w)
     world_loads(c, w, out.loads)
     for j in range(out.rates.shape[0]):
         out.rates[j] = w.speed[j].acceleration
         out.drives[j] = w.speed[j].drive
-    _observe_motion(c, w, out)
 
 
 @kernel
 def transmitted(c, w, loads):
-    """Loads (N,6) across all hinges, World axes: the part of what `observe` finds for who asks for no more."""
+    """Loads (N,6) across all hinges, World axes, without the other outputs of `observe`."""
     pose_sweep(c, w)
     hinge_loads(c, w)
     world_loads(c, w, loads)
@@ -109,9 +117,9 @@ def transmitted(c, w, loads):
 
 @kernel
 def observe_motion(t, y, c, w, out):
-    """What follows from the state and given accelerations, out.rates, by kinematics and bodies' own momentum.
+    """Outputs that follow from the state and the given accelerations out.rates without solving equations of motion.
 
-    Markers, loads of wheels, energy and momentum.
+    These are markers, loads of wheels, energy and momentum.
     """
     load_state(t, y, c, w)
     for j in range(out.rates.shape[0]):
@@ -124,9 +132,9 @@ def observe_motion(t, y, c, w, out):
 
 @kernel
 def sense_markers(t, y, c, w, out):
-    """The rows of all markers, out.markers, at y = [q, u, work] and given accelerations, out.rates.
+    """Markers at y = [q, u, work] and given accelerations out.rates, to out.markers.
 
-    Positions and velocities do not depend on the latter. Bodies of level ruthless are seen as markers see them.
+    Positions and velocities do not depend on the accelerations. Bodies of level ruthless have their true deformation.
     """
     load_state(t, y, c, w)
     for j in range(out.rates.shape[0]):
@@ -134,15 +142,15 @@ def sense_markers(t, y, c, w, out):
     velocity_sweep(c, w, True, True)
     pose_sweep(c, w)
     acceleration_sweep(c, w)
-    for i in range(out.marker_port.shape[0]):
-        observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+    _observe_each_marker(c, w, out)
 
 
 @helper
 def _observe_motion(c, w, out):
-    """Needs the velocity, pose and acceleration sweeps as the equations of motion see the state.
+    """Loads of wheels, energy, momentum, connectors and markers.
 
-    Energy and markers see bodies at rest otherwise, and all others alike.
+    Needs the velocity, pose and acceleration sweeps of the equations of motion. For bodies of level ruthless the sweeps
+    are repeated: energy and momentum need their true modal speeds, markers their true deformation, too.
     """
     if has(c, WHEELS):
         _world_wheel_loads(c, w, out.wheel_loads)
@@ -154,17 +162,22 @@ def _observe_motion(c, w, out):
             store6(out.connectors[i], 0, vec6(w.connector[i].load, 0))
     if has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS):
         _observe_along_hinges(c, w, out.hinge_forces)
+    observe_markers(c, w, out)
+
+
+@helper
+def observe_markers(c, w, out):
+    """All markers; bodies of level ruthless are seen deformed."""
     if has(c, AT_REST):
         velocity_sweep(c, w, True, True)
         pose_sweep(c, w)
         acceleration_sweep(c, w)
-    for i in range(out.marker_port.shape[0]):
-        observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+    _observe_each_marker(c, w, out)
 
 
 @helper
 def _observe_along_hinges(c, w, loads):
-    """Loads of springs, then of other laws, along coordinates."""
+    """Write the loads of springs, then of other laws, along coordinates to loads (S,)."""
     springs = c.hinge_spring.shape[0]
     for i in range(springs):
         loads[i] = w.hinge_spring[i].load
@@ -173,7 +186,13 @@ def _observe_along_hinges(c, w, loads):
 
 
 @helper
-def observe_marker(c, w, k, port, row):
+def _observe_each_marker(c, w, out):
+    for i in range(out.marker_port.shape[0]):
+        _observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+
+
+@helper
+def _observe_marker(c, w, k, port, row):
     """The row (24,) of a marker at a port of body k."""
     R = mat3(w.body[k].pose_rotation, 0)
     alpha, a = times6(R, port_acceleration(c, w, k, port))

@@ -1,23 +1,18 @@
-"""Derivatives of what sensors read, exact to round-off, as `flexmb.entry.tangent` has those of the accelerations.
+"""Derivatives of the outputs that sensors use, exact to round-off, like those of `flexmb.entry.tangent`.
 
-Rows are those of `flexmb.entry.observation.Outputs`: all of `every`, of which accelerations, loads of hinges and
-markers are found and the others zero, then `drives`.
+Rows are those of `flexmb.entry.observation.Outputs`: all of `every`, of which only accelerations, loads of hinges and
+markers are computed and the others zero, then `drives`.
 """
 
 from __future__ import annotations
 
-from flexmb.entry.articulated import slope, world_loads
-from flexmb.entry.observation import Outputs, observe_marker, places
-from flexmb.jain.accelerations import acceleration_sweep
-from flexmb.jain.kinematics import pose_sweep, velocity_sweep
-from flexmb.jain.loads import hinge_loads
+from flexmb.entry.articulated import slope
+from flexmb.entry.observation import Outputs, observe_free_motion, observe_markers, places
 from flexmb.jit.bundle import bundle
 from flexmb.jit.duals import DUAL, rate, seeded
-from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.lanes import LANES
 from flexmb.jit.wide_arrays import as_duals
-from flexmb.levels.body import AT_REST
 from flexmb.tables.status import OK
 
 
@@ -29,7 +24,7 @@ class OutputsTangent(Outputs):
 
 
 def outputs_tangent(out: Outputs) -> OutputsTangent:
-    """Of the same shapes, for the same markers; one per thread."""
+    """Dual outputs of the shapes and markers of `out`; one per thread."""
     every = as_duals(out.every)
     shapes = {name: getattr(out, name).shape for name in _PARTS}
     parts = {name: every[place].reshape(*shape, every.shape[-1]) for name, (place, shape) in places(shapes).items()}
@@ -43,9 +38,9 @@ _PARTS = ("rates", "markers", "loads", "wheel_loads", "energy", "momentum", "con
 
 @kernel
 def observed_jacobian(t, y, J, c, w, out):
-    """J (E+nu,n): derivatives of `every` (E,) and `drives` by y = [q, u, work] (n,); returns a status code.
+    """J (E+nu,n): derivatives of `every` (E,) and `drives` with respect to y = [q, u, work] (n,); returns a status.
 
-    w: of `flexmb.entry.tangent.tangent_workspace`. The values themselves are left in `out`.
+    w is made by `flexmb.entry.tangent.tangent_workspace`. The values are in `out`.
     """
     columns = w.column.shape[0]
     w.time[0] = t
@@ -72,19 +67,9 @@ def observed_jacobian(t, y, J, c, w, out):
 
 @helper
 def sense(c, w, out):
-    """What sensors read where the right-hand side of the recursion was just evaluated, with status OK."""
-    pose_sweep(c, w)
-    hinge_loads(c, w)
-    world_loads(c, w, out.loads)
-    for j in range(out.rates.shape[0]):
-        out.rates[j] = w.speed[j].acceleration
-        out.drives[j] = w.speed[j].drive
-    if has(c, AT_REST):
-        velocity_sweep(c, w, True, True)
-        pose_sweep(c, w)
-        acceleration_sweep(c, w)
-    for i in range(out.marker_port.shape[0]):
-        observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+    """The outputs that sensors use, after an evaluation of the right-hand side of the recursion with status OK."""
+    observe_free_motion(c, w, out)
+    observe_markers(c, w, out)
 
 
 @helper

@@ -1,4 +1,4 @@
-"""What is observed at the samples of a run, in one compiled loop for all algorithms and scenes: by address."""
+"""Outputs at all samples of a run, in one compiled loop that calls the kernels of any algorithm by address."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ outputs_at = at_address(outputs(shapes(0, 0, 0, 0), _NONE, _NONE))
 
 @kernel
 def observe_samples(where, doubt, times, states, slope, rows):
-    """Rows (T,m) of out.every, out.drives and what is not written, at states (T,n) and times (T,); how many are sound.
+    """Write out.every and out.drives at states (T,n) and times (T,) to rows (T,m); returns the number of valid rows.
 
-    where (5,): addresses of a right-hand side (t, y, dy, c, w) and its tables, of the kernel (c, w, out) that observes
-    where it was evaluated, and of the outputs; doubt (1,) is that of w, slope (n,) is written. The loop ends where a
-    status is not OK, a number is not finite, or a pivot may be rounding: for Python to look into.
+    where (5,): addresses of a right-hand side (t, y, dy, c, w), of its c and w, of the kernel (c, w, out) that computes
+    the outputs after it, and of the outputs; doubt (1,) is that of w; slope (n,) is overwritten. The loop ends at the
+    first sample with a status other than OK, a number that is not finite, or a doubtful pivot, which Python examines.
     """
     motion, c, w, observe, out = where[0], where[1], where[2], where[3], where[4]
     o = outputs_at(out)

@@ -3,11 +3,12 @@
     w = tangent_workspace(system.constants, system.nq, system.nu)
     status = jacobian(t, y, J, system.constants, w)
 
-The kernels of the recursion are compiled once more for a workspace whose numbers are duals (`flexmb.jit.duals`): they
-carry their derivatives along eight directions with them. No difference is formed, and nothing cancels.
+The kernels of the recursion are compiled once more for a workspace whose numbers are duals (`flexmb.jit.duals`), which
+carry derivatives along eight directions (forward differentiation). No differences are formed, so that nothing cancels.
 
 y = [q, u, work] as in `flexmb.entry.articulated.rhs`. The constants must be those of the system (`System.constants`),
-not those with reduced bodies: every body is eliminated explicitly here.
+not `System.recursion_constants`, in which bodies may be reduced: here the modes of all bodies are eliminated
+explicitly.
 """
 
 from __future__ import annotations
@@ -30,18 +31,18 @@ from flexmb.typing import Index, Real
 
 @bundle
 class TangentWorkspace(Workspace):
-    """A workspace whose numbers are duals, and what a Jacobian needs besides."""
+    """A workspace whose numbers are duals, and the further arrays of a Jacobian."""
 
     numbers = DUAL
 
     time: Real  # (1,) s
     state: Real  # (nq+nu+1,) y
     slope: Real  # (nq+nu+1,) dy/dt
-    column: Index  # (C,) places in y that dy/dt depends on; the others' columns vanish
+    column: Index  # (C,) indices in y of the nonzero columns of the Jacobian
 
 
 def tangent_workspace(c: Constants, nq: int, nu: int) -> TangentWorkspace:
-    """What `jacobian` and `time_derivative` write; one per thread."""
+    """The workspace of `jacobian` and `time_derivative`; one per thread."""
     n = nq + nu + 1
     tables = workspace(c, nq, nu)
     return TangentWorkspace(
@@ -65,7 +66,7 @@ def jacobian(t, y, J, c, w):
         w.state[i] = y[i]
         for j in range(n):
             J[i, j] = 0.0
-    for first in range(0, max(columns, 1), LANES):  # once, for its status, where there is no column
+    for first in range(0, max(columns, 1), LANES):  # without any column once, for the status
         count = min(LANES, columns - first)
         for lane in range(count):
             j = w.column[first + lane]
@@ -95,7 +96,7 @@ def time_derivative(t, y, out, c, w):
 
 
 def _columns(c: Constants, nq: int, nu: int) -> Index:
-    """All places in y but those of work, prescribed coordinates with their speeds, and angles of unsprung wheels."""
+    """Indices in y of all but work, prescribed coordinates and speeds, and angles of wheels without springs."""
     needed = np.ones(nq + nu, bool)
     prescribed = np.flatnonzero(c.speed["prescribed"] >= 0)
     needed[c.speed["coordinate"][prescribed]] = needed[nq + prescribed] = False

@@ -11,14 +11,14 @@ from flexmb.tables.status import OK
 
 
 def joint(c: Constants) -> Joint:
-    """What the recursion writes besides the workspace."""
+    """The arrays of the unsplit recursion in addition to the workspace."""
     n, _, m = c.mfr.shape
     return Joint(np.zeros((n, m + 6, m + 6)), np.zeros((n, m + 6, 6)), np.zeros((n, m + 6)))
 
 
 @kernel
 def accelerations(t, y, c, w, x):
-    """udot into w.speed.acceleration, drive loads into w.speed.drive; returns a status code."""
+    """udot to w.speed.acceleration, drive loads to w.speed.drive; returns a status code."""
     load_state(t, y, c, w)
     status = forward_dynamics(c, w, x)
     if status == OK:

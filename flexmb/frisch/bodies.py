@@ -1,9 +1,9 @@
 """One body's share of the nested-body equations: (47)-(53), the momentum rates (86)-(88), the modal rows (110).
 
-Corrections to the print, each declared in docs/errata.md: the parameters themselves; A_n and Q_n of (110) and of the
-left side depend on deformation to first order; Phi and Delta-L keep the second-order terms that cancel those of G (98),
-so that the terms of one body about its hinge point are of first order; loads at nodes and gravity act on the modes; the
-frame of a wheel turns with its node.
+Corrections of the print (docs/errata.md): the parameters themselves; A_n and Q_n, in (110) and in the matrix, depend on
+the deformation to first order; Phi and Delta-L keep those second-order terms that cancel terms of G (98), so that the
+terms of one body about its hinge point are of first order; loads at nodes and gravity act on the modes; the frame of a
+wheel turns with its node.
 """
 
 from flexmb.frisch.tables import FIXED_SPIN_AXIS, NO_LOADS_ON_MODES, SECOND_ORDER
@@ -34,7 +34,7 @@ from flexmb.tables.arrays import FORCE, NODE_AXES
 
 @helper
 def body_terms(c, w, k):
-    """Mass, first moment, Phi + G about the hinge point, and the right sides of (107), (108), (110) of body k."""
+    """Mass, first moment, Phi + G about the hinge point, and right-hand sides of (107), (108), (110) of body k."""
     nest, e = w.nest[k], c.element[k]
     nm = c.body[k].modes
     R = mat3(nest.rotation, 0)
@@ -50,7 +50,7 @@ def body_terms(c, w, k):
         Phi_rate = sym_axpy(etad, E, Phi_rate)  # (172)
         momentum = axpy(etad, vec3(c.element_mode[k, n].Q, 0), momentum)  # (53)
     alpha = add(vec3(e.alpha, 0), moved)
-    if nm > 0 and c.printed[SECOND_ORDER] == 0:
+    if nm > 0 and c.printed[SECOND_ORDER] == 0:  # cancels m (dalpha.dalpha 1 - dalpha dalpha) in G below
         Phi = sym_axpy(-mass, steiner(moved, moved), Phi)
         Phi_rate = sym_axpy(-2.0 * mass, steiner(moved, moved_rate), Phi_rate)
         momentum = axpy(-mass, cross(moved, moved_rate), momentum)
@@ -71,7 +71,10 @@ def body_terms(c, w, k):
 
 @helper
 def _modal_row(c, w, k, n, R, omega, moved):
-    """A_n and Q_n in World axes and the right side of (110), (186) for mode n of body k."""
+    """A_n and Q_n in World axes and the right-hand side of (110), (186) for mode n of body k.
+
+    The elastic force has the true deformation, also at level ruthless, where w.modal is zero.
+    """
     e = c.element[k]
     A0, Q = vec3(c.element_mode[k, n].A, 0), vec3(c.element_mode[k, n].Q, 0)
     change, K = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -100,7 +103,10 @@ def _modal_row(c, w, k, n, R, omega, moved):
 
 @helper
 def wheel_terms(c, w, k, i):
-    """Wheel i of body k: I_W, bias of its relative rate (122), (131), (134), rate (94), (105) of its momentum (102)."""
+    """Wheel i of body k: I_W, bias of its relative rate (122), (131), (134), rate (94), (105) of its momentum (102).
+
+    Adds I_W to the inertia and minus the rate to the torque of the body, and writes its columns of S.
+    """
     wheel, port, omega = w.wheel[i], w.port[c.wheel[i].port], vec3(w.nest[k].omega, 0)
     axis, spin = times(mat3(port.R, 0), vec3(c.wheel[i].axis, 0)), w.u[c.wheel[i].u_index]
     axial, transverse = c.wheel[i].axial, c.wheel[i].transverse
@@ -113,7 +119,7 @@ def wheel_terms(c, w, k, i):
     total = add(omega, axpy(spin, axis, node))  # (120), inertial
     bias, rate = node_rate, cross(omega, sym_times(inertia, total))
     if c.printed[FIXED_SPIN_AXIS] == 0:
-        # the tensor is fixed in the node's frame: rate of I_W . total with the angular rate omega + node
+        # The print turns I_W with the body. It turns with the node, at omega + node: the terms with `node` are added.
         bias = axpy(spin, cross(node, axis), bias)
         rate = add(rate, sub(cross(node, sym_times(inertia, total)), sym_times(inertia, cross(node, total))))
     store3(wheel.axis, 0, axis)
@@ -132,7 +138,7 @@ def wheel_terms(c, w, k, i):
 
 @helper
 def load_terms(c, w, k, i):
-    """Load i at its node: on the body (80), (81), and on its modes, which the third partition of (111) leaves out."""
+    """Load i at its node: on the body (80), (81), and on its modes, on which (111) as printed has no loads."""
     port, F = node_load(c, w, i)
     torque, force = shift_force(F, vec3(w.port[port].r, 0))
     add3(w.nest[k].force, 0, force)
@@ -145,7 +151,7 @@ def load_terms(c, w, k, i):
 
 @helper
 def node_load(c, w, i):
-    """Load i as (port, [torque; force] about the port), World axes."""
+    """Load i: its port, and [torque; force] about the port in World axes."""
     port, zero = c.load[i].port, (0.0, 0.0, 0.0)
     value = scale(w.function[c.load[i].function, 0], vec3(c.load[i].direction, 0))
     if c.load[i].frame == NODE_AXES:
@@ -157,7 +163,7 @@ def node_load(c, w, i):
 
 @helper
 def steiner(a, b):
-    """(a . b) 1 - (a b + b a)/2, symmetric: G (98) of unit mass."""
+    """(a . b) 1 - (a b + b a)/2, symmetric: for a = b, G (98) of a unit mass at a."""
     return (
         a[1] * b[1] + a[2] * b[2],
         a[0] * b[0] + a[2] * b[2],

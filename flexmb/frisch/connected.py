@@ -1,4 +1,4 @@
-"""Connectors in the nested-body equations: loads at nodes (80), (81), on bodies and modes as `load_terms` has them."""
+"""Connectors in the nested-body equations: loads at nodes (80), (81) on bodies and modes, as in `load_terms`."""
 
 from flexmb.connectors.between import load_between
 from flexmb.frisch.tables import NO_LOADS_ON_MODES
@@ -11,7 +11,7 @@ from flexmb.tables.arrays import ON_GROUND
 
 @helper
 def connector_terms(c, w):
-    """Loads of all connectors on the bodies that they join."""
+    """Add the loads of all connectors to the right-hand sides of the bodies that they join."""
     for i in range(c.connector.shape[0]):
         load_between(c, w, i, _end(c, w, i, 0), _end(c, w, i, 1))
         on_B = vec6(w.connector[i].load, 0)
@@ -32,7 +32,7 @@ def _end(c, w, i, side):
 
 @helper
 def _add_force(c, w, i, side, F):
-    """A force about an end of connector i."""
+    """Add a force F about an end of connector i, World axes, to the body at that end and to its modes."""
     k, port = c.end[i, side].body, c.end[i, side].port
     if k == ON_GROUND:
         return

@@ -1,4 +1,4 @@
-"""From links to the constants of Frisch's route: parameters of the bodies, places in the expanded equations."""
+"""Constants of Frisch's equations from the links of a scene: parameters of bodies, indices of the sparse matrix S."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _SWITCHES = (
 def nested_constants(
     constants: a.Constants, chain: list[BodyLink], errata: Set[Erratum], null_partitions: bool = False
 ) -> t.NestedConstants:
-    """The scene's constants with the tables Frisch's equations need, keeping the print's `errata`.
+    """The scene's constants and the tables of Frisch's equations, in which the defects `errata` of the print are kept.
 
-    Null partitions phiR_H, phiT_H, phiR_W of hinges and wheels at nodes that do not deform are skipped, unless
-    `null_partitions` keeps those that the constants have ports for.
+    The partitions phiR_H, phiT_H, phiR_W vanish for hinges and wheels at nodes that do not deform. They have no entries
+    in S, unless `null_partitions` keeps those for which the constants have ports.
 
-    Raises ValueError where a body is of level stiffened, or where the print is to be followed and the modes of a body
-    are not clamped at its origin.
+    Raises ValueError if a body is of level stiffened, or if any defect is kept and the modes of a body are not clamped
+    at its origin.
     """
     parameters = [_parameters(link, errata) for link in chain]
     element, mode, pair, slopes = _elements(parameters, constants.mff.shape[2])
@@ -51,8 +51,8 @@ def _parameters(link: BodyLink, errata: Set[Erratum]) -> ModeParameters:
     model = link.model
     if link.level.second_order:
         raise ValueError(
-            f'body "{link.name}": these equations are of first order in the deformation and know no geometric '
-            'stiffness, for which level "stiffened" stands; use level "linear" or "full", or algorithm "articulated"'
+            f'body "{link.name}": these equations are of first order in the deformation and have no geometric '
+            'stiffness, which level "stiffened" needs; use level "linear" or "full", or algorithm "articulated"'
         )
     first_wheel = len(model.mass) - link.wheels
     inertia = np.where((np.arange(len(model.mass)) < first_wheel)[:, None, None], model.inertia, 0.0)
@@ -76,7 +76,7 @@ def _parameters(link: BodyLink, errata: Set[Erratum]) -> ModeParameters:
 
 
 def _elements(parameters: list[ModeParameters], m: int) -> tuple[a.Record, a.Record, a.Record, a.Real]:
-    """Parameters as tables, m the largest number of modes."""
+    """The parameters of all bodies as tables; m is the largest number of modes."""
     bodies = len(parameters)
     element = np.zeros(bodies, t.ELEMENTS)
     mode, pair = np.zeros((bodies, m), t.ELEMENT_MODE), np.zeros((bodies, m, m), t.ELEMENT_PAIR)
@@ -103,7 +103,12 @@ def _six(tensors: a.Real) -> a.Real:
 def _places(
     c: a.Constants, element: a.Record, null_partitions: bool
 ) -> tuple[a.Record, a.Index, a.Index]:
-    """Columns of S and their expanded rows; completes `element`."""
+    """Columns of S, the expanded row of each entry, and `wheel_entry`; completes `element`.
+
+    The column of a hinge or wheel speed has the rows of its own relative motion. The column of a mode has the mode's
+    own row, then the rows of every relative motion that the mode causes: of the body itself if its hinge sits on a
+    deforming node, of hinges on its deforming nodes, and of its wheels.
+    """
     bodies, wheels = len(c.body), len(c.wheel)
     modes = int(np.sum(c.body["modes"]))
     hinges = 3 * bodies + 3 * wheels + modes

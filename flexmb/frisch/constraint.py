@@ -1,7 +1,8 @@
-"""Constraint loads: they follow from the suppressed rows of (111) and its last partition, given the accelerations.
+"""Constraint loads, from the suppressed rows and the last partition of (111) once the accelerations are known.
 
-Row block k of (112) and of (115) is the balance of the nest of body k: left side minus eta is the whole torque and
-force that hinge k-1 transmits, phi^c + phi^H and F^c + F^H; likewise the row of a wheel, phi^c_W + CL (113).
+Row block k of (112) and of (115) is the momentum balance of the nest of body k: its left-hand side minus eta is the
+total torque and force that hinge k-1 transmits, phi^c + phi^H and F^c + F^H. Likewise the row of a wheel gives
+phi^c_W + CL (113).
 """
 
 from flexmb.frisch.reduction import expanded_accelerations
@@ -11,7 +12,7 @@ from flexmb.spatial.vector import cross, store3, sub, vec3
 
 @helper
 def constraint_loads(c, w):
-    """Load (6,) across every hinge about its outboard hinge point (112), (115), torque of wheels (113), World axes."""
+    """Loads (6,) across all hinges about outboard hinge points (112), (115), torques on wheels (113); World axes."""
     expanded_accelerations(c, w)
     bodies = c.body.shape[0]
     hinges = w.y.shape[0] - 3 * bodies

@@ -1,9 +1,9 @@
-"""Between the mode-dependent parameters and the modal integrals of the recursion.
+"""Conversion between the mode-dependent parameters and the modal integrals of the recursion.
 
-Both are sums over the same body: the parameters about its mass centre, to first order in the coordinates; the integrals
-about the body origin, complete in the coordinates where no point turns, with the points that turn kept as points. So
-the integrals give all parameters. The parameters give the integrals only together with the points that turn, because
-C_n, J_n and the rotary parts of the others are sums from which the single points cannot be recovered.
+Both are sums over the same body. The parameters are about its mass centre, to first order in the coordinates. The
+integrals are about the body origin and exact in the coordinates, with turning points listed one by one. Therefore the
+integrals give all parameters, while the parameters give the integrals only together with the turning points: C_n, J_n
+and the rotary parts of the others are sums from which the single points cannot be recovered.
 """
 
 from __future__ import annotations
@@ -16,15 +16,16 @@ from flexmb.modal.cross import cross_matrix
 from flexmb.modal.integrals import ModalIntegrals, TurningPoints
 from flexmb.typing import Real
 
-# Turning inertia in the parameters beyond that of the given points: a smaller share is round-off of the sums.
+# Relative difference between the turning inertia in the parameters and that of the given points that is still
+# attributed to rounding in the sums.
 _ROUND_OFF = 1e-12
 
 
 def from_integrals(integrals: ModalIntegrals, *, as_printed: bool = False) -> ModeParameters:
-    """All parameters (48)-(72), without exception, of a body of which only the modal integrals are known.
+    """All parameters (48)-(72) of a body of which only the modal integrals are known.
 
-    The sums are moved from the body origin to the mass centre. That subtracts nearly equal numbers: with the radius of
-    gyration r, the relative error grows as (|alpha| / r)^2.
+    The sums are moved from the body origin to the mass centre, by subtraction: with r the radius of gyration, relative
+    rounding errors grow as (|alpha| / r)^2.
     """
     i = integrals
     turned = elements(i.turning)
@@ -46,10 +47,10 @@ def from_integrals(integrals: ModalIntegrals, *, as_printed: bool = False) -> Mo
 
 
 def to_integrals(parameters: ModeParameters, turning: TurningPoints | None = None) -> ModalIntegrals:
-    """The modal integrals, about the body origin, of the body with these corrected parameters.
+    """The modal integrals about the body origin of the body with these corrected parameters.
 
-    `turning` are its points with inertia or offset mass centre; without them all its masses must be particles. Raises
-    ValueError where the parameters hold other turning inertia than `turning`, or are the printed ones.
+    `turning` are its points with inertia or offset mass centre; if it is None, all masses must be particles. Raises
+    ValueError if the turning inertia in the parameters is not that of `turning`, or if they are the printed ones.
     """
     p = parameters
     points = _none(p.mode_count) if turning is None else turning
@@ -62,7 +63,7 @@ def to_integrals(parameters: ModeParameters, turning: TurningPoints | None = Non
         mA=p.mass * p.A,
         mQ=p.Q - own.C,
         D=p.D,
-        F=p.F - slope.F + 0.5 * cross_matrix(K),  # only the symmetric part is in F_mn, the other one is K_mn
+        F=p.F - slope.F + 0.5 * cross_matrix(K),  # F_mn has only the symmetric part; K_mn has the antisymmetric one
         K=K,
         M1=p.M1 - own.M1,
     )
@@ -101,14 +102,14 @@ def _check(p: ModeParameters, every: Particles, own: Rotary, slope: Slopes) -> N
     for name, (rest, size) in left.items():
         if np.any(np.abs(rest) > _ROUND_OFF * p.mass * size):
             raise ValueError(
-                f"the parameters' {name} is not that of the given turning points: single points cannot be had from "
-                "their sums; pass the body's points with inertia or offset mass centre as `turning`, and corrected "
+                f"the parameters' {name} is not that of the given turning points, and the points cannot be recovered "
+                "from the sums: pass the body's points with inertia or offset mass centre as `turning`, and corrected "
                 "parameters, not the printed ones"
             )
 
 
 def _combined(a: Particles, b: Particles, sign: float) -> Particles:
-    """a + sign b, sums about the same point."""
+    """a + sign b, field by field, for sums about the same point."""
     return Particles(*(getattr(a, name) + sign * getattr(b, name) for name in Particles.__dataclass_fields__))
 
 

@@ -1,4 +1,4 @@
-"""The elements of a flexible body and their sums: masses at mass centres, and the inertia that turns with its element.
+"""Elements of a flexible body and sums over them: point masses at mass centres, and inertias that turn with them.
 
 Element i is the mass m_i at its mass centre x_i = position + c, moved by the mode vectors phiT and turned by phiR, with
 its own inertia Phi_i. It turns by exp(theta~), theta = sum_n a_n phiR_n, and carries c along, so that
@@ -65,7 +65,7 @@ class Rotary:
 
 @dataclass(frozen=True)
 class Slopes:
-    """Sums over turning elements that the print leaves out or has otherwise; indices as in `ModeParameters`.
+    """Sums over turning elements that the print omits or has in another form; indices as in `ModeParameters`.
 
     K (n,n,3) their part of K_mn; mA1, Q1 (n,n,3); M1 (n,n,n) [k,m,n]; F (n,n,3,3).
     """
@@ -85,7 +85,7 @@ def elements(points: FlexibleModel | TurningPoints) -> Elements:
 
 
 def turning(e: Elements) -> Elements:
-    """Those elements whose inertia or mass centre turns."""
+    """The elements that are not mere point masses: they have inertia, or a mass centre off the turning point."""
     kept = np.any(e.inertia != 0.0, axis=(1, 2)) | np.any(e.c != 0.0, axis=1)
     return Elements(e.mass[kept], e.x[kept], e.c[kept], e.inertia[kept], e.phiT[kept], e.phiR[kept])
 
@@ -126,17 +126,18 @@ def rotary(e: Elements) -> Rotary:
 
 
 def slopes(e: Elements, alpha: Real) -> Slopes:
-    """The terms of first order in the coordinates of the exact kinetic energy of turning elements, about `alpha`.
+    """First-order terms in the coordinates of the exact kinetic energy of turning elements, about `alpha`.
 
-    Per rate adot_n an element turns by phiR_n + 1/2 theta~ phiR_n, its mass centre moves by phiT_n + sum_k a_k bend_kn,
-    and its inertia is Phi_i + [theta~, Phi_i], where (12) takes the second term for one of second order. So
+    At unit rate adot_n the angular velocity of an element is phiR_n + 1/2 theta~ phiR_n and the velocity of its mass
+    centre phiT_n + sum_k a_k bend_kn; its inertia is Phi_i + [theta~, Phi_i], of which (12) omits the second term as if
+    it were of second order. Hence
 
         M1[k,m,n] = sum m_i (bend_km . phiT_n + phiT_m . bend_kn)
                     - 1/2 ((phiR_k x phiR_m) . Phi_i phiR_n + phiR_m . Phi_i (phiR_k x phiR_n))
         Q1[k,n]   = sum m_i (x_i - alpha) x bend_kn + phiR_k x Phi_i phiR_n - 1/2 Phi_i (phiR_k x phiR_n)
         K[k,n]    = (Q1[k,n] - Q1[n,k]) / 2 = sum 1/2 (tr(Phi_i) 1 - 2 Phi_i)(phiR_k x phiR_n)
 
-    where (72) has 1/2 (Phi_i phiR_k) x phiR_n.
+    in place of 1/2 (Phi_i phiR_k) x phiR_n in (72).
     """
     bend = _curvature(e)
     turn = np.cross(e.phiR[:, :, None], e.phiR[:, None])  # phiR_m x phiR_n
@@ -167,17 +168,17 @@ def axial(moment: Real) -> Real:
 
 
 def _curvature(e: Elements) -> Real:
-    """bend (p,n,n,3) of exp(theta~) c: half of phiR_m x (phiR_n x c) + phiR_n x (phiR_m x c)."""
+    """bend (p,n,n,3), the second derivatives of exp(theta~) c: 1/2 (phiR_m x (phiR_n x c) + phiR_n x (phiR_m x c))."""
     arm = np.cross(e.phiR, e.c[:, None])
     nested = np.cross(e.phiR[:, :, None], arm[:, None])
     return 0.5 * (nested + np.swapaxes(nested, 1, 2))
 
 
 def _curved_inertia(e: Elements, bend: Real) -> Real:
-    """Half the second derivatives (n,n,3,3) of the inertia about the body origin that turning causes.
+    """Half the second derivatives (n,n,3,3) of the inertia about the body origin with respect to turning.
 
-    That of a mass by its mass centre's bend, that of exp(theta~) Phi_i exp(-theta~) by
-    1/2 (theta~ theta~ Phi_i + Phi_i theta~ theta~) - theta~ Phi_i theta~.
+    The masses contribute by `bend` of their mass centres, the inertias exp(theta~) Phi_i exp(-theta~) by their
+    second-order term 1/2 (theta~ theta~ Phi_i + Phi_i theta~ theta~) - theta~ Phi_i theta~.
     """
     moment = np.einsum("p,pa,pmnb->mnab", e.mass, e.x, bend, optimize=True)
     P = cross_matrix(e.phiR)

@@ -1,4 +1,4 @@
-"""The defects of the print that change a result when it is followed to the letter, each with a switch of its own."""
+"""The defects of the print that change results, each with a switch that keeps it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Entry points of Frisch's route: right-hand side of the motion, accelerations, loads."""
+"""Entry points of Frisch's equations: right-hand side of the equations of motion, accelerations, loads."""
 
 from flexmb.connectors.between import connector_power
 from flexmb.connectors.bushings import overturned
@@ -20,7 +20,7 @@ from flexmb.tables.status import CONNECTOR_OVERTURNED, OK, OUT_OF_RANGE
 
 @kernel
 def rhs(t, y, dy, c, w):
-    """dy/dt of y = [q, u, work] at time t; returns a status code. `work` collects the non-conservative power."""
+    """dy/dt of y = [q, u, work] at time t; returns a status code. `work` integrates the non-conservative power."""
     status = accelerations(t, y, c, w)
     if status != OK:
         return status
@@ -30,7 +30,7 @@ def rhs(t, y, dy, c, w):
 
 @kernel
 def accelerations(t, y, c, w):
-    """udot into w.speed.acceleration, drive loads into w.speed.drive; returns a status code."""
+    """udot to w.speed.acceleration, drive loads to w.speed.drive; returns a status code."""
     assemble(t, y, c, w)
     for k in range(c.body.shape[0]):
         if is_out_of_range(c, w.modal[k], k):
@@ -46,7 +46,7 @@ def accelerations(t, y, c, w):
 
 @kernel
 def loads(t, y, c, w):
-    """Accelerations, and the loads of hinges and wheels into w.nest.load and w.wheel.torque; returns a status code."""
+    """Accelerations, and the loads of hinges and wheels to w.nest.load and w.wheel.torque; returns a status code."""
     status = accelerations(t, y, c, w)
     if status == OK:
         constraint_loads(c, w)
@@ -55,7 +55,7 @@ def loads(t, y, c, w):
 
 @kernel
 def assemble(t, y, c, w):
-    """Partitions and right sides of (111), the transformation and the reduced equations, without solving them."""
+    """Partitions and right-hand sides of (111), the transformation and the reduced equations, without solving them."""
     load_state(t, y, c, w)
     hinge_forces(c, w)
     relative_motion(c, w)

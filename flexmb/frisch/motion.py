@@ -1,10 +1,9 @@
 """Relative motion of contiguous bodies, base to tip: (78), (79), (116)-(132), and the entries of S = (126) (133).
 
-The hinge point of the paper is the origin of a body's frame. Extensions beyond the paper, which change only S: hinges
-may translate along free coordinate vectors, hinges may sit off their nodes, and a body's own frame may move with its
-modes where its inboard hinge sits on a node that deforms (free-free modes). Node frames move exactly: by the
-translation shapes, turned by the exponential of the rotation shapes. As printed they move by constant shapes, (118),
-(121), (124).
+The hinge point of the paper is the origin of a body's frame. Extensions beyond the paper change S only: hinges may
+translate, hinges may be offset from their nodes, and the modes of a body may move its hinge point against its frame
+(free-free modes). The motion of node frames is exact: displacement by the translation shapes, rotation by the
+exponential of the rotation shapes. As printed, (118), (121), (124), they move by constant shapes.
 """
 
 from flexmb.frisch.tables import FIXED_SHAPES
@@ -65,7 +64,7 @@ def _port_in_body(c, w, k, i):
 
 @helper
 def _by_constant_shapes(c, w, k, i):
-    """Place of port i and its velocity relative to body k as printed, by constant shapes: (118), (121), (124)."""
+    """Position of port i and its velocity relative to body k as printed, by constant shapes: (118), (121), (124)."""
     x, p = vec3(c.port[i].position, 0), vec3(c.port[i].offset, 0)
     r, V = add(x, p), ZERO6
     for n in range(c.body[k].modes):
@@ -79,7 +78,7 @@ def _by_constant_shapes(c, w, k, i):
 
 @helper
 def _port_in_world(c, w, k, i):
-    """The same in World axes, once the body's attitude is known."""
+    """Turn pose and motion of port i of body k to World axes, once the body's attitude is known."""
     R = mat3(w.nest[k].rotation, 0)
     port = w.port[i]
     store9(port.R, 0, matmul(R, mat3(port.R, 0)))
@@ -92,9 +91,9 @@ def _port_in_world(c, w, k, i):
 
 @helper
 def _across_hinge(c, w, k):
-    """Body k relative to its parent: rates (116), (117), (123), at udot = 0 (119), (125); its motion in World.
+    """Velocity (116), (117), (123) and bias (119), (125) of body k relative to its parent; its motion in World.
 
-    V and A are motions relative to the parent, World axes: [rotation; translation], with rates at udot = 0.
+    V and A are the velocity and the acceleration at udot = 0 relative to the parent, [angular; linear], World axes.
     """
     p, o = c.body[k].parent, c.body[k].outboard_port
     R_parent, omega = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
@@ -113,7 +112,7 @@ def _across_hinge(c, w, k):
     beta, back = add(r, arm), (0.0, 0.0, 0.0)
     V, A = _carried(V_node, A_node, arm, V_hinge, A_hinge)
     _hinge_columns(c, w, k, R)
-    if o >= 0:  # from O to the body frame, which the modes move away from it
+    if o >= 0:  # from O to the body frame, against which the modes move O; `back` leads from the body origin to O
         R = matmul(R, transpose(mat3(w.port[o].R, 0)))
         back = times(R, vec3(w.port[o].r, 0))
         beta = sub(beta, back)
@@ -131,7 +130,7 @@ def _across_hinge(c, w, k):
 
 @helper
 def _inboard_node(c, w, k, R_parent):
-    """The node of the parent that carries hinge k: place, attitude, and its motion (124) and rates, World axes."""
+    """Node of the parent that carries hinge k: position, attitude, velocity (124) and acceleration, World axes."""
     i = c.body[k].inboard_port
     if i >= 0:
         return vec3(w.port[i].r, 0), mat3(w.port[i].R, 0), vec6(w.port[i].v, 0), vec6(w.port[i].a, 0)
@@ -141,7 +140,10 @@ def _inboard_node(c, w, k, R_parent):
 
 @helper
 def _carried(V, A, arm, V_rel, A_rel):
-    """Motion of a point `arm` away that moves by V_rel, A_rel, on a frame that moves by V, A: (116), (123), (129)."""
+    """Composition: velocity and acceleration of a point at `arm` in a frame, (116), (123), (129).
+
+    V, A are those of the frame, V_rel, A_rel those of the point relative to the frame.
+    """
     omega, (w_rel, v_rel) = V[0], V_rel
     turning = add(cross(omega, add(cross(omega, arm), scale(2.0, v_rel))), A_rel[1])
     alpha = add(add(A[0], cross(omega, w_rel)), A_rel[0])  # (130)
@@ -150,7 +152,7 @@ def _carried(V, A, arm, V_rel, A_rel):
 
 @helper
 def _carrier(V_point, A_point, arm, V_rel, A_rel):
-    """Motion of the frame whose point `arm` away moves by V_point, A_point: what `_carried` undoes."""
+    """The inverse of `_carried`: motion of the frame from that of its point at `arm`."""
     w_rel, v_rel = V_rel
     omega = sub(V_point[0], w_rel)
     alpha = sub(A_point[0], add(A_rel[0], cross(omega, w_rel)))
@@ -161,7 +163,7 @@ def _carrier(V_point, A_point, arm, V_rel, A_rel):
 
 @helper
 def _follow_parent(w, k, p, omega, beta, beta_rate):
-    """Origin of body k, its velocity, and what its acceleration is at udot = 0, from those of the parent p."""
+    """Origin of body k, its velocity, and its acceleration at udot = 0, from those of the parent p."""
     nest = w.nest[k]
     origin, velocity, path = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if p >= 0:

@@ -1,4 +1,4 @@
-"""Frisch's route to a system's accelerations and loads, and its matrices by the names of the paper."""
+"""Accelerations and loads of a system by Frisch's equations, and their matrices by the names of the paper."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from flexmb.building.assemble import assemble
 from flexmb.building.links import BodyLink, links
-from flexmb.building.numbering import Numbering, wheels_by_body
+from flexmb.building.numbering import Numbering
 from flexmb.frisch import evaluation
 from flexmb.frisch.constants import nested_constants
 from flexmb.frisch.errata import CORRECTED, Erratum
@@ -26,12 +26,12 @@ from flexmb.typing import Index, Real
 class Partitions:
     """The equations of motion (111), partition by partition, all vectors in World axes.
 
-    First rows: rotation of every nest of a body, then translation of those nests whose hinge translates: point masses
-    and the base of the paper, here prismatic hinges and their like too. Second: wheels. Third: modes. Last: translation
-    of the remaining nests, whose hinges suppress it. `bodies` numbers the body of each block of three.
+    First rows: rotation of the nests of all bodies, then translation of those nests whose hinges translate (in the
+    paper point masses and the base, here also prismatic hinges, for example). Second: wheels. Third: modes. Last:
+    translation of the remaining nests, which their hinges suppress.
 
     X, I_c, F, Gamma, I_s, M1, A, M2   as in (111)
-    eta                                right sides eta_1 .. eta_4 with external loads, without those of hinges
+    eta                                right-hand sides eta_1 .. eta_4 with external loads, without those of hinges
     S                                  (126) times (133), rows as above, a column for each speed
     bias                               expanded accelerations at udot = 0: second terms of (127), (134)
     """
@@ -87,13 +87,13 @@ class NestedMotion(NamedTuple):
 
 
 def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partitions: bool = False) -> NestedSystem:
-    """Frisch's equations of a checked scene with any of the print's defects kept.
+    """Frisch's equations of a checked scene; `errata` are the defects of the print to keep.
 
-    `null_partitions` computes the partitions of (126) that vanish instead of skipping them: the difference is the
-    price of not having the paper's logic flags.
+    `null_partitions` also computes those partitions of (126) that vanish. The difference in time is what the paper's
+    logic flags save.
     """
     chain = links(scene)
-    numbering = Numbering(chain, wheels_by_body(scene))
+    numbering = Numbering(chain, scene)
     constants = assemble(scene, chain, numbering, null_partitions).constants
     return NestedSystem(constants, chain, numbering.layout, errata, null_partitions)
 
@@ -101,7 +101,8 @@ def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partition
 class NestedSystem:
     """The equations of one scene. Threads may share them: each has a workspace of its own.
 
-    y = [q, u, work]: ValueError or TypeError for what does not fit, DynamicsError where numbers overflow.
+    All methods take y = [q, u, work]. They raise ValueError or TypeError for arrays that do not fit, DynamicsError
+    where numbers overflow.
     """
 
     def __init__(
@@ -117,27 +118,22 @@ class NestedSystem:
         self._layout = layout
 
     @per_thread
-    def _w(self) -> NestedWorkspace:
-        """The one that all questions of this thread write."""
+    def own_workspace(self) -> NestedWorkspace:
+        """The workspace of the calling thread, overwritten by every method."""
         return self.workspace()
 
     def workspace(self) -> NestedWorkspace:
         """A fresh workspace for the right-hand side; one per thread."""
         return workspace(self.constants, self._layout.nq)
 
-    @property
-    def own_workspace(self) -> NestedWorkspace:
-        """The one that all questions of this thread write."""
-        return self._w
-
     def accelerations(self, t: float, y: Real) -> tuple[int, Real]:
         """Status code and udot (nu,) at y = [q, u, work]."""
-        status = evaluation.accelerations(*self._layout.whole(t, y), self.constants, self._w)
-        return status, self._w.speed["acceleration"].copy()
+        status = evaluation.accelerations(*self._layout.whole(t, y), self.constants, self.own_workspace)
+        return status, self.own_workspace.speed["acceleration"].copy()
 
     def motion(self, t: float, y: Real) -> tuple[int, NestedMotion]:
-        """Status code, and accelerations with everything the suppressed rows give."""
-        w = self._w
+        """Status code, accelerations, and the loads from the suppressed rows."""
+        w = self.own_workspace
         status = evaluation.loads(*self._layout.whole(t, y), self.constants, w)
         drives = np.where(self.constants.speed["prescribed"] >= 0, w.speed["drive"], 0.0)
         rates, loads, torques = w.speed["acceleration"].copy(), w.nest["load"].copy(), w.wheel["torque"].copy()
@@ -145,27 +141,27 @@ class NestedSystem:
 
     @property
     def doubt(self) -> Index:
-        """(1,) whether the last evaluation met a pivot that may be rounding."""
-        return self._w.doubt
+        """(1,) whether the last evaluation met a pivot that may consist of rounding errors."""
+        return self.own_workspace.doubt
 
     @property
     def fault(self) -> int:
         """Body at which the last evaluation failed."""
-        return int(self._w.fault[0])
+        return int(self.own_workspace.fault[0])
 
     def reduced(self, t: float, y: Real) -> tuple[Real, Real]:
-        """Matrix (nu,nu) and right side (nu,) of (136)."""
+        """Matrix (nu,nu) and right-hand side (nu,) of (136)."""
         t, y = self._layout.whole(t, y)
-        evaluation.assemble(t, y, self.constants, self._w)
-        return finite_result(self._w.M.copy(), t), finite_result(self._w.right.copy(), t)
+        evaluation.assemble(t, y, self.constants, self.own_workspace)
+        return finite_result(self.own_workspace.M.copy(), t), finite_result(self.own_workspace.right.copy(), t)
 
     def partitions(self, t: float, y: Real) -> Partitions:
         """The named blocks of (111) at y."""
         motion = self.relative_motion(t, y)
-        finite_result(self._w.Z, t), finite_result(self._w.eta, t)
+        finite_result(self.own_workspace.Z, t), finite_result(self.own_workspace.eta, t)
         first, wheels, modes, last = self._rows()
         rows = np.concatenate([first, wheels, modes, last])
-        Z, eta = self._w.Z, self._w.eta
+        Z, eta = self.own_workspace.Z, self.own_workspace.eta
         return Partitions(
             X=Z[np.ix_(first, first)],
             I_c=Z[np.ix_(first, wheels)],
@@ -182,7 +178,7 @@ class NestedSystem:
 
     def relative_motion(self, t: float, y: Real) -> RelativeMotion:
         """NestedMotion of contiguous bodies at y, every row of it, those without inertia of their own too (117)."""
-        w, c = self._w, self.constants
+        w, c = self.own_workspace, self.constants
         t, y = self._layout.whole(t, y)
         evaluation.assemble(t, y, c, w)
         finite_result(w.x, t)
@@ -194,7 +190,7 @@ class NestedSystem:
 
     def _rows(self) -> tuple[Index, Index, Index, Index]:
         """Expanded rows of the four partitions."""
-        c, w = self.constants, self._w
+        c, w = self.constants, self.own_workspace
         bodies, nx = len(c.body), len(w.x)
         rows = np.arange(nx)
         rotation = rows[: 3 * bodies].reshape(-1, 3)[np.any(c.element["Phi"], axis=1)]

@@ -1,7 +1,7 @@
-"""Nests: sums over all bodies outboard of a hinge point, (78)-(84), (107), (108), taken in one pass inward.
+"""Nests: sums over all bodies outboard of a hinge point, (78)-(84), (107), (108), computed in one inward pass.
 
-The sums over S_{k-1} of mass, m gamma, Phi + G and of the right sides all follow from those of the nests one hinge
-further out, shifted along beta. So the work is of order N, where the print's double sums are of order N^2.
+The sums over S_{k-1} of mass, m gamma, Phi + G and the right-hand sides follow from those of the nests one hinge
+further out, shifted by beta. This costs O(N) operations; the print's double sums cost O(N^2).
 """
 
 from flexmb.frisch.bodies import body_terms, load_terms, steiner, store_sym6, wheel_terms
@@ -14,7 +14,7 @@ from flexmb.tables.features import CONNECTORS
 
 @helper
 def nest_sums(c, w):
-    """All sums of (107)-(110) over the bodies of each nest, and the right sides eta of (111)."""
+    """All sums of (107)-(110) over the bodies of each nest, and the right-hand sides eta of (111)."""
     for k in range(c.body.shape[0]):
         body_terms(c, w, k)
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
@@ -31,7 +31,7 @@ def nest_sums(c, w):
 
 @helper
 def _join_nest(w, k, p):
-    """Nest of body k as a part of its parent's: moments about the parent's hinge point."""
+    """Add the sums of the nest of body k to those of its parent p, with moments about the parent's hinge point."""
     inner, outer = w.nest[p], w.nest[k]
     beta, first, mass = vec3(outer.beta, 0), vec3(outer.first, 0), outer.mass
     shifted = sym_add(sym6(outer.inertia, 0), sym_axpy(mass, steiner(beta, beta), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
@@ -46,7 +46,7 @@ def _join_nest(w, k, p):
 
 @helper
 def _right_sides(c, w):
-    """eta_1 .. eta_4 of (111), right sides of (112)-(115), in the order of the expanded velocities."""
+    """eta_1 .. eta_4 of (111), the right-hand sides of (112)-(115), in the order of the expanded velocities."""
     bodies, wheels = c.body.shape[0], c.wheel.shape[0]
     hinges = w.eta.shape[0] - 3 * bodies
     for k in range(bodies):

@@ -1,4 +1,4 @@
-"""The paper's demands on modes: clamped at the hinge point, (46), and normalised to the mass of the body, (41)."""
+"""The paper's conditions on modes: clamped at the hinge point, (46), and normalised to the mass of the body, (41)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexmb.frisch.elements import elements, mass_centre, particles, rotary
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.typing import Real
 
-# Shapes printed to ten digits vanish at the clamp this well.
+# Relative size below which a shape counts as zero at the clamp: files with ten printed digits satisfy it.
 _PRINTED = 1e-9
 
 
@@ -41,20 +41,20 @@ def check_boundary(model: FlexibleModel, name: str = "flexible body") -> None:
         if np.any(largest > _PRINTED * moved):
             mode = int(np.argmax(largest))
             raise ValueError(
-                f"{name}: mode {mode} moves the body origin, seen at {place}, but clamped modes vanish there in "
+                f"{name}: mode {mode} moves the body origin (at {place}), but clamped modes vanish there in "
                 "translation and rotation; subtract the rigid-body motion from the mode, move the body frame to the "
                 'clamp, or make the boundary "free-free"'
             )
 
 
 def normalised(model: FlexibleModel, name: str = "flexible body") -> FlexibleModel:
-    """The same body with modes as (41) wants them: modal mass m_body times the unit matrix, stiffness diagonal.
+    """The same body with modes normalised by (41): modal mass m_body times the unit matrix, stiffness diagonal.
 
-    The new modes are linear combinations of the given ones, which they span; stiffness is m_body diag(omega^2) in
-    ascending order, as in (45), and the damping is transformed. Modes that are orthogonal already keep their order and
-    are only scaled. New modes have the sign in which they contain most of an old one. Coordinates change: a_old = X
-    a_new, where X' M1 X = m_body 1. Raises ValueError where clamped modes move the body origin, or where modes depend
-    on one another.
+    The new modes span the same space as the given ones. Their stiffness is m_body diag(omega^2) in ascending order, as
+    in (45); damping is transformed along. Modes that are orthogonal already keep their order and are only scaled. The
+    sign of a new mode is such that its largest component along a given one is positive. Coordinates change by a_old = X
+    a_new, X' M1 X = m_body 1. Raises ValueError if clamped modes move the body origin, or if modes are linearly
+    dependent.
     """
     check_boundary(model, name)
     if model.mode_count == 0:
@@ -81,9 +81,9 @@ def _orthonormal(M1: Real, stiffness: Real, name: str) -> Real:
     d = np.diag(M1)
     scale = np.where(d > 0.0, 1.0 / np.sqrt(np.where(d > 0.0, d, 1.0)), 0.0)
     mass = M1 * np.outer(scale, scale)
-    round_off = 64 * len(d) * np.finfo(float).eps
+    round_off = 64 * len(d) * np.finfo(float).eps  # of eigenvalues and of sums over inertia points, at unit diagonal
     if np.linalg.eigvalsh(mass)[0] <= round_off:
-        raise ValueError(f"{name}: its modes depend on one another, or one moves no mass; leave one of them out")
+        raise ValueError(f"{name}: its modes are linearly dependent, or one moves no mass; leave one of them out")
     K = stiffness * np.outer(scale, scale)
     k = np.diag(K)
     apart = np.abs(mass - np.eye(len(d))) <= round_off

@@ -1,17 +1,17 @@
-"""Mode-dependent parameters of one flexible body, (48)-(72): every sum over its elements, done once.
+"""Mode-dependent parameters of one flexible body, (48)-(72): all sums over its elements, evaluated once.
 
 Body axes; the body origin is the hinge point lambda-1; a_n are modal coordinates (`eta` elsewhere).
 
-As printed, the parameters are exactly (48)-(72). As corrected, they give mass matrix and bias of the exact kinetic
+The printed parameters are exactly (48)-(72). The corrected ones give the mass matrix and the bias of the exact kinetic
 energy of the elements to first order in a_n and its rate. The two differ only where elements turn:
 
-    E_n    is H_n + H_n', for the inertia of elements turns at first order: (12) takes it for second, (52) leaves it out
+    E_n    is H_n + H_n': the turning of inertias is of first order, while (12) calls it second, and (52) omits it
     K_mn   has the rotary part 1/2 (tr(Phi_i) 1 - 2 Phi_i)(phiR_m x phiR_n), not that of (72), which produces power
     F_mn   is half the second derivative of the inertia about the hinge point, (70) that of the masses alone
     A1, Q1, M1_slope   are the slopes of A_n, Q_n and of the modal mass; (64) and (96) drop them
 
-except for the slopes Q1, which masses have as well, and for F_mn, of which only the symmetric part acts: corrected, it
-is symmetric.
+with two exceptions: point masses have slopes Q1 as well, and the corrected F_mn is symmetric, because only its
+symmetric part has an effect.
 """
 
 from __future__ import annotations
@@ -80,9 +80,9 @@ class ModeParameters:
 def mode_parameters(model: FlexibleModel, *, as_printed: bool = False, name: str = "flexible body") -> ModeParameters:
     """Parameters of one flexible body, corrected or exactly as printed, (48)-(72).
 
-    Modes may be any assumed modes: with modes that (41) does not normalise, M1 is full, and the printed parameters are
-    the paper's in other coordinates. The corrected ones hold for free-free modes too. Raises ValueError, naming the
-    body `name`, for printed parameters of modes that are not clamped at the body origin as the paper demands.
+    Any assumed modes will do: if they are not normalised by (41), M1 is a full matrix, and the printed parameters are
+    the paper's in other coordinates. The corrected ones are also valid for free-free modes. Raises ValueError, which
+    names the body `name`, for printed parameters of modes that are not clamped at the body origin.
     """
     if as_printed:
         if not model.clamped:
@@ -100,7 +100,7 @@ def mode_parameters(model: FlexibleModel, *, as_printed: bool = False, name: str
 def assemble(
     alpha: Real, masses: Particles, turned: Elements, stiffness: Real, damping: Real, *, as_printed: bool
 ) -> ModeParameters:
-    """Parameters out of the sums over all masses, about their mass centre alpha, and the elements that turn."""
+    """Parameters from the sums over all masses, about their mass centre alpha, and the turning elements."""
     m, D = masses.mass, masses.D
     A = masses.mA / m  # (48)
     own = rotary(turned)

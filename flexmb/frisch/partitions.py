@@ -1,8 +1,8 @@
-"""The coefficient matrix of (111): partitions X, I^c, F, Gamma, I^s, M^1, A, M^2 of (112)-(115), compiled.
+"""The coefficient matrix of (111): partitions X, I^c, F, Gamma, I^s, M^1, A, M^2 of (112)-(115).
 
-Body i stands on the path from the ground to hinge point k-1, or is k; d is the vector from its hinge point to that of
-k. Every sum over the nest of k of terms with gamma_{i-1} = gamma_{k-1} + d follows from the sums about hinge point k-1.
-Where neither nest contains the other, the matrix is zero and is never written.
+Body i is k or one of the bodies between k and the ground; d is the vector from its hinge point to that of k. Sums over
+the nest of k of terms with gamma_{i-1} = gamma_{k-1} + d follow from the sums about hinge point k-1. The blocks of two
+bodies neither of which carries the other are zero and are never written.
 """
 
 from flexmb.jit.kernel import helper
@@ -11,7 +11,7 @@ from flexmb.spatial.vector import add, axpy, cross, dot, scale, sub, sym6, sym_f
 
 @helper
 def coefficient_matrix(c, w):
-    """Z of (111), left sides of (112)-(115), from the nest sums, both triangles."""
+    """Both triangles of Z of (111), the left-hand sides of (112)-(115), from the sums over nests."""
     wheels = 3 * c.body.shape[0]
     for k in range(c.body.shape[0]):
         i = k
@@ -65,7 +65,7 @@ def _modes(c, w, k, i, d):
 
 @helper
 def _modal_mass(c, w, k):
-    """M^1 (110): m delta in the print; its first-order change where point inertias turn."""
+    """M^1 (110): constant, m delta in the print, plus its first-order change where inertias turn."""
     at, slope = c.element[k].mode_row, c.element[k].slope
     for m in range(c.body[k].modes):
         for n in range(c.body[k].modes):
@@ -78,7 +78,7 @@ def _modal_mass(c, w, k):
 
 @helper
 def _block(Z, row, col, m):
-    """A 3x3 block and its transpose on the other side of the diagonal."""
+    """Store a 3x3 block and, on the other side of the diagonal, its transpose."""
     for a, x in ((0, (m[0], m[1], m[2])), (1, (m[3], m[4], m[5])), (2, (m[6], m[7], m[8]))):
         Z[row + a, col] = x[0]
         Z[row + a, col + 1] = x[1]

@@ -1,9 +1,8 @@
-"""From the expanded equations to the speeds: the transformation (126)-(134), the reduction (135)-(141), and the
-solution with predefined motion (142)-(145).
+"""Reduction of the expanded equations to the speeds (126)-(141), and their solution with predefined motion (142)-(145).
 
-Corrected, (111) is premultiplied by the transpose of the whole transformation S = (126) (133): a congruence, hence a
-symmetric matrix, and the constraint loads, which do no work in any motion S describes, drop out. As printed, (136) and
-(138), only q' and h' stand on the left.
+Corrected, (111) is premultiplied by the transpose of the whole transformation S = (126) (133). The matrix is then
+symmetric, and the constraint loads vanish, because they do no work in any motion that S describes. As printed, (136)
+and (138) premultiply by q' and h' only.
 """
 
 from flexmb.frisch.tables import ONE_SIDED
@@ -16,7 +15,10 @@ from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 
 @helper
 def reduce(c, w):
-    """M and right side of the scalar equations (136), (138), (141) in the speeds; constraint loads drop out (135)."""
+    """Matrix and right-hand side of the scalar equations (136), (138), (141) in the speeds.
+
+    They contain no constraint loads (135).
+    """
     _bias(c, w)
     _times(w, w.x, w.y)
     _product(c, w)
@@ -24,7 +26,7 @@ def reduce(c, w):
     one_sided = c.printed[ONE_SIDED] == 1
     for i in range(nu):
         start, stop = c.column[i].start, c.column[i].stop
-        first = i  # of a symmetric matrix the upper triangle is enough
+        first = i  # the matrix is symmetric: its upper triangle is computed and copied
         if one_sided:
             stop, first = c.column[i].own, 0
         row, force = w.M[i, first:], w.speed[i].applied
@@ -40,7 +42,11 @@ def reduce(c, w):
 
 @helper
 def _product(c, w):
-    """Z S of (128), expanded rows by speeds; a few columns at a time are turned into rows, a cache line of each."""
+    """Z S of (128), stored by expanded rows.
+
+    Z is symmetric, so that a column of Z S is a combination of rows of Z, which are contiguous. Eight columns at a time
+    are computed into a buffer and transposed: eight numbers are a cache line of the product.
+    """
     nu, buffer = w.M.shape[0], w.columns
     for j in range(0, nu, buffer.shape[0]):
         count = min(nu - j, buffer.shape[0])
@@ -53,9 +59,9 @@ def _product(c, w):
 
 @helper
 def _combine(c, w, start, stop, X, first, y):
-    """y = sum of the rows of X, from `first` on, that entries start .. stop of S name, times the entries.
+    """y = sum over the entries start .. stop of S of each entry times its row of X, from column `first` on.
 
-    The one entry of a mode's own row comes first; all others are components of vectors, three at a time.
+    The entry in a mode's own row comes first; all others are components of vectors, and come in threes.
     """
     for i in range(y.shape[0]):
         y[i] = 0.0
@@ -67,7 +73,8 @@ def _combine(c, w, start, stop, X, first, y):
         r = c.entry_row[e]
         s0, s1, s2 = w.S[e], w.S[e + 1], w.S[e + 2]
         a, b, d = X[r, first:], X[r + 1, first:], X[r + 2, first:]
-        if s0 != 0.0 or s1 != 0.0 or s2 != 0.0:  # revolute hinges do not translate, bending modes do not stretch
+        # Many vectors are zero: the translation of revolute hinges, the axial motion of bending modes.
+        if s0 != 0.0 or s1 != 0.0 or s2 != 0.0:
             for i in range(y.shape[0]):
                 y[i] += s0 * a[i] + s1 * b[i] + s2 * d[i]
         e += 3
@@ -75,7 +82,7 @@ def _combine(c, w, start, stop, X, first, y):
 
 @helper
 def solve(c, w):
-    """Free accelerations (144) of (137) reordered by w.free (142), given the predefined ones; a status code."""
+    """Free accelerations (144) of (137), reordered by w.free (142), for given predefined ones; returns a status."""
     nu = w.u.shape[0]
     free = nu
     one_sided = c.printed[ONE_SIDED] == 1
@@ -114,7 +121,7 @@ def solve(c, w):
 
 @helper
 def expanded_accelerations(c, w):
-    """x of (111) from the accelerations of the speeds, (127) with (134), and Z x - eta: the hinge loads of (111)."""
+    """x of (111) from the accelerations of the speeds, (127) with (134); w.y = Z x - eta, the hinge loads of (111)."""
     _bias(c, w)
     for j in range(w.u.shape[0]):
         for e in range(c.column[j].start, c.column[j].stop):
@@ -126,7 +133,7 @@ def expanded_accelerations(c, w):
 
 @helper
 def _bias(c, w):
-    """What the expanded accelerations are at udot = 0: the second terms of (127) and (134)."""
+    """The expanded accelerations at udot = 0: the second terms of (127) and (134)."""
     bodies = c.body.shape[0]
     hinges = w.x.shape[0] - 3 * bodies
     for k in range(bodies):
@@ -140,7 +147,7 @@ def _bias(c, w):
 
 @helper
 def _times(w, x, y):
-    """y = Z x, by rows of the symmetric Z."""
+    """y = Z x as a combination of rows of the symmetric Z, which are contiguous."""
     for r in range(y.shape[0]):
         y[r] = 0.0
     for r in range(x.shape[0]):
@@ -157,7 +164,10 @@ def _axpy(s, x, y):
 
 @helper
 def _eliminate(w, n):
-    """Solve with the unsymmetric w.factor by Gauss with partial pivoting; the place of a zero pivot, else -1."""
+    """Solve with the matrix w.factor, unsymmetric as printed, by Gaussian elimination with partial pivoting.
+
+    Returns the row of a zero pivot, or -1.
+    """
     A, x = w.factor, w.solution
     for j in range(n):
         p = j

@@ -1,9 +1,9 @@
-"""The arrays of Frisch's route: a scene's constants with the mode-dependent parameters, and what an evaluation writes.
+"""Arrays of Frisch's equations: constants with the mode-dependent parameters, and the workspace of an evaluation.
 
-The expanded velocities of (126) are, in this order: relative angular rates of the N bodies (3 each), of the W wheels
+The expanded velocities of (126) are, in this order, relative angular rates of the N bodies (3 each), of the W wheels
 (3 each), rates of all modes, and rates of the N hinge points (3 each): nx = 6 N + 3 W + modes rows. Point masses are
-bodies without rotary inertia, the ground carries World; all vectors of the workspace are in World axes. The sparse
-matrix S = (126) (133) from speeds to expanded velocities is kept by columns, one for each speed.
+bodies without rotary inertia. All vectors of the workspace are in World axes. The sparse matrix S = (126) (133) from
+speeds to expanded velocities is stored by columns, one for each speed.
 """
 
 from __future__ import annotations
@@ -52,13 +52,13 @@ SPEED_COLUMN = _record(  # a column of S: its entries start .. stop
     ("body", _I),
 )
 
-# These defects of the print switch the algorithm; the others change the parameters of the bodies.
+# Defects of the print that change the algorithm (indices of `printed`); the others change parameters of the bodies.
 ONE_SIDED, NO_LOADS_ON_MODES, FIXED_SPIN_AXIS, FIXED_SHAPES, SECOND_ORDER = range(5)
 
 
 @bundle
 class NestedConstants(Constants):
-    """The constants of a scene with what Frisch's equations need besides."""
+    """The constants of a scene and the additional tables of Frisch's equations."""
 
     element: Record  # (N,) ELEMENTS
     element_mode: Record  # (N,m) ELEMENT_MODE
@@ -108,7 +108,7 @@ NEST_WHEEL = _record(
 
 @bundle
 class NestedWorkspace:
-    """What one evaluation writes. One workspace per thread."""
+    """The arrays that one evaluation writes. One workspace per thread."""
 
     q: Real  # (nq,)
     u: Real  # (nu,)
@@ -127,11 +127,11 @@ class NestedWorkspace:
     port_mode: Real  # (P,6,m) [angular; linear] velocity per modal speed
     wheel: Record  # (W,) NEST_WHEEL
     S: Real  # (nnz,) entries of S
-    Z: Real  # (nx,nx) coefficient matrix of (111); rows and columns without relation stay zero
+    Z: Real  # (nx,nx) coefficient matrix of (111); blocks of bodies on different branches stay zero
     x: Real  # (nx,) expanded accelerations
     y: Real  # (nx,) Z x
     eta: Real  # (nx,) right side of (111) without hinge loads
-    columns: Real  # (8,nx) columns of Z S
+    columns: Real  # (8,nx) eight columns of Z S, see `flexmb.frisch.reduction`
     product: Real  # (nx,nu) Z S
     M: Real  # (nu,nu) (136), corrected: S' Z S
     right: Real  # (nu,)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from flexmb.integrate.control import SAMPLES, copy
 from flexmb.jit.kernel import helper
+from flexmb.tables.status import OK
 
 
 @helper
 def store_samples(problem, step, ends, state_at, s, samples, run):
-    """Store the samples in a step, its end included.
+    """Store the samples in a step, its end included; returns a status code.
 
-    `state_at` is the method's, as `flexmb.integrate.watch` asks for it, and finds a state without fail. samples:
-    (times, states); run: accuracy and counts.
+    `state_at` is the method's, as `flexmb.integrate.watch` asks for it. samples: (times, states); run: accuracy and
+    counts.
     """
     times, out = samples
     _, counts = run
@@ -20,6 +21,9 @@ def store_samples(problem, step, ends, state_at, s, samples, run):
         if times[sample] == step.end:
             copy(ends.y_new, out[sample])
         else:
-            state_at(problem, step, ends, s, times[sample], out[sample], run)
+            status = state_at(problem, step, ends, s, times[sample], out[sample], run)
+            if status != OK:
+                return status
         sample += 1
-    counts[SAMPLES] = sample
+        counts[SAMPLES] = sample
+    return OK

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from flexmb.integrate.dop853 import END, ERROR_EXPONENT
-from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, D
+from flexmb.integrate.dop853_formulas import END, ERROR_EXPONENT, combine, error_norm, error_sums, interpolant
+from flexmb.integrate.dop853_tableau import STAGES, STAGES_DENSE, A, C
 from flexmb.integrate.lane_control import RUNNING, set_times
 from flexmb.integrate.lane_problem import any_chosen, lane_copy, lane_derivative, mark_finite
 from flexmb.jit.kernel import helper
@@ -14,33 +14,10 @@ from flexmb.tables.status import OK
 
 
 @helper
-def _combine(s, weights, count):
-    """s.trial = y + h * sum over j < count of weights[j] k[j], past the many zeros of the weights."""
-    n, h = s.y.shape[0], s.h[0]
-    for i in range(n):
-        s.trial[i] = weights[0] * s.k[0, i]
-    for j in range(1, count):
-        a = weights[j]
-        if a != 0.0:
-            for i in range(n):
-                s.trial[i] += a * s.k[j, i]
-    for i in range(n):
-        s.trial[i] = s.y[i] + h * s.trial[i]
-
-
-@helper
-def _weighted_sum(weights, count, k, i):
-    total = weights[0] * k[0, i]
-    for j in range(1, count):
-        total += weights[j] * k[j, i]
-    return total
-
-
-@helper
 def _stages(problem, s, entries, control, counts):
     """Stages 1 to 11 (stage 0 is given), then s.trial = y(t + h); returns a status code."""
     for stage in range(1, STAGES + 1):
-        _combine(s, A[stage], stage)
+        combine(s.y, s.h[0], A[stage], stage, s.k, s.trial)
         if stage == END:
             break
         set_times(entries, control, C[stage])
@@ -51,29 +28,12 @@ def _stages(problem, s, entries, control, counts):
 
 
 @helper
-def _error_sums(s, accuracy):
-    """Sums of squares of the 5th and 3rd order error estimates over the tolerance, into s.norm[0] and s.norm[1]."""
-    sum5, sum3 = 0.0, 0.0
-    for i in range(accuracy.controlled):
-        old, new = abs(s.y[i]), abs(s.trial[i])
-        scale = accuracy.atol + accuracy.rtol * select(new > old, new, old)
-        five = _weighted_sum(E5, E5.shape[0], s.k, i) / scale
-        three = _weighted_sum(E3, E3.shape[0], s.k, i) / scale
-        sum5 += five * five
-        sum3 += three * three
-    s.norm[0], s.norm[1] = sum5, sum3
-
-
-@helper
 def _judge(s, entries, control, accuracy):
     """The error norm of each lane, infinite where its state is not finite; marks those that may accept their steps."""
     mark_finite(s.trial, s.chosen)
-    _error_sums(s, accuracy)
+    s.norm[0], s.norm[1] = error_sums(s.y, s.trial, s.k, accuracy)
     for lane in range(LANES):
-        sum5, sum3 = entries.norm[0, lane], entries.norm[1, lane]
-        error = 0.0
-        if sum5 != 0.0 or sum3 != 0.0:
-            error = control.length[lane] * sum5 / math.sqrt((sum5 + 0.01 * sum3) * accuracy.controlled)
+        error = error_norm(control.length[lane], entries.norm[0, lane], entries.norm[1, lane], accuracy)
         finite = entries.chosen[0, lane] == 1.0
         control.error[lane] = error if finite else math.inf
         entries.chosen[0, lane] = 1.0 if control.status[lane] == RUNNING and finite and error < 1.0 else 0.0
@@ -164,31 +124,13 @@ def _scaled_norm_of(s, values, accuracy):
 
 
 @helper
-def interpolant(problem, s, entries, control, counts):
-    """Coefficients s.f (7,n) of the interpolant of order 7 on the step from y to y_new; three more stages."""
+def last_stages(problem, s, entries, control, counts):
+    """Coefficients s.f (7,n) of the interpolant on the step from y to y_new; three more stages. A status code."""
     for stage in range(STAGES + 1, STAGES_DENSE):
-        _combine(s, A[stage], stage)
+        combine(s.y, s.h[0], A[stage], stage, s.k, s.trial)
         set_times(entries, control, C[stage])
         status = lane_derivative(problem, s, stage, counts)
         if status != OK:
             return status
-    h = s.h[0]
-    for i in range(s.y.shape[0]):
-        change = s.y_new[i] - s.y[i]
-        s.f[0, i] = change
-        s.f[1, i] = h * s.k[0, i] - change
-        s.f[2, i] = 2.0 * change - h * (s.k[END, i] + s.k[0, i])
-        for row in range(4):
-            s.f[3 + row, i] = h * _weighted_sum(D[row], D.shape[1], s.k, i)
+    interpolant(s.y, s.y_new, s.h[0], s.k, s.f)
     return OK
-
-
-@helper
-def interpolate(s):
-    """s.trial = y + x (f0 + (1-x) (f1 + x (f2 + (1-x) (f3 + ...)))) at the fractions x of the steps."""
-    x = s.fraction[0]
-    for i in range(s.y.shape[0]):
-        value = s.f[6, i] * x
-        for row in range(5, -1, -1):
-            value = (value + s.f[row, i]) * (x if row % 2 == 0 else 1.0 - x)
-        s.trial[i] = s.y[i] + value

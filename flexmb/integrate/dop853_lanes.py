@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from flexmb.integrate.control import CALM, SAMPLES
-from flexmb.integrate.dop853 import END, ERROR_EXPONENT
-from flexmb.integrate.dop853_lane_steps import attempt, first_step, interpolant, interpolate
+from flexmb.integrate.dop853_formulas import END, ERROR_EXPONENT, interpolate
+from flexmb.integrate.dop853_lane_steps import attempt, first_step, last_stages
 from flexmb.integrate.lane_control import RUNNING, any_running, awaits_sample, begin_segment, go_on, propose
 from flexmb.integrate.lane_problem import any_chosen, lane_copy, lane_derivative, mark_finite, set_all, store_lane
 from flexmb.jit.kernel import helper, kernel
@@ -15,7 +15,7 @@ from flexmb.tables.status import NONFINITE, OK
 @helper
 def _begin(problem, s, entries, control, clock, out, counts):
     """Initial states put on their manifolds; they are the first samples, and every lane enters its first segment."""
-    times, segment_ends = clock
+    times, segment_ends, _ = clock
     set_all(entries.time, times[0])
     lane_copy(s.y, s.trial)
     problem.project(problem.stages, problem.constants)
@@ -62,7 +62,7 @@ def _store_samples(problem, s, entries, control, times, out, counts):
             return OK
         if inside:
             if not built:
-                status = interpolant(problem, s, entries, control, counts)
+                status = last_stages(problem, s, entries, control, counts)
                 if status != OK:
                     return status
                 built = True
@@ -71,7 +71,7 @@ def _store_samples(problem, s, entries, control, times, out, counts):
                     time = times[counts[lane, SAMPLES]]
                     entries.time[0, lane] = time
                     entries.fraction[0, lane] = (time - control.t[lane]) / (control.end[lane] - control.t[lane])
-            interpolate(s)
+            interpolate(s.y, s.f, s.fraction[0], s.trial)
             problem.project(problem.stages, problem.constants)
         for lane in range(LANES):
             if entries.chosen[0, lane] == 1.0 and awaits_sample(control, times, counts, lane):
@@ -88,7 +88,7 @@ def dop853_lanes(problem, s, entries, control, clock, accuracy, out, counts):
     clock: times (T,) of the output and ends (LANES,S) of each lane's segments. out (LANES,T,n), counts (LANES,COUNTS).
     The status is OK unless no lane can go on; control.status (LANES,) is OK for lanes that have reached their ends.
     """
-    times, segment_ends = clock
+    times, segment_ends, _ = clock
     _begin(problem, s, entries, control, clock, out, counts)
     status = _derivative_at_start(problem, s, entries, control, counts)
     if status == OK:

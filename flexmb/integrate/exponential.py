@@ -1,4 +1,4 @@
-"""Exponential collocation with error control and dense output, whole runs in one compiled loop.
+"""Exponential collocation with error control and dense output.
 
 Over a step f(t, y) is a linear part J (y - y_n), treated exactly, and the rest
 
@@ -18,33 +18,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.control import (
-    ACCEPTED,
-    CALM,
-    FACTORISATIONS,
-    REJECTED,
-    Interval,
-    copy,
-    derivative,
-    enter_segment,
-    next_step,
-    reason,
-    retreat,
-    scaled_norm,
-    shorter,
-    step_end,
-    step_factor,
+from flexmb.integrate.adaptive import (
+    Method,
+    accept_by_error,
+    adaptive,
+    after_leap_by_error,
+    enter_afresh,
+    keep_nothing,
+    recall_nothing,
+    reject_by_error,
 )
-from flexmb.integrate.dense_output import store_samples
+from flexmb.integrate.control import FACTORISATIONS, copy, derivative, scaled_norm
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
-from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
-from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
 from flexmb.integrate.settling import prepare_settling, settle
-from flexmb.integrate.watch import Ends, keep_sides, pause
-from flexmb.jit.kernel import handed_on, helper, kernel
-from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
+from flexmb.integrate.watch import Ends
+from flexmb.jit.kernel import handed_in, handed_on, helper, kernel
+from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
 NODES = np.array([0.25, 0.5, 0.75, 1.0])
 # Row l: l-th derivative at 0 of the polynomial that vanishes at 0 and has given values at the nodes.
@@ -82,6 +73,7 @@ class Collocation(NamedTuple):
     real: np.ndarray
     real_pivots: np.ndarray
     change: np.ndarray
+    linearised_at: np.ndarray  # (1,) s, of J
 
 
 @helper
@@ -177,20 +169,29 @@ def estimate(y, s, accuracy):
     return norm
 
 
-@helper
-def attempt(problem, step, y, s, accuracy, counts):
-    """One trial step: y_new, projected, and its slope f_new; returns status, error norm."""
-    status = iterate(problem, step, y, s, accuracy, counts)
+@handed_in
+def attempt(problem, step, ends, s, known, accuracy, counts):
+    """See `flexmb.integrate.adaptive.Method`."""
+    h = step.end - step.start
+    if s.linearised_at[0] != step.start:
+        status = linearisation(problem, step.start, ends.y, s.J, counts)
+        if status != OK:
+            return status, (math.inf,)
+        s.linearised_at[0] = step.start
+    counts[FACTORISATIONS] += 1
+    if not prepare(s.flow, s.J, h):
+        return NOT_CONVERGED, (math.inf,)
+    status = iterate(problem, step, ends.y, s, accuracy, counts)
     if status != OK:
-        return status, math.inf
-    for i in range(y.shape[0]):
-        s.y_new[i] = y[i] + s.flow.scale[i] * s.x[3, i]
-    error = estimate(y, s, accuracy)
+        return status, (math.inf,)
+    for i in range(ends.y.shape[0]):
+        ends.y_new[i] = ends.y[i] + s.flow.scale[i] * s.x[3, i]
+    error = estimate(ends.y, s, accuracy)
     if error < 1.0:
-        prepare_settling(problem, RATE / (step.end - step.start), s)
-        settle(problem, step.end, RATE / (step.end - step.start), s.y_new, s, accuracy)
-        status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
-    return status, error
+        prepare_settling(problem, RATE / h, s)
+        settle(problem, step.end, RATE / h, ends.y_new, s, accuracy)
+        status = derivative(problem, min(step.end, step.last), ends.y_new, ends.dy_new, counts)
+    return status, (error,)
 
 
 @handed_on
@@ -216,6 +217,7 @@ def scratch(n):
         flow, np.empty(n), np.empty((n, n)), np.empty((TERMS, n)), np.empty((TERMS, n)), np.empty((LEVELS, TERMS, n)),
         np.empty((LEVELS, TERMS, n)), np.empty((4, n)), np.empty((4, n)), np.empty((4, n)), np.empty(n), np.empty(n),
         np.empty(n), np.empty(n), np.empty(n), np.empty((n, n)), np.empty(n, np.int64), np.empty(n),
+        np.full(1, np.nan),
     )  # fmt: skip
 
 
@@ -223,73 +225,15 @@ def scratch(n):
 def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
-    The retreat from a failing right-hand side is that of `dop853`, and so are leaps. Where the iteration does not
-    converge, the step is halved.
+    Where the iteration does not converge, the step is halved.
     """
-    times, segment_ends = clock
     s = scratch(y.shape[0])
-    ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
-    t = begin(problem, times, y, s.y_new, memory, out, counts)
-    h, error_before, kept = memory.numbers[STEP], memory.numbers[ERROR_BEFORE], False
-    rejected, linear, trouble = memory.numbers[RETRIED] != 0.0, False, STEP_TOO_SMALL
-    for i in range(segment_ends.shape[0]):
-        end, is_last = segment_ends[i], i + 1 == segment_ends.shape[0]
-        last = np.nextafter(end, t)
-        status, h = enter_segment(problem, Interval(t, end, last), y, s.f, h, accuracy, _ERROR_EXPONENT, counts)
-        if status != OK:
-            return status, t
-        linear = False
-        while t < end:
-            status, t_new = step_end(t, h, end, trouble, accuracy.max_steps, counts)
-            if not kept and (status != OK or (is_last and t_new == end)):
-                keep(memory, t, y, h, error_before, rejected, counts)
-                if watch is not None:
-                    keep_sides(watch)
-                kept = True
-            if status != OK:
-                return status, t
-            step, length = Interval(t, t_new, last), t_new - t
-            if not linear:
-                status = linearisation(problem, t, y, s.J, counts)
-                if status != OK:
-                    return status, t
-                linear = True
-            status, error = NOT_CONVERGED, math.inf
-            counts[FACTORISATIONS] += 1
-            if prepare(s.flow, s.J, length):
-                status, error = attempt(problem, step, y, s, accuracy, counts)
-            trouble, leapt = reason(status), False
-            if may_leap(status):
-                far = leap(problem, last, y, s.f, s.y_new, s.f_new, counts)
-                if far > 0.0:
-                    t_new, length, status, error = t + far, far, OK, CALM
-                    step, leapt = Interval(t, t_new, last), True
-            accepted = status == OK and error < 1.0
-            if accepted:
-                if watch is not None:
-                    if leapt:
-                        status, t_at = pause_in_leap(problem, watch, step, ends, samples, run)
-                    else:
-                        status, t_at = pause(problem, watch, step, ends, state_at, s, samples, run)
-                    if status != OK:
-                        return status, t_at
-                if leapt:
-                    store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
-                store_samples(problem, step, ends, state_at, s, samples, run)
-                factor = step_factor(error, error_before, _ERROR_EXPONENT, rejected)
-                h = next_step(h, length, factor, t_new == end)
-                t, error_before = t_new, error
-                copy(s.y_new, y)
-                copy(s.f_new, s.f)
-                counts[ACCEPTED] += 1
-            else:
-                h = length * (shorter(error, _ERROR_EXPONENT) if status == OK else retreat(status))
-                counts[REJECTED] += 1
-            rejected, linear = not accepted, not accepted
-        rejected, trouble = False, STEP_TOO_SMALL
-    if not kept:
-        keep(memory, t, y, h, error_before, rejected, counts)
-    return OK, t
+    ends = Ends(y, s.f, s.y_new, s.f_new)
+    method = Method(
+        attempt, accept_by_error, reject_by_error, after_leap_by_error, enter_afresh, recall_nothing, keep_nothing,
+        state_at, _ERROR_EXPONENT,
+    )  # fmt: skip
+    return adaptive(method, problem, s, ends, clock, accuracy, out, counts, memory, watch)
 
 
 INTEGRATOR = Integrator(

@@ -6,9 +6,10 @@ methods then come closer by shorter steps until the problem itself can leap, fro
 
 from __future__ import annotations
 
-from flexmb.integrate.control import EVALUATIONS, SAMPLES, copy
+from flexmb.integrate.control import ACCEPTED, EVALUATIONS, Interval, copy
+from flexmb.integrate.dense_output import store_samples
 from flexmb.integrate.watch import CROSSED, pause
-from flexmb.jit.kernel import handed_on, helper, sweep
+from flexmb.jit.kernel import handed_on, helper
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR, OK
 
 EVALUATED = 8  # about as often a leap evaluates equations of motion
@@ -18,16 +19,6 @@ EVALUATED = 8  # about as often a leap evaluates equations of motion
 def may_leap(status):
     """Whether a failure may be that of a place to leap over."""
     return status in (CLOSURE_SINGULAR, BRANCH_UNKNOWN, CLOSURE_OPEN)
-
-
-@helper
-def leap(problem, end, y, dy, y_new, dy_new, counts):
-    """Length of the leap from y, the last good state, to y_new, not beyond `end`; 0 where none is possible yet.
-
-    dy, dy_new: slopes there. y may change by rounding.
-    """
-    counts[EVALUATIONS] += EVALUATED
-    return problem.leap(end, y, dy, y_new, dy_new, problem.constants)
 
 
 @helper
@@ -48,24 +39,29 @@ def in_leap(problem, step, ends, s, t, result, run):
     return OK
 
 
-@sweep
-def pause_in_leap(problem, watch, step, ends, samples, run):
-    """As `flexmb.integrate.watch.pause`; of a leap that comes to a level, watch keeps its times and where it starts."""
-    copy(ends.y, watch.before)
-    status, t = pause(problem, watch, step, ends, in_leap, OK, samples, run)
-    if status == CROSSED:
-        watch.leap[0], watch.leap[1] = step.start, step.end
-    return status, t
-
-
 @helper
-def store_leapt(step, y, dy, y_new, dy_new, times, out, counts):
-    """Store the samples in a leap."""
-    sample = counts[SAMPLES]
-    while sample < times.shape[0] and times[sample] <= step.end:
-        if times[sample] == step.end:
-            copy(y_new, out[sample])
-        else:
-            cubic(step, y, dy, y_new, dy_new, times[sample], out[sample])
-        sample += 1
-    counts[SAMPLES] = sample
+def leap_over(problem, watch, t, farthest, ends, samples, run):
+    """Leap from the last good state, ends.y at t (s), over the place where steps fail, not beyond `farthest` (s).
+
+    Stores the samples on the way and puts the state beyond, and its slope, into ends.y and ends.dy. Returns (OK, time
+    reached, length of the leap), of length 0 where none is possible yet; (CROSSED, its time, .) where the leap comes to
+    a level, with the times of the leap and its first state in `watch`; or the status of what fails. ends.y may change
+    by rounding. samples: times of samples, and samples; run: accuracy and counts.
+    """
+    _, counts = run
+    counts[EVALUATIONS] += EVALUATED
+    length = problem.leap(farthest, ends.y, ends.dy, ends.y_new, ends.dy_new, problem.constants)
+    if length > 0.0:
+        step = Interval(t, t + length, farthest)
+        if watch is not None:
+            copy(ends.y, watch.before)
+            status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
+            if status == CROSSED:
+                watch.leap[0], watch.leap[1] = step.start, step.end
+            if status != OK:
+                return status, t_at, length
+        store_samples(problem, step, ends, in_leap, OK, samples, run)
+        copy(ends.y_new, ends.y)
+        copy(ends.dy_new, ends.dy)
+        counts[ACCEPTED] += 1
+    return OK, t + length, length

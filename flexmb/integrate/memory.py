@@ -59,19 +59,21 @@ def begin(problem, times, y, scratch, memory, out, counts):
 
 
 @helper
-def keep(memory, t, y, h, error_before, rejected, counts):
-    """Before a step of a method that adapts them. The first step of all depends on the length of the run: it is left to
-    be found again."""
+def keep(memory, t, y, known, counts):
+    """Before a step of a method that adapts them, `known` (NUMBERS,) being its numbers. The first step of all depends
+    on the length of the run: it is left to be found again."""
     numbers = memory.numbers
-    numbers[TIME], numbers[ERROR_BEFORE] = t, error_before
-    numbers[STEP] = h if counts[ACCEPTED] > 0 or numbers[TAKEN_UP] != 0.0 else 0.0
-    numbers[RETRIED] = 1.0 if rejected else 0.0
+    copy(known, numbers)
+    numbers[TIME] = t
+    if counts[ACCEPTED] == 0 and numbers[TAKEN_UP] == 0.0:
+        numbers[STEP] = 0.0
     copy(y, memory.y)
 
 
 @helper
-def keep_place(memory, t, y, stretch, done):
-    """Before a step of a method that takes equal ones."""
+def keep_place(memory, t, y, stretch, done, known):
+    """Before a step of a method that takes equal ones, `known` (NUMBERS,) being its numbers."""
     numbers = memory.numbers
+    copy(known, numbers)
     numbers[TIME], numbers[STRETCH], numbers[DONE] = t, stretch, done
     copy(y, memory.y)

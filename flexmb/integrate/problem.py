@@ -58,11 +58,13 @@ class Clock(NamedTuple):
 
     segment_ends (S,) s, increasing: no step crosses one, and the stages before one see the right-hand side's limit from
     the left. The last is the end of the run: times[-1], once more where a segment ends there in any longer run too; for
-    methods of equal steps it is infinite, as nothing need end where the run does.
+    methods of equal steps it is infinite, as nothing need end where the run does. farthest (s): up to where a leap over
+    a singular position may go on beyond the end of the run.
     """
 
     times: np.ndarray
     segment_ends: np.ndarray
+    farthest: float = -math.inf
 
 
 class Accuracy(NamedTuple):

@@ -1,4 +1,4 @@
-"""Radau IIA of order 5 with error control and dense output, whole runs in one compiled loop.
+"""Radau IIA of order 5 with error control and dense output.
 
 Hairer, Wanner, Solving Ordinary Differential Equations II (1996), IV.8. L-stable: a mode that is too fast for the step
 dies out instead of limiting it. The three stages come from simplified Newton iterations with one real and one complex
@@ -9,35 +9,18 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from flexmb.integrate.control import (
-    ACCEPTED,
-    REJECTED,
-    SAFETY,
-    SHRINK,
-    Interval,
-    copy,
-    derivative,
-    enter_segment,
-    next_step,
-    reason,
-    retreat,
-    scaled_norm,
-    step_end,
-)
-from flexmb.integrate.dense_output import store_samples
+from flexmb.integrate.adaptive import Method, adaptive
+from flexmb.integrate.control import SAFETY, SHRINK, copy, derivative, next_step, retreat, scaled_norm
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
-from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
 from flexmb.integrate.lu import lu_solve
-from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE, begin, keep
+from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE
 from flexmb.integrate.radau5_stages import ITERATIONS, evaluate_polynomial, factorise, guess, newton, scratch
 from flexmb.integrate.radau5_tableau import REAL, E
 from flexmb.integrate.settling import settle
-from flexmb.integrate.watch import Ends, keep_sides, pause
-from flexmb.jit.kernel import handed_on, helper, kernel
-from flexmb.tables.status import NOT_CONVERGED, OK, STEP_TOO_SMALL
+from flexmb.integrate.watch import Ends
+from flexmb.jit.kernel import handed_in, handed_on, helper, kernel
+from flexmb.tables.status import NOT_CONVERGED, OK
 
 _GROW = 8.0  # strongest growth of a step
 _KEEP = 1.2  # a growth below this is not worth new factors
@@ -70,14 +53,15 @@ def new_over_old(h, h_before, error, error_before):
 
 
 @helper
-def attempt(problem, step, y, s, filter_again, accuracy, counts):
-    """One trial step from a guess in Z: y_new, projected, and its slope f_new; returns status, error norm, iterations,
-    contraction. `filter_again`: a rejection is confirmed by the estimate (8.20), which no stiff transient can spoil.
+def try_step(problem, step, ends, s, filter_again, accuracy, counts):
+    """A step from a guess in Z: ends.y_new, projected, and its slope; a status code, and the verdict of `attempt`.
+
+    filter_again: a rejection is confirmed by the estimate (8.20), which no stiff transient can spoil.
     """
-    h = step.end - step.start
+    y, h = ends.y, step.end - step.start
     status, iterations, rate = newton(problem, step, y, s, accuracy, counts)
     if status != OK:
-        return status, math.inf, iterations, rate
+        return status, (math.inf, iterations, rate)
     for i in range(y.shape[0]):
         s.y_new[i] = y[i] + s.Z[2, i]
     error = estimate(y, s.f, h, s, accuracy)
@@ -90,7 +74,26 @@ def attempt(problem, step, y, s, filter_again, accuracy, counts):
     if status == OK and error < 1.0:
         settle(problem, step.end, REAL / h, s.y_new, s, accuracy)
         status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
-    return status, error, iterations, rate
+    return status, (error, iterations, rate)
+
+
+@handed_in
+def attempt(problem, step, ends, s, known, accuracy, counts):
+    """See `flexmb.integrate.adaptive.Method`; verdict: error norm, iterations, contraction of Newton's method."""
+    length, nothing = step.end - step.start, (math.inf, 0, 0.0)
+    if known[RENEW] != 0.0:
+        status = linearisation(problem, step.start, ends.y, s.J, counts)
+        if status != OK:
+            return status, nothing
+        known[RENEW], known[FRESH], known[FACTORED] = 0.0, 1.0, 0.0
+    # Equal steps differ by the rounding of time: the factors are good for all of them.
+    if abs(length - known[FACTORED]) > _SAME * length:
+        known[FACTORED] = length if factorise(s, length, counts) else 0.0
+    if known[FACTORED] == 0.0:
+        return NOT_CONVERGED, nothing
+    guess(s.Z_before, known[STEP_BEFORE], length, s.Z)
+    filter_again = known[RETRIED] != 0.0 or known[STEP_BEFORE] == 0.0
+    return try_step(problem, step, ends, s, filter_again, accuracy, counts)
 
 
 @handed_on
@@ -104,39 +107,29 @@ def state_at(problem, step, ends, s, t, result, run):
     return OK
 
 
-@helper
-def keep_stages(memory, s, h_factored, h_before, renew, fresh):
-    """What only this method knows before a step: Jacobian, stages of the step before."""
-    numbers, n = memory.numbers, s.f.shape[0]
-    numbers[FACTORED], numbers[STEP_BEFORE] = h_factored, h_before
-    numbers[RENEW], numbers[FRESH] = 1.0 if renew else 0.0, 1.0 if fresh else 0.0
+@handed_in
+def keep(memory, s):
+    """The Jacobian, and stages of the step before."""
+    n = s.f.shape[0]
     for i in range(n):
         copy(s.J[i], memory.rows[i])
     for stage in range(3):
         copy(s.Z_before[stage], memory.rows[n + stage])
 
 
-@helper
-def recall(memory, s, counts):
-    """The same of a run that is taken up, with factors made again; of another one that there is nothing.
-
-    Returns (step of the factors, step and error norm before, whether to renew the Jacobian, whether it is of this
-    place, whether the step before was rejected).
-    """
-    numbers, n = memory.numbers, s.f.shape[0]
-    h_factored = numbers[FACTORED]
-    if numbers[STEP_BEFORE] == 0.0 and h_factored == 0.0:
-        return 0.0, 0.0, 0.0, True, False, numbers[RETRIED] != 0.0
+@handed_in
+def recall(memory, s, known, counts):
+    """The same of a run that is taken up, with factors made again; of another one that there is nothing."""
+    n = s.f.shape[0]
+    if known[STEP_BEFORE] == 0.0 and known[FACTORED] == 0.0:
+        known[ERROR_BEFORE], known[RENEW], known[FRESH] = 0.0, 1.0, 0.0
+        return
     for i in range(n):
         copy(memory.rows[i], s.J[i])
     for stage in range(3):
         copy(memory.rows[n + stage], s.Z_before[stage])
-    if h_factored > 0.0:
-        factorise(s, h_factored, counts)
-    return (
-        h_factored, numbers[STEP_BEFORE], numbers[ERROR_BEFORE], numbers[RENEW] != 0.0, numbers[FRESH] != 0.0,
-        numbers[RETRIED] != 0.0,
-    )  # fmt: skip
+    if known[FACTORED] > 0.0:
+        factorise(s, known[FACTORED], counts)
 
 
 @helper
@@ -169,110 +162,62 @@ def after_rejection(length, status, factor, rate, fresh):
 
 
 @helper
-def leap_over(problem, watch, t, last, ends, samples, run):
-    """The place at t where steps fail is passed, and sampled: (OK, the time beyond it), or t where it cannot be yet.
+def by_trend(length, verdict, known):
+    """New step over old by the trend of errors, shorter the more iterations Newton's method took."""
+    error, iterations, _ = verdict
+    caution = SAFETY * (2.0 * ITERATIONS + 1.0) / (2.0 * ITERATIONS + iterations)
+    return caution * new_over_old(length, known[STEP_BEFORE], error, known[ERROR_BEFORE])
 
-    What ends the run there is returned with its time.
-    """
-    _, counts = run
-    far = leap(problem, last, ends.y, ends.dy, ends.y_new, ends.dy_new, counts)
-    if far > 0.0:
-        step = Interval(t, t + far, last)
-        if watch is not None:
-            status, t_at = pause_in_leap(problem, watch, step, ends, samples, run)
-            if status != OK:
-                return status, t_at
-        store_leapt(step, ends.y, ends.dy, ends.y_new, ends.dy_new, samples[0], samples[1], counts)
-        copy(ends.y_new, ends.y)
-        copy(ends.dy_new, ends.dy)
-        counts[ACCEPTED] += 1
-    return OK, t + far
+
+@handed_in
+def accept(step, cut, verdict, s, known, exponent):
+    """See `flexmb.integrate.adaptive.Method`."""
+    length, (error, iterations, rate) = step.end - step.start, verdict
+    worn = rate > (_SLOW if iterations > 2 else _POOR)
+    factor = min(by_trend(length, verdict, known), by_contraction(rate))
+    known[STEP] = after_acceptance(known[STEP], length, cut, factor, known[RETRIED] != 0.0, worn)
+    known[STEP_BEFORE], known[ERROR_BEFORE] = length, max(1e-2, error)
+    known[RENEW], known[FRESH], known[RETRIED] = 1.0 if worn else 0.0, 0.0, 0.0
+    for stage in range(3):
+        copy(s.Z[stage], s.Z_before[stage])
+
+
+@handed_in
+def reject(step, status, verdict, s, known, exponent):
+    """See `flexmb.integrate.adaptive.Method`."""
+    length, rate = step.end - step.start, verdict[2]
+    factor = by_trend(length, verdict, known) if status == OK else 1.0
+    known[STEP], renew = after_rejection(length, status, factor, rate, known[FRESH] != 0.0)
+    known[RENEW] = 1.0 if renew else 0.0
+    if known[STEP] < length:
+        known[RETRIED] = 1.0
+
+
+@handed_in
+def after_leap(length, cut, known, exponent):
+    """See `flexmb.integrate.adaptive.Method`."""
+    known[STEP] = length
+    enter(known)
+
+
+@handed_in
+def enter(known):
+    """Nothing is known across the end of a segment, or beyond a leap."""
+    known[FACTORED], known[STEP_BEFORE], known[ERROR_BEFORE] = 0.0, 0.0, 0.0
+    known[RENEW], known[FRESH], known[RETRIED] = 1.0, 0.0, 0.0
 
 
 @kernel
 def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
-    The retreat from a failing right-hand side is that of `dop853`, and so are leaps. Where Newton's method does not
-    converge, an old Jacobian is renewed, then the step is shortened by how far it is from converging.
+    Where Newton's method does not converge, an old Jacobian is renewed, then the step is shortened by how far it is
+    from converging.
     """
-    times, segment_ends = clock
     s = scratch(y.shape[0])
-    ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
-    t = begin(problem, times, y, s.y_new, memory, out, counts)
-    h, kept = memory.numbers[STEP], False
-    h_factored, h_before, error_before, renew, fresh, rejected = recall(memory, s, counts)
-    trouble = STEP_TOO_SMALL
-    for i in range(segment_ends.shape[0]):
-        end, is_last = segment_ends[i], i + 1 == segment_ends.shape[0]
-        last = np.nextafter(end, t)
-        status, h = enter_segment(problem, Interval(t, end, last), y, s.f, h, accuracy, _ERROR_EXPONENT, counts)
-        if status != OK:
-            return status, t
-        while t < end:
-            status, t_new = step_end(t, h, end, trouble, accuracy.max_steps, counts)
-            if not kept and (status != OK or (is_last and t_new == end)):
-                keep(memory, t, y, h, error_before, rejected, counts)
-                if watch is not None:
-                    keep_sides(watch)
-                keep_stages(memory, s, h_factored, h_before, renew, fresh)
-                kept = True
-            if status != OK:
-                return status, t
-            step, length = Interval(t, t_new, last), t_new - t
-            if renew:
-                status = linearisation(problem, t, y, s.J, counts)
-                if status != OK:
-                    return status, t
-                renew, fresh, h_factored = False, True, 0.0
-            # Equal steps differ by the rounding of time: the factors are good for all of them.
-            if abs(length - h_factored) > _SAME * length:
-                h_factored = length if factorise(s, length, counts) else 0.0
-            status, error, iterations, rate = NOT_CONVERGED, math.inf, 0, 0.0
-            if h_factored > 0.0:
-                guess(s.Z_before, h_before, length, s.Z)
-                status, error, iterations, rate = attempt(
-                    problem, step, y, s, rejected or h_before == 0.0, accuracy, counts
-                )
-            trouble = reason(status)
-            if may_leap(status):
-                passed, t_at = leap_over(problem, watch, t, last, ends, samples, run)
-                if passed != OK:
-                    return passed, t_at
-                if t_at > t:  # beyond it everything begins anew
-                    t, h, h_factored, h_before, error_before = t_at, t_at - t, 0.0, 0.0, 0.0
-                    renew, fresh, rejected = True, False, False
-                    continue
-            factor = 1.0
-            if status == OK:
-                caution = SAFETY * (2.0 * ITERATIONS + 1.0) / (2.0 * ITERATIONS + iterations)
-                factor = caution * new_over_old(length, h_before, error, error_before)
-            if status == OK and error < 1.0:
-                if watch is not None:
-                    status, t_at = pause(problem, watch, step, ends, state_at, s, samples, run)
-                    if status != OK:
-                        return status, t_at
-                store_samples(problem, step, ends, state_at, s, samples, run)
-                renew = rate > (_SLOW if iterations > 2 else _POOR)
-                factor = min(factor, by_contraction(rate))
-                h = after_acceptance(h, length, t_new == end, factor, rejected, renew)
-                t, h_before, error_before = t_new, length, max(1e-2, error)
-                copy(s.y_new, y)
-                copy(s.f_new, s.f)
-                for stage in range(3):
-                    copy(s.Z[stage], s.Z_before[stage])
-                counts[ACCEPTED] += 1
-                fresh, rejected = False, False
-            else:
-                h, renew = after_rejection(length, status, factor, rate, fresh)
-                counts[REJECTED] += 1
-                rejected = rejected or h < length
-        h_factored, h_before, error_before = 0.0, 0.0, 0.0  # nothing is known across a segment's end
-        renew, fresh, rejected, trouble = True, False, False, STEP_TOO_SMALL
-    if not kept:
-        keep(memory, t, y, h, error_before, rejected, counts)
-        keep_stages(memory, s, h_factored, h_before, renew, fresh)
-    return OK, t
+    ends = Ends(y, s.f, s.y_new, s.f_new)
+    method = Method(attempt, accept, reject, after_leap, enter, recall, keep, state_at, _ERROR_EXPONENT)
+    return adaptive(method, problem, s, ends, clock, accuracy, out, counts, memory, watch)
 
 
 INTEGRATOR = Integrator(

@@ -1,1 +1,1 @@
-"""Exchange with other programs: SID files, finite-element matrices, robot descriptions. Nothing here knows dynamics."""
+"""Exchange with other programs: SID files, finite-element matrices, robot descriptions; without any dynamics."""

@@ -1,8 +1,8 @@
-"""A few equal masses that have given sums of products of their fields: 1, coordinates of r, and of mode shapes.
+"""Few equal point masses with a given Gram matrix of the fields 1, coordinates of r, and coordinates of mode shapes.
 
-All that the kinetic energy of masses needs are sums m a b of two of these 4 + 3 m fields: their Gram matrix. The rows
-of any factor X of it, X'X, are the fields at points times the root of the point's mass. A reflection turns the column
-of the field 1 into equal numbers, so that all points have the same mass.
+The kinetic energy of point masses depends only on the sums m a b of two of these 4 + 3 m fields, their Gram matrix. The
+rows of any factor X of it, X'X, are the fields at points, times the square root of the point's mass. A Householder
+reflection makes all entries in the column of the field 1 equal, so that all points have the same mass.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from flexmb.typing import Real
 
 NEGATIVE = 1e-6
-"""Share of the largest eigenvalue by which a Gram matrix that was printed in single precision may be negative."""
-ROUNDING = 1e-15  # share of it below which a direction is rounding
+"""Negative eigenvalues down to this fraction of the largest are attributed to printing in single precision."""
+ROUNDING = 1e-15  # eigenvalues below this fraction of the largest are rounding errors
 
 
 class EquivalentMasses(NamedTuple):
@@ -27,24 +27,24 @@ class EquivalentMasses(NamedTuple):
 
 
 class NoMasses(ValueError):
-    """No masses have these sums; `field` is the one that shows it most: 0 is 1, 1 to 3 are r, then phi by modes."""
+    """No masses have this Gram matrix; `field` is the field with the largest defect: 0 is 1, 1 to 3 are r, then phi."""
 
     def __init__(self, field: int) -> None:
         self.field = field
-        super().__init__(f"no distribution of mass has these sums, least of all those of field {field}")
+        super().__init__(f"no distribution of mass has these sums; the largest defect is that of field {field}")
 
 
 def equivalent_masses(gram: Real) -> EquivalentMasses:
     """Points whose fields have the Gram matrix `gram` (4+3m, 4+3m), of which the upper triangle is read.
 
-    Raises NoMasses where it is not positive semidefinite.
+    Raises NoMasses if it is not positive semidefinite.
     """
     gram = np.triu(gram) + np.triu(gram, 1).T
     size = _sizes(np.diag(gram))
     with np.errstate(over="ignore", invalid="ignore"):
         scaled = gram / size[:, None] / size
     largest = np.max(np.abs(scaled), axis=1)
-    if not np.all(np.isfinite(largest)):  # of positive semidefinite matrices no element is above those of the diagonal
+    if not np.all(np.isfinite(largest)):  # in a positive semidefinite matrix scaled elements are at most 1
         raise NoMasses(int(np.argmin(np.isfinite(largest))))
     values, vectors = np.linalg.eigh(scaled)
     if values[0] < -NEGATIVE * values[-1]:
@@ -61,7 +61,8 @@ def equivalent_masses(gram: Real) -> EquivalentMasses:
 
 
 def _sizes(squares: Real) -> Real:
-    """One size for the three coordinates of a vector: of one that is rounding, the others say so."""
+    """Scales of the fields, the same for the three coordinates of a vector, so that one that is zero to round-off is
+    compared with the others."""
     vectors = np.repeat(np.sqrt(np.abs(squares[1:].reshape(-1, 3).sum(axis=1))), 3)
     size = np.concatenate([np.sqrt(np.abs(squares[:1])), vectors])
     return np.where(size == 0.0, 1.0, size)

@@ -1,8 +1,8 @@
-"""MJCF: what MuJoCo's own compiler makes of a model, as a scene.
+"""Import of MJCF models by MuJoCo's own compiler.
 
-Defaults, inertia of shapes, frames of all notations and included files are resolved by MuJoCo itself. A joint becomes a
-hinge of its name; bodies with several joints get bodies without mass in between. Coordinates count from the model's
-pose at its reference, `qpos0`.
+MuJoCo resolves defaults, inertia of shapes, all notations of frames, and included files. A joint becomes a hinge with
+the same name; between the joints of a body with several of them there are bodies without mass. Coordinates are relative
+to the model's reference pose `qpos0`.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
 def read_mjcf(path: str | os.PathLike[str]) -> ImportedScene:
     """The rigid tree of an MJCF file (or of a URDF file, as MuJoCo reads it), at its reference pose and at rest.
 
-    Springs and dampers of joints come along. Contacts, limits, dry friction, actuators and sensors are left out, as the
-    notes say. Raises ImportError without MuJoCo; ModelError for a file that MuJoCo refuses, for numbers that are not
-    finite, in whose place MuJoCo would put defaults (`flexmb.interchange.mjcf_text`), and for what changes the motion
-    and has no counterpart: equality constraints, tendons, rotor inertia, fluids, flexible parts.
+    Springs and dampers of joints are included. Contacts, limits, dry friction, actuators and sensors are omitted, and
+    the notes list them. Raises ImportError without MuJoCo; ModelError for a file that MuJoCo refuses, for numbers that
+    are not finite, which MuJoCo would replace by defaults (`flexmb.interchange.mjcf_text`), and for elements that
+    change the motion and have no counterpart in a scene: equality constraints, tendons, rotor inertia, fluids, flexible
+    parts.
     """
     try:
         import mujoco
@@ -58,7 +59,7 @@ class _Model:
         return ImportedScene(builder.scene(), tuple(self._notes()))
 
     def _body(self, builder: SceneBuilder, k: int) -> None:
-        """Body k and its joints: massless bodies carry all but the last of these."""
+        """Body k and its joints; all joints but the last move massless bodies."""
         m, name = self.m, self._body_name(k)
         R = rotation_matrix(m.body_iquat[k])
         inertia = R @ np.diag(m.body_inertia[k]) @ R.T
@@ -105,7 +106,7 @@ class _Model:
         return str(self.m.joint(j).name) or f"{self._body_name(int(self.m.jnt_bodyid[j]))}.joint {j}"
 
     def _refuse(self) -> None:
-        """ModelError for what changes the motion and has no counterpart in a scene."""
+        """ModelError for elements that change the motion and have no counterpart in a scene."""
         m = self.m
         for count, what, remedy in (
             (m.neq, "equality constraints", "remove them, and add closures to the scene"),
@@ -114,7 +115,7 @@ class _Model:
             (m.npluginstate, "plugins", "remove them"),
         ):
             if count:
-                self._fail(f"it has {count} {what}, which no scene has", remedy)
+                self._fail(f"it has {count} {what}, which scenes do not support", remedy)
         for dof in np.flatnonzero(m.dof_armature):
             joint = self._joint_name(int(m.dof_jntid[dof]))
             self._fail(

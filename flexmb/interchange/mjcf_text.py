@@ -1,7 +1,8 @@
-"""The text of an MJCF model before MuJoCo compiles it: numbers that are none, and counts that would fill the memory.
+"""Checks of the text of an MJCF model before MuJoCo compiles it: numbers that are not finite, and excessive counts.
 
-MuJoCo takes NaN for "not given" and puts a default in its place, so that a slip ends in a finite, wrong model. And it
-makes as many copies as `count` says. Both stand in the text alone, of the model and of all files that it includes.
+MuJoCo interprets NaN as "not given" and uses a default, so that an error results in a wrong model with finite numbers.
+It also makes as many copies as `count` specifies, whatever memory they need. Both can be seen only in the text of the
+model and of all files that it includes.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ from flexmb.scene.reading import MIB, Unreadable, read_text
 LIMIT = 256 * MIB
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)  # MuJoCo's reader takes "--" in them, which XML does not
 NO_NUMBER = re.compile(r"[-+]?(nan(\(.*\))?|inf(inity)?)", re.IGNORECASE)
-MOST_COPIES = 10_000  # of bodies, in all: MuJoCo takes some 30 kB for each
+MOST_COPIES = 10_000  # total number of copied bodies; MuJoCo needs some 30 kB for each
 MOST_ENTRIES = 100_000_000  # of a texture or a height field
-MOST_RESERVED = 1_000_000  # numbers of the user for each item, keyframes
-# Attributes whose words are names and texts: a body may be called "inf".
+MOST_RESERVED = 1_000_000  # user numbers for each item, and keyframes
+# Attributes whose values are names or texts: a body may be called "inf".
 TEXTS = frozenset((
     "name", "class", "childclass", "dclass", "model", "file", "content_type", "plugin", "instance", "key", "text",
     "target", "objname", "reftype", "refname", "objtype", "body", "body1", "body2", "bodyname", "bodyname1",
@@ -33,11 +34,11 @@ TEXTS = frozenset((
     "child", "link", "type", "filename", "fileup", "filedown", "fileleft", "fileright", "filefront", "fileback",
     "meshdir", "texturedir", "assetdir",
 ))  # fmt: skip
-FOLLOWED = {"include": "file", "model": "file"}  # elements that name a file of the same language
+FOLLOWED = {"include": "file", "model": "file"}  # elements that refer to another MJCF file
 
 
 def refuse_bad_text(path: Path) -> None:
-    """ModelError naming file, element, attribute and remedy; OSError for a file that cannot be read."""
+    """Check a model and all files it includes. ModelError names file, element, attribute and remedy; OSError."""
     folders, seen = [path.parent], set[str]()
     waiting = [path]
     for file in waiting:
@@ -50,7 +51,7 @@ def refuse_bad_text(path: Path) -> None:
         _refuse_elements(file, root)
         for named in _named_files(root):
             found = (folder / named for folder in (*folders, file.parent))
-            waiting += [each for each in found if os.path.lexists(each)]  # MuJoCo says which is not there
+            waiting += [each for each in found if os.path.lexists(each)]  # MuJoCo reports missing files
 
 
 def _parsed(file: Path) -> ElementTree.Element:
@@ -73,17 +74,16 @@ def _named_files(root: ElementTree.Element) -> Iterator[str]:
 
 
 def _refuse_elements(file: Path, root: ElementTree.Element) -> None:
-    """All elements, each with the number of copies that those around it ask for."""
+    """Check all elements, each with the number of copies that the enclosing elements request."""
     waiting = [(root, 1)]
-    while waiting:  # no recursion: elements may be nested as deeply as the file is long
+    while waiting:  # without recursion, because the nesting is limited only by the size of the file
         element, copies = waiting.pop()
         for key, text in element.attrib.items():
             if key not in TEXTS and element.tag != "text":
                 _refuse_words(file, element, key, text)
         copies *= _copies(element)
         if copies > MOST_COPIES:
-            what = f"it asks for {copies} copies, and {MOST_COPIES} are allowed"
-            _fail(file, element, "count", what, "ask for fewer")
+            _fail(file, element, "count", f"it requests {copies} copies, and the limit is {MOST_COPIES}", "reduce it")
         _refuse_sizes(file, element)
         waiting += [(child, copies) for child in element]
 
@@ -92,7 +92,7 @@ def _refuse_words(file: Path, element: ElementTree.Element, key: str, text: str)
     for word in text.split():
         if NO_NUMBER.fullmatch(word) or _is_too_large(word):
             remedy = "give a finite number, or leave the attribute out for MuJoCo's default"
-            _fail(file, element, key, f'"{word}" is no finite number up to {MAGNITUDE:g}', remedy)
+            _fail(file, element, key, f'"{word}" is not a finite number up to {MAGNITUDE:g}', remedy)
 
 
 def _copies(element: ElementTree.Element) -> int:
@@ -109,11 +109,11 @@ def _refuse_sizes(file: Path, element: ElementTree.Element) -> None:
         if element.tag == tag:
             size = math.prod(max(1, each) for key in keys for each in _counts(element, key))
             if size > most:
-                _fail(file, element, keys[0], f"it asks for {size} entries, and {most} are allowed", "ask for fewer")
+                _fail(file, element, keys[0], f"it requests {size} entries, and the limit is {most}", "reduce it")
 
 
 def _counts(element: ElementTree.Element, key: str) -> list[int]:
-    """Whole numbers of an attribute; none where MuJoCo will say that it is wrong."""
+    """Integers of an attribute; an empty list if it is invalid, which MuJoCo reports."""
     try:
         return [int(float(word)) for word in element.get(key, "").split()]
     except (ValueError, OverflowError):
@@ -121,7 +121,7 @@ def _counts(element: ElementTree.Element, key: str) -> list[int]:
 
 
 def _is_too_large(word: str) -> bool:
-    """Quaternions are divided by their length, which takes squares: MuJoCo makes zeros of those that overflow."""
+    """Whether the square of a number overflows: MuJoCo turns quaternions with such components into zeros."""
     try:
         return not usable(float(word))
     except ValueError:

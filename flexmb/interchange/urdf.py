@@ -1,7 +1,7 @@
-"""URDF: links become bodies, joints hinges of the same names, and inertia tensors turn with their frames.
+"""Import of URDF files: links become bodies, and joints become hinges with the same names.
 
-Read by Python's own XML parser, with every element that carries mechanics checked: the usual parsers fill in what is
-wrong, and the best kept of them brings twenty packages for meshes that no scene needs.
+They are read by Python's XML parser, with checks of all mechanical elements. The usual URDF parsers replace invalid
+data by defaults, and the best maintained one depends on twenty packages for meshes, which scenes do not have.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ def read_urdf(
 ) -> ImportedScene:  # fmt: skip
     """The rigid tree of a URDF file, at its zero position and at rest, under `gravity` (m/s², World axes).
 
-    The root link is welded to the ground, or free with `free_base`; its frame starts at the World's. Many published
-    robots have tensors that no mass has: `repair` changes them as little as makes them possible, and a note lists them;
-    otherwise they are SceneErrors. Limits, damping,
-    friction, shapes and transmissions are left out, as the notes say. Raises ModelError for what is no URDF, has no one
-    root, or has mimic joints; SceneError for inertia that no body has; OSError for a file that cannot be read.
+    The root link is welded to the ground, or free with `free_base`; its initial frame is that of the World. Many
+    published robots have inertia tensors that no body can have. They raise a SceneError, or with `repair` are changed
+    by the least amount that makes them possible, and a note lists them. Limits, damping, friction, shapes and
+    transmissions are omitted; notes list limits, damping and friction. Raises ModelError for a file that is not URDF,
+    has no unique root, or has mimic joints; SceneError for impossible inertia; OSError.
     """
     with naming(str(path)):
         return _Robot(str(path), _parsed(Path(path)), repair).scene(gravity, free_base)
@@ -64,7 +64,7 @@ def _parsed(path: Path) -> ElementTree.Element:
 
 
 class _Robot:
-    """One robot; `place` in errors are the names of link and joint."""
+    """One robot; `place` in errors is the name of a link or joint."""
 
     def __init__(self, file: str, robot: ElementTree.Element, repair: bool) -> None:
         self.file, self.robot, self.repair = file, robot, repair
@@ -97,7 +97,7 @@ class _Robot:
         return found
 
     def _root(self) -> str:
-        """The one link that is no child. ModelError where the joints make no tree."""
+        """The only link that is not a child of a joint. ModelError if the joints do not form a tree."""
         children: dict[str, str] = {}
         for name, joint in self.joints.items():
             parent, child = self._link_of(name, joint, "parent"), self._link_of(name, joint, "child")
@@ -107,7 +107,7 @@ class _Robot:
             children[child] = name
         roots = [name for name in self.links if name not in children]
         if len(roots) != 1:
-            what = f"{len(roots)} links are no joint's child ({listed(roots) or 'none'})"
+            what = f"{len(roots)} links are not the child of a joint ({listed(roots) or 'none'})"
             self._fail("robot", what, "join all links to one tree")
         return roots[0]
 
@@ -115,11 +115,11 @@ class _Robot:
         element = joint.find(end)
         link = "" if element is None else element.get("link", "")
         if link not in self.links:
-            self._fail(f'joint "{name}"', f'its {end} is "{link}", which is no link', "name one that is there")
+            self._fail(f'joint "{name}"', f'its {end} is "{link}", which is not a link', "give the name of a link")
         return link
 
     def _body_of(self, link: str) -> str:
-        """The name of a link's body: "ground" is taken by the inertial frame."""
+        """The name of a link's body, another one if the link is called "ground", the name of the inertial frame."""
         return (
             link if link != GROUND else next(name for name in ("ground link", "link ground") if name not in self.links)
         )
@@ -145,7 +145,7 @@ class _Robot:
         place, kind = f'joint "{name}"', joint.get("type", "")
         parent, child = (self._body_of(self._link_of(name, joint, end)) for end in ("parent", "child"))
         if joint.find("mimic") is not None:
-            what = "it mimics another joint, and no hinge of a scene follows another"
+            what = "it mimics another joint, which hinges of a scene cannot do"
             self._fail(place, what, "prescribe both coordinates, or close the mechanism by a closure")
         R, p = self._origin(place, joint)
         at: Placement = {"parent_position": p, "parent_quaternion": quaternion_of(R)}
@@ -170,7 +170,7 @@ class _Robot:
                 self.ignored.setdefault(tag, []).append(name)
 
     def _origin(self, place: str, element: ElementTree.Element) -> tuple[Real, Real]:
-        """Rotation (3,3) and position (3,) m of a frame: turns about the fixed axes x, then y, then z."""
+        """Rotation (3,3) and position (3,) m of a frame; the rotation is about the fixed axes x, then y, then z."""
         origin = element.find("origin")
         if origin is None:
             return np.eye(3), np.zeros(3)
@@ -210,7 +210,7 @@ class _Robot:
         if others:
             yield f"elements that URDF does not define are left out: {listed(others)}"
         if self.repaired:
-            yield f"tensors that no mass has were changed as little as makes them possible: {listed(self.repaired)}"
+            yield f"impossible inertia tensors were changed by the least amount: {listed(self.repaired)}"
         if empty := [name for name, link in self.links.items() if link.find("inertial") is None]:
             yield f"links without inertia are bodies without mass: {listed(empty)}"
 
@@ -219,7 +219,7 @@ class _Robot:
 
 
 def _possible(mass: float, tensor: Real) -> Real:
-    """The tensor itself if masses can have it, else the one whose second moments sum m x x' lose what is negative."""
+    """The tensor itself if it is possible; else the one in which negative second moments sum m x x' are zero."""
     if mass == 0.0:
         return np.zeros((3, 3))
     second, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
@@ -230,7 +230,7 @@ def _possible(mass: float, tensor: Real) -> Real:
 
 
 def _upright(axis: Real) -> Real:
-    """A rotation whose z is the unit vector `axis`; its x is as near to x as can be."""
+    """A rotation whose z axis is the unit vector `axis`; its x axis is as near as possible to x (or y, if parallel)."""
     along = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     y = np.cross(axis, along)
     y /= np.linalg.norm(y)
@@ -238,7 +238,7 @@ def _upright(axis: Real) -> Real:
 
 
 def _real(word: str) -> float:
-    """A number as XML has it; NaN for what Python alone reads as one, such as 1_0 and digits of other scripts."""
+    """A number in XML notation; NaN for others, also those that only Python accepts (1_0, digits of other scripts)."""
     try:
         return float(word) if word.isascii() and "_" not in word else math.nan
     except ValueError:

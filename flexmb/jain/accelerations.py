@@ -1,7 +1,7 @@
-"""Accelerations outward, body by body: Jain & Rodriguez (24), with what hinges and modes do given or found on the way.
+"""Accelerations of the bodies from base to tip, Jain & Rodriguez (24), for known accelerations of hinges and modes.
 
-Accelerations are classical, of the point O in body axes, and those of the workspace are minus gravity. Each function
-is for accelerations that x holds: the workspace w itself, or a response to forces.
+Accelerations are classical, of the point O, in body axes. Those in the workspace are relative to free fall (gravity is
+subtracted). An argument x holds the accelerations: the workspace w itself, or a response to forces.
 """
 
 from flexmb.jain.kinematics import motion_column
@@ -15,7 +15,7 @@ from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
 @sweep
 def acceleration_sweep(c, w):
-    """Accelerations of all bodies for given udot in w.speed.acceleration (24): inverse dynamics, outward."""
+    """Accelerations of all bodies for given udot in w.speed.acceleration (24): the outward half of inverse dynamics."""
     for k in range(c.body.shape[0]):
         A = sum6(inboard_acceleration(c, w, k), vec6(w.body[k].bias, 0))
         for n in range(c.body[k].nv):
@@ -34,7 +34,7 @@ def inboard_acceleration(c, w, k):
 
 @helper
 def carried_acceleration(c, w, x, k):
-    """Phi' alpha_m for the accelerations that x holds."""
+    """Phi' alpha_m for the accelerations in x."""
     p = c.body[k].parent
     R = mat3(w.body[k].rotation, 0)
     if p < 0:
@@ -49,7 +49,7 @@ def carried_acceleration(c, w, x, k):
 
 @helper
 def store_body_acceleration(c, w, k, A):
-    """Keep the acceleration of O (without deformation part) and go on to the body origin."""
+    """Store the acceleration A of O, without the modal accelerations at O, and that of the body origin."""
     if has(c, OUTBOARD_NODES):
         store6(w.body[k].accel_hinge, 0, A)
     store_origin_acceleration(c, w, w, k, A)
@@ -57,13 +57,13 @@ def store_body_acceleration(c, w, k, A):
 
 @helper
 def hinge_acceleration(c, w, k):
-    """What was kept of O, whose acceleration is that of the body where no body has its hinge on a deforming node."""
+    """The stored acceleration of O; where no body has its hinge on a deforming node, O is the body origin."""
     return vec6(w.body[k].accel_hinge if has(c, OUTBOARD_NODES) else w.body[k].accel, 0)
 
 
 @helper
 def store_origin_acceleration(c, w, x, k, A):
-    """From the acceleration of O, without deformation part, to that of the body origin, kept in x."""
+    """Acceleration of the body origin into x, from A of O without the modal accelerations at O."""
     if has(c, OUTBOARD_NODES):
         i = c.body[k].outboard_port
         if i >= 0:

@@ -1,8 +1,8 @@
-"""Hinges with a single axis along z, without the zeros and ones of their rotation and their map H.
+"""Kinematics of hinges with a single axis along z, without the zeros and ones of their rotation and their map H.
 
-Most hinges are of this kind. What `flexmb.hinges` says of a revolute and a prismatic hinge is written out here, so that
-no product with a zero is left: the compiler must not leave one out, for 0 times infinity is not 0. How such a hinge is
-eliminated is in `flexmb.jain.hinge_solve`.
+Most hinges are of this kind. The kinematics of the revolute and the prismatic hinge of `flexmb.hinges` are repeated
+here without products with zero: the compiler may not remove these itself, because 0 times infinity is NaN.
+`flexmb.jain.hinge_solve` eliminates such hinges.
 """
 
 from flexmb.jit.features import has
@@ -18,7 +18,7 @@ TURNING, SLIDING, OTHERS = (f"{AXIS} {row}" for row in (ANGULAR_Z, LINEAR_Z, NO_
 
 @helper
 def has_axis(c, k):
-    """Whether hinge k has a single axis; known beforehand in scenes where all have one, or none has."""
+    """Whether hinge k has a single axis; known at compile time in scenes where all have one, or none has."""
     if not has(c, OTHERS):
         return True
     if not has(c, TURNING) and not has(c, SLIDING):
@@ -36,7 +36,7 @@ def turns(c, k):
 
 @helper
 def turn(c, w):
-    """Sine and cosine of all angles, for `pose`: at once, because the processor has room for eight."""
+    """Sines and cosines of all angles, for `pose`: in one call, which computes eight at a time in vector registers."""
     if not has(c, TURNING):
         return
     for k in range(c.body.shape[0]):
@@ -47,7 +47,7 @@ def turn(c, w):
 
 @helper
 def pose(c, w, k, R, arm):
-    """R_parent_O and the arm to O, in parent axes, from those of O+."""
+    """R_parent_O and the arm to O, in parent axes, from those of the inboard frame O+."""
     if turns(c, k):
         return turned_about_z(R, w.cosine[k], w.sine[k]), arm
     return R, axpy(w.q[c.body[k].q_index], (R[2], R[5], R[8]), arm)
@@ -55,7 +55,10 @@ def pose(c, w, k, R, arm):
 
 @helper
 def cross_hinge(c, w, k, V, A):
-    """Velocity and bias of O from those of this point of the parent, in outboard axes: H u and the Coriolis term."""
+    """Velocity and bias of O from those of the coincident point of the parent, in outboard axes.
+
+    V + H u, and the Coriolis acceleration A + [omega x w_rel; 2 omega x v_rel] of (25).
+    """
     u = w.u[c.body[k].u_index]
     (x, y, z), v = V
     alpha, a = A
@@ -66,7 +69,7 @@ def cross_hinge(c, w, k, V, A):
 
 @helper
 def column(c, k):
-    """The motion of O that a unit of the hinge's speed is, in outboard axes."""
+    """H': the velocity [angular; linear] of O at unit speed of the hinge, in outboard axes."""
     if turns(c, k):
         return (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
     return (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -74,13 +77,13 @@ def column(c, k):
 
 @helper
 def along(c, k, F):
-    """H F."""
+    """H F: the component of a force F = (torque, force) along the axis."""
     return F[0][2] if turns(c, k) else F[1][2]
 
 
 @helper
 def move_along(c, k, A, rate):
-    """A + H' rate."""
+    """A + H' rate, the rate of the hinge's speed added to an acceleration A."""
     alpha, a = A
     if turns(c, k):
         return (alpha[0], alpha[1], alpha[2] + rate), a

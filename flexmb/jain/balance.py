@@ -1,4 +1,4 @@
-"""Energy, momentum and power of a whole system, from the same modal mass matrices that move it."""
+"""Energy, momentum and power of a system, from the modal mass matrices that the equations of motion use."""
 
 from flexmb.connectors.along_hinges import evaluate_along_hinges, stored_along_hinges
 from flexmb.connectors.between import connector_power, stored_in_connectors
@@ -64,7 +64,11 @@ def energy_and_momentum(c, w, energy, momentum):
 
 @helper
 def _body(c, w, k, energy, momentum):
-    """1/2 [etadot; V]' M_m [etadot; V] plus wheels; momentum h = M_rf etadot + M_rr V about the body origin."""
+    """Add the shares of body k and its wheels.
+
+    Kinetic energy 1/2 [etadot; V]' M_m [etadot; V], momentum h = M_rf etadot + M_rr V about the body origin. M_m holds
+    the wheels as if they did not spin, so that each adds its spin alone: I thetad (thetad/2 + q.w) and I thetad q.
+    """
     M_rr, V = load_inertia(w.body[k].inertia, 0), vec6(w.body[k].velocity, 0)
     h = inertia_times(M_rr, V)
     twice = dot6(h, V)
@@ -93,7 +97,7 @@ def _body(c, w, k, energy, momentum):
 
 @helper
 def power(c, w):
-    """Power of everything that is not conservative: motors, dampers, drives, loads, modal damping, friction (W)."""
+    """Power in W of all forces without a potential: motors, dampers, drives, loads, modal damping, friction."""
     total = speed_power(c, w)
     for k in range(c.body.shape[0]):
         if has(c, MODAL_DAMPING):

@@ -1,10 +1,9 @@
 """Composite-body inertias and the mass matrix of trees: Jain & Rodriguez (47)-(50), O(N^2 n^2); forward dynamics (46).
 
-R(k) is the modal inertia of body k with all that it carries, as if frozen to it. A unit rate of a speed of body k asks
-for the force X = R H', which is passed inward through the bodies that carry k: its projections on their motions are the
-elements of M (50). All forces are passed through a body at once. For this M is written in places (`Places`) instead of
-in the order of u, so that the speeds of what a body carries are neighbours; rows of M are filled from one end to the
-other.
+R(k) is the modal inertia of body k and of all bodies that it carries, rigidly attached to it. A unit rate of a speed of
+body k needs the force X = R H'. It is passed inward through the bodies that carry k, and its projections on the motions
+of their speeds are the elements of M (50). A body passes on the forces of all speeds that it carries in one loop over
+contiguous columns, for which M has the depth-first order of `flexmb.jain.places` in place of that of u.
 
 A wheel is one more speed of its body, whose force is the torque I q on its node.
 """
@@ -31,9 +30,9 @@ TILE = 16
 
 @helper
 def mass_matrix(c, w, m):
-    """Upper triangle of M in places into m.M, at the configuration in w.q."""
+    """Write the upper triangle of M at the configuration in w.q to m.M, in depth-first order."""
     for j in range(w.u.shape[0]):
-        w.u[j] = 0.0
+        w.u[j] = 0.0  # the kernels below compute bias forces too, which are not needed here
     velocity_sweep(c, w, False, False)
     for k in range(c.body.shape[0]):
         body_inertia(c, w, k)
@@ -42,9 +41,10 @@ def mass_matrix(c, w, m):
 
 @kernel
 def forward_dynamics(c, w, m):
-    """Accelerations into w.speed.acceleration by (46), drive loads into w.speed.drive; returns a status code.
+    """Accelerations to w.speed.acceleration by (46), drive loads to w.speed.drive; returns a status code.
 
-    The rates of prescribed speeds are given, and what they ask for is part of the bias. m keeps M, bias and factor.
+    Inverse dynamics with zero rates of the free speeds gives the bias; the given rates of the prescribed speeds are
+    part of it. m keeps M, the bias and the factor.
     """
     hinge_forces(c, w)
     for j in range(w.u.shape[0]):
@@ -63,7 +63,11 @@ def forward_dynamics(c, w, m):
 
 @helper
 def _solve(c, w, m):
-    """M x = T - C for the free speeds, tips first: pivots are those of articulated bodies, branches do not fill in."""
+    """Solve M x = T - C for the free speeds.
+
+    The order tips first keeps the zeros of M between branches out of the factor's fill-in, and its pivots are those of
+    the articulated-body elimination, so that `flexmb.spatial.pivots` judges both alike.
+    """
     free = m.x.shape[0]
     _reverse(m, free)
     for a in range(free):
@@ -80,7 +84,7 @@ def _solve(c, w, m):
     cholesky_solve(m.U, m.x, free)
     for a in range(free):
         w.speed[m.speed[m.order[a]]].acceleration = m.x[a]
-    for b in range(free, m.order.shape[0]):
+    for b in range(free, m.order.shape[0]):  # drive loads: the rows of M of the prescribed speeds
         i = m.order[b]
         j = m.speed[i]
         load = m.bias[j] - w.speed[j].applied
@@ -93,7 +97,10 @@ def _solve(c, w, m):
 
 @helper
 def _reverse(m, n):
-    """The free speeds' upper triangle of M into U, tips first: a transposition, by tiles that stay in the cache."""
+    """Copy M of the free speeds to the upper triangle of U, tips first.
+
+    The reversed order makes this a transposition, done by tiles of TILE x TILE numbers that fit the first cache.
+    """
     for a0 in range(0, n, TILE):
         for b0 in range(a0, n, TILE):
             for b in range(b0, min(b0 + TILE, n)):
@@ -104,9 +111,9 @@ def _reverse(m, n):
 
 @kernel
 def composite_bodies(c, w, m):
-    """R(k) = Phi R(k-1) Phi' + M_m (47), X(k) = R(k) H' and the rows of M that body k has (50), tips to base.
+    """R(k) = Phi R(k-1) Phi' + M_m (47), X(k) = R(k) H' and the rows of M of body k (50), from tips to base.
 
-    Needs M_m of all bodies in w.body.inertia, w.pff and w.pfr, and leaves R there.
+    Needs M_m of all bodies in w.body.inertia, w.pff and w.pfr, and overwrites it by R.
     """
     for k in range(c.body.shape[0] - 1, -1, -1):
         if c.body[k].outboard_port >= 0:
@@ -121,7 +128,7 @@ def composite_bodies(c, w, m):
 
 @helper
 def _own_forces(c, w, m, k):
-    """X of body k's own speeds about O into their columns of m.X, and M of its modes and wheels among themselves."""
+    """X of body k's own speeds about O to their columns of m.X; the block of M of its modes and wheels."""
     first, modes, wheels = m.hinge[k], m.modes[k], m.wheels[k]
     R = load_inertia(w.body[k].inertia, 0)
     for n in range(c.body[k].nv):
@@ -148,7 +155,7 @@ def _own_forces(c, w, m, k):
 
 @helper
 def _hinge_rows(c, w, m, k):
-    """M(k, j) = H X(j) of the hinge's speeds and all speeds j of what it carries."""
+    """M(k, j) = H X(j) for the hinge's speeds and all speeds j that the hinge carries."""
     for n in range(c.body[k].nv):
         place = m.hinge[k] + n
         _project(motion_column(c, w, k, n), m.X, m.M[place], place, m.stop[k])
@@ -156,7 +163,10 @@ def _hinge_rows(c, w, m, k):
 
 @helper
 def _forces_to_hinge(c, w, m, k):
-    """Forces of what body k carries from its origin to O on a node that deforms: modes feel -[Pi_d]' X (45)."""
+    """Refer the forces of all that body k carries from its origin to O, where O sits on a node that deforms.
+
+    The modes of the body receive -[Pi_d]' X (45), because O moves against the body with them.
+    """
     i, start, stop = c.body[k].outboard_port, m.carried[k], m.stop[k]
     _shift(scale(-1.0, vec3(w.port[i].r, 0)), m.X, start, stop)
     for n in range(c.body[k].modes):
@@ -165,7 +175,7 @@ def _forces_to_hinge(c, w, m, k):
 
 @helper
 def _forces_to_parent(c, w, m, k):
-    """X(j) = Phi X(j-1) of all speeds that hinge k carries, and the rows of the parent's modes: [Pi_t]' X."""
+    """X(j) = Phi X(j-1) for all speeds that hinge k carries, and the rows [Pi_t]' X of the parent's modes."""
     p, i = c.body[k].parent, c.body[k].inboard_port
     start, stop = m.hinge[k], m.stop[k]
     _rotate(mat3(w.body[k].rotation, 0), m.X, start, stop)
@@ -182,7 +192,7 @@ def _forces_to_parent(c, w, m, k):
 
 @helper
 def _store_force(X, j, F):
-    """F into column j of X."""
+    """Store F = (torque, force) in column j of X."""
     tau, f = F
     for i in range(3):
         X[i, j] = tau[i]
@@ -232,7 +242,7 @@ def _rotate3(R, x, y, z, start, stop):
 
 @helper
 def _shift(d, X, start, stop):
-    """phi X: torques about a point from which d leads to the one they were about."""
+    """phi X: refer torques to another point; d is the vector from that point to the one they were about."""
     a, b, c, x, y, z = X[0], X[1], X[2], X[3], X[4], X[5]
     for j in range(start, stop):
         a[j] += d[1] * z[j] - d[2] * y[j]

@@ -1,14 +1,15 @@
 """Modes condensed onto the nodes of a body: (63), (64) at cost O(n_m) without D_f, where M_ff = L L' is constant.
 
 With Lam = M_ff^-1, the constants of Appendix B are Psi = Lam M_fr, Ups = Lam Pi', zeta = M_rf Psi, Omega = Pi Ups and
-Theta = phi' - Pi Psi. The modes follow the body and the loads F at its nodes,
+Theta = phi' - Pi Psi. The modal accelerations follow from that of the body and the loads F at its nodes,
 
     etadd = -Lam z_f - Psi alpha - Ups F,      F = T Theta alpha + F_0,      T = (1 + Gamma Omega)^-1 Gamma,
     F_0   = y - T (Ups' z_f + Omega y),
 
-hence P_R = M_rr - zeta + Theta' T Theta and z_R = z_r - Psi' z_f + Theta' F_0: no term knows how many modes there are.
-What is kept is L' Psi = L^-1 M_fr, L' Ups and L^-1 z_f, which loses the fewest digits. Where M_fr and Pi change with
-the deformation, the tables are made anew at each evaluation.
+hence P_R = M_rr - zeta + Theta' T Theta and z_R = z_r - Psi' z_f + Theta' F_0, in which no matrix has the size of the
+modes. Stored are L' Psi = L^-1 M_fr, L' Ups and L^-1 z_f in place of Psi, Ups and Lam z_f: products of two of them
+contain Lam with the square root of its condition in each factor, which loses fewer digits. Where M_fr and Pi change
+with the deformation, these tables are recomputed at each evaluation.
 """
 
 from math import sqrt
@@ -23,12 +24,12 @@ from flexmb.spatial.rows import column_inertia, strips6
 from flexmb.spatial.spatial_vector import dot6, plus6, store6, sub6, vec6
 from flexmb.spatial.vector import vec3
 
-NEGLIGIBLE = 2.0**-49  # pivots of a matrix of unit diagonal below it are rounding: 16 units
+NEGLIGIBLE = 2.0**-49  # 16 unit roundoffs: pivots of a matrix with unit diagonal below this are rounding errors
 
 
 @helper
 def eliminate_modes(c, w, k):
-    """P_R and z_R of (63), (64) from the constants of (B4); False where T does not exist."""
+    """P_R and z_R of (63), (64) from the constants of (B4); returns False if 1 + Gamma Omega is singular."""
     r = c.body[k].reduced
     nodes = c.body[k].nodes
     if not is_at_rest(c.body[k].level):
@@ -51,10 +52,11 @@ def eliminate_modes(c, w, k):
 
 @helper
 def _pass_nodes(w, k, r, nodes):
-    """F_0 and T Theta of all nodes, and what they are for the rigid motion: P_R += Theta' T Theta, z_R += Theta' F_0.
+    """F_0 and T Theta of all nodes, and their shares of P_R += Theta' T Theta and z_R += Theta' F_0.
 
-    Needs T in w.scratch[2] and the nodes' y and Ups' z_f + Omega y.
+    Needs T in w.scratch[2], y in the nodes' `force` and Ups' z_f + Omega y in their `response`.
     """
+    # F_0 goes to w.scratch first: the y of every node is needed until the last node has its F_0.
     T = w.scratch[2]
     for i in range(nodes):
         for a in range(6):
@@ -80,7 +82,10 @@ def _pass_nodes(w, k, r, nodes):
 
 @helper
 def _tables(c, w, k):
-    """L^-1 M_fr, L^-1 Pi', zeta, Theta and root of Omega at the present deformation; L is diagonal."""
+    """L^-1 M_fr, L^-1 Pi', zeta, Theta and the root of Omega at the present deformation, for diagonal L.
+
+    `flexmb.jain.elimination.applies` admits no coupled modal masses here.
+    """
     r, nodes, nm = c.body[k].reduced, c.body[k].nodes, c.body[k].modes
     rows, inverse, found = w.gain[r], c.compliance[r], w.point_mode
     for n in range(nm):
@@ -107,14 +112,14 @@ def _tables(c, w, k):
 
 @helper
 def _scale_row(w, s, row, out):
-    """Six elements of `row` times s into `out`."""
+    """Write s times the six elements of `row` to `out`."""
     for b in range(0, 6, width(w)):
         put(w, out, b, s * strip(w, row, b))
 
 
 @helper
 def _products(w, left, right, nm, out):
-    """sum_n x y' of six elements x of the rows of `left` and y of those of `right` into six rows of `out`."""
+    """Write X' Y (6,6) to `out`, X and Y being the first six columns of the first `nm` rows of `left` and `right`."""
     for a in range(6):
         for b in range(0, 6, width(w)):
             total = 0.0
@@ -125,7 +130,7 @@ def _products(w, left, right, nm, out):
 
 @helper
 def _theta(product, r, theta):
-    """Theta = phi' - Pi Lam M_fr of a node at r, with this product."""
+    """Theta = phi' - Pi Lam M_fr of a node at r from the `product` Pi Lam M_fr (6,6)."""
     for a in range(6):
         for b in range(6):
             theta[a, b] = -product[a, b]
@@ -142,8 +147,8 @@ def _theta(product, r, theta):
 def semidefinite_root(a, diagonal, root, n):
     """Rows root[:rank] with a[:n,:n] = root' root to round-off; returns the rank. Overwrites a and diagonal (n,).
 
-    By Cholesky where every pivot is positive; otherwise with complete pivoting of the matrix scaled to a unit diagonal,
-    so that what is left behind is smaller than the last pivot, and units do not matter.
+    By Cholesky's factor if every pivot is positive. Otherwise by elimination with complete pivoting of the matrix
+    scaled to a unit diagonal: the remainder that is neglected is then smaller than the last pivot, in any units.
     """
     for i in range(n):
         diagonal[i] = a[i, i]
@@ -178,8 +183,8 @@ def semidefinite_root(a, diagonal, root, n):
 
 @helper
 def _to_orthonormal(c, w, k):
-    """L^-1 z_f in place."""
-    rows = c.compliance[c.body[k].reduced]
+    """z_f := L^-1 z_f."""
+    rows = c.compliance[c.body[k].reduced]  # L^-1, lower triangular: from the last column on, z_f[i] is still unchanged
     for i in range(c.body[k].modes - 1, -1, -1):
         s = w.zf[k, i]
         w.zf[k, i] = rows[i, i] * s
@@ -190,7 +195,7 @@ def _to_orthonormal(c, w, k):
 
 @helper
 def _sum_of_modes(w, zf, rows, nm):
-    """Psi' z_f or Ups' z_f of a node, by the rows of either."""
+    """rows' z_f (6,): Psi' z_f or Ups' z_f of a node, from the rows of L' Psi or L' Ups and L^-1 z_f."""
     found = w.point_mode[0]
     for b in range(0, 6, width(w)):
         total = 0.0
@@ -202,7 +207,7 @@ def _sum_of_modes(w, zf, rows, nm):
 
 @helper
 def _responses(c, w, k):
-    """Ups' z_f + Omega y by node."""
+    """Ups' z_f + Omega y of each node, Omega y by its root."""
     r = c.body[k].reduced
     nodes = c.body[k].nodes
     for i in range(nodes):
@@ -222,7 +227,7 @@ def modal_accelerations(c, w, k, A):
     """etadd from the acceleration A of O: outward half of (64)."""
     r = c.body[k].reduced
     nodes = c.body[k].nodes
-    for i in range(nodes):
+    for i in range(nodes):  # F = T Theta A + F_0
         node = w.node[r, i]
         for b in range(6):
             node.response[b] = plus6(node.force[b], vec6(node.carried[b], 0), A)
@@ -232,7 +237,7 @@ def modal_accelerations(c, w, k, A):
         for i in range(nodes):
             s += dot6(vec6(rows[1 + i, n], 0), vec6(w.node[r, i].response, 0))
         w.etadd[k, n] = -s
-    for i in range(c.body[k].modes):
+    for i in range(c.body[k].modes):  # L'^-1 in place, from the first row of L^-1 on
         row, s = c.compliance[r, i], w.etadd[k, i]
         w.etadd[k, i] = row[i] * s
         if not c.body[k].orthogonal:

@@ -1,4 +1,4 @@
-"""Connectors in the sweeps: between frames that ports are, or the ground; their loads as forces on bodies and modes."""
+"""Connectors in the sweeps. Each acts between two ports, or a port and the ground, as forces on bodies and modes."""
 
 from flexmb.connectors.between import load_between
 from flexmb.connectors.bushings import overturned
@@ -15,7 +15,7 @@ from flexmb.tables.status import CONNECTOR_OVERTURNED, OK
 
 @sweep
 def evaluate_connectors(c, w):
-    """Loads, energies and powers of all connectors between frames into w.connector.
+    """Write the loads, energies and powers of all connectors between frames to w.connector.
 
     Needs the velocity and pose sweeps.
     """
@@ -25,7 +25,7 @@ def evaluate_connectors(c, w):
 
 @sweep
 def connect(c, w):
-    """Subtract the loads of all connectors from the bias forces of the bodies that they join; a status code."""
+    """Subtract the loads of all connectors from the bias forces of the bodies that they join; returns a status code."""
     evaluate_connectors(c, w)
     if has(c, BUSHINGS):
         i = overturned(c, w)
@@ -52,7 +52,7 @@ def _end(c, w, i, side):
 
 @helper
 def _add_force(c, w, i, side, F):
-    """A force about an end of connector i, World axes, added to what its body feels."""
+    """Add a force F about an end of connector i, World axes, to the bias force of the body at that end."""
     k = c.end[i, side].body
     if k != ON_GROUND:
         add_port_force(c, w, w, k, c.end[i, side].port, times6_t(mat3(w.body[k].pose_rotation, 0), F))

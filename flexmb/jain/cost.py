@@ -1,15 +1,16 @@
-"""What the two forward dynamics of Jain & Rodriguez cost, by the polynomials of their section VII.
+"""Operation counts of the two forward dynamics of Jain & Rodriguez, by the polynomials of their section VII.
 
-Operations of one evaluation, divisions counted as multiplications. n modes of a body; the sums take the numbers of
-modes of the bodies in the paper's order, tip to base. For: serial chains, every hinge one rotation, free-free modes,
-ruthless bodies (appendix B) whose constant parts are computed before. Every polynomial is that of an inner flexible
-body; the paper has none for tips, bases and rigid bodies, which cost less than n = 0 says here.
+The counts are those of one evaluation, divisions counted as multiplications, as polynomials in the number of modes n of
+a body. Functions of several bodies take the numbers of modes in the paper's order, tip to base. The paper assumes
+serial chains, one rotation per hinge, free-free modes, and level ruthless (appendix B) with constants computed
+beforehand. Every polynomial is that of an inner flexible body. The paper gives none for tips, bases and rigid bodies;
+these cost less than the polynomials say with n = 0.
 
-Read against the print: polynomials that count must be whole numbers. All are, but for the additions of R(k), where the
-scan has n^2 + 97/2 n + 116: they are read as n^2/2 + 97/2 n + 116, which is n (n + 1)/2 sums for the constant modal
-block and 48 n for as many multiplications. What the list leaves out: the products of the modal block of R(k), unless
-it is referred to the hinge beforehand; and in the articulated-body algorithm velocities and bias, step 1 of section
-VI.B, which the composite-body algorithm pays for in its bias vector.
+Correction of the print: an operation count must be a whole number for every n. All polynomials fulfil this except the
+additions of R(k), printed as n^2 + 97/2 n + 116. They are read as n^2/2 + 97/2 n + 116: n (n + 1)/2 sums for the
+constant modal block, and 48 n, as many as the multiplications. The paper's lists omit the products of the modal block
+of R(k), which are needed unless it is referred to the hinge beforehand, and, in the articulated-body algorithm, the
+velocities and the bias (step 1 of section VI.B), which the composite-body algorithm counts in its bias vector.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from fractions import Fraction
 
 from flexmb.jit.counting import Operations
 
-EXPLICIT_UP_TO = 7  # modes; beyond, D_f is inverted by the matrix identity of appendix B
+EXPLICIT_UP_TO = 7  # modes: with more, the identity of appendix B inverts D_f in fewer operations
 
 
 def composite(modes: Sequence[int]) -> Operations:
@@ -89,7 +90,7 @@ def _operations(n: int, multiplications: str, additions: str) -> Operations:
 
 
 def _whole(n: int, coefficients: str) -> int:
-    """ValueError unless the polynomial counts."""
+    """The value of a polynomial at n; ValueError if it is not a whole number."""
     value = sum(Fraction(c) * n**power for power, c in enumerate(coefficients.split()))
     if value != int(value):
         raise ValueError(f"{value} is no number of operations: coefficients {coefficients} at {n}")

@@ -1,4 +1,4 @@
-"""Pivots of the recursion that may be rounding, by body: noted in w.doubt."""
+"""Pivots of the recursion that are so small that they may consist of rounding errors: noted in w.doubt."""
 
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import every
@@ -14,9 +14,9 @@ def note_mode(c, w, k, n, pivot):
 
 @helper
 def note_hinge(c, w, k, L, first):
-    """Note small pivots of the free speeds of hinge k, from row `first` on of a Cholesky factor L."""
+    """Note small pivots of the free speeds of hinge k, which have the rows of a Cholesky factor L from `first` on."""
     for a in range(w.body[k].free_count):
-        diagonal = 0.0
+        diagonal = 0.0  # of D before the elimination, recovered from L L': the factor has overwritten it
         for b in range(first + a + 1):
             diagonal += L[first + a, b] * L[first + a, b]
         j = c.body[k].u_index + w.hinge[k].free_speed[a]

@@ -1,10 +1,10 @@
 """The elements of the spatial operators, body by body: Jain & Rodriguez, section II, from the definitions.
 
-All components are in World axes, so that phi(x, y) stands as printed, without rotation matrices. Whatever depends on
-the configuration is evaluated once, at q + i h dq/dt: its real part is the value, its imaginary part divided by h the
-inertial rate, both to round-off. `value` and `rate` tell them apart.
+All components are in World axes, so that phi(x, y) has its printed form, without rotation matrices. Functions of the
+configuration are evaluated once, at q + i h dq/dt (complex-step differentiation): the real part is the value, the
+imaginary part divided by h the inertial rate, both to round-off. `value` and `rate` extract them.
 
-Positions, directions and mode shapes come from `flexmb.dense`, nothing from the compiled recursions.
+Positions, directions and mode shapes come from `flexmb.dense`; nothing is taken from the compiled recursions.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from flexmb.scene import schema as s
 from flexmb.typing import Real
 
 Complex = NDArray[np.complex128]
-STEP = 2.0**-200
+STEP = 2.0**-200  # h: h^2 is lost beside the value, so that rates have no truncation error
 
 
 def value(x: Complex) -> Real:
-    """What was evaluated at q + i h dq/dt, at q."""
+    """The value at q of something evaluated at q + i h dq/dt."""
     return np.asarray(x.real)
 
 
 def rate(x: Complex) -> Real:
-    """Its inertial rate."""
+    """The inertial rate of something evaluated at q + i h dq/dt."""
     return np.asarray(x.imag / STEP)
 
 
 def phi(l: NDArray) -> NDArray:
-    """phi(x, y) (6,6) with l from x to y (6): phi F_y is the load about x, phi' V_x the velocity of y."""
+    """phi(x, y) (6,6) of (6); l leads from x to y. phi F_y is a load about x, phi' V_x the velocity of y."""
     shift = np.eye(6, dtype=l.dtype)
     shift[:3, 3:] = skew(l)
     return shift
@@ -63,7 +63,7 @@ class NodalBody:
         return np.asarray(np.einsum("pai,pab,pbj->ij", A, value(self.M_s), A))
 
     def b_m(self, V_m: Real) -> Real:
-        """Modal gyroscopic forces (m+6,) at V_m (28), (31), (37): as printed, but inertias turn with their nodes."""
+        """Modal gyroscopic forces (m+6,) at V_m, (28), (31), (37); inertias turn with their nodes, which (31) omits."""
         A, M_s = value(self.A), value(self.M_s)
         w = (A @ V_m)[:, :3]
         force = M_s[:, 5, 5, None] * np.cross(w, np.cross(w, value(self.p)))
@@ -129,9 +129,9 @@ class Configuration:
         return np.hstack([angular @ R.T, linear @ R.T])
 
     def joint_map(self, k: int) -> Complex:
-        """script-H (m+n,m+6), rows [etadot; beta]: with the minus of (17), but phi(O_k, k) once, as in (13).
+        """script-H (m+n,m+6), rows [etadot; beta], with the minus sign of (17) but only one phi(O_k, k), as in (13).
 
-        Pi_F = phi'(d, k) Pi_d: the phi'(O_k, k) of the print holds for hinge points at their nodes.
+        Pi_F = phi'(d, k) Pi_d; the printed phi'(O_k, k) is right only for hinge points that coincide with their nodes.
         """
         H_F = self.H(k) @ phi(self.frame(k)[0] - self.hinge_point(k))
         d, Pi_d = self.node(k, self.tree.members[k].outboard)
@@ -158,7 +158,7 @@ class Configuration:
         return self._unit(self.tree.members[k].u_modes)
 
     def _unit(self, speeds: slice) -> Motions:
-        """One motion with unit speed for each of `speeds`."""
+        """Motions (one row each) in which one of `speeds` is 1 and all others are 0."""
         units = np.eye(self.tree.nu)[speeds]
         return Motions(self._motion.q, units, np.zeros_like(units))
 
@@ -171,12 +171,12 @@ def spatial_inertia(mass: Real, central: NDArray, p: NDArray) -> NDArray:
 
 
 def with_wheels(tree: DenseTree) -> DenseTree:
-    """The same tree with its wheels as members, after all others: rigid bodies on revolute hinges."""
+    """The same tree with its wheels as rigid bodies on revolute hinges, numbered after all other members."""
     return replace(tree, members=[*tree.members, *(_wheel(tree, rotor) for rotor in tree.rotors)], rotors=[])
 
 
 def _wheel(tree: DenseTree, rotor: Rotor) -> Member:
-    """At level linear a wheel's mass is an element of the body that carries it: its own body has inertia only."""
+    """A wheel as a member. At level linear its mass is part of the body that carries it, and it has inertia only."""
     wheel = rotor.wheel
     mass = 0.0 if rotor.member in tree.linear else wheel.mass_kg
     model = rigid_model(mass, np.zeros(3), rotor.inertia, {"origin": ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))})

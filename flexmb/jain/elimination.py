@@ -1,4 +1,7 @@
-"""Which bodies are reduced, by rule or by force, and the constants of Appendix B for them."""
+"""Choice of the bodies whose modes are condensed or eliminated in Woodbury form, and their constants of Appendix B.
+
+Such a body is called *reduced*: the effect of its outboard bodies is expressed at its nodes (`flexmb.jain.reduced`).
+"""
 
 from __future__ import annotations
 
@@ -13,21 +16,23 @@ from flexmb.tables import arrays as a
 
 Elimination = Literal["fastest", "explicit", "woodbury", "condensed"]
 
-ELIMINATIONS = ("explicit", "woodbury", "condensed")  # by the numbers of flexmb.tables.arrays
+ELIMINATIONS = ("explicit", "woodbury", "condensed")  # in the order of EXPLICIT, WOODBURY, CONDENSED in tables/arrays
 
-WELL_CONDITIONED = 1e4  # modal masses scaled to a unit diagonal; condensing loses the square root of it
-NEGLIGIBLE = 2.0**-49  # rows of a scaled root of Omega below it are rounding: 16 units
+# Largest condition of the modal masses, scaled to a unit diagonal, with which a body is reduced. Condensing multiplies
+# rounding errors by at most the square root of it, the condition of L in M_ff = L L': two digits.
+WELL_CONDITIONED = 1e4
+NEGLIGIBLE = 2.0**-49  # 16 unit roundoffs: pivots of Omega, scaled to a unit diagonal, below this are rounding errors
 
-# Modes for each node from which condensing is faster, of bodies whose inertia is that of the undeformed shape and of
-# those whose tables follow the deformation: measured, see `is_faster`.
-AT_REST, FOLLOWING = 11, 18
+# Number of modes for each node from which condensing is faster than the explicit form: of bodies with constant tables,
+# and of bodies whose tables are recomputed because they follow the deformation. Measured, see `is_faster`.
+MODES_WITH_CONSTANT_TABLES, MODES_WITH_CHANGING_TABLES = 11, 18
 
 
 def with_elimination(c: a.Constants, choice: Elimination = "fastest") -> a.Constants:
-    """The constants with the variant that eliminates the modes of each body; ReducedConstants where any is reduced.
+    """The constants with a variant of the elimination for each body; ReducedConstants if any body is reduced.
 
-    "fastest" follows the rule of `is_faster`; the others force one variant wherever it applies (`applies`), the
-    explicit one elsewhere. ValueError for a choice that does not exist.
+    "fastest" condenses bodies by the rule of `is_faster`. The other choices force one variant wherever it applies
+    (`applies`), and the explicit one elsewhere. ValueError for any other choice.
     """
     if choice not in get_args(Elimination):
         raise ValueError(f"elimination is {choice!r}: use one of {', '.join(map(repr, get_args(Elimination)))}")
@@ -41,12 +46,13 @@ def with_elimination(c: a.Constants, choice: Elimination = "fastest") -> a.Const
 
 
 def applies(c: a.Constants, k: int, variant: int) -> bool:
-    """Whether body k may be reduced: modal masses constant and regular, nothing but its nodes adding to them.
+    """Whether body k may be reduced: D_f must be constant, well-conditioned modal masses plus loads at its nodes.
 
-    Not with a free wheel, which takes a rank-one part out of D_f. A hinge on a node that its own modes move adds the
-    rigid inertia to D_f: it must be constant too, so that level ruthless is needed and no outboard body may sit on a
-    point that does not deform. The Woodbury form is Appendix B's: of ruthless bodies. Condensed tables that are made
-    anew at each evaluation are worth their cost only where modal masses are diagonal, as those of beams are.
+    A free wheel subtracts a rank-one term from D_f, so that its body is not reduced. If the body's own hinge sits on a
+    node that its modes move, the rigid inertia is part of D_f and must be constant too: the level must be ruthless, and
+    no outboard body may be hinged to a point that does not deform. The Woodbury form of Appendix B is for ruthless
+    bodies. Bodies of other levels recompute their condensed tables at each evaluation; this is cheaper than factorising
+    D_f only if their modal masses are diagonal, as those of beams are.
     """
     body = c.body[k]
     free_wheel = any(
@@ -67,19 +73,21 @@ def applies(c: a.Constants, k: int, variant: int) -> bool:
 
 
 def is_faster(c: a.Constants, k: int, nodes: int) -> bool:
-    """Whether condensing body k is taken to be faster than a Cholesky factor of D_f.
+    """Whether condensing body k is expected to be faster than factorising D_f.
 
-    Measured (tests/benchmarks/test_elimination.py) on chains of clamped beams, one node each: ruthless ones gain from
-    10 to 12 modes on, those of level full, whose tables are made anew at each evaluation, from 16 to 20. Estimated from
-    operation counts, not measured: the growth of the thresholds with the nodes. A tip counts as one node: it would
-    gain earlier, but not what compiling costs.
+    Measured (tests/benchmarks/test_elimination.py) on chains of clamped beams with one node each: condensing becomes
+    faster between 10 and 12 modes at level ruthless, and between 16 and 20 at level full, which recomputes its tables
+    at each evaluation. That the thresholds are proportional to the number of nodes is estimated from operation counts,
+    not measured. A tip counts as one node: it would gain from fewer modes, but less than the compilation costs.
     """
     body = c.body[k]
-    return bool(body["modes"] >= (AT_REST if LEVELS[body["level"]].at_rest else FOLLOWING) * max(1, nodes))
+    constant = LEVELS[body["level"]].at_rest
+    modes = MODES_WITH_CONSTANT_TABLES if constant else MODES_WITH_CHANGING_TABLES
+    return bool(body["modes"] >= modes * max(1, nodes))
 
 
 def _is_regular(M: a.Real) -> bool:
-    """Positive definite and well conditioned, whatever the units of the modes."""
+    """Whether M is positive definite and well conditioned, in any units of the modes."""
     size = np.sqrt(np.abs(np.diag(M)))
     if np.any(np.diag(M) <= 0.0):
         return False
@@ -88,7 +96,7 @@ def _is_regular(M: a.Real) -> bool:
 
 
 def _node_ports(c: a.Constants) -> dict[int, list[int]]:
-    """By flexible body, its ports that deform and carry hinges, in the order of the outboard bodies."""
+    """For each flexible body, its deforming ports that carry hinges, in the order of the outboard bodies."""
     found: dict[int, list[int]] = {k: [] for k in np.flatnonzero(c.body["modes"]).tolist()}
     hinged = np.flatnonzero(c.body["inboard_port"] >= 0)
     for parent, port in zip(c.body["parent"][hinged].tolist(), c.body["inboard_port"][hinged].tolist(), strict=True):
@@ -114,7 +122,7 @@ def _reduced_constants(
     body["reduced"] = body["node"] = -1
     for row, k in enumerate(reduced):
         body["elimination"][k], body["reduced"][k], body["nodes"][k] = variant, row, len(nodes[k])
-        body["orthogonal"][k] &= body["outboard_port"][k] < 0  # about a node that deforms, masses couple all modes
+        body["orthogonal"][k] &= body["outboard_port"][k] < 0  # referred to a deforming node, M_ff couples all modes
         children = np.flatnonzero((body["parent"] == k) & (body["inboard_port"] >= 0))
         body["node"][children] = np.arange(len(children))
         _fill(c, k, row, nodes[k], variant, tables)
@@ -124,7 +132,7 @@ def _reduced_constants(
 
 @dataclass(frozen=True)
 class _Rest:
-    """H_f M_m H_f' of a body at rest: modal masses (n,n), coupling (n,6); and of its nodes Pi' (n,6C), phi' (6C,6)."""
+    """A body at rest: H_f M_m H_f', modal masses (n,n) and coupling (n,6); of its C nodes Pi' (n,6C), phi' (6C,6)."""
 
     M_ff: a.Real
     M_fr: a.Real
@@ -133,7 +141,7 @@ class _Rest:
 
     @classmethod
     def of(cls, c: a.Constants, k: int, ports: list[int]) -> _Rest:
-        """About O. Where O sits on a node d of the body: with V = X V_O - B etadot, the congruence of (13), (17)."""
+        """All of it about O. Where O sits on a node d of the body, V = X V_O - B etadot: the congruence (13), (17)."""
         n, hinge = c.body["modes"][k], int(c.body["outboard_port"][k])
         M_ff, M_fr, Pi_t = c.mff[k, :n, :n], c.mfr[k, :, :n].T, _shapes(c, ports, n)
         phi_t = np.vstack([np.zeros((0, 6)), *(_shift(_place(c, port)) for port in ports)])
@@ -148,7 +156,10 @@ class _Rest:
 
 
 def _fill(c: a.Constants, k: int, row: int, ports: list[int], variant: int, tables: dict[str, Any]) -> None:
-    """Row of body k: the constants of (B4), with the zeta = M_rf Lam M_fr and Theta they leave out; at rest."""
+    """Fill the row of body k: at rest, the constants of (B4), and zeta = M_rf Lam M_fr and Theta, which (B4) lacks.
+
+    Condensed bodies store L^-1, L^-1 M_fr and L^-1 Pi' with M_ff = L L', Woodbury bodies Lam = M_ff^-1, Psi and Ups.
+    """
     from scipy.linalg import solve_triangular  # slow to import, and only bodies that are reduced need it
 
     n = c.body["modes"][k]
@@ -171,7 +182,10 @@ def _fill(c: a.Constants, k: int, row: int, ports: list[int], variant: int, tabl
 
 
 def _scaled_root(ups: a.Real) -> tuple[a.Real, a.Real, a.Real]:
-    """Rows of the triangular factor of the columns of `ups`, scaled to unit length and pivoted: scale, rows, order."""
+    """Pivoted QR factorisation of `ups` with columns scaled to unit length: scale, rows of R, order of the columns.
+
+    R' R is the scaled Omega. Rows whose diagonal is below the root of NEGLIGIBLE are left out.
+    """
     scale = np.linalg.norm(ups, axis=0)
     if not ups.shape[1]:
         return scale, np.zeros((0, 0)), np.zeros(0, int)
@@ -183,7 +197,7 @@ def _scaled_root(ups: a.Real) -> tuple[a.Real, a.Real, a.Real]:
 
 
 def _shapes(c: a.Constants, ports: list[int], n: int) -> a.Real:
-    """Pi' (n, 6C) of the nodes at rest: angular and linear velocity by modal speed."""
+    """Pi' (n, 6C) of the nodes at rest: their angular and linear velocities at unit modal speeds."""
     rotation, translation = np.split(c.port_mode[ports, :, :n].swapaxes(1, 2), 2, axis=2)
     linear = translation + np.cross(rotation, c.port["offset"][ports][:, None])
     return np.concatenate([rotation, linear], axis=2).swapaxes(0, 1).reshape(n, 6 * len(ports))
@@ -201,7 +215,7 @@ def _rigid_block(rigid: a.Real) -> a.Real:
 
 
 def _shift(r: a.Real) -> a.Real:
-    """phi' (6,6): velocity at r from the origin by that of the origin."""
+    """phi' (6,6): velocity [angular; linear] at r from that at the origin."""
     x, y, z = r
     out = np.eye(6)
     out[3:, :3] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
@@ -209,7 +223,7 @@ def _shift(r: a.Real) -> a.Real:
 
 
 def _spatial(P: a.Real) -> a.Real:
-    """The 21 numbers of a symmetric (6,6) matrix, as in flexmb.spatial.inertia."""
+    """A symmetric (6,6) matrix as the 21 numbers of `flexmb.spatial.inertia`."""
     six = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     A, C = [P[i, j] for i, j in six], [P[3 + i, 3 + j] for i, j in six]
     return np.array([*A, *P[:3, 3:].ravel(), *C])

@@ -1,7 +1,8 @@
-"""Modes eliminated by the factors D_f = L D L', (63), (64): for any body, at any level, with any hinge.
+"""Elimination of the modes by the factors D_f = L D L', (63), (64): for any body, at any level, with any hinge.
 
-L has a unit diagonal, D is that of the pivots: no square root is taken. After the inward sweep the workspace holds D L'
-(w.pff, upper triangle; what is below means nothing), D^-1 (w.inverse_pivot) and rows of L^-1 [P_fr z_f] (w.pfr).
+L has a unit diagonal and D holds the pivots; no square root is needed, on which the next pivot would wait. After the
+inward sweep the workspace holds D L' (w.pff, upper triangle; the rest is undefined), D^-1 (w.inverse_pivot) and the
+rows of L^-1 [P_fr z_f] (w.pfr).
 """
 
 from flexmb.jain.doubt import note_mode
@@ -44,12 +45,15 @@ from flexmb.spatial.spatial_vector import (
 from flexmb.spatial.vector import cross, mat3, scale, sub, sym6, vec3
 from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
-LOAD = 6  # place of L^-1 z_f in a row of w.pfr
+LOAD = 6  # column of L^-1 z_f in w.pfr, behind the six of L^-1 P_fr
 
 
 @helper
 def eliminate_modes(c, w, k):
-    """D_f = L D L', P_R = P_rr - P_rf D_f^-1 P_fr and z_R likewise, about O; L^-1 P_fr and L^-1 z_f are kept."""
+    """D_f = L D L', P_R = P_rr - P_rf D_f^-1 P_fr and z_R = z_r - P_rf D_f^-1 z_f about O; stores L^-1 [P_fr z_f].
+
+    Returns False if a pivot is not above rounding.
+    """
     if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         refer_to_hinge(c, w, k)
     return _eliminate(c, w, k)
@@ -57,12 +61,15 @@ def eliminate_modes(c, w, k):
 
 @helper
 def _one_by_one(c, w, k):
-    """Each row of [D_f P_fr z_f] less what those before it take: of vectors, which are better not stored often."""
+    """Left-looking elimination of [D_f P_fr z_f]: each row is reduced by all rows before it, then stored once.
+
+    For lanes and duals, whose numbers are vectors: here stores and loads cost more than the order of the sums.
+    """
     D, factor = w.pff[k], w.point_mode[0]
     P, z_r = load_inertia(w.body[k].inertia, 0), vec6(w.body[k].force, 0)
     for n in range(c.body[k].modes):
         P_fr, z, pivot = vec6(w.pfr[k, n], 0), w.zf[k, n], D[n, n]
-        floor = SINGULAR * pivot
+        floor = SINGULAR * pivot  # relative to the diagonal before elimination: independent of the modes' units
         for i in range(n):
             s = -w.inverse_pivot[k, i] * D[i, n]
             factor[i] = s
@@ -88,10 +95,14 @@ def _one_by_one(c, w, k):
 
 @helper
 def _in_strips(c, w, k):
-    """Each row of [D_f P_fr z_f] taken from those after it, and from [P_rr z_r]: few sums wait for each other."""
+    """Right-looking elimination of [D_f P_fr z_f]: each row, once finished, is subtracted from all rows after it.
+
+    For one scene of floats: the updates of different rows are independent of each other, so that vector instructions
+    overlap. z_f is column LOAD of w.pfr, where each update of a row includes it at no cost.
+    """
     D, Y, nm = w.pff[k], w.pfr[k], c.body[k].modes
     for n in range(nm):
-        w.inverse_pivot[k, n] = SINGULAR * D[n, n]  # the least that the pivot may be
+        w.inverse_pivot[k, n] = SINGULAR * D[n, n]  # until the pivot is known, its least admissible value
         put(w, Y[n], 0, with_seventh(w, strip(w, Y[n], 0), w.zf[k, n]))
     taken = ZERO6
     for n in range(nm):
@@ -116,7 +127,7 @@ def _in_strips(c, w, k):
 
 @helper
 def _keep_pivot(c, w, k, n, pivot, floor):
-    """The inverse of the pivot of mode n; False where it is rounding, or NaN."""
+    """Store the pivot of mode n and its inverse; returns False if the pivot is NaN, or a rounding error."""
     sound = pivot.real > floor.real
     if not some(sound):
         return False
@@ -132,7 +143,7 @@ _eliminate = by_width(_in_strips, _one_by_one)
 
 @helper
 def about_hinge(c, w, k):
-    """P_R (21,) and z_R (6,) of body k about O: where nothing has modes, its own about its origin."""
+    """P_R (21,) and z_R (6,) of body k about O; in scenes without modes those of the body, whose origin is O."""
     if has(c, MODES):
         return w.body[k].hinge_inertia, w.body[k].hinge_force
     return w.body[k].inertia, w.body[k].force
@@ -140,7 +151,7 @@ def about_hinge(c, w, k):
 
 @helper
 def cholesky(a, n):
-    """Lower Cholesky factor of a[:n,:n] in place; False where it is not positive definite to round-off (or NaN)."""
+    """Lower Cholesky factor of a[:n,:n] in place; returns False if a is not positive definite to round-off, or NaN."""
     for j in range(n):
         d = a[j, j]
         floor = SINGULAR * d
@@ -167,6 +178,8 @@ def refer_to_hinge(c, w, k):
     With V_body = X V_O - B etadot, B = X [W; L], X the shift from O to the origin: P_ff - B'P_rf - P_fr B + B'P_rr B,
     (P_fr - B'P_rr) X, X'P_rr X; z_f - B'z_r, X'z_r.
     """
+    # P_fr is changed by -B'P_rr in two halves. With the first half, P_ff - P_fr B - B'P_rf contains half of B'P_rr B
+    # from each of its products, as it should in all, and the new P_ff costs two products an element instead of three.
     P_rr = load_inertia(w.body[k].inertia, 0)
     for n in range(c.body[k].modes):
         _add_momentum(c, w, k, n, P_rr, -0.5)
@@ -181,7 +194,7 @@ def refer_to_hinge(c, w, k):
 
 @helper
 def from_hinge(c, w, k, n):
-    """Column n of B: velocity of the body origin against the rate of mode n, O at rest."""
+    """Column n of B: minus the velocity [angular; linear] of the body frame at unit speed of mode n, with O at rest."""
     i = c.body[k].outboard_port
     angular, linear = mode_motion(w, i, n)
     return angular, sub(linear, cross(angular, vec3(w.port[i].r, 0)))
@@ -195,7 +208,7 @@ def _add_momentum(c, w, k, n, P_rr, s):
 
 @helper
 def refer_coupling(c, w, k, s):
-    """(P_fr + s B'P_rr) X: loads of unit modal rates about O."""
+    """P_fr := (P_fr + s B'P_rr) X: the loads about O of unit modal accelerations."""
     back = scale(-1.0, vec3(w.port[c.body[k].outboard_port].r, 0))
     P_rr = load_inertia(w.body[k].inertia, 0)
     for n in range(c.body[k].modes):
@@ -205,7 +218,7 @@ def refer_coupling(c, w, k, s):
 
 @helper
 def refer_rigid(c, w, k):
-    """z_f - B'z_r, X'P_rr X and X'z_r."""
+    """z_f := z_f - B'z_r, P_rr := X'P_rr X, z_r := X'z_r."""
     z_r = vec6(w.body[k].force, 0)
     for n in range(c.body[k].modes):
         w.zf[k, n] -= dot6(from_hinge(c, w, k, n), z_r)
@@ -216,9 +229,10 @@ def refer_rigid(c, w, k):
 
 @helper
 def to_parent(c, w, k, P, F, row):
-    """P_R^+ and F = z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+.
+    """Add P_R^+ and F = z_R^+ to the parent: P += A Gamma A', z += A z_R^+.
 
-    A hinge with a single axis leaves no inertia along it: `row` of P_R^+ is zero then, negative for all other hinges.
+    Behind a hinge with a single axis P_R^+ has no inertia along it: row `row` of P_R^+ is zero, and its rotation skips
+    it. For other hinges `row` is negative.
     """
     R, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
     rotated = rotate_inertia(R, P) if row < 0 else rotate_without(R, P, row)
@@ -233,20 +247,24 @@ def to_parent(c, w, k, P, F, row):
 
 @helper
 def _start_inertia(c, w, k, gamma):
-    """P = gamma and the body's own, which is constant: stored once, where it would be written, read and written."""
+    """P = gamma + the constant inertia of the rigid body k.
+
+    `sweeps.bodies` does not write the inertia of such a body: it is stored here once in place of stored, read and
+    stored again.
+    """
     own = c.body[k].rigid
     store_inertia(w.body[k].inertia, 0, add_rigid(gamma, own[0], vec3(own, 1), sym6(own, 4)))
 
 
 @helper
 def inertia_to_parent(c, w, k, P):
-    """P += A Gamma A' of the parent, Gamma = P_R^+ in its axes at its reference."""
+    """P += A Gamma A' of the parent; Gamma is P in the parent's axes about the parent's origin or inboard port."""
     _add_inertia(c, w, k, shift_inertia(rotate_inertia(mat3(w.body[k].rotation, 0), P), vec3(w.body[k].arm, 0)))
 
 
 @helper
 def force_to_parent(c, w, z, k, F):
-    """A F added to the parent's force; z holds forces: the workspace w, or a response to w's factors."""
+    """Add A F to the parent's force in z: the workspace w itself, or a `Response` to the factors in w."""
     _add_force(c, w, z, k, shift_force(times6(mat3(w.body[k].rotation, 0), F), vec3(w.body[k].arm, 0)))
 
 
@@ -265,7 +283,7 @@ def _add_inertia(c, w, k, gamma):
 
 @helper
 def _add_to_modes(c, w, k, i, gamma, r):
-    """Pi' Gamma Pi added to P_ff, upper triangle, and phi Gamma Pi to P_fr, of port i of body k, at r."""
+    """Add Pi' Gamma Pi to the upper triangle of P_ff and phi Gamma Pi to P_fr, for port i of body k at position r."""
     nm, modes, momenta = c.body[k].modes, w.port_mode[i], w.point_mode
     for n in range(0, nm, width(w)):
         momentum = inertia_times(gamma, strips6(w, modes, n))
@@ -279,7 +297,7 @@ def _add_to_modes(c, w, k, i, gamma, r):
 
 @helper
 def _add_force(c, w, z, k, F_parent):
-    """z += A F with A = [Pi'; phi] of body k's inboard port on the parent, F about it in the parent's axes."""
+    """z += A F with A = [Pi'; phi] of body k's inboard port on the parent; F is about this port, in parent axes."""
     parent, i = c.body[k].parent, c.body[k].inboard_port
     if has(c, INBOARD_NODES) and i >= 0:
         add_port_force(c, w, z, parent, i, F_parent)
@@ -289,7 +307,7 @@ def _add_force(c, w, z, k, F_parent):
 
 @helper
 def modal_accelerations(c, w, k, A):
-    """Back substitution L' etadd = -D^-1 (L^-1 z_f + L^-1 P_fr alpha) from the acceleration of O: outward (64)."""
+    """Back substitution L' etadd = -D^-1 L^-1 (z_f + P_fr A) with the acceleration A of O: outward half of (64)."""
     nm = c.body[k].modes
     for n in range(nm - 1, -1, -1):
         s = plus6(w.pfr[k, n, LOAD], vec6(w.pfr[k, n], 0), A)

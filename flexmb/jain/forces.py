@@ -1,4 +1,4 @@
-"""What acts on the bodies besides inertia: elasticity and the loads at nodes."""
+"""Forces on bodies and modes besides those of inertia: elastic and modal damping forces, loads at nodes."""
 
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
@@ -12,7 +12,7 @@ from flexmb.tables.features import COUPLED_MODES, MODES
 
 @helper
 def elastic_forces(c, w, k):
-    """Add K eta + D etadot, at the true deformation for every level."""
+    """Add K eta + D etadot to z_f, with the true deformation also at level ruthless, whose inertia ignores it."""
     nm, q, u = c.body[k].modes, c.body[k].eta_index, c.body[k].etad_index
     if not has(c, COUPLED_MODES) or c.body[k].uncoupled:
         for n in range(nm):
@@ -35,7 +35,7 @@ def node_loads(c, w, k):
 
 @helper
 def load_at_port(c, w, k, i):
-    """Load i as (port, [tau; f] about the port), body axes."""
+    """Load i of body k: its port, and [torque; force] about the port in body axes."""
     port = c.load[i].port
     magnitude = w.function[c.load[i].function, 0]
     direction = vec3(c.load[i].direction, 0)
@@ -52,7 +52,7 @@ def load_at_port(c, w, k, i):
 def add_port_force(c, w, z, k, port, F):
     """z += A F with A = [Pi'; phi] of (14), (15): a force about a port of body k, for its modes and about its origin.
 
-    z holds forces: the workspace w itself, or a response to the factors in w.
+    z holds the forces: the workspace w itself, or a `Response` to the factors in w.
     """
     if has(c, MODES):
         for n in range(0, c.body[k].modes, width(w)):
@@ -62,7 +62,7 @@ def add_port_force(c, w, z, k, port, F):
 
 @helper
 def add_port_torque(c, w, z, k, port, torque):
-    """z += A [torque; 0], as `add_port_force`."""
+    """z += A [torque; 0], like `add_port_force`."""
     add3(z.body[k].force, 0, torque)
     if has(c, MODES):
         for n in range(0, c.body[k].modes, width(w)):

@@ -1,20 +1,20 @@
-"""What one hinge does in the sweeps, by the factor of its D_R = L L': the only place that knows a single axis.
+"""The hinge of one body in the sweeps, by the factor of D_R = L L', with a faster form for hinges with a single axis.
 
-P_R and z_R are the articulated inertia and force of body k about O, without its modes; the rows of H are the motions of
-the hinge's free speeds. With epsilon = T - H z_R and G = P_R H' D_R^-1, Jain & Rodriguez (63), (64), `eliminate` leaves
-G L = P_R H' L'^-1, L and L^-1 epsilon as `gain`, `factor` and `residual` in w.hinge. `accelerate` takes the
-residual outward. The others solve with the same factors for a response:
+P_R and z_R are the articulated inertia and force of body k about O after its modes are eliminated; the rows of H are
+the motions of the hinge's free speeds. With epsilon = T - H z_R and G = P_R H' D_R^-1, Jain & Rodriguez (63), (64),
+`eliminate` stores G L = P_R H' L'^-1, L and L^-1 epsilon as `gain`, `factor` and `residual` in w.hinge. `accelerate`
+is the outward half. The other functions solve with the same factors for a `Response`:
 
     innovate      y = L^-1 (T - H z)               z^+ = z + G L y            inward   (55)
     solve         x = L'^-1 (y - (G L)'alpha^+)    alpha = alpha^+ + H' x     outward  (56)
     synthesise    T = L y + H z                    z^+ = z + G L y            inward, undoes `innovate`
     excite        y = L' x + (G L)'alpha^+         alpha = alpha^+ + H' x     outward, undoes `solve`
 
-The response holds T, y and x in one array `speed`, each in place of what it is made from. Prescribed speeds are no
-freedom: H leaves them out, and they are zero in y and x.
+The response holds T, y and x in one array `speed`, in which each overwrites the one it is computed from. H has no rows
+for prescribed speeds, which are zero in y and x.
 
-A hinge with a single axis, one free speed along z, needs no small matrices: H picks a row, and D_R is a number. For
-such a hinge G, D_R and D_R^-1 epsilon are kept in w.body, so that forward dynamics takes no square root.
+A hinge with a single axis has one free speed, along z: H selects a row, and D_R is a number. For such a hinge G, D_R
+and D_R^-1 epsilon are stored in w.body, so that forward dynamics takes no square root.
 """
 
 from math import log
@@ -34,12 +34,12 @@ from flexmb.spatial.spatial_vector import add6, axpy6, dot6, less6, scale6, stor
 from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z, NO_AXIS
 from flexmb.tables.features import PRESCRIBED, SEVERAL
 
-SINGLE = -1  # free_count of a hinge with a single axis
+SINGLE = -1  # in `free_count`: the hinge was eliminated by its single axis, and w.hinge was not written
 
 
 @helper
 def impose(c, w, k):
-    """Rates of the hinge's prescribed speeds, added to the bias."""
+    """Set the rates of the hinge's prescribed speeds and add their accelerations of O to the bias."""
     j = c.body[k].u_index
     for n in range(c.body[k].nv):
         f = c.speed[j + n].prescribed
@@ -50,7 +50,7 @@ def impose(c, w, k):
 
 @helper
 def find_free(c, w, k):
-    """The hinge's free speeds into w.hinge[k].free_speed; returns how many there are."""
+    """Write the numbers of the hinge's free speeds to w.hinge[k].free_speed; returns their count."""
     free = 0
     for n in range(c.body[k].nv):
         if c.speed[c.body[k].u_index + n].prescribed < 0:
@@ -62,9 +62,9 @@ def find_free(c, w, k):
 
 @helper
 def eliminate(c, w, k):
-    """D_R, G_R and epsilon_R, P_R^+ and z_R^+ of (63), (64), handed to the parent; returns whether D_R > 0.
+    """D_R, G_R and epsilon_R of (63), (64); adds P_R^+ and z_R^+ to the parent. Returns whether D_R > 0.
 
-    Prescribed speeds act as bias, not as freedom. Needs P_R and z_R of body k.
+    Prescribed speeds contribute to the bias only. Needs P_R and z_R of body k.
     """
     if has(c, PRESCRIBED):
         impose(c, w, k)
@@ -77,7 +77,7 @@ def eliminate(c, w, k):
     row = ANGULAR_Z if turns(c, k) else LINEAR_Z
     PH = inertia_column(P, row)
     D = along(c, k, PH)
-    before = w.body[k].inertia[2 if turns(c, k) else 17]
+    before = w.body[k].inertia[2 if turns(c, k) else 17]  # diagonal of this row before the modes were eliminated
     if is_small(c, w, j, D, before):
         sound = is_inertia(D, before)
         if not some(sound):
@@ -97,7 +97,10 @@ def eliminate(c, w, k):
 
 @helper
 def _eliminate_several(c, w, k, P, z):
-    """The general hinge, or one that is prescribed."""
+    """`eliminate` for hinges with several or prescribed speeds, or with O on a deforming node.
+
+    P^+ and z^+ are updated by one column of G L after the other: P - (G L)(G L)', z + (G L) L^-1 epsilon.
+    """
     free = find_free(c, w, k)
     D, G, residual = w.hinge[k].factor, w.hinge[k].gain, w.hinge[k].residual
     for a in range(free):
@@ -130,7 +133,7 @@ def _eliminate_several(c, w, k, P, z):
 
 @helper
 def accelerate(c, w, k, A):
-    """Rates of the free speeds from alpha^+ and what `eliminate` left; returns alpha^+ + H' udot + a_m (64)."""
+    """Rates of the free speeds from A = alpha^+; returns the acceleration alpha^+ + H' udot + a_m of O (64)."""
     j, free = c.body[k].u_index, w.body[k].free_count
     moved = sum6(A, vec6(w.body[k].bias, 0))
     if not has(c, SEVERAL) or free == SINGLE:
@@ -151,7 +154,7 @@ def accelerate(c, w, k, A):
 
 @helper
 def add_innovations(c, w, x, k):
-    """Further forces T have the innovations y: what `eliminate` left is as if they had been there."""
+    """Add generalised forces to those that `eliminate` has seen; x.speed holds their innovations y."""
     j = c.body[k].u_index
     if not has(c, SEVERAL) or w.body[k].free_count == SINGLE:
         w.body[k].rate_at_rest += x.speed[j] / sqrt(w.body[k].inertia_along)
@@ -162,7 +165,7 @@ def add_innovations(c, w, x, k):
 
 @helper
 def innovate(c, w, x, k, z):
-    """y = L^-1 (T - H z) in place of T; returns z^+ (55)."""
+    """T := y = L^-1 (T - H z); returns z^+ (55)."""
     j, free = c.body[k].u_index, w.body[k].free_count
     if not has(c, SEVERAL) or free == SINGLE:
         epsilon = x.speed[j] - along(c, k, z)
@@ -181,7 +184,7 @@ def innovate(c, w, x, k, z):
 
 @helper
 def synthesise(c, w, x, k, z):
-    """T = L y + H z in place of y; returns z^+ (54)."""
+    """y := T = L y + H z; returns z^+ (54)."""
     j, free = c.body[k].u_index, w.body[k].free_count
     if not has(c, SEVERAL) or free == SINGLE:
         epsilon = sqrt(w.body[k].inertia_along) * x.speed[j]
@@ -201,7 +204,7 @@ def synthesise(c, w, x, k, z):
 
 @helper
 def solve(c, w, x, k, A):
-    """x = L'^-1 (y - (G L)'alpha^+) in place of y; returns alpha^+ + H' x (56)."""
+    """y := x = L'^-1 (y - (G L)'alpha^+); returns alpha^+ + H' x (56)."""
     j, free = c.body[k].u_index, w.body[k].free_count
     if not has(c, SEVERAL) or free == SINGLE:
         rate = less6(x.speed[j] / sqrt(w.body[k].inertia_along), vec6(w.body[k].gain, 0), A)
@@ -219,7 +222,7 @@ def solve(c, w, x, k, A):
 
 @helper
 def excite(c, w, x, k, A):
-    """y = L' x + (G L)'alpha^+ in place of x; returns alpha^+ + H' x."""
+    """x := y = L' x + (G L)'alpha^+; returns alpha^+ + H' x."""
     j, free = c.body[k].u_index, w.body[k].free_count
     if not has(c, SEVERAL) or free == SINGLE:
         rate = x.speed[j]
@@ -249,7 +252,7 @@ def log_determinant(c, w, k):
 
 @helper
 def _hold(c, x, k):
-    """Prescribed speeds of the hinge have neither innovations nor accelerations."""
+    """Set the entries of the hinge's prescribed speeds to zero."""
     for j in range(c.body[k].u_index, c.body[k].u_index + c.body[k].nv):
         if c.speed[j].prescribed >= 0:
             x.speed[j] = 0.0

@@ -1,8 +1,8 @@
 """Innovations factorisation M = (1 + H Phi K) D (1 + H Phi K)' of trees, applied and inverted by recursion, O(N).
 
-The factors are what `flexmb.jain.sweeps.inward` leaves: per body first the free wheels, then the modes (D_f), then the
-hinge (D_R), each D = L L'; of modes L is that of `flexmb.jain.explicit` times the roots of the pivots. Prescribed
-speeds are held: their rows and columns of M are left out. With
+`flexmb.jain.sweeps.inward` computes the factors: in each body first those of the free wheels, then of the modes (D_f),
+then of the hinge (D_R), each D = L L'. The L of the modes is that of `flexmb.jain.explicit` times the square roots of
+the pivots. Rows and columns of prescribed speeds are left out of M. With
 
     F = (1 + H Phi K) L
 
@@ -11,9 +11,9 @@ speeds are held: their rows and columns of M are left out. With
     excite        y = F' x        outward
     synthesise    T = F y         inward      both together: M x, (54)
 
-F is the Cholesky factor of M in the order tip to base, of each body its wheels, modes, hinge speeds. T, y and x are
-`speed` of a response, each in place of what it is made from. The first takes the response's forces on bodies and modes
-as well: F^-1 (T - H Phi z).
+F is the Cholesky factor of M in the order tip to base, in each body wheels, modes, hinge speeds. T, y and x are `speed`
+of a `Response`, in which each overwrites the one it is computed from. `innovations` includes the forces z on bodies and
+modes in the response: y = F^-1 (T - H Phi z).
 """
 
 from math import log, sqrt
@@ -35,8 +35,8 @@ from flexmb.spatial.vector import dot, scale, vec3
 
 @helper
 def factorise(c, w):
-    """Factors of M at the configuration in w.q; False where a D is not positive definite, w.fault names the body."""
-    for j in range(w.u.shape[0]):
+    """Factors of M at the configuration in w.q; False where a D is not positive definite: w.fault names the body."""
+    for j in range(w.u.shape[0]):  # the sweeps also eliminate bias forces, which are unwanted here
         w.u[j] = 0.0
         w.speed[j].applied = 0.0
     velocity_sweep(c, w, False, False)
@@ -48,14 +48,14 @@ def factorise(c, w):
 
 @helper
 def innovations(c, w, x):
-    """z = Phi z^+, epsilon = T - H z, y = L^-1 epsilon in place of T, z^+ = z + G epsilon (55); uses up the forces."""
+    """z = Phi z^+, epsilon = T - H z, T := y = L^-1 epsilon, z^+ = z + G epsilon (55); overwrites the forces in x."""
     for k in range(c.body.shape[0] - 1, -1, -1):
         innovate(c, w, x, k)
 
 
 @helper
 def innovate(c, w, x, k):
-    """What (55) does at body k; x.body[k].force then holds z_R, the force about O that the modes have left."""
+    """(55) at body k. x.body[k].force is then z_R, the force about O after the elimination of the modes."""
     for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
         j = c.wheel[i].u_index
         if c.speed[j].prescribed < 0:
@@ -81,7 +81,7 @@ def innovate(c, w, x, k):
 
 @helper
 def respond(c, w, x):
-    """alpha^+ = Phi' alpha, x = L'^-1 y - G' alpha^+ in place of y, alpha = alpha^+ + H' x: outward half of (56)."""
+    """alpha^+ = Phi' alpha, y := x = L'^-1 y - G' alpha^+, alpha = alpha^+ + H' x: the outward half of (56)."""
     for k in range(c.body.shape[0]):
         A = hinge_solve.solve(c, w, x, k, carried_acceleration(c, w, x, k))
         start, nm = c.body[k].etad_index, c.body[k].modes
@@ -102,7 +102,7 @@ def respond(c, w, x):
 
 @helper
 def excite(c, w, x):
-    """alpha^+ = Phi' alpha, y = L' (x + G' alpha^+) in place of x, alpha = alpha^+ + H' x: what `respond` undoes."""
+    """alpha^+ = Phi' alpha, x := y = L' (x + G' alpha^+), alpha = alpha^+ + H' x: the inverse of `respond`."""
     for k in range(c.body.shape[0]):
         A = hinge_solve.excite(c, w, x, k, carried_acceleration(c, w, x, k))
         start, nm = c.body[k].etad_index, c.body[k].modes
@@ -123,7 +123,7 @@ def excite(c, w, x):
 
 @helper
 def synthesise(c, w, x):
-    """epsilon = L y, T = epsilon + H z in place of y, z^+ = z + G epsilon: undoes `innovations`. x has no forces."""
+    """epsilon = L y, y := T = epsilon + H z, z^+ = z + G epsilon: the inverse of `innovations`; needs z = 0 in x."""
     for k in range(c.body.shape[0] - 1, -1, -1):
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             j = c.wheel[i].u_index
@@ -149,14 +149,14 @@ def synthesise(c, w, x):
 
 @helper
 def add_to_modes(c, w, x, k):
-    """Further forces T on the modes have the innovations y: what `inward` left is as if they had been there."""
+    """Add generalised forces on the modes to those that `sweeps.inward` has seen; x.speed holds their innovations y."""
     for n in range(c.body[k].modes):
         w.pfr[k, n, LOAD] -= x.speed[c.body[k].etad_index + n] * sqrt(w.pff[k, n, n])
 
 
 @helper
 def log_determinant(c, w):
-    """log det M = log det D, the other factors being unit triangular (54)."""
+    """log det M = log det D, because the other factors are unit triangular (54)."""
     total = 0.0
     for k in range(c.body.shape[0]):
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
@@ -170,7 +170,7 @@ def log_determinant(c, w):
 
 @helper
 def _turn_node(c, w, x, k, i, torque):
-    """z += G epsilon of wheel i: its torque about its axis, on the node that carries it."""
+    """z += G epsilon of wheel i: a torque about its axis on the node that carries it."""
     add_port_torque(c, w, x, k, c.wheel[i].port, scale(torque, spin_axis(c, w, i)))
 
 
@@ -183,7 +183,7 @@ def _node_acceleration(c, w, x, k, i):
 
 @helper
 def _force_at_hinge(c, w, x, k):
-    """z_r about O; where O is on a node that deforms, z_f - [Pi_d]' z_r stays for the modes (45)."""
+    """z_r about O; where O sits on a node that deforms, also z_f := z_f - [Pi_d]' z_r (45)."""
     z = vec6(x.body[k].force, 0)
     i = c.body[k].outboard_port
     if i >= 0:
@@ -195,9 +195,9 @@ def _force_at_hinge(c, w, x, k):
 
 @helper
 def project(c, w, x, k):
-    """T - H z of body k's own speeds in place of T; all of z goes on to the parent (36), (41).
+    """T := T - H z for the speeds of body k; all of z is passed to the parent (36), (41), without any elimination.
 
-    x.body[k].force then holds z about O, body axes. w has the poses and the motions of the ports.
+    x.body[k].force is then z about O, body axes. Poses and port motions are read from w.
     """
     z = _force_at_hinge(c, w, x, k)
     store6(x.body[k].force, 0, z)

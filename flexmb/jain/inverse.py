@@ -1,7 +1,8 @@
 """Inverse dynamics tau = M udot + c of trees, O(N): Jain & Rodriguez (44), (45).
 
-tau holds inertia, gravity, elasticity, node loads and connectors between nodes, but not hinge springs and motors: these
-are what it is compared with. Its modal rows vanish where the accelerations are consistent with an undriven structure.
+tau contains inertia, gravity, elasticity, node loads and connectors between nodes, but not the springs, dampers and
+motors of hinges: tau is what these have to supply. Its modal rows vanish if the accelerations are a motion that the
+structure performs without forces on its modes.
 """
 
 from flexmb.jain.accelerations import acceleration_sweep
@@ -23,9 +24,9 @@ from flexmb.tables.status import OK
 
 @kernel
 def inverse_dynamics(c, w, tau):
-    """tau (nu,) for the state in w.q, w.u and the rates in w.speed.acceleration; w.body.load receives the loads.
+    """tau (nu,) for the state in w.q, w.u and the rates in w.speed.acceleration; hinge loads go to w.body.load.
 
-    Returns the status code of connectors.
+    Returns the status code of the connectors.
     """
     velocity_sweep(c, w, False, False)
     if c.load.shape[0] > 0 or has(c, CONNECTORS):
@@ -44,7 +45,7 @@ def inverse_dynamics(c, w, tau):
 
 @helper
 def _inertial_force(c, w, k, tau):
-    """f_m = M_m alpha_m + b_m (36), rigid part into w.body.force, modal part into w.zf; wheels' rows into tau."""
+    """f_m = M_m alpha_m + b_m (36): rigid part to w.body.force, modal part to w.zf, rows of wheels to tau."""
     A = vec6(w.body[k].accel, 0)
     F = inertia_times(load_inertia(w.body[k].inertia, 0), A)
     for n in range(c.body[k].modes):
@@ -67,7 +68,7 @@ def _inertial_force(c, w, k, tau):
 
 @helper
 def _project_force(c, w, k, tau):
-    """tau = script-H f_m (41); the force F at O is the load across the hinge; pass it on to the parent (36)."""
+    """tau = script-H f_m (41). The force F at O, which is the load across the hinge, is passed to the parent (36)."""
     F = vec6(w.body[k].force, 0)
     i = c.body[k].outboard_port
     if i >= 0:

@@ -1,7 +1,8 @@
-"""Outward sweep, base to tip: poses, velocities and the accelerations left when the speeds' rates vanish.
+"""Outward sweep, base to tip: poses, velocities and bias accelerations (those at zero rates of all speeds).
 
-Jain & Rodriguez (10), (24), (25) for trees, in body axes. For hinges at deforming nodes on either side. Departure: the
-accelerations are classical (of the hinge point), not spatial; the body order is base to tip.
+Jain & Rodriguez (10), (24), (25) for trees, in body axes, with hinges that may sit on deforming nodes of the inboard
+and the outboard body. Departures: accelerations are classical ones of the hinge point O, and bodies are numbered from
+base to tip.
 """
 
 from flexmb.hinges import catalogue
@@ -43,8 +44,12 @@ from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 def velocity_sweep(c, w, shape, rates):
     """Poses, velocities and bias accelerations of all bodies and ports, base to tip (10), (11).
 
-    `shape` and `rates` say whether a ruthless body shows its true eta and etadot or zero: neither in the equations of
-    motion, the rates in kinetic energy and momentum (T = 1/2 u' M u), both for markers. What is at rest stays so.
+    Bodies of level ruthless move here with their true eta and etadot if `shape` and `rates` are True, and with zero
+    otherwise: neither is used in the equations of motion (B1), the rates in kinetic energy and momentum, for which
+    T = 1/2 u' M u must hold, and both for the positions and velocities of markers.
+
+    w.displaced remembers whether the last sweep used them: if not, ruthless bodies are undeformed in the workspace
+    already, and sweeps of the equations of motion leave them alone.
     """
     axis.turn(c, w)
     displaced = shape or rates or w.displaced[0] != 0
@@ -55,7 +60,7 @@ def velocity_sweep(c, w, shape, rates):
 
 @helper
 def move_body(c, w, k, shape, rates, displaced):
-    """What `velocity_sweep` does for body k after its parent; `displaced`: a ruthless body may need it too."""
+    """`velocity_sweep` for body k after its parent; `displaced`: ruthless bodies may not be undeformed in w."""
     if has(c, MODES):
         exact = not is_at_rest(c.body[k].level)
         if exact or displaced:
@@ -69,7 +74,11 @@ def move_body(c, w, k, shape, rates, displaced):
 
 @helper
 def _take(w, row, modes, shown, numbers, first):
-    """A row by mode from numbers[first] on, or zeros; written in strips, for it is soon read in strips."""
+    """Copy the numbers from `first` on to a row over modes, or zeros.
+
+    They are written in strips because they are soon read in strips: a vector load of numbers that were just stored one
+    by one waits until they have reached the cache.
+    """
     for n in range(0, modes, width(w)):
         if shown:
             put(w, row, n, part(w, numbers, first, n, modes))
@@ -79,7 +88,7 @@ def _take(w, row, modes, shown, numbers, first):
 
 @helper
 def _cross_hinge(c, w, k):
-    """Velocity and bias of body k from its parent through the hinge (8), (9), (25)."""
+    """Velocity and bias acceleration of body k from those of its parent, through the hinge (8), (9), (25)."""
     R, arm = _inboard(c, w, k)
     if axis.has_axis(c, k):
         R, arm = axis.pose(c, w, k, R, arm)
@@ -104,7 +113,7 @@ def _cross_hinge(c, w, k):
 
 @helper
 def _inboard(c, w, k):
-    """R_parent_O+ of body k, and the arm to O+ from the parent's reference, which is the port where O+ sits on one."""
+    """R_parent_O+ of body k, and the arm to O+ from the parent's origin, or from the port if O+ sits on one."""
     if has(c, INBOARD_NODES):
         i = c.body[k].inboard_port
         if i >= 0:
@@ -114,7 +123,7 @@ def _inboard(c, w, k):
 
 @helper
 def _carried(c, w, k, R, arm):
-    """Velocity and bias of O as a point of the parent, in outboard axes (7), R = R_parent_O."""
+    """Velocity and bias of the point of the parent that coincides with O, in outboard axes (7); R = R_parent_O."""
     p = c.body[k].parent
     if p < 0:
         return ZERO6, ZERO6
@@ -129,9 +138,10 @@ def _carried(c, w, k, R, arm):
 
 @helper
 def _from_deforming_node(c, w, k, R_parent_O, V_O, A_O):
-    """From O to the modal frame where O sits on a node d that moves in it: (9) with Pi_d, and its rate.
+    """Motion of the modal frame from that of O, where O sits on a node d that deforms: (9) with Pi_d, and its rate.
 
-    The bias stays that of O, without what the deformation adds: the sweeps refer the body's inertia to O.
+    The bias returned is that of O less `port_bias`. It is not shifted to the origin of the modal frame, because the
+    sweeps refer the body's inertia to O.
     """
     i = c.body[k].outboard_port
     R_body_O = mat3(w.port[i].R, 0)
@@ -160,7 +170,7 @@ def store_column(H, n, V):
 
 @helper
 def motion_column(c, w, k, n):
-    """Column n of H' in body axes: the motion of O that speed n of the hinge is."""
+    """Column n of H' in body axes: the velocity [angular; linear] of O at unit speed n of the hinge."""
     if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         return column(w.hinge[k].motion, n)
     return _own_column(c, w, k, n)
@@ -168,7 +178,7 @@ def motion_column(c, w, k, n):
 
 @helper
 def _own_column(c, w, k, n):
-    """The same in outboard axes."""
+    """Column n of H' in outboard axes."""
     if axis.has_axis(c, k):
         return axis.column(c, k)
     return column(w.hinge[k].map, n)
@@ -183,7 +193,7 @@ def pose_sweep(c, w):
 
 @helper
 def pose_body(c, w, k):
-    """World pose of body k, from its parent's."""
+    """World pose of body k from that of its parent."""
     p = c.body[k].parent
     i = c.body[k].inboard_port
     arm = vec3(w.body[k].arm, 0)

@@ -1,6 +1,6 @@
-"""Loads across hinges, at wheel bearings, and of drives, from the accelerations the sweeps have found.
+"""Loads across hinges, at wheel bearings, and of drives, from the accelerations of the sweeps.
 
-A load is the total one (constraint, spring and motor) on the outboard part, about the outboard hinge point O.
+A load is the total load (constraint, spring and motor) on the outboard part, about the outboard hinge point O.
 """
 
 from flexmb.jain.accelerations import hinge_acceleration
@@ -18,14 +18,17 @@ from flexmb.tables.features import PRESCRIBED, WHEELS
 
 @helper
 def hinge_loads(c, w):
-    """Loads across all hinges, body axes, into w.body.load."""
+    """Write the loads across all hinges, body axes, to w.body.load."""
     for k in range(c.body.shape[0]):
         hinge_load(c, w, k)
 
 
 @helper
 def hinge_load(c, w, k):
-    """F = P_R A + z_R at O of body k, body axes, into w.body[k].load."""
+    """Write the load across hinge k, F = P_R A + z_R about O, body axes, to w.body[k].load.
+
+    P_R and z_R contain all outboard bodies, so that no further sweep is needed.
+    """
     P_R, z_R = about_hinge(c, w, k)
     A = hinge_acceleration(c, w, k)
     store6(w.body[k].load, 0, sum6(inertia_times(load_inertia(P_R, 0), A), vec6(z_R, 0)))
@@ -33,7 +36,7 @@ def hinge_load(c, w, k):
 
 @helper
 def drive_loads(c, w):
-    """Generalised load of every prescribed speed, H F, beyond its spring and damper, into w.speed.drive."""
+    """Write the load of the drive of every prescribed speed, H F less its spring and damper, to w.speed.drive."""
     if has(c, PRESCRIBED):
         for k in range(c.body.shape[0]):
             _drive_loads(c, w, k)
@@ -41,7 +44,7 @@ def drive_loads(c, w):
 
 @helper
 def _drive_loads(c, w, k):
-    """Those of the speeds of hinge and wheels of body k."""
+    """Drive loads of the hinge and the wheels of body k."""
     for n in range(c.body[k].nv):
         j = c.body[k].u_index + n
         if c.speed[j].prescribed >= 0:
@@ -59,9 +62,10 @@ def _drive_loads(c, w, k):
 
 @helper
 def wheel_load(c, w, k, i):
-    """Load [tau; f] of the bearing and motor of wheel i on the wheel about its centre, body axes.
+    """Load [torque; force] of bearing and motor on wheel i about its centre, body axes.
 
-    Rate of its angular momentum h = J_t (w - q q.w) + I (thetad + q.w) q; gravity is in the acceleration.
+    It is the rate of the wheel's momentum, with the angular momentum h = J_t (w - q q.w) + I (thetad + q.w) q.
+    Accelerations are relative to free fall, so that gravity needs no term of its own.
     """
     port = c.wheel[i].port
     mass, axial, transverse = c.wheel[i].mass, c.wheel[i].axial, c.wheel[i].transverse

@@ -1,14 +1,14 @@
-"""Spatial operators as dense arrays, to be read beside Jain & Rodriguez, sections II to V.
+"""Spatial operators as dense arrays, in the notation of Jain & Rodriguez, sections II to V.
 
     operators = system.operators(state)
     operators.H @ operators.Phi @ operators.M_m @ operators.Phi.T @ operators.H.T  # the mass matrix (43)
 
-Names are the paper's; of its script letters E is `E_Phi`, H is `H`; its star is the transpose. Departures: bodies are
-numbered base to tip, so that what is block lower triangular in the print is upper triangular here; generalised speeds
-stand in the order of u, in which a hinge's speeds precede its body's modes; wheels are bodies, after all others.
+Names are the paper's: script E is `E_Phi`, script H is `H`, the star is the transpose. Departures: bodies are numbered
+from base to tip, so that operators that are block lower triangular in the print are upper triangular here; generalised
+speeds have the order of u, in which a hinge's speeds precede its body's modes; wheels are bodies, after all others.
 
-All of it is of order n^3, to be looked at and to check the recursions: a third route, with the kinematics of
-`flexmb.dense` and the equations of the operators.
+The cost is of order n^3. The operators are for reading and for checks of the recursions: they are a third independent
+route, with the kinematics of `flexmb.dense` and the paper's operator equations.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class Operators:
     @cached_property
     def _articulated(self) -> tuple[Real, Real, Real]:
         """P (nbar,nbar), D^-1 (n,n) and G (nbar,n) by the recursion (51), tips to base."""
-        from scipy.linalg import cho_factor, cho_solve  # slow to import, and those who ask for H or M_m wait for none
+        from scipy.linalg import cho_factor, cho_solve  # slow to import, and not needed for H, M_m or M
 
         P, G, D_inverse = self.M_m.copy(), np.zeros_like(self.H.T), np.zeros((len(self.H), len(self.H)))
         for k in reversed(range(len(self.parent))):
@@ -178,11 +178,11 @@ class Operators:
 
     @property
     def log_determinant(self) -> float:
-        """log det M = log det D: the factors beside D (54) are unit triangular."""
+        """log det M = log det D, because the other factors of (54) are unit triangular."""
         return sum(float(np.linalg.slogdet(self.D[np.ix_(rows, rows)])[1]) for rows in self.rows)
 
     def accelerations(self, T: Real) -> Real:
-        """chi_dot (n,) for generalised forces T (n,), all of them free: Lemma 5 (57)."""
+        """chi_dot (n,) for generalised forces T (n,), with all speeds free: Lemma 5 (57)."""
         T = self._speeds("T", T)
         forces = self.K @ T + self.P @ self.a_m + self.b_m + self.K_m @ self.deformation
         innovation = T - self.H @ (self.Psi @ forces)
@@ -190,9 +190,10 @@ class Operators:
         return arguments.representable(chi_dot - self.K.T @ (self.Psi.T @ self.a_m))
 
     def driven(self, prescribed: NDArray[np.bool_], rates: Real) -> Operators:
-        """The same tree with some speeds no longer free but driven at `rates`; both (n,), rates of free ones ignored.
+        """The same tree with the speeds marked in `prescribed` (n,) driven at `rates` (n,); other rates are ignored.
 
-        The driven rates join the accelerations a_m. M, C, T and chi_dot are then those of the free speeds; V_m stays.
+        The driven rates become part of the accelerations a_m. M, C, T and chi_dot of the result are those of the
+        remaining free speeds; V_m is unchanged. ValueError for arrays of the wrong shape or type.
         """
         rates, prescribed = self._speeds("rates", rates), np.asarray(prescribed)
         if prescribed.shape != rates.shape or prescribed.dtype != bool:
@@ -211,7 +212,7 @@ class Operators:
         return arguments.finite(name, arguments.vector(name, values, len(self.H)))
 
     def _resolvent(self, E: Real) -> Real:
-        """(1 - E)^-1 = 1 + E + E^2 + ... of a nilpotent E with one block in each body's columns, that of its parent."""
+        """(1 - E)^-1 = 1 + E + E^2 + ..., E nilpotent with one block in the columns of each body, at its parent."""
         found = np.eye(len(E))
         for p, columns in zip(self.parent, self.columns, strict=True):
             if p >= 0:
@@ -234,7 +235,7 @@ class SpatialOperators:
         self._bodies = with_wheels(self._dense.tree)
 
     def configuration(self, t: float, q: Real, u: Real) -> Configuration:
-        """All bodies as inertia sees them: prescribed coordinates on their functions, ruthless bodies undeformed."""
+        """The configuration of the inertia terms: prescribed coordinates as given, ruthless bodies undeformed."""
         return Configuration(self._bodies, *undeformed(self._bodies, *self._dense.on_profile(q, u, t)))
 
     def at(self, t: float, q: Real, u: Real) -> Operators:
@@ -273,7 +274,7 @@ class SpatialOperators:
         )
 
     def _inertia(self, now: Configuration, columns: tuple[slice, ...], V_m: Real) -> tuple[Real, Real]:
-        """M_m (nbar,nbar) and b_m (nbar,); level linear cut off after the first order, in its own body's frame."""
+        """M_m (nbar,nbar) and b_m (nbar,); at level linear truncated after the first order, in the body's frame."""
         M_m, b_m = np.zeros((len(V_m), len(V_m))), np.zeros(len(V_m))
         tree = self._dense.tree
         linear = Instant(tree, now.q, now.u, np.zeros(tree.nu)).first_order if tree.linear else {}

@@ -1,6 +1,6 @@
-"""Where the speeds of a tree stand in its mass matrix: depth first, so that all that a body carries are neighbours.
+"""Order of the speeds in the mass matrix of a tree: depth first, so that a body and all it carries are contiguous.
 
-u itself has point masses at its end, away from the bodies that carry them.
+The order of u does not have this property: it has point masses at its end, away from the bodies that carry them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ from flexmb.typing import Index, Real
 
 @bundle
 class Matrices:
-    """The mass matrix in places, and its solution. Places of a body: hinge, modes, wheels, all that it carries."""
+    """The mass matrix in depth-first order, and the solution of its equations.
+
+    A *place* is a row of this matrix. Places of a body: its hinge, its modes, its wheels, then all that it carries.
+    """
 
     hinge: Index  # (N,) first place of a body
     modes: Index  # (N,) first place of its modes
@@ -24,10 +27,10 @@ class Matrices:
     speed: Index  # (nu,) number in u of a place
     body: Index  # (nu,) body of a place
     order: Index  # (nu,) places of the n speeds that are free, tips first, then of those that are prescribed
-    X: Real  # (6,nu) forces [torque; force] of the speeds, where they have come to
+    X: Real  # (6,nu) forces [torque; force] of unit rates of the speeds, about the body that the sweep has reached
     M: Real  # (nu,nu) its upper triangle
     U: Real  # (n,n) upper Cholesky factor over the free speeds, tips first
-    x: Real  # (n,) its right side and solution
+    x: Real  # (n,) right-hand side, then solution
     bias: Real  # (nu,) C, in the order of u
 
 

@@ -1,4 +1,4 @@
-"""Motion of ports: frames fixed to points of bodies that may deform, where hinges, wheels, loads and markers sit."""
+"""Motion of ports: frames fixed to points of a body that may deform, to which hinges, wheels and loads are attached."""
 
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
@@ -14,7 +14,7 @@ from flexmb.tables.features import SECOND_ORDER
 def move_port(c, w, k, i):
     """Pose and relative motion of port i of body k, from w.eta and w.etad."""
     if c.body[k].modes == 0:
-        return  # set once in the workspace
+        return  # the pose of a rigid body's port is constant, and the workspace was made with it
     x = vec3(c.port[i].position, 0)
     offset = vec3(c.port[i].offset, 0)
     row = c.port[i].second
@@ -34,13 +34,13 @@ def move_port(c, w, k, i):
 
 @helper
 def mode_motion(w, i, n):
-    """Column n of Pi_i: velocity of port i relative to its body by the speed of mode n, body axes."""
+    """Column n of Pi_i: velocity of port i relative to its body at unit speed of mode n, body axes."""
     return column6(w.port_mode[i], n)
 
 
 @helper
 def moved_by_modes(c, w, x, k, i):
-    """Pi_i etaddot: what the modal accelerations that x holds add to the acceleration of port i, body axes."""
+    """Pi_i etaddot: the part of the acceleration of port i that the modal accelerations in x cause, body axes."""
     A = ZERO6
     for n in range(0, c.body[k].modes, width(w)):
         A = axpy6(strip(w, x.etadd[k], n), strips6(w, w.port_mode[i], n), A)
@@ -55,7 +55,10 @@ def port_velocity(w, k, i):
 
 @helper
 def port_bias(w, k, i):
-    """Acceleration of port i at zero acceleration of the body origin and etaddot = 0, body axes."""
+    """Acceleration of port i when the body origin has none and etaddot = 0, body axes.
+
+    The relative acceleration of the field, w x w_rel and w x (w x r) + 2 w x v_rel.
+    """
     omega = vec3(w.body[k].velocity, 0)
     w_rel, v_rel = vec6(w.port[i].v, 0)
     inner = add(cross(omega, vec3(w.port[i].r, 0)), scale(2.0, v_rel))
@@ -64,6 +67,6 @@ def port_bias(w, k, i):
 
 @helper
 def port_acceleration(c, w, k, i):
-    """Acceleration of port i, minus gravity, body axes."""
+    """Acceleration of port i relative to free fall, body axes."""
     A = sum6(port_bias(w, k, i), shift_motion(vec6(w.body[k].accel, 0), vec3(w.port[i].r, 0)))
     return sum6(A, moved_by_modes(c, w, w, k, i))

@@ -1,17 +1,17 @@
-"""How well M is known: what rounding does to its factors M = F F', as a motion meets it.
+"""Condition of M = F F' with respect to the rounding errors of the recursion.
 
-An articulated inertia P is known to the rounding of what it was summed from before eliminations took from it, however
-little they leave: the element i, j to about u s_i s_j, where s_i^2 is a diagonal element before elimination. Handed to
-the parent, s becomes t = |phi(arm)| |R| s, for what cancels in a shift is rounded too. In a motion x (nu,) of the
-speeds rounding therefore stands for the energy u |S x|^2,
+The rounding error of an articulated inertia P is that of the sums before the eliminations subtracted from them, however
+small the remainder is: about u s_i s_j in element i, j, where s_i^2 is the diagonal element before the elimination and
+u the unit roundoff. Referred to the parent, s becomes t = |phi(arm)| |R| s, because terms that cancel in a shift are
+rounded, too. In a motion x (nu,) of the speeds, rounding errors therefore amount to the energy u |S x|^2,
 
     |S x|^2 = sum over bodies  sum_i t_i^2 A_i^2  +  sum over hinge speeds  sum_i s_i^2 h_i^2 x_j^2
             + sum over modes (D_nn + sum_i s_i^2 Pi_in^2) x_n^2,
 
-A the acceleration of the place on the parent where the body is hinged, h a column of H, Pi_n the motion by mode n of a
-node with O on it. M gives it x'M x = |F'x|^2. The largest ratio of the two, kappa = |S F'^-1|^2, is the condition of M
-in units that do not matter; u kappa bounds the share of rounding in the accelerations, measured by S. A motion for
-which it is 1 has no inertia but rounding.
+with A the acceleration of the point of the parent where the body is hinged, h a column of H, and Pi_n the motion by
+mode n of a node that carries O. The true energy is x'M x = |F'x|^2. The largest ratio of the two, kappa =
+|S F'^-1|^2, is a condition number of M that does not depend on units; u kappa bounds the relative error of the
+accelerations in the norm of S. Where u kappa reaches 1, there is a motion whose inertia is all rounding error.
 """
 
 from flexmb.jain.innovations import innovations, respond
@@ -26,7 +26,7 @@ from flexmb.spatial.vector import add, mat3, times, vec3
 
 @helper
 def weigh(c, w, x):
-    """y = F^-1 S'S F'^-1 y of the free speeds, y in x.speed: kappa is the largest eigenvalue of this."""
+    """y := F^-1 S'S F'^-1 y for the free speeds, y in x.speed. kappa is the largest eigenvalue of this operator."""
     respond(c, w, x)
     for k in range(c.body.shape[0]):
         clear_body(c, x, k)
@@ -44,7 +44,10 @@ def weigh(c, w, x):
 
 @helper
 def _size(c, w, k):
-    """s as (angular, linear): of P about O before elimination, and of the body's own inertia."""
+    """s as (angular, linear), from P about O before elimination and the body's own inertia.
+
+    Both count, as magnitudes, so that what free wheels or level linear have subtracted from P is included.
+    """
     P, own = w.body[k].inertia, c.body[k].rigid
     return (
         (sqrt(abs(P[0]) + own[4]), sqrt(abs(P[1]) + own[5]), sqrt(abs(P[2]) + own[6])),
@@ -63,7 +66,7 @@ def _squares(s, h):
 
 @helper
 def _weigh_modes(c, w, x, k, s):
-    """S'S x of the modes of body k: D_nn from its factors."""
+    """x := S'S x for the modes of body k; D_nn before the elimination is recovered from the factors."""
     out = c.body[k].outboard_port
     for n in range(c.body[k].modes):
         size = 0.0
@@ -76,7 +79,7 @@ def _weigh_modes(c, w, x, k, s):
 
 @helper
 def _weigh_transfer(c, w, x, k, s):
-    """S'S x of what body k hands to its parent."""
+    """S'S x for the inertia that body k adds to its parent."""
     p, i = c.body[k].parent, c.body[k].inboard_port
     R = _magnitude(mat3(w.body[k].rotation, 0))
     angular, linear = times(R, s[0]), times(R, s[1])
@@ -105,6 +108,6 @@ def _magnitude(R):
 
 @helper
 def _lever(r, f):
-    """|r~| f of f >= 0: r x f without cancellation."""
+    """|r~| f for f >= 0: the cross product r x f with all terms added as magnitudes."""
     x, y, z = abs(r[0]), abs(r[1]), abs(r[2])
     return y * f[2] + z * f[1], z * f[0] + x * f[2], x * f[1] + y * f[0]

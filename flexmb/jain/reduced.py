@@ -1,8 +1,8 @@
-"""What outboard bodies do to the modes of a reduced body, kept at its nodes: of size 6 each, whatever the mode count.
+"""Effect of the outboard bodies on the modes of a reduced body, expressed at its nodes.
 
-A node is a port that deforms and carries a hinge. With Gamma and y the articulated inertia and force of what is hinged
-there, and A the acceleration of the node, its load on the body and its modes is F = Gamma A + y. Matrices of several
-nodes have six rows for each.
+A node is a port that deforms and carries a hinge. Let Gamma and y be the articulated inertia and force of all that is
+hinged there, and A the acceleration of the node. The load of the node on its outboard body is then F = Gamma A + y.
+Matrices of several nodes have six rows for each node, however many modes the body has.
 """
 
 from math import sqrt
@@ -25,10 +25,11 @@ def to_node(c, w, k, P, F):
 
 @helper
 def node_inertia(w, r, nodes):
-    """T = (1 + Gamma Omega)^-1 Gamma into w.scratch[2], for Omega = root' root; False where it does not exist.
+    """T = (1 + Gamma Omega)^-1 Gamma to w.scratch[2], Omega = root' root; returns False if it does not exist.
 
-    As Gamma - B'B with B = C^-1 root Gamma and C C' = 1 + root Gamma root': neither Gamma, which a hinge makes
-    singular, nor Omega, which has the rank of the modes, is inverted.
+    Computed as Gamma - B'B with B = C^-1 root Gamma and C C' = 1 + root Gamma root'. This inverts neither Gamma, which
+    is singular behind a hinge, nor Omega, whose rank is at most the number of modes; 1 + root Gamma root' is symmetric
+    with no eigenvalue below one.
     """
     B, C, T = w.scratch[0], w.scratch[1], w.scratch[2]
     root, rank = w.root[r], w.rank[r]
@@ -42,8 +43,10 @@ def node_inertia(w, r, nodes):
             for i in range(6 * nodes):
                 s += B[a, i] * root[b, i]
             C[a, b] = s
-        T[0, a] = SINGULAR * C[a, a]
-    for a in range(rank):  # one elimination for C and B: roots are no part of its chain of divisions
+        T[0, a] = SINGULAR * C[a, a]  # the least value that the pivot of row a may have; T is free until the end
+    # C is eliminated as L D L' together with B. The square roots come after a row is finished, so that no pivot waits
+    # for a root of the one before.
+    for a in range(rank):
         if not C[a, a] > T[0, a]:
             return False
         s = 1.0 / C[a, a]

@@ -1,7 +1,7 @@
-"""Forces that act beside those of a workspace, and the accelerations they add: what later right sides are solved in.
+"""Additional forces on a system, and the accelerations they cause: further right-hand sides for given factors of M.
 
-It stands beside the workspace whose sweeps hold the factors and the poses; nothing there is overwritten, hence the
-factors of one forward dynamics serve as many responses as are asked for.
+A response is an array set of its own beside the workspace that holds the factors and the poses, and overwrites nothing
+there, so that the factors of one forward dynamics serve any number of responses.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from flexmb.typing import Real, Record
 
 BODY_RESPONSE = np.dtype(
     [
-        ("force", np.float64, (6,)),  # z_r: minus the load on the body, with what its children hand on; body axes
+        ("force", np.float64, (6,)),  # z_r: minus the load on the body and, after a sweep, its children; body axes
         ("accel", np.float64, (6,)),  # of the body frame, body axes
     ]
 )
@@ -28,13 +28,13 @@ BODY_RESPONSE = np.dtype(
 
 @bundle
 class Response:
-    """Accelerations that forces add, at the pose and with the factors that a workspace holds."""
+    """Forces and the accelerations they cause, at the pose and with the factors in a workspace."""
 
     ground: Real  # (3,) zero: gravity is no part of a response
     body: Record  # (N,) BODY_RESPONSE
     zf: Real  # (N,m) z_f: minus the loads on modes
     etadd: Real  # (N,m)
-    speed: Real  # (nu,) generalised forces T, their innovations y, accelerations M^-1 T: each in place of the last
+    speed: Real  # (nu,) generalised forces T, then their innovations y, then accelerations M^-1 T
 
 
 def response(c: Constants) -> Response:
@@ -51,7 +51,7 @@ def response(c: Constants) -> Response:
 
 @helper
 def clear(c, x):
-    """No forces, on bodies, modes or speeds."""
+    """Set all forces on bodies, modes and speeds to zero."""
     for k in range(c.body.shape[0]):
         clear_body(c, x, k)
     for j in range(x.speed.shape[0]):
@@ -60,7 +60,7 @@ def clear(c, x):
 
 @helper
 def clear_body(c, x, k):
-    """No forces on body k and its modes."""
+    """Set the forces on body k and its modes to zero."""
     for i in range(6):
         x.body[k].force[i] = 0.0
     for n in range(c.body[k].modes):
@@ -69,21 +69,21 @@ def clear_body(c, x, k):
 
 @helper
 def read_speeds(x, y):
-    """y (nu,) into x.speed."""
+    """Copy y (nu,) to x.speed."""
     for j in range(y.shape[0]):
         x.speed[j] = y[j]
 
 
 @helper
 def write_speeds(x, y):
-    """x.speed into y (nu,)."""
+    """Copy x.speed to y (nu,)."""
     for j in range(y.shape[0]):
         y[j] = x.speed[j]
 
 
 @helper
 def push(c, w, x, k, port, F):
-    """Add a load F = [tau; f] at a port of body k, body axes: A F with A = [Pi'; phi] of (14), (15)."""
+    """Apply a load F = [torque; force] at a port of body k, body axes: A F with A = [Pi'; phi] of (14), (15)."""
     add_port_force(c, w, x, k, port, scale6(-1.0, F))
 
 

@@ -1,7 +1,7 @@
-"""Articulated-body forward dynamics as (51) and (58) have it: modes and hinge of a body eliminated together.
+"""Articulated-body forward dynamics by (51), (58): the modes and the hinge of a body are eliminated together.
 
-D = script-H P script-H' of order n_m + n_r is factorised whole, D = L L'. The split algorithm (63), (64) of
-`flexmb.jain.sweeps` does the same to a smaller matrix after the modes: this one is what it is checked against.
+D = script-H P script-H' of order n_m + n_r is factorised as a whole, D = L L'. The split algorithm (63), (64) of
+`flexmb.jain.sweeps` is checked against this one.
 """
 
 from flexmb.jain.accelerations import inboard_acceleration, store_body_acceleration
@@ -25,16 +25,16 @@ class Joint:
     """Modes and free hinge speeds of each body, in this order, as one joint."""
 
     D: Real  # (N,m+6,m+6), then its Cholesky factor L
-    gain: Real  # (N,m+6,6) P script-H', then L^-1 of it: what of G = P script-H' D^-1 concerns the rigid motion
+    gain: Real  # (N,m+6,6) rigid columns of script-H P, then L^-1 of them: the rigid part of G L, transposed
     residual: Real  # (N,m+6) epsilon, then L^-1 of it, then the speeds' rates
 
 
 @helper
 def forward_dynamics(c, w, x):
-    """Accelerations into w.speed.acceleration; P^+ and z^+ stand where P_R and z_R do else.
+    """Accelerations to w.speed.acceleration; returns a status code.
 
-    Loads across hinges are f = P^+ alpha^+ + z^+; z^+ becomes f - P^+ alpha, so that `jain.loads` finds them here
-    too. Returns a status code.
+    P^+ and z^+ are stored in the places of P_R and z_R. Loads across hinges are f = P^+ alpha^+ + z^+. At the end z^+
+    is replaced by f - P^+ alpha, so that `flexmb.jain.loads`, which evaluates P_R alpha + z_R, gives f.
     """
     status = bodies(c, w)
     if status != OK:
@@ -51,7 +51,7 @@ def forward_dynamics(c, w, x):
 
 @helper
 def _eliminate(c, w, x, k):
-    """D, G, P^+ = (1 - G script-H) P and z^+ = z + P a + G epsilon of (51), (58), about O; handed to the parent."""
+    """D, G, P^+ = (1 - G script-H) P and z^+ = z + P a + G epsilon of (51), (58) about O; adds them to the parent."""
     nm = c.body[k].modes
     if c.body[k].outboard_port >= 0:
         refer_to_hinge(c, w, k)
@@ -98,7 +98,7 @@ def _eliminate(c, w, x, k):
 
 @helper
 def _mode_rows(c, w, x, k, a):
-    """The modes' rows of D = script-H P script-H', P script-H' and epsilon = T - script-H (z + P a)."""
+    """Rows of the modes in D = script-H P script-H', script-H P and epsilon = T - script-H (z + P a)."""
     D, gain, residual = x.D[k], x.gain[k], x.residual[k]
     for n in range(c.body[k].modes):
         P_fr = vec6(w.pfr[k, n], 0)
@@ -110,7 +110,7 @@ def _mode_rows(c, w, x, k, a):
 
 @helper
 def _accelerate(c, w, x, k):
-    """chi-dot = nu - G' alpha^+ and alpha = alpha^+ + script-H' chi-dot + a: the outward half of (58)."""
+    """chi_dot = nu - G' alpha^+ and alpha = alpha^+ + script-H' chi_dot + a: the outward half of (58)."""
     nm = c.body[k].modes
     rows = nm + w.body[k].free_count
     D, gain, rates = x.D[k], x.gain[k], x.residual[k]

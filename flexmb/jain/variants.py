@@ -1,6 +1,8 @@
-"""Which variant eliminates the modes of a body: of a scene where all factorise D_f, the explicit one, at no cost.
+"""Dispatch of each body to the variant that eliminates its modes.
 
-Scenes with other choices have ReducedConstants: the kernels are compiled again for them.
+A scene in which every body uses the explicit variant has plain `Constants`, and its kernels contain no other variant
+and no branch. A scene with condensed or Woodbury bodies has `ReducedConstants`, another type, for which the kernels are
+compiled separately.
 """
 
 from flexmb.jain import condensed, explicit, woodbury
@@ -15,7 +17,7 @@ def _inertia(c, w, k):
     if c.body[k].elimination == EXPLICIT:
         body_inertia(c, w, k)
     else:
-        inertia_without_masses(c, w, k)  # no summed points: see `flexmb.jain.elimination.applies`
+        inertia_without_masses(c, w, k)  # a reduced body has no summed points (`flexmb.jain.elimination.applies`)
 
 
 @helper
@@ -45,7 +47,7 @@ def _modal_accelerations(c, w, k, A):
         explicit.modal_accelerations(c, w, k, A)
 
 
-inertia = by_bundle(ReducedConstants, _inertia, body_inertia)  # M_m and b_m as far as the variant needs them
+inertia = by_bundle(ReducedConstants, _inertia, body_inertia)  # those parts of M_m and b_m that the variant needs
 eliminate_modes = by_bundle(ReducedConstants, _eliminate_modes, explicit.eliminate_modes)
 to_parent = by_bundle(ReducedConstants, _to_parent, explicit.to_parent)
 modal_accelerations = by_bundle(ReducedConstants, _modal_accelerations, explicit.modal_accelerations)

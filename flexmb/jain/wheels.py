@@ -1,6 +1,6 @@
-"""Wheels: each is one more speed of its body, and acts on the node that carries it.
+"""Wheels: each adds one speed to its body and acts on the node that carries it.
 
-The mass matrix of the body holds the despun wheel: its mass and its inertia, as if it turned with the node.
+The mass matrix of the body already contains the despun wheel, its mass and inertia as if it were fixed to the node.
 """
 
 from flexmb.jain.forces import add_port_torque
@@ -26,10 +26,10 @@ def gyroscopic_torque(c, w, k, i, axis):
 
 @helper
 def wheel_forces(c, w, k):
-    """Wheels of body k, eliminated: I (thetadd + q . alpha_node) = torque.
+    """Elimination of the wheels of body k, whose equations are I (thetadd + q . alpha_node) = torque.
 
-    A free wheel takes the axial inertia away from the body again (rank one) and hands its torque to the node; both free
-    and prescribed wheels add the gyroscopic torque.
+    A free wheel transmits its torque to the node but not its axial inertia, which is subtracted from the body again (a
+    term of rank one). Free and prescribed wheels add the gyroscopic torque.
     """
     for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
         port = c.wheel[i].port
@@ -48,7 +48,7 @@ def wheel_forces(c, w, k):
 
 @helper
 def wheel_acceleration(c, w, k, i):
-    """I (thetadd + q . alpha_node) = torque: the rate of a free wheel."""
+    """Rate of wheel i from I (thetadd + q . alpha_node) = torque, or from its drive."""
     j = c.wheel[i].u_index
     f = c.speed[j].prescribed
     if f >= 0:

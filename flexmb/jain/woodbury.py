@@ -1,10 +1,10 @@
 """D_f^-1 of a ruthless body without factorising D_f: (B2)-(B4), corrected.
 
-The print's (B3) inverts Gamma, which a hinge makes singular (its rank is at most 6 - n_r). Instead
+(B3) as printed inverts Gamma, which a hinge makes singular (its rank is at most 6 - n_r). Used here is
 
     D_f^-1 = Lam - Ups T Ups',   T = (1 + Gamma Omega)^-1 Gamma,
 
-with the constants Lam = M_ff^-1, Ups = Lam Pi', Omega = Pi Ups of (B4); the rest is (63), (64) as printed.
+with the constants Lam = M_ff^-1, Ups = Lam Pi', Omega = Pi Ups of (B4). All else is (63), (64) as printed.
 """
 
 from flexmb.jain.explicit import refer_coupling, refer_rigid
@@ -20,7 +20,10 @@ from flexmb.spatial.vector import vec3
 
 @helper
 def eliminate_modes(c, w, k):
-    """P_R = P_rr - g mu', z_R = z_r + g epsilon_f of (63), (64) with g = mu D_f^-1, kept in w.gain; D_f^-1 of (B3)."""
+    """P_R = P_rr - g mu', z_R = z_r + g epsilon_f of (63), (64) with g = mu D_f^-1, which stays in w.gain.
+
+    D_f^-1 is that of (B3), corrected. Returns False if T does not exist.
+    """
     r = c.body[k].reduced
     nm = c.body[k].modes
     for n in range(nm):
@@ -51,7 +54,7 @@ def eliminate_modes(c, w, k):
 
 @helper
 def _load_node(c, w, k, i):
-    """P += A Gamma A' but for its ff block, z += A z_R^+: the outboard body at node i."""
+    """Add the outboard body at node i: z += A z_R^+, and P += A Gamma A' without the ff block, which is in T."""
     node = w.node[c.body[k].reduced, i]
     port = c.node[c.body[k].reduced, i].port
     r = vec3(w.port[port].r, 0)
@@ -64,7 +67,7 @@ def _load_node(c, w, k, i):
 
 @helper
 def _inverse(c, w, k):
-    """D_f^-1 = Lam - Ups T Ups' into w.pff[k]: (B3), corrected."""
+    """D_f^-1 = Lam - Ups T Ups' to w.pff[k]: (B3), corrected."""
     r = c.body[k].reduced
     nodes = c.body[k].nodes
     T = w.scratch[2]

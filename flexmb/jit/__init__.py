@@ -24,7 +24,6 @@ installed.py    kernels that came with the installation, and whether they fit
 fingerprint.py  the key of a compiled kernel: the code that it reaches
 folder.py       where compiled kernels are kept, and for how long
 once.py         of many processes, one compiles a kernel
-collector.py    no search for garbage meanwhile
 progress.py     a line about what takes long to compile
 hooks.py        which of numba's internals are used, and what is done without them
 counting.py     operations of a kernel, by interpreting it; it needs no numba

@@ -52,7 +52,7 @@ def _describe(self: Any) -> None:
     for name in _names(type(self)):
         array = getattr(self, name)
         if not isinstance(array, np.ndarray):
-            rows.append((array._address, *[0] * _DIMENSIONS))
+            rows.append((array.kernel_address, *[0] * _DIMENSIONS))
             kinds.append((name, array._numba_type_))
             continue
         shape = array.shape[:-1] if numbers != types.float64 and array.dtype == np.float64 else array.shape
@@ -63,8 +63,8 @@ def _describe(self: Any) -> None:
         if features:
             array.setflags(write=False)
     table = np.array(rows, np.int64)
-    object.__setattr__(self, "_table", table)
-    object.__setattr__(self, "_address", table.ctypes.data)
+    object.__setattr__(self, "kernel_table", table)
+    object.__setattr__(self, "kernel_address", table.ctypes.data)
     object.__setattr__(self, "_numba_type_", _bundle_type(type(self), tuple(kinds), features))
 
 
@@ -142,7 +142,7 @@ class AnyBundle:
 
     def __init__(self, bundle: Any) -> None:
         self._bundle = bundle
-        self._address = bundle._address
+        self.kernel_address = bundle.kernel_address
 
 
 register_model(BundleType)(models.OpaqueModel)
@@ -153,7 +153,7 @@ register_model(AnyBundleType)(models.OpaqueModel)
 @unbox(BundleType)
 def _unbox(typ, obj, c):
     """A bundle enters a kernel as the address of its table."""
-    address = c.pyapi.object_getattr_string(obj, "_address")
+    address = c.pyapi.object_getattr_string(obj, "kernel_address")
     pointer = c.pyapi.long_as_voidptr(address)
     c.pyapi.decref(address)
     return NativeValue(pointer, is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))

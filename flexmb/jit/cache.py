@@ -30,7 +30,6 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.runtime.nrt import rtsys
 from numba.core.sigutils import normalize_signature
 
-from flexmb.jit.collector import no_searches
 from flexmb.jit.fingerprint import fingerprint
 from flexmb.jit.folder import delete_unused, mark_used, warn_once
 from flexmb.jit.installed import installed_directory
@@ -39,6 +38,7 @@ from flexmb.jit.once import compiled_once
 from flexmb.jit.processors import compiled_for, running
 from flexmb.jit.progress import announced
 from flexmb.jit.stored import packed, unpacked
+from flexmb.scene.garbage import collector_paused
 
 _DIGEST = hashlib.sha256().digest_size
 
@@ -99,7 +99,7 @@ class KernelCache(NullCache):
             if any(file.is_file() for file in self._places(signature, codegen)):
                 return plain(signature)
             own = nullcontext() if self._folder is None else compiled_once(self._own(self._folder, signature, codegen))
-            with global_compiler_lock, announced(self._function, self._folder), own, no_searches():
+            with global_compiler_lock, announced(self._function, self._folder), own, collector_paused():
                 return plain(signature)
 
         return compile_once

@@ -64,7 +64,7 @@ def addresses(compiled: Any, returned: Any, *arguments: Any) -> tuple[int, ...]:
 
 def address(bundle: Any) -> int:
     """Of a bundle, which the caller holds."""
-    return int(bundle._address)
+    return int(bundle.kernel_address)
 
 
 def settled(compiled: Any, *kinds: Any) -> Any:

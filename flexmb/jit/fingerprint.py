@@ -34,7 +34,7 @@ import numpy as np
 
 _BY_VERSION = {"builtins", "math", "cmath", "numpy", "numba"}
 # Modules of this room.
-_COMPILE_NOTHING = {"collector", "counting", "folder", "installed", "once", "processors", "progress", "warmed"}
+_COMPILE_NOTHING = {"counting", "folder", "installed", "once", "processors", "progress", "warmed"}
 _PLAIN = {type(None), type(...), bool, int, float, complex, str, bytes}
 _KIND = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS | inspect.CO_GENERATOR  # other flags say how the file was compiled
 _CONSTANT, _GLOBAL, _EXTENDED = frozenset(dis.hasconst), dis.opmap["LOAD_GLOBAL"], dis.opmap["EXTENDED_ARG"]

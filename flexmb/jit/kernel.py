@@ -80,6 +80,23 @@ def handed_on(function: Callable[..., Any]) -> Any:
     return choose
 
 
+def handed_in(function: Callable[..., Any]) -> Any:
+    """The same of a helper that is written out where it is called: for a part of a loop that calls it at one place.
+
+    Beside short steps a call costs as much as they do: all arrays that are handed on are counted again.
+    """
+
+    def choose(*args: Any) -> Any:
+        return function(*args)
+
+    @overload(choose, jit_options=AS_PART, strict=False)
+    def _typed(*args):
+        return function
+
+    choose.py_func = function  # type: ignore[attr-defined]
+    return choose
+
+
 def by_bundle(kind: type, of_kind: Callable[..., Any], others: Callable[..., Any]) -> Callable[..., Any]:
     """One helper for two kinds of bundles: `of_kind` where the first argument is of class `kind`, else `others`.
 

@@ -94,7 +94,7 @@ def builtin(address: int, bundle: Any, *held: Any) -> Callable[..., Any]:
     address of the names of those that come by name, or 0. It returns the address of an object, as a new reference, or 0
     after an error.
     """
-    place = bundle._table.view(Anchor)
+    place = bundle.kernel_table.view(Anchor)
     place.held = bundle, held
     method = _methods.setdefault(address, _Method(b"evaluator", address, _FAST | _WITH_NAMES, None))
     make = ctypes.pythonapi.PyCFunction_NewEx

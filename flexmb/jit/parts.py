@@ -59,6 +59,7 @@ class KernelLibrary(JITCodeLibrary):
     """A kernel, into which every part of it is linked once, however many others call it; `callees` are kernels."""
 
     callees: tuple[Callee, ...] = ()
+    held: tuple[Any, ...] = ()
 
     def finalize(self) -> None:
         """With all that it calls, directly or not."""
@@ -69,7 +70,7 @@ class KernelLibrary(JITCodeLibrary):
         others = [library for library in called if not isinstance(library, _PartLibrary)]
         referred = {library: refer(self._final_module, library) for library in others}
         self.callees = tuple(callee for callee in referred.values() if callee is not None)
-        self._held = tuple(library for library, callee in referred.items() if callee is not None)
+        self.held = tuple(library for library, callee in referred.items() if callee is not None)
         self._linking_libraries = [library for library, callee in referred.items() if callee is None]
         super().finalize()
 

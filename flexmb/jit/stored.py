@@ -39,7 +39,7 @@ def unpacked(context: Any, contents: Any) -> Any:
         return None
     context.codegen()._engine._defined_symbols.update(symbols)
     compiled = CompileResult._rebuild(context, *state)
-    compiled.library._held = held
+    compiled.library.held = held
     return compiled
 
 

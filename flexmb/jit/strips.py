@@ -29,6 +29,7 @@ from flexmb.jit.bundle import BundleType, is_long
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import BYTES, LANE, LANES, repeated
 from flexmb.jit.tables import WORD, TableType, load_number, store_number
+from flexmb.jit.transposition import transposed
 from flexmb.typing import Real
 
 _STRIP = ir.VectorType(ir.DoubleType(), LANES)
@@ -264,7 +265,8 @@ def _across(context: Any, builder: Any, sig: Any, args: Any, added: bool) -> Any
         return builder.gep(builder.extract_value(args[1], 0), [builder.mul(at, WORD(size))], inbounds=True)
 
     if is_long(w):
-        parts = [(place(row, 0), x) for row, x in enumerate(_transposed(builder, columns))]
+        square = [*columns, *[ir.Constant(_STRIP, None)] * (LANES - len(columns))]
+        parts = [(place(row, 0), x) for row, x in enumerate(transposed(builder, square))]
     else:
         parts = [(place(0, column), x) for column, x in enumerate(columns)]
     add = context.get_function(operator.add, signature(number, number, number))
@@ -276,24 +278,6 @@ def _across(context: Any, builder: Any, sig: Any, args: Any, added: bool) -> Any
             x = add(builder, [load_number(context, builder, number, at), x]) if added else x
             store_number(context, builder, number, x, at)
     return context.get_dummy_value()
-
-
-def _transposed(builder: Any, columns: list[Any]) -> list[Any]:
-    """The LANES rows of a matrix whose first columns these are, the others zero: its blocks exchanged, then theirs."""
-    rows = [*columns, *[ir.Constant(_STRIP, None)] * (LANES - len(columns))]
-    size = LANES // 2
-    while size:
-        upper = [k if not k & size else LANES + k - size for k in range(LANES)]
-        lower = [k + size if not k & size else LANES + k for k in range(LANES)]
-        for i in range(LANES):
-            if not i & size:
-                a, b = rows[i], rows[i + size]
-                rows[i], rows[i + size] = (
-                    builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_PLACE, LANES), mask))
-                    for mask in (upper, lower)
-                )
-        size //= 2
-    return rows
 
 
 @lower_builtin(put_across, BundleType, TableType, types.Integer, types.BaseTuple)

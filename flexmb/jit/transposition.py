@@ -44,7 +44,7 @@ class _Square(AbstractTemplate):
 @lower_builtin(square_to_lanes, types.Array, types.Integer, types.Integer, TableType)
 def _to_lanes(context, builder, sig, args):
     rows, lanes = _places(context, builder, sig, args)
-    values = _transposed(builder, [builder.load(row, align=_FLOAT) for row in rows])
+    values = transposed(builder, [builder.load(row, align=_FLOAT) for row in rows])
     for value, place in zip(values, lanes, strict=True):
         builder.store(value, place, align=BYTES)
     return context.get_dummy_value()
@@ -53,7 +53,7 @@ def _to_lanes(context, builder, sig, args):
 @lower_builtin(square_to_rows, types.Array, types.Integer, types.Integer, TableType)
 def _to_rows(context, builder, sig, args):
     rows, lanes = _places(context, builder, sig, args)
-    values = _transposed(builder, [builder.load(place, align=BYTES) for place in lanes])
+    values = transposed(builder, [builder.load(place, align=BYTES) for place in lanes])
     for value, row in zip(values, rows, strict=True):
         builder.store(value, row, align=_FLOAT)
     return context.get_dummy_value()
@@ -80,7 +80,7 @@ def _places(context: Any, builder: Any, sig: Any, args: Any) -> tuple[list[Any],
     return [at(bytes_of_rows, of_row(k)) for k in range(LANES)], [at(base, of_lanes(k)) for k in range(LANES)]
 
 
-def _transposed(builder: Any, square: list[Any]) -> list[Any]:
+def transposed(builder: Any, square: list[Any]) -> list[Any]:
     """Column j of the rows as row j: halves, then quarters, then eighths change sides of the diagonal."""
     rows, distance = list(square), LANES // 2
     while distance:

@@ -1,8 +1,9 @@
-"""Modal integrals that are affine in eta, summed over modes: strips of a table of `Constants.product`.
+"""Modal integrals that are affine in eta, summed over modes: strips of the table `Constants.product`.
 
-Of a body, first the integrals P0_n = sum m phi_n x' at rest, then, for every mode i, their slopes P1_ni = sum m phi_n
-phi_i' by eta_i: 3x3 matrices, column after column, for each number a strip of modes n. A mode that moves no mass along
-an axis has no such column; most modes of beams move along one axis alone. What is not there is not summed.
+For each body the table has the integrals P0_n = sum m phi_n x' at rest and, for every mode i, their derivatives
+P1_ni = sum m phi_n phi_i' with respect to eta_i. They are 3x3 matrices, stored by columns, each element as a strip over
+the modes n. Column j of P1_ni is zero for all n if mode i moves no mass along axis j; such columns are skipped. Most
+modes of beams move along one axis only.
 """
 
 import numpy as np
@@ -18,7 +19,7 @@ NUMBERS = 9
 
 @helper
 def sum_integrals(w, k, product, moves, nm, n):
-    """Columns of P_n = P0_n + sum_i eta_i P1_ni and of sum_i etad_i P1_ni, of body k, for the strip from mode n on."""
+    """Columns of P_n = P0_n + sum_i eta_i P1_ni and of sum_i etad_i P1_ni of body k, for the strip that starts at n."""
     blocks, at = product[n // ROW], n % ROW
     X, Y, Z = columns_of(w, blocks[0], at)
     x = y = z = (0.0, 0.0, 0.0)
@@ -38,7 +39,7 @@ def sum_integrals(w, k, product, moves, nm, n):
 
 @helper
 def columns_of(w, block, at):
-    """The three columns of matrices for the strip from element `at` on, of a row of `Constants.product`."""
+    """The three columns of the matrices of a strip, which starts at element `at` of a block of `Constants.product`."""
     return _column(w, block, 0, at), _column(w, block, 1, at), _column(w, block, 2, at)
 
 
@@ -50,14 +51,14 @@ def _column(w, block, column, at):
 
 @helper
 def symmetric_part(columns):
-    """Of a matrix with these columns: (xx, yy, zz, xy, xz, yz)."""
+    """Symmetric part (xx, yy, zz, xy, xz, yz) of the matrix with these columns."""
     X, Y, Z = columns
     return X[0], Y[1], Z[2], 0.5 * (X[1] + Y[0]), 0.5 * (X[2] + Z[0]), 0.5 * (Y[2] + Z[1])
 
 
 @helper
 def axial_vector(columns):
-    """sum m b x a of sum m a b' with these columns."""
+    """sum m b x a from the matrix sum m a b' with these columns."""
     X, Y, Z = columns
     return Y[2] - Z[1], Z[0] - X[2], X[1] - Y[0]
 
@@ -65,8 +66,9 @@ def axial_vector(columns):
 def table_of_products(at_rest: Real, slope: Real, points: int) -> Real:
     """(strips,1+n,72) of `Constants.product` from sum m x~' phi_n~ (n,3,3) and sum m phi_n~' phi_i~ (n,n,3,3).
 
-    Numbers of slopes that are rounding of a sum over so many points are zero: gamma(points) of its terms, which by
-    Cauchy and Schwarz are at most the root of what both modes have on the diagonal.
+    Elements of the slopes below the rounding error of their sum over `points` terms are set to zero, so that their
+    columns are skipped. The error is bounded by points 2^-53 times the sum of the terms' magnitudes, which by the
+    Cauchy-Schwarz inequality is at most the root of the product of both modes' diagonal elements.
     """
     P0, P1 = _products(at_rest), _products(slope)
     size = np.sqrt(np.abs(np.einsum("nnaa->n", P1)))

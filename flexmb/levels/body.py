@@ -1,6 +1,6 @@
-"""The list of all fidelity levels, and what follows from it: M_m and b_m of a body, whatever its level.
+"""The list of all fidelity levels, and M_m and b_m of a body by dispatch on its level.
 
-The number of a level is its place in the list, which has the order of the names in the schema.
+The number of a level is its index in the list, whose order is that of the names in the schema.
 """
 
 import numpy as np
@@ -17,10 +17,10 @@ BY_NAME = {level.name: level for level in LEVELS}
 _inertia_and_bias = numbered("inertia_and_bias", LEVEL, [level.inertia_and_bias for level in LEVELS])
 _without_masses = numbered("without_masses", LEVEL, [level.without_masses for level in LEVELS])
 AT_REST = f"{LEVEL} {[level.at_rest for level in LEVELS].index(True)}"
-"""The feature of scenes with bodies whose kinematics are those of their rest shape."""
+"""The feature of scenes that contain bodies with the kinematics of their undeformed shape."""
 
 RIGID = f"{LEVEL} {LEVELS.index(rigid.LEVEL)}"
-"""The feature of scenes with bodies of level rigid."""
+"""The feature of scenes that contain bodies of level rigid."""
 
 _AT_REST = np.array([level.at_rest for level in LEVELS])
 
@@ -33,11 +33,11 @@ def body_inertia(c, w, k):
 
 @helper
 def inertia_without_masses(c, w, k):
-    """The same as far as constant modal masses M_ff, eliminated from tables made before the run, ask for it."""
+    """M_m and b_m without the parts of M_m that are constant and in tables, for bodies whose modes are condensed."""
     _without_masses(c, c.body[k].level, c, w, k)
 
 
 @helper
 def is_at_rest(level):
-    """Whether inertia and kinematics of a body of this level are those of its rest shape."""
+    """Whether inertia and kinematics of a body of this level are those of the undeformed shape."""
     return _AT_REST[level]

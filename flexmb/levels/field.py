@@ -1,9 +1,9 @@
 """Kinematics of one point of the modal field: position x + phi eta + R p, rotation R = exp(skew(psi eta)).
 
-The angular velocity relative to the body is the true rate of R: W etadot with W_n = J_l(theta) psi_n. Used for inertia
-points and for ports alike. All components are in body axes. At level stiffened displacement and rotation vector have a
-part of second order, 1/2 eta' G eta: their rates are those of the linear field with phi_n + (G eta)_n for phi_n, and
-they accelerate by etadot' G etadot at etaddot = 0.
+The angular velocity relative to the body is the exact one of R: W etadot with W_n = J_l(theta) psi_n. Inertia points
+and ports use the same functions. All components are in body axes. At level stiffened displacement and rotation vector
+have a part of second order, 1/2 eta' G eta: their rates are those of the linear field with phi_n + (G eta)_n for phi_n,
+and etadot' G etadot is their acceleration at etaddot = 0.
 """
 
 from flexmb.jit.kernel import helper
@@ -24,9 +24,10 @@ from flexmb.spatial.vector import add, cross, dot, times, vec3
 def field_motion(w, x, p, shapes, eta, etad, nm, columns):
     """Motion of a point carried by the modal field.
 
-    x (3) rest position, p (3) fixed offset in point axes; shapes (6,m) mode shapes [rotation; translation]; eta, etad
-    (m,). Writes columns (6,m) [W; L]: angular and linear velocity per modal speed. w is the workspace that has them.
-    Returns position (3), R (9), relative velocity w, v and the relative acceleration alpha, a at etaddot = 0 (3 each).
+    w is the workspace that contains the rows; x (3) rest position; p (3) fixed offset in point axes; shapes (6,m) mode
+    shapes [rotation; translation]; eta, etad (m,). Writes columns (6,m) [W; L]: angular and linear velocity at unit
+    modal speeds. Returns position (3), R (9), and relative to the body the velocities w, v and the accelerations
+    alpha, a at etaddot = 0 (3 each).
     """
     displacement, rate = ZERO6, ZERO6  # [rotation vector; translation]
     for n in range(0, nm, width(w)):
@@ -50,7 +51,7 @@ def field_motion(w, x, p, shapes, eta, etad, nm, columns):
 
 @helper
 def second_order_motion(x, p, shapes, second, eta, etad, nm, columns):
-    """The same for a point of level stiffened: `second` (m,m) records of its second-order field."""
+    """`field_motion` for a point of level stiffened; `second` (m,m) records of its second-order field."""
     displacement = rate = bent = ZERO6  # [rotation vector; translation]
     for n in range(nm):
         at_rest = column6(shapes, n)
@@ -75,7 +76,7 @@ def second_order_motion(x, p, shapes, second, eta, etad, nm, columns):
 
 @helper
 def _shape_now(shape, second, eta, etad, nm):
-    """Velocity and rate of the rotation vector per speed of mode n, phi_n + (G eta)_n, and their rates (G etadot)_n."""
+    """phi_n + (G eta)_n of mode n, for rotation vector and displacement, and their rates (G etadot)_n."""
     rate = ZERO6
     for i in range(nm):
         G = vec3(second[i].rotation, 0), vec3(second[i].translation, 0)

@@ -1,8 +1,8 @@
 """Level full: exact kinematics of the linear modal field; the kinetic energy is the sum over inertia points.
 
-Point r = x + phi eta, point rotation exp(skew(psi eta)). Mass at the points themselves gives a kinetic energy that is
-polynomial in eta: it is carried by the integrals P0_n = sum m phi_n x' and P1_ni = sum m phi_n phi_i', no sum over
-points is left. Points with rotating inertia, or with a mass centre off the point, are summed.
+Point r = x + phi eta, point rotation exp(skew(psi eta)). The kinetic energy of masses at the points themselves is a
+polynomial in eta, with the integrals P0_n = sum m phi_n x' and P1_ni = sum m phi_n phi_i' as coefficients: an
+evaluation needs no sum over these points. Points with turning inertia, or with a mass centre off the point, are summed.
 """
 
 import numpy as np
@@ -36,7 +36,7 @@ from flexmb.spatial.vector import (
 
 @helper
 def inertia_and_bias(c, w, k):
-    """Modal masses, all else of the polynomial part, then the summed points."""
+    """Modal masses, then coupling and bias of the polynomial part, then the summed points."""
     modal_masses(c, w, k)
     coupling_and_bias(c, w, k)
     for j in range(c.body[k].point_start, c.body[k].point_stop):
@@ -45,7 +45,11 @@ def inertia_and_bias(c, w, k):
 
 @helper
 def coupling_and_bias(c, w, k):
-    """Integrals of r x (.) and phi_n . (.) of the point acceleration w x (w x r) + 2 w x (phi etadot)."""
+    """Coupling P_fr, rigid block and bias of the polynomial part.
+
+    The bias consists of the integrals of r x a, a and phi_n . a with the point acceleration
+    a = w x (w x r) + 2 w x (phi etadot).
+    """
     nm, row = c.body[k].modes, c.body[k].product
     omega = vec3(w.body[k].velocity, 0)
     spin = centrifugal(omega)
@@ -53,7 +57,7 @@ def coupling_and_bias(c, w, k):
     moved = (0.0, 0.0, 0.0)  # sum m phi eta
     stretch = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum m (u r' + x u'), u = phi eta
     flow = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum m (phi etadot) r', symmetric part
-    turn = (0.0, 0.0, 0.0)  # and axial vector
+    turn = (0.0, 0.0, 0.0)  # the same, axial vector
     momentum = (0.0, 0.0, 0.0)  # sum m phi etadot
     for n in range(0, nm, width(w)):
         eta, etad = strip(w, w.eta[k], n), strip(w, w.etad[k], n)
@@ -78,38 +82,38 @@ def coupling_and_bias(c, w, k):
 
 @helper
 def _at_rest(w, block, at):
-    """The symmetric part of sum m phi_n x'."""
+    """Symmetric part of sum m phi_n x' at rest."""
     return symmetric_part(columns_of(w, block, at))
 
 
 @helper
 def centrifugal(omega):
-    """W with w' P w - w'w tr P = W . P for symmetric P."""
+    """Coefficients W with W . P = w' P w - w'w tr P for symmetric P, where . is the sum of six products."""
     x, y, z = omega
     return -(y * y + z * z), -(x * x + z * z), -(x * x + y * y), 2.0 * x * y, 2.0 * x * z, 2.0 * y * z
 
 
 @helper
 def stretched(j, P):
-    """Inertia J with sum m r r' changed by the symmetric P."""
+    """The inertia J after sum m r r' has increased by the symmetric P: J + tr(P) 1 - P."""
     xx, yy, zz, xy, xz, yz = P
     return sym_add(j, (yy + zz, xx + zz, xx + yy, -xy, -xz, -yz))
 
 
 @helper
 def coriolis(omega, flow, turn):
-    """tr(P) w - P w of P = sum m v r' with symmetric part `flow` and axial vector `turn`."""
+    """tr(P) w - P w for P = sum m v r' with symmetric part `flow` and axial vector `turn`."""
     moved = add(sym_times(flow, omega), scale(0.5, cross(turn, omega)))
     return sub(scale(flow[0] + flow[1] + flow[2], omega), moved)
 
 
 def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
-    """The polynomial part; every point whose inertia turns is summed."""
+    """Tables of the polynomial part; every point whose inertia turns is summed."""
     return polynomial(modal_integrals(model), model)
 
 
 def polynomial(i: ModalIntegrals, model: FlexibleModel) -> InertiaTables:
-    """The same of known integrals."""
+    """`tables` from known integrals."""
     rigid, mfr = np.array([i.mass, *i.s0, *six(i.J0)]), np.vstack([i.C0, i.s1])
     product = table_of_products(i.J1, i.J2, len(model.mass))
     return InertiaTables(rigid, i.M_ff, mfr, np.zeros_like(mfr), i.turning, product)

@@ -1,4 +1,4 @@
-"""Level linear: M_m and b_m of level full to first order in (eta, etadot), what Frisch set out to write.
+"""Level linear: M_m and b_m of level full to first order in (eta, etadot), the order of Frisch's equations.
 
 With s = s0 + L0 eta, J = J0 + E eta, the coupling [C; L] and the modal masses M_ff affine in eta likewise, and
 B_n = -1/2 E_n, G_nk = 1/2 d2J/(deta_n deta_k):
@@ -7,8 +7,9 @@ B_n = -1/2 E_n, G_nk = 1/2 d2J/(deta_n deta_k):
     torque   w x (J w) + sum_n etadot_n (E_n w + w x C0_n)
     modal    w.(B_n - sum_k eta_k G_nk) w + w.sum_k etadot_k (C1_kn - C1_nk)
 
-These are not the equations of a kinetic energy: power is balanced to first order only, and M_m is not positive definite
-everywhere. The rotary inertia of wheels is no part of it: it turns with the wheel's node exactly and is summed.
+These truncated equations do not follow from a kinetic energy: energy is conserved to first order only, and M_m is not
+positive definite at all deformations. The rotary inertia of wheels is not truncated: it turns with the wheel's node
+and is summed.
 """
 
 from dataclasses import replace
@@ -83,7 +84,7 @@ def _mode(c, w, k, n, omega):
 
 
 def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
-    """First order in eta; the rotary inertia of the wheels belongs to their nodes, which turn exactly: it is summed."""
+    """Tables of first order in eta; the rotary inertia of wheels, which turns with their nodes, is summed."""
     points, rotors = _wheels_apart(model, wheels)
     i: FirstOrder = first_order(points)
     slope = np.zeros(i.M0.shape, SLOPE)
@@ -98,7 +99,7 @@ def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
 
 
 def _wheels_apart(model: FlexibleModel, wheels: int) -> tuple[FlexibleModel, TurningPoints]:
-    """The model with its wheels as mere masses, and their rotary inertia as points without mass."""
+    """The model with its wheels as point masses, and their rotary inertia as points without mass."""
     first = len(model.mass) - wheels
     inertia = model.inertia.copy()
     inertia[first:] = 0.0

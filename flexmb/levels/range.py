@@ -1,18 +1,18 @@
-"""The range of deflections in which a modal field means anything."""
+"""The range of deflections in which a modal field is meaningful."""
 
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import every, kept
 from flexmb.levels.body import is_at_rest
 
-RANGE = 10.0  # beyond so many body sizes a motion has diverged, and no modal field describes it
+RANGE = 10.0  # in sizes of the body: a larger deflection means that the motion has diverged
 
 
 @helper
 def is_out_of_range(c, eta, k):
     """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size.
 
-    eta (m,) as the level sees it: a ruthless body never leaves its range. Of lanes: all of them; what goes on of single
-    ones is NaN.
+    eta (m,) is zero at level ruthless, whose bodies are never out of range. In lanes the answer is True if all copies
+    are; the copies in which the body is so alone get NaN and end by that.
     """
     if c.body[k].modes == 0 or is_at_rest(c.body[k].level):
         return False
@@ -21,7 +21,7 @@ def is_out_of_range(c, eta, k):
     diagonal = 0.0
     for n in range(c.body[k].modes):
         diagonal += eta[n] * c.mff[k, n, n] * eta[n]
-    if every(c.body[k].modes * diagonal.real <= limit):  # Cauchy and Schwarz: the sum below is no larger
+    if every(c.body[k].modes * diagonal.real <= limit):  # an upper bound of the sum below, by Cauchy-Schwarz
         return False
     squares = 0.0
     for n in range(c.body[k].modes):

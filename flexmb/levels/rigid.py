@@ -31,7 +31,7 @@ def bias(c, w, k):
 
 
 def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
-    """The rest shape."""
+    """Tables of the undeformed body."""
     integrals = modal_integrals(model)
     n, block = integrals.mode_count, integrals.spatial_mass
     rr = block[n:, n:]

@@ -21,7 +21,7 @@ def inertia_and_bias(c, w, k):
 
 @helper
 def rigid_block_and_bias(c, w, k):
-    """The same without the modal blocks of M_m, for callers that do not need them."""
+    """`inertia_and_bias` without the modal blocks of M_m."""
     rigid.inertia_and_bias(c, w, k)
     omega = vec3(w.body[k].velocity, 0)
     spin = omega[0] * omega[0], omega[1] * omega[1], omega[2] * omega[2]

@@ -1,12 +1,12 @@
 """Level stiffened: level full with a second-order field, displacements phi eta + 1/2 eta' G eta.
 
-The kinetic energy is the sum over inertia points that move like this. All products are kept: nothing is truncated, so
-it is positive. Centrifugal, gyroscopic and gravity stiffness follow from it, as the velocity of a point is
+The kinetic energy is the sum over inertia points with this motion. Nothing is truncated, so that it is positive.
+Centrifugal, gyroscopic and gravity stiffness follow from it. The velocity of a point is
 
     v + w x rho + sum_n (phi_n + (G eta)_n) etadot_n
 
-and its acceleration at wdot = vdot = etaddot = 0 is w x (w x rho) + 2 w x rho' + etadot' G etadot. The points of a beam
-are few (`flexmb.modal.equivalent`).
+and its acceleration at wdot = vdot = etaddot = 0 is w x (w x rho) + 2 w x rho' + etadot' G etadot. The inertia points
+are few equivalent masses (`flexmb.modal.equivalent`).
 """
 
 from dataclasses import replace
@@ -46,7 +46,7 @@ def inertia_and_bias(c, w, k):
 
 @helper
 def _add_mass(c, w, k, j):
-    """Add point j to body k: a mass that does not turn. The table of modal masses has it at rest already."""
+    """Add the point mass j to body k. It is in the table of modal masses at rest; here their change is added."""
     nm = c.body[k].modes
     omega = vec3(w.body[k].velocity, 0)
     mass = c.point[j].mass
@@ -76,7 +76,7 @@ def _add_mass(c, w, k, j):
 
 @helper
 def _motion(c, w, k, j):
-    """Position, velocity and acceleration of point j in the body at etaddot = 0; columns L in w.point_mode."""
+    """Position, and relative to the body velocity and acceleration at etaddot = 0, of point j; L in w.point_mode."""
     second = c.second_shape[c.point[j].second]
     r = vec3(c.point[j].position, 0)
     v = (0.0, 0.0, 0.0)
@@ -97,7 +97,7 @@ def _motion(c, w, k, j):
 
 
 def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
-    """Every mass is a point to be summed, what turns another; the tables have the masses at rest."""
+    """Every mass, and every turning inertia, is a point to be summed; the tables have the modal masses at rest."""
     i = modal_integrals(model)
     masses = np.flatnonzero((model.mass > 0.0) & ~np.any(model.com_offset != 0.0, axis=1))
     return replace(full.polynomial(i, model), product=None, summed=stacked(still_points(model, masses), i.turning))

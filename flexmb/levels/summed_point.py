@@ -1,6 +1,6 @@
-"""Inertia that turns with one point of the modal field, summed at run time: rotating points of level full, wheels.
+"""Inertia that turns with one point of the modal field, summed at every evaluation: turning points, and wheels.
 
-Angular momentum and force follow the point's exact motion; nothing is truncated.
+Angular momentum and force are those of the point's exact motion; nothing is truncated.
 """
 
 from flexmb.jit.kernel import helper

@@ -63,7 +63,9 @@ class Campbell:
         from flexmb.linear.campbell_picture import write_campbell_plot  # loads matplotlib
 
         self._refuse_torn()
-        return write_campbell_plot(self, Path(path), modes)
+        shown = self.eigenvalues[:, :modes]
+        is_growing = shown.real > np.array([found.tolerance for found in self.stability])[:, None]
+        return write_campbell_plot(Path(path), self.scene, self.hinge, self.rates, self.names, shown, is_growing)
 
     def to_csv(self, path: Path | str) -> Path:
         """Rates, and of every mode the frequency (Hz) and the growth rate (1/s), named as in `names`."""

@@ -13,6 +13,7 @@ linear.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -21,10 +22,11 @@ import numpy as np
 from flexmb.control.feedback import Feedback
 from flexmb.control.loop import look, project, respond
 from flexmb.integrate.problem import Accuracy, Clock
+from flexmb.linear.equations import equations_of
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.observed import values
 from flexmb.linear.sensed import ChangedRow, sensed
-from flexmb.linear.variations import Equations, equations_of
+from flexmb.linear.variations import Equations
 from flexmb.scene.functions import Constant
 from flexmb.system import algorithms
 from flexmb.system.closed import ClosedSystem
@@ -46,7 +48,7 @@ def closed_loop(system: System, state: State, model: Callable[[Equations, State]
     NotImplementedError for controllers that are sampled.
     """
     if isinstance(system, ClosedSystem):
-        state = system._admissible(*system.layout.entering(state), "state")
+        state = system.admissible(state, "state")
     loop = ClosedLoop(system, state)
     found = loop.at(state, loop.initial, model)
     return replace(
@@ -71,7 +73,7 @@ class ClosedLoop:
 
     def __init__(self, system: System, start: State) -> None:
         _refuse(system)
-        self._plant = plant = system._anew()
+        self._plant = plant = copy(system)
         chosen, route = algorithms.chosen("articulated"), plant.route()
         self._feedback = feedback = Feedback(plant, chosen, route, route.tables())
         clock = Clock(np.array([start.t, start.t + 1.0]), np.array([start.t + 1.0]))
@@ -167,5 +169,5 @@ def _effect(equations: Equations, state: State, driven: Sequence[int]) -> tuple[
         other = equations.with_functions([*held[:f], changed, *held[f + 1 :]])
         by_drive[:, i] = (values(other, state) - now) / LARGE
     still = np.zeros((system.nq + system.nu, len(driven)))
-    rates = by_drive[system._observation.columns["rates"][0]][equations.free]
+    rates = by_drive[system.observation.columns["rates"][0]][equations.free]
     return rates, sensed(system, ChangedRow(now, by_drive, still))

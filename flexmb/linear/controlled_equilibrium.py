@@ -1,7 +1,7 @@
 """Where a closed loop rests: neither the motion accelerates nor do states of controllers change.
 
 Newton's method over displacements xi and states x of controllers together, by the linear model of the closed loop, for
-an integrator has no state of its own that belongs to a displacement. Damping is that of `flexmb.linear.equilibrium`.
+an integrator has no state of its own that belongs to a displacement. Damping is that of `flexmb.linear.newton`.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.linear.closed_loop import ClosedLoop
-from flexmb.linear.equilibrium import LONGEST, SMALLEST, STEPS, EquilibriumError
+from flexmb.linear.equations import equations_of
 from flexmb.linear.linearize import held_model
-from flexmb.linear.variations import Equations, equations_of
+from flexmb.linear.newton import LONGEST, SMALLEST, STEPS, EquilibriumError
+from flexmb.linear.variations import Equations
 from flexmb.system.closed import ClosedSystem
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
@@ -42,7 +43,7 @@ def resting(system: System, guess: State) -> State:
     t, y = system.layout.entering(guess)
     start = replace(guess, u=np.zeros_like(guess.u))
     if isinstance(system, ClosedSystem):
-        start = system._admissible(t, np.r_[start.q, start.u, 0.0])
+        start = system.admissible(start)
     equations = equations_of(system).held(t)
     loop = ClosedLoop(system, start)
     try:

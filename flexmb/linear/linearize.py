@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexmb.linear.equations import entering
 from flexmb.linear.linear_model import LinearModel
-from flexmb.linear.variations import Equations, Variations, entering
+from flexmb.linear.variations import Equations, Variations
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System

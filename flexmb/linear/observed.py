@@ -79,7 +79,7 @@ def _free(equations: Equations, state: State) -> _Raw:
 def _raw(equations: Equations, state: State, load: Real, closures: Real) -> _Raw:
     """At a state under loads of the rows (G,), with the loads of closures (C,6) that are theirs."""
     system, y, rows = equations.system, pack(state), len(load)
-    observation: Observation = system._observation
+    observation: Observation = system.observation
     out, E = outputs_tangent(observation.out), observation.width
     J = np.empty((E + rows, len(y) + rows))
     if isinstance(equations, ClosedEquations):
@@ -103,11 +103,11 @@ def moving(equations: Equations, at: Variations) -> Real:
 def _by_force(equations: Equations, state: State) -> Real:
     """(E,n) by generalised forces along the free speeds, at given closure loads."""
     system, free = equations.system, equations.free
-    places = system._observation.columns
+    places = system.observation.columns
     whole = system.mass_matrix(state)
     rates = np.zeros((system.nu, len(free)))
     rates[free] = np.linalg.inv(whole[np.ix_(free, free)])
-    found = np.zeros((system._observation.width, len(free)))
+    found = np.zeros((system.observation.width, len(free)))
     resting = _of_rates(equations, state, np.zeros(system.nu))
     for i, column in enumerate(rates.T):
         for name, change in _of_rates(equations, state, LARGE * column).items():
@@ -120,11 +120,9 @@ def _by_force(equations: Equations, state: State) -> Real:
 def _of_rates(equations: Equations, state: State, rates: Real) -> dict[str, Real]:
     """What changes with accelerations (nu,): hinge loads by inverse dynamics, markers."""
     system, y = equations.system, pack(state)
-    loads = system._inverse(state.t, y, rates)[1]
-    out = system._out
-    out.rates[:] = rates
-    system._observe_motion(state.t, y)
-    return {"rates": rates, "loads": loads, "markers": out.markers.copy()}
+    system.observe_rates(state.t, y, rates)
+    out = system.observation.out
+    return {"rates": rates, "loads": out.loads.copy(), "markers": out.markers.copy()}
 
 
 def _inverse(K: Real, rank: int) -> Real:

@@ -81,7 +81,7 @@ def _units(system: System, sensor: Sensor) -> list[str]:
 
 def _change(system: System, sensor: Sensor, at: ChangedRow) -> Real:
     """(width,k) of one sensor."""
-    names, k = system._observation.names, at.change.shape[1]
+    names, k = system.observation.names, at.change.shape[1]
     match sensor:
         case CoordinateSensor(of=of, quantity="value"):
             return at.of_state[system.coordinate(of)]
@@ -109,7 +109,7 @@ def _change(system: System, sensor: Sensor, at: ChangedRow) -> Real:
 
 def _part(system: System, at: ChangedRow, name: str, i: int) -> tuple[Real, Real]:
     """Value and change of item i of a part of the row."""
-    place, shape = system._observation.columns[name]
+    place, shape = system.observation.columns[name]
     return at.value[place].reshape(shape)[i], at.change[place].reshape(*shape, at.change.shape[1])[i]
 
 

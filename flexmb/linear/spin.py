@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexmb.linear.equilibrium import balanced
+from flexmb.linear.equations import entering
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.linearize import linear_model
-from flexmb.linear.variations import Equations, entering
+from flexmb.linear.newton import balanced
+from flexmb.linear.variations import Equations
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Revolute, Scene
 from flexmb.system.tree_system import System

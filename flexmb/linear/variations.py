@@ -23,10 +23,6 @@ import numpy as np
 from flexmb.entry import articulated
 from flexmb.entry.tangent import jacobian, tangent_workspace, time_derivative
 from flexmb.scene.functions import Constant, Function, Ramp
-from flexmb.scene.open_loop import refuse_feedback
-from flexmb.scene.schema import Scene
-from flexmb.system.closed import ClosedSystem
-from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.functions import pack as pack_functions
@@ -183,33 +179,6 @@ class Equations:
         if status != OK:
             place = self.system.fault_name(status, int(fault))
             raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
-
-
-def equations_of(system: System) -> Equations:
-    """The equations of a tree or a closed chain; NotImplementedError for closures on bodies of level "ruthless"."""
-    if not isinstance(system, ClosedSystem):
-        return Equations(system)
-    from flexmb.linear.closed_variations import ClosedEquations  # few scenes need it
-
-    return ClosedEquations(system)
-
-
-def entering(system: System | Scene, state: State | None) -> tuple[Equations, State]:
-    """The two parts of a linear model: the equations of a system or scene, and a state of it (default: initial).
-
-    NotImplementedError for scenes with controllers and for closures on bodies of level "ruthless", ValueError or
-    TypeError for a state that is not one of this system.
-    """
-    if not isinstance(system, System | Scene):
-        raise TypeError(f"a System or a Scene is needed, not {type(system).__name__}")
-    refuse_feedback(system if isinstance(system, Scene) else system.scene, "a linear model of the motion alone")
-    equations = equations_of(system if isinstance(system, System) else compile(system))
-    if state is None:
-        return equations, equations.system.initial_state
-    t, y = equations.system.layout.entering(state)
-    if isinstance(equations.system, ClosedSystem):
-        return equations, equations.system._admissible(t, y, "state")
-    return equations, state
 
 
 def _cross(v: Real) -> Real:

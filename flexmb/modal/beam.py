@@ -1,7 +1,7 @@
 """Finite-element model of a straight beam: stiffness and mass of axial motion, torsion and two bending planes.
 
-The four families of motion are uncoupled in the beam itself (principal section axes, centroidal axis); a rigid lump
-with an offset mass centre or a product of inertia may couple them. A point of the axis moves by
+The four families of motion are uncoupled in the beam itself, because its axis is centroidal and the section axes are
+principal; a rigid lump with an offset mass centre or a product of inertia may couple them. A point of the axis moves by
 [displacement; rotation], the rotation about y being -w' and about z v' (without shear).
 """
 
@@ -26,7 +26,7 @@ FAMILIES = ("axial", "torsion", "bending_y", "bending_z")
 
 @dataclass(frozen=True)
 class BeamElements:
-    """Fields of the chosen families over one mesh; the coordinates of all families follow one another.
+    """Fields of the chosen families over one mesh; the coordinates of the families are stacked.
 
     `fields` maps family to its field, in the canonical order of `FAMILIES`.
     """
@@ -40,7 +40,7 @@ class BeamElements:
         return sum(field.size for field in self.fields.values())
 
     def coordinates(self, family: str) -> slice:
-        """Where the coordinates of one family stand."""
+        """The range of the coordinates of one family; KeyError for a family that is not chosen."""
         start = 0
         for name, field in self.fields.items():
             if name == family:
@@ -55,7 +55,7 @@ class BeamElements:
         ]
 
     def rigid(self) -> Real:
-        """Rigid motions (size, r) that the chosen families can make: one of axial and torsion, two of each bending."""
+        """Rigid motions (size, r) in the chosen families: one of axial motion and of torsion, two per bending plane."""
         columns = []
         for name, field in self.fields.items():
             motion = np.zeros((self.size, field.rigid().shape[1]))
@@ -93,7 +93,7 @@ class BeamElements:
         return stretch, turn
 
     def stiffness(self) -> Real:
-        """Stiffness matrix (size, size): the sum of EA e^2, GJ twist^2, EI curvature^2 and GA shear^2 over the beam."""
+        """Stiffness matrix (size, size) of the energy 1/2 int EA e^2 + GJ twist^2 + EI curvature^2 + GA shear^2 dx."""
         x, weight = quadrature(self.mesh, self.table)
         K = np.zeros((self.size, self.size))
         for name, field in self.fields.items():
@@ -131,7 +131,7 @@ class BeamElements:
 
 
 def beam_elements(body: BeamBody) -> BeamElements:
-    """Mesh and fields of `body` for the families its modes want. Raises ValueError for bad mesh data."""
+    """Mesh and fields of `body` for the families in `modes.families`. Raises ValueError for bad mesh data."""
     if body.elements < 1 or body.length_m <= 0.0:
         raise ValueError(f"beam '{body.name}': needs elements >= 1 and length_m > 0")
     if not body.modes.families:

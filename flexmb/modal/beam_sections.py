@@ -1,7 +1,7 @@
 """A beam cut at some sections: the inertia points beyond each cut, and the motion of the sections themselves.
 
-Between two cuts the beam's own inertia is integrated piece by piece, so that no cut falls between two points of the
-dynamics. All integrals are those of the dynamics: the sum beyond the root is that of the whole beam.
+The quadrature of the beam's inertia is split at the cuts, so that the interval of each inertia point lies on one side
+of every cut. The inertia beyond the root is therefore that of the whole beam in the equations of motion.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from flexmb.typing import Index, Real
 class BeamSections:
     """Cuts at x (X,) m of a beam, body frame.
 
-    points: inertia points of the whole beam, a cut never within the interval that one stands for; `beyond` (n,): how
-    many cuts each is beyond, or at; `second`: their second-order field at level stiffened. motion (X,6,m): mode shapes
+    points: inertia points of the whole beam, with no cut inside the interval of any; `beyond` (n,): the number of cuts
+    that each is at or beyond; `second`: their second-order field at level stiffened. motion (X,6,m): mode shapes
     [displacement; rotation] of the sections, `second_motion` their field. Stiffnesses (X,): EA N, EIy, EIz, GJ N m².
     """
 
@@ -43,7 +43,7 @@ class BeamSections:
 
 
 def beam_sections(body: BeamBody, x: Real) -> BeamSections:
-    """A beam with its modes, none at level rigid, cut at ascending x (X,) m."""
+    """A beam with its modes (none at level rigid), cut at ascending x (X,) m."""
     elements = beam_elements(body)
     table, rigid_lumps = elements.table, lumps(body)
     stations = inertia_stations(body, elements.mesh, table)

@@ -1,7 +1,7 @@
-"""Symmetric eigenproblems with two matrices, in numpy alone: SciPy's take a fifth of a second to import.
+"""Generalised symmetric eigenproblems by numpy alone, because importing SciPy's takes a fifth of a second.
 
-numpy has no triangular solver. Its general one, though, exchanges no rows of an upper triangular matrix and subtracts
-nothing from it: what is left of it is back substitution.
+numpy has no triangular solver. Applied to an upper triangular matrix, its general solver exchanges no rows and
+eliminates nothing, so that it reduces to back substitution.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from flexmb.typing import Real
 def eigenpairs(a: Real, b: Real) -> tuple[Real, Real]:
     """Ascending values (n,) and columns X (n,n) of a x = value b x for symmetric a and positive definite b: X'b X = 1.
 
-    LinAlgError where b is not positive definite, or a number is not finite.
+    LinAlgError if b is not positive definite, or an element is not finite.
     """
     _refuse_infinite(a)
     L = _factor(b)
@@ -24,18 +24,18 @@ def eigenpairs(a: Real, b: Real) -> tuple[Real, Real]:
 
 
 def solve_definite(a: Real, b: Real) -> Real:
-    """a^-1 b for positive definite a, by Cholesky; LinAlgError where it is not, or a number of a is not finite."""
+    """a^-1 b for positive definite a, by Cholesky; LinAlgError if a is not, or has elements that are not finite."""
     L = _factor(a)
     return np.linalg.solve(L.T, forward(L, b))
 
 
 def forward(L: Real, b: Real) -> Real:
-    """L^-1 b for lower triangular L; backwards it is upper triangular."""
+    """L^-1 b for lower triangular L, which is upper triangular with rows and columns reversed."""
     return np.linalg.solve(L[::-1, ::-1], b[::-1])[::-1]
 
 
 def _factor(a: Real) -> Real:
-    """Cholesky's, lower triangular."""
+    """Cholesky's factor, lower triangular."""
     _refuse_infinite(a)
     return np.linalg.cholesky(a)
 

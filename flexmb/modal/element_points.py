@@ -1,4 +1,4 @@
-"""Inertia points of a beam with its modes: stations and lumps become the points that the dynamics sums over."""
+"""Inertia points of a beam with its modes, from its stations and lumps."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class Points:
-    """Inertia points with modes; the arrays of `FlexibleModel` (which says units and frames) of the same names.
+    """Inertia points with mode shapes. Units and frames are those of the same arrays of `FlexibleModel`.
 
-    x (n,) m: the axis point with which each moves.
+    x (n,) m: the axis point to whose section each is fixed.
     """
 
     x: Real
@@ -28,12 +28,12 @@ class Points:
 
 
 def join(groups: list[Points]) -> Points:
-    """One set out of several."""
+    """Several sets as one."""
     return Points(*(np.concatenate([getattr(g, name) for g in groups]) for name in Points.__dataclass_fields__))
 
 
 def axis_points(elements: BeamElements, columns: Real, stations: Stations) -> Points:
-    """One point per station, its section inertia as a tensor that turns with it."""
+    """One point per station; the section's inertia is a tensor that turns with the point."""
     moved = elements.motion(stations.x, columns)
     inertia = np.zeros((len(stations.x), 3, 3))
     inertia[:, 0, 0] = stations.inertia_y + stations.inertia_z
@@ -44,10 +44,10 @@ def axis_points(elements: BeamElements, columns: Real, stations: Stations) -> Po
 
 
 def section_points(elements: BeamElements, columns: Real, stations: Stations) -> Points:
-    """Four massy points per station at (+-a, +-b), a^2 = inertia_z / mass, b^2 = inertia_y / mass; none turns.
+    """Four point masses per station at (+-a, +-b), a^2 = inertia_z / mass, b^2 = inertia_y / mass.
 
-    Their second moments are those of the section, so the mass matrix is that of `axis_points`, while the kinetic energy
-    is a polynomial in the modal coordinates. Sections without inertia keep their one point.
+    Their second moments are those of the section, so that the mass matrix is that of `axis_points`. Without turning
+    tensors the kinetic energy is a polynomial in the modal coordinates. Sections without inertia keep one point.
     """
     if not (np.any(stations.inertia_y) or np.any(stations.inertia_z)):
         return axis_points(elements, columns, stations)
@@ -59,7 +59,7 @@ def section_points(elements: BeamElements, columns: Real, stations: Stations) ->
 
 
 def turning_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:
-    """A lump as one point of the axis with mass-centre offset and turning inertia."""
+    """A lump as one point of the axis with an offset mass centre and an inertia tensor that turns with it."""
     x = np.array([lump.x])
     moved = elements.motion(x, columns)
     mass = np.array([lump.mass])
@@ -67,10 +67,10 @@ def turning_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:
 
 
 def massy_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:
-    """A lump as six equal masses on its principal axes, at +-sqrt(3 s_k / mass) from the mass centre.
+    """A lump as six equal point masses on its principal axes, at +-sqrt(3 s_k / mass) from the mass centre.
 
-    s_k are the eigenvalues of the second-moment tensor S = tr(J)/2 - J, so mass, mass centre and inertia are exact.
-    A lump without inertia is one mass.
+    s_k are the eigenvalues of the second-moment tensor S = tr(J)/2 - J: mass, mass centre and inertia are exact. A lump
+    without inertia is one point mass. Raises ValueError if S has a negative eigenvalue beyond rounding.
     """
     if not np.any(lump.inertia):
         return _massy(elements, columns, np.array([lump.x]), lump.com[None], np.array([lump.mass]))
@@ -87,7 +87,7 @@ def massy_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:
 
 
 def _massy(elements: BeamElements, columns: Real, x: Real, offset: Real, mass: Real) -> Points:
-    """Masses (n,) at `offset` (n,3) from the axis points x (n,), displaced by the axis point plus rotation x offset."""
+    """Point masses (n,) at `offset` (n,3) from the axis points x (n,): displacement plus rotation x offset."""
     moved = elements.motion(x, columns)
     translation = moved[:, :3] + np.cross(moved[:, 3:], offset[:, :, None], axis=1)
     nothing = np.zeros((len(x), 3))

@@ -1,12 +1,11 @@
-"""A few masses with the same kinetic energy as the many inertia points of a body.
+"""Reduction of the inertia points of a body to few point masses with the same kinetic energy to the third order.
 
 All integrals of the masses are sums m a b of two scalar fields a, b on the points: 1, components of the rest position
-r, of the mode shapes phi_n and of the second-order field G_ni. Choose a basis that is orthonormal under sum m a b, and
-equal masses, one for each basis function. The coefficients of the fields in this basis, divided by the square root of
-such a mass, are the position, the mode shapes and the field of the new points. If the basis spans 1, r and phi, every
-integral in which one of these occurs is exact. The kinetic energy loses only what G has beyond the basis. That part
-enters squared, as a term of fourth order in (eta, etadot) that is never negative. So the mass matrix summed over the
-new points is positive and exact to the third order.
+r, of the mode shapes phi_n and of the second-order field G_ni. Take a basis that is orthonormal under sum m a b and
+spans 1, r and phi, and equal masses, one for each basis function. The coefficients of the fields in this basis, divided
+by the square root of such a mass, are the positions, the mode shapes and the field of the new points. Every integral
+that contains 1, r or phi is then exact. Only products G.G, of fourth order in (eta, etadot), lack the part of G outside
+the basis, a nonnegative term of the kinetic energy. The mass matrix is a sum over the new masses and thus positive.
 """
 
 from __future__ import annotations
@@ -19,13 +18,13 @@ from flexmb.modal.flexible_model import FlexibleModel, SecondOrder, join_second
 from flexmb.typing import Real
 
 NEGLIGIBLE = 1e-12
-"""A field of unit size adds nothing to the span of the others if its remainder is smaller: that is rounding."""
+"""A field of unit norm whose remainder orthogonal to the others is below this is taken to lie in their span."""
 
 
 def with_equivalent_masses(model: FlexibleModel) -> FlexibleModel:
-    """The body with as few masses as its modes allow, if it has a second-order field; else the body itself.
+    """The body with the fewest possible point masses if it has a second-order field; else the body itself.
 
-    Masses with an offset stay as they are; inertia tensors stay too, on points without mass.
+    Masses with an offset are kept. Inertia tensors are kept on points without mass.
     """
     if model.second is None:
         return model
@@ -70,9 +69,10 @@ def _basis(fields: Real) -> Real:
 
 
 def _equal_masses(basis: Real, m: Real) -> Real:
-    """Rows (r, points) that take a field times sqrt(m) to its values at r points of mass sum(m) / r.
+    """Rows (r, points) that map a field times sqrt(m) to its values at r points of mass sum(m) / r.
 
-    The field 1 must have equal coefficients: a reflection turns the coefficients it has into equal ones of that norm.
+    The field 1 must have the value 1 at every new point, hence equal coefficients: a Householder reflection of the
+    basis maps its coefficients to equal ones of the same norm.
     """
     r = basis.shape[1]
     coefficients, equal = basis.T @ np.sqrt(m), np.full(r, np.sqrt(m.sum() / r))

@@ -1,14 +1,15 @@
 """Modal mass matrix and bias of a flexible body to first order in its modal coordinates: the tables of level `linear`.
 
-They are derivatives, at the rest shape, of the kinetic energy that is the sum over all inertia points, point
-inertias J turning with their points and mass centres off their points included. With sums over points, rho = r + c,
+They are derivatives at the rest shape of the kinetic energy of all inertia points, whose inertias J and offset mass
+centres turn with them. With sums over points and rho = r + c,
 
     rho(eta)  = rho + u_n eta_n + 1/2 a_kn eta_k eta_n     u_n = phi_n + psi_n x c
     L_n(eta)  = u_n + a_kn eta_k                           a_kn = 1/2 (psi_k x (psi_n x c) + psi_n x (psi_k x c))
     W_n(eta)  = psi_n + 1/2 eta_k psi_k x psi_n            angular velocity per modal speed
     RJR'(eta) = J + eta_k T_k                              T_k = psi_k~ J - J psi_k~
 
-every table below is a product of these, cut off after the first order (only G belongs to the second order of J(eta)).
+each table below is a product of these, truncated after the first order. Only G is of second order, that of J(eta); its
+derivative with respect to a coordinate is of first order.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from flexmb.modal.cross import cross_matrix
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.typing import Real
 
-TOGETHER = 2**18  # vectors by point and pair of modes in memory at once
+_BLOCK = 2**18  # vectors (one for each point and pair of modes) held in memory at once: 6 MB an array
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class FirstOrder:
 
 def first_order(model: FlexibleModel) -> FirstOrder:
     """All tables, summed over all points of `model`."""
-    count = max(1, TOGETHER // (1 + model.mode_count**2))
+    count = max(1, _BLOCK // (1 + model.mode_count**2))
     parts = [_sums(_points(model, slice(i, i + count))) for i in range(0, len(model.mass), count)]
     return FirstOrder(**{field.name: sum(getattr(part, field.name) for part in parts) for field in fields(FirstOrder)})
 
@@ -68,7 +69,7 @@ def _points(model: FlexibleModel, chosen: slice) -> FlexibleModel:
 
 
 def _sums(model: FlexibleModel) -> FirstOrder:
-    """All tables of some points, few enough to hold a vector for every point and pair of modes in memory."""
+    """All tables, summed over the points of `model`; holds a vector for each point and pair of modes in memory."""
     m, J, psi = model.mass, model.inertia, np.swapaxes(model.rotation, 1, 2)
     rho, u, a = _mass_centres(model)
     T = _turning(model)
@@ -116,7 +117,7 @@ def _turning(model: FlexibleModel) -> Real:
 
 
 def _inertia_curvature(model: FlexibleModel) -> Real:
-    """G_nk = 1/2 d2J/(deta_n deta_k): of the mass centres, and of exp(theta~) J exp(-theta~) to second order."""
+    """G_nk = 1/2 d2J/(deta_n deta_k), from the mass centres and from exp(theta~) J exp(-theta~) to second order."""
     rho, u, a = _mass_centres(model)
     places = np.einsum("p,pna,pkb->nkab", model.mass, u, u, optimize=True)
     places += np.einsum("p,pa,pnkb->nkab", model.mass, rho, a, optimize=True)
@@ -128,7 +129,7 @@ def _inertia_curvature(model: FlexibleModel) -> Real:
 
 
 def _steiner(A: Real) -> Real:
-    """sum m (a.b 1 - b a') made symmetric, of A = sum m a b' (...,3,3)."""
+    """The symmetric part of sum m (a.b 1 - b a') from A = sum m a b' (...,3,3)."""
     return np.trace(A, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - _symmetric(A)
 
 

@@ -1,4 +1,4 @@
-"""From a flexible body of a scene to the modal data of the dynamics: beam or raw modal body to `FlexibleModel`."""
+"""The `FlexibleModel` of a flexible body of a scene, beam or raw modal body."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from flexmb.typing import Real
 def flexible_model(body: BeamBody | ModalBody, folder: Path | None = None) -> FlexibleModel:
     """Inertia points, modes, stiffness, damping and nodes of one flexible body.
 
-    `folder` is where a modal body's `.npz` lies (the scene file's folder). Node "origin" is the body frame, which does
-    not deform; a beam also has "root" and "tip". At level "stiffened" a few equivalent points replace the many
-    (`flexmb.modal.equivalent`). Equal beams share one model, so its arrays must not be written to. Raises ValueError
-    for data of which no model can be made.
+    `folder` contains a modal body's `.npz` (the folder of the scene file). Node "origin" is the body frame, which does
+    not deform; a beam also has "root" and "tip". At level "stiffened" few equivalent masses replace the inertia points
+    (`flexmb.modal.equivalent`). Equal beams share one model: its arrays must not be written to. Raises ValueError for
+    inconsistent data.
     """
     match body:
         case ModalBody():
@@ -37,7 +37,7 @@ def flexible_model(body: BeamBody | ModalBody, folder: Path | None = None) -> Fl
             try:
                 return _beam(replace(body, name="beam"))
             except ValueError:
-                return _beam(body)  # raises again, now with the name of the body
+                return _beam(body)  # equal beams of any name share the cache; this raises again, with the name
         case _:
             assert_never(body)
 
@@ -76,7 +76,7 @@ def beam_model(body: BeamBody) -> FlexibleModel:
 def points_of(
     body: BeamBody, elements: BeamElements, columns: Real, stations: Stations, rigid_lumps: tuple[Lump, ...]
 ) -> Points:
-    """Stations and lumps in the form that `body.points` asks for."""
+    """Stations and lumps in the form of `body.points`."""
     along, at_lump = (section_points, massy_lump) if body.points == "section" else (axis_points, turning_lump)
     return join([along(elements, columns, stations), *(at_lump(elements, columns, lump) for lump in rigid_lumps)])
 

@@ -1,4 +1,4 @@
-"""What modal preprocessing hands to the dynamics: inertia points, mode shapes, stiffness and damping of one body."""
+"""The result of modal preprocessing: inertia points, mode shapes, stiffness and damping of one body."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class SecondOrder:
-    """The motion of second order in the modal coordinates, 1/2 eta' G eta; G is symmetric in its last two axes.
+    """Displacement of second order in the modal coordinates, 1/2 eta' G eta; G is symmetric in its last two axes.
 
-    translation (...,3,m,m): added to the displacement phi eta of a point (m); rotation (...,3,m,m): added to its
-    rotation vector psi eta. Leading axes: points, or none for a node.
+    translation (...,3,m,m) is the G that adds to the displacement phi eta of a point (m), rotation (...,3,m,m) the one
+    that adds to its rotation vector psi eta. Leading axes: points, or none for a node.
     """
 
     translation: Real
     rotation: Real
 
     def turned(self, turn: Real) -> SecondOrder:
-        """The same in axes R_new_old = `turn`."""
+        """The same field in other axes, R_new_old = `turn`."""
         return self.map(lambda G: np.einsum("ab,...bmn->...amn", turn, G))
 
     def map(self, linear: Callable[[Real], Real]) -> SecondOrder:
-        """The same operation on both fields."""
+        """A linear operation applied to both fields."""
         return SecondOrder(linear(self.translation), linear(self.rotation))
 
 
@@ -34,7 +34,7 @@ class SecondOrder:
 class FlexibleNode:
     """A node: rest position (3,) m, rest rotation (3,3) node->body, mode shapes translation and rotation (3, m).
 
-    `second` (3,m,m): its second-order field, where the body has one.
+    `second` (3,m,m): its second-order field, if the body has one.
     """
 
     position: Real
@@ -44,7 +44,7 @@ class FlexibleNode:
     second: SecondOrder | None = None
 
     def seen_from(self, origin: Real, turn: Real) -> FlexibleNode:
-        """The same node in axes R_new_old = `turn` about `origin` (3,), old axes."""
+        """The same node in other axes, R_new_old = `turn`, with the new origin at `origin` (3,) in the old axes."""
         return FlexibleNode(
             turn @ (self.position - origin),
             turn @ self.rotation,
@@ -62,7 +62,7 @@ def undeforming_node(modes: int) -> FlexibleNode:
 
 @dataclass(frozen=True, eq=False)
 class FlexibleModel:
-    """Inertia points and modes of one flexible body in its body frame. Equal is what is one object.
+    """Inertia points and modes of one flexible body in its body frame. Models are compared by identity.
 
     mass (n,) kg; position (n,3) m; com_offset (n,3) m, in point axes, turning with the point; inertia (n,3,3) kg m^2
     about the point's mass centre, turning with the point; translation and rotation mode shapes (n,3,m); stiffness and
@@ -88,7 +88,7 @@ class FlexibleModel:
 
 
 def join_second(first: SecondOrder | None, then: SecondOrder | None) -> SecondOrder | None:
-    """The fields of more points; None unless all have one."""
+    """The fields of two sets of points as one; None if either is None."""
     if first is None or then is None:
         return None
     return SecondOrder(
@@ -97,9 +97,9 @@ def join_second(first: SecondOrder | None, then: SecondOrder | None) -> SecondOr
 
 
 def with_node(model: FlexibleModel, node: FlexibleNode) -> SecondOrder | None:
-    """The second-order field of the points of `model` and, as one more point, of `node`; None where it has none.
+    """The second-order field of the points of `model` and, as one more point, of `node`; None if the model has none.
 
-    A node without a field of its own does not deform.
+    A node without a field of its own does not deform, and gets zeros.
     """
     if model.second is None:
         return None

@@ -1,12 +1,12 @@
-"""Modal integrals: everything the dynamics needs of one flexible body, summed once over its inertia points.
+"""Modal integrals: the inertia of one flexible body in the equations of motion, summed once over its inertia points.
 
 Body frame throughout; eta are modal coordinates, rho(eta) = r + phi eta a point's position, w and v angular velocity
 and velocity of the body frame. Masses at points without `com_offset` have the kinetic energy
 
     T = 1/2 etadot' M_ff etadot + etadot' C(eta)' w + etadot' s1' v + 1/2 w' J(eta) w + v' (w x s(eta)) + 1/2 m v'v,
 
-which is exactly a polynomial in eta. What turns with a point (inertia tensors, offset masses) is no polynomial; it is
-kept apart, as a set of points that are summed at every evaluation.
+a polynomial in eta, without truncation. Inertia that turns with a point (tensors, offset masses) is not polynomial in
+eta: such points are listed separately and summed at every evaluation.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from flexmb.typing import Real
 class TurningPoints:
     """Inertia that turns with its point by exp(skew(theta)), theta = rotation eta; k points, m modes.
 
-    mass (k,) kg, zero where the mass is already in the polynomial integrals; position (k,3) m; com_offset (k,3) m and
-    inertia (k,3,3) kg m^2 about the mass centre, both in point axes; translation and rotation mode shapes (k,3,m);
-    second-order field (k,3,m,m), where the body has one.
+    mass (k,) kg, zero if the mass is part of the polynomial integrals; position (k,3) m; com_offset (k,3) m and inertia
+    (k,3,3) kg m^2 about the mass centre, both in point axes; translation and rotation mode shapes (k,3,m);
+    second-order field (k,3,m,m), if the body has one.
     """
 
     mass: Real
@@ -52,7 +52,7 @@ class ModalIntegrals:
     C0             (3,m)       sum m r x phi_n                C(eta)_n = C0_n + sum_k eta_k C1_kn
     C1             (m,3,m)     sum m phi_k x phi_n            (first index k, last n; antisymmetric in k, n)
     M_ff           (m,m)       sum m phi_n . phi_k
-    turning        what is left to sum at run time (see `TurningPoints`)
+    turning        points that are summed at every evaluation (see `TurningPoints`)
     spatial_mass   (m+6,m+6)   mass matrix at eta = 0 of the whole body, turning points included,
                                order [modes; angular; linear] about the body origin
     stiffness, damping (m,m)   as in the model
@@ -101,7 +101,7 @@ def modal_integrals(model: FlexibleModel) -> ModalIntegrals:
 
 
 def _turning(model: FlexibleModel, offset: NDArray[np.bool_]) -> TurningPoints:
-    """Points with an offset mass (whole) and points with an inertia tensor (the tensor only)."""
+    """Points with an offset mass, with mass and tensor, and other points with a tensor, without their mass."""
     kept = offset | np.any(model.inertia != 0.0, axis=(1, 2))
     return TurningPoints(
         mass=np.where(offset, model.mass, 0.0)[kept],

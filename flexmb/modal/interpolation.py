@@ -63,11 +63,11 @@ def line_shapes(xi: Real, h: Real) -> LineValues:
 def bending_shapes(xi: Real, h: Real, shear: bool) -> BendingValues:
     """Local functions of a bending element, columns [v0, theta0, v1, theta1, internal ...].
 
-    Without shear: the cubic Hermite functions and two internal deflections, all with theta = v': every v of degree 5.
-    With shear: besides these, deflections without rotation and one rotation without deflection; together every v of
-    degree 5 with every theta of degree 4. The statics of a uniform Timoshenko element (the interdependent
-    interpolation, Friedman and Kosmatka, Computers & Structures 47 (1993) 473) and the shear-free motions are both
-    among them, so the element is exact for end loads and does not lock.
+    Without shear: the cubic Hermite functions and two internal deflections, all with theta = v'; they span all v of
+    degree 5. With shear: in addition deflections without rotation and one rotation without deflection; together they
+    span all v of degree 5 and, independently, all theta of degree 4. This space contains the static solutions of a
+    uniform Timoshenko element (the interdependent interpolation, Friedman and Kosmatka, Computers & Structures 47
+    (1993) 473) and the motions without shear. The element is therefore exact for end loads and free of shear locking.
     """
     x2, x3, x4 = xi**2, xi**3, xi**4
     one = np.ones_like(xi)
@@ -202,7 +202,7 @@ class BendingField:
 
 
 def _spread(local: Real, columns: NDArray[np.intp], size: int) -> Real:
-    """Local values (n, k) into rows over all coordinates (n, size)."""
+    """Scatter local values (n, k) to rows over all coordinates (n, size)."""
     rows = np.zeros((len(local), size))
     np.put_along_axis(rows, columns, local, axis=1)
     return rows

@@ -1,4 +1,4 @@
-"""Raw modal bodies: inertia points and modes given inline or in an `.npz`."""
+"""Raw modal bodies, whose inertia points and modes are given in the scene or in an `.npz` file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from flexmb.typing import Real
 def raw_model(body: ModalBody, folder: Path | None = None) -> FlexibleModel:
     """The model of a raw modal body; a relative `file` is looked up in `folder`.
 
-    Raises ValueError naming the body and what is missing or has a wrong shape, OSError where the file cannot be read.
+    Raises ValueError, which names the body, for arrays that are missing or have a wrong shape, OSError if the file
+    cannot be read.
     """
     if body.file is not None and folder is not None:
         body = msgspec.structs.replace(body, file=str(folder / body.file))

@@ -1,9 +1,10 @@
 """Second-order field of a raw modal body, given by the user or derived from geometric stiffness under unit loads.
 
-A load F_j on the points does the work sum F_j . u_2j = 1/2 eta' (sum F_j . G_j) eta on the second-order field. So its
-geometric stiffness is K_g = -sum F_j . G_j. The kinetic energy needs only the integrals sum m G and sum m r x' G of the
-field. These follow from the geometric stiffness under mass forces that are uniform and that grow with the coordinates.
-Every field with these integrals gives the same kinetic energy, so the one that is affine in the position is taken.
+Loads F_j on the points do the work sum F_j . u_2j = 1/2 eta' (sum F_j . G_j) eta on the second-order field; their
+geometric stiffness is therefore K_g = -sum F_j . G_j. To the second order in eta, the kinetic energy contains only the
+integrals sum m G and sum m r x' G of the field. They follow from the geometric stiffness under mass forces that are
+uniform and under mass forces that are proportional to a coordinate. To that order all fields with these integrals are
+equivalent; the one that is affine in the position is used.
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ from flexmb.scene.bodies import ModalNode
 from flexmb.scene.modal_data import ModalArrays, node_arrays
 from flexmb.typing import Real
 
-EXTENT = 1e-9  # share of the mass' extent below which points lie in a plane or on a line
+_FLAT = 1e-9  # points lie in a plane or on a line if their extent across it is below this fraction of their size
 
 
 def second_order(arrays: ModalArrays) -> SecondOrder | None:
     """Field of the points (n,3,m,m), None without data.
 
-    Raises ValueError where gradient_stiffness has a load that acts on no mass.
+    Raises ValueError if `gradient_stiffness` is not zero for a direction in which the points have no extent.
     """
     if arrays.second_translation is not None:
         G, H = arrays.second_translation, arrays.second_rotation
@@ -49,18 +50,18 @@ def _affine(arrays: ModalArrays, Z: Real, X: Real) -> Real:
     rows = np.column_stack([np.ones(len(p)), p / size])
     moments = (rows.T * arrays.mass) @ rows
     wanted = np.concatenate([Z[:, None], X / size], axis=1)
-    parameters = np.einsum("bc,acnk->abnk", np.linalg.pinv(moments, rcond=EXTENT, hermitian=True), wanted)
+    parameters = np.einsum("bc,acnk->abnk", np.linalg.pinv(moments, rcond=_FLAT, hermitian=True), wanted)
     left = wanted - np.einsum("bc,acnk->abnk", moments, parameters)
     largest = np.max(np.abs(left[:, 1:]), axis=(2, 3))
-    if np.max(largest) > np.sqrt(EXTENT) * np.max(np.abs(wanted)):
+    if np.max(largest) > np.sqrt(_FLAT) * np.max(np.abs(wanted)):
         along, axis = ("xyz"[i] for i in np.unravel_index(np.argmax(largest), largest.shape))
         raise ValueError(
-            f'"gradient_stiffness" says that mass forces along {along} that grow with {axis} stiffen the body, but its '
-            f"points have no extent along {axis}; correct the matrices, or the points"
+            f'"gradient_stiffness" is not zero for mass forces along {along} that grow with {axis}, but the points '
+            f"have no extent along {axis}; correct the matrices, or the points"
         )
     return np.einsum("pb,abnk->pank", rows, parameters)
 
 
 def _symmetric(G: Real) -> Real:
-    """The symmetric part, the only one that acts."""
+    """The symmetric part; the other one has no effect."""
     return 0.5 * (G + np.swapaxes(G, -1, -2))

@@ -1,4 +1,4 @@
-"""Modes of a beam: eigenmodes of the wanted families, attachment modes, deterministic order and sign."""
+"""Modes of a beam: eigenmodes of the chosen families and attachment modes, in deterministic order and sign."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from flexmb.modal.eigenproblem import eigenpairs, forward, solve_definite
 from flexmb.scene.bodies import Modes
 from flexmb.typing import Real
 
-# A direction has no inertia if its share of the mass is below this many round-offs of the largest share. Its frequency
-# is infinite, so it is never among the lowest. Families whose coupling is below the same share are not coupled.
+# Relative size below which a modal mass, and the coupling of two families by the mass matrix, are taken for rounding
+# errors. A motion without mass has an infinite frequency and is never among the lowest modes.
 _ROUND_OFF = 64 * np.finfo(float).eps
 
 
@@ -27,10 +27,11 @@ class BeamModes:
 
 @dataclass(frozen=True)
 class _Coupled:
-    """Families coupled with one another: stiffness K and mass M over their free coordinates `index`.
+    """A set of families that the mass matrix couples: stiffness K and mass M over their free coordinates `index`.
 
-    `rigid` (n, r): M-orthonormal rigid motions (none for a clamped beam). `A` is K made positive definite on them,
-    `M_elastic` is M without them: (A, M_elastic) has the elastic eigenpairs of (K, M), and rigid motions have no mass.
+    `rigid` (n, r): M-orthonormal rigid motions (none for a clamped beam). `A` is K, made positive definite on the rigid
+    motions; `M_elastic` is M, deflated by them. (A, M_elastic) has the elastic eigenpairs of (K, M), and the rigid
+    motions have no mass in it.
     """
 
     index: NDArray[np.intp]
@@ -43,11 +44,11 @@ class _Coupled:
 def beam_modes(elements: BeamElements, K: Real, M: Real, modes: Modes) -> BeamModes:
     """The `modes.count` lowest eigenmodes of the chosen families, with attachment modes if `modes.static`.
 
-    Families that nothing couples are solved separately, so degenerate bending pairs come out as pure planes; modes are
-    merged by frequency, then by the order axial, torsion, bending_y, bending_z. Families that a lump couples are solved
+    Uncoupled families are solved separately, so that degenerate bending modes each lie in one plane; their modes are
+    merged by frequency, then in the order axial, torsion, bending_y, bending_z. Families that a lump couples are solved
     together; families that are not chosen are held fixed. Families without inertia have no modes. Free-free modes are
-    orthogonal to the rigid motions of the chosen families, so their frame is a mean-axis (Buckens) frame of those.
-    Raises ValueError if the finite-element model has fewer modes than asked for.
+    orthogonal to the rigid motions of the chosen families, which makes the body frame a mean-axis (Buckens) frame.
+    Raises ValueError if the finite-element model has fewer modes than requested.
     """
     found: list[tuple[float, int, Real]] = []
     parts = _parts(elements, K, M, modes.boundary == "clamped-free")
@@ -81,12 +82,12 @@ def damping_matrix(frequencies: Real, ratio: float | tuple[float, ...]) -> Real:
 
 
 def _order(mode: tuple[float, int, Real]) -> tuple[float, int]:
-    """Frequencies equal to nine digits count as equal: a degenerate pair keeps the order of its families."""
+    """Sort key: frequencies that agree to nine digits count as equal, so that their families decide the order."""
     return float(f"{mode[0]:.8e}"), mode[1]
 
 
 def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Coupled]:
-    """Groups of families that M couples (K couples none), in order; those without inertia are left out."""
+    """Sets of families that M couples (K couples none), in order, without those that have no inertia."""
     names = list(elements.fields)
     blocks = [elements.coordinates(name) for name in names]
     coupled = np.array([[_coupled(M[a, b], M[a, a], M[b, b]) for b in blocks] for a in blocks])
@@ -109,7 +110,7 @@ def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Cou
 
 
 def _groups(coupled: NDArray[np.bool_]) -> list[int]:
-    """For each family the first one that it is coupled with, directly or by way of others."""
+    """For each family the first one that it is coupled with, directly or through others."""
     label = list(range(len(coupled)))
     for a, b in np.argwhere(coupled):
         label = [min(label[a], label[b]) if its in (label[a], label[b]) else its for its in label]
@@ -117,7 +118,7 @@ def _groups(coupled: NDArray[np.bool_]) -> list[int]:
 
 
 def _coupled(M_ab: Real, M_aa: Real, M_bb: Real) -> bool:
-    """Whether two blocks of the mass matrix are coupled by more than the round-off of a lump's position."""
+    """Whether M couples two families by more than the rounding error of a lump's position."""
     return bool(np.abs(M_ab).max() > _ROUND_OFF * np.sqrt(np.abs(M_aa).max() * np.abs(M_bb).max()))
 
 
@@ -132,7 +133,11 @@ def _part(index: NDArray[np.intp], K: Real, M: Real, rigid: Real) -> _Coupled:
 
 
 def _eigenmodes(part: _Coupled, count: int) -> list[tuple[float, Real]]:
-    """Lowest eigenpairs from M phi = omega^-2 K phi: accurate for low modes, and massless coordinates do no harm."""
+    """Lowest eigenpairs from M phi = omega^-2 K phi.
+
+    The low modes are the largest eigenvalues of this form, which are the accurate ones, and coordinates without mass
+    have the eigenvalue zero in place of infinity.
+    """
     size = len(part.index)
     wanted = min(count, size)
     if wanted == 0:
@@ -145,17 +150,18 @@ def _eigenmodes(part: _Coupled, count: int) -> list[tuple[float, Real]]:
 def _with_attachment(
     elements: BeamElements, part: _Coupled, eigenmodes: list[tuple[float, Real]]
 ) -> list[tuple[float, Real]]:
-    """Eigenmodes and the deflections under unit tip forces and moments, orthonormalised by the reduced eigenproblem.
+    """The eigenmodes, and attachment modes: the deflections under unit tip forces and moments.
 
-    Free-free: the load is balanced by the inertia of the rigid motion it causes (inertia relief).
+    The attachment modes are orthonormalised by a reduced eigenproblem. For free-free beams the load is balanced by the
+    inertia of the rigid motion that it causes (inertia relief).
     """
     tip = np.array([elements.mesh.nodes[-1]])
     load = elements.motion(tip, np.eye(elements.size))[0][:, part.index].T
     load = load[:, np.any(load, axis=0)]
     static = solve_definite(part.A, load)
-    # The remainder of the static deflections is orthogonal to the eigenmodes, so only the remainder needs reducing.
+    # The static deflections are made M-orthogonal to the eigenmodes; the eigenproblem is then that of the remainders.
     known = np.column_stack([part.rigid, *(column for _, column in eigenmodes)])
-    for _ in range(2):  # twice is enough (Parlett): the second pass removes the round-off of the first
+    for _ in range(2):  # "twice is enough" (Parlett): the second pass removes the rounding errors of the first
         static = static - known @ (known.T @ part.M @ static)
     static = static / np.sqrt(np.einsum("im,ij,jm->m", static, part.A, static))
     compliance, mix = eigenpairs(static.T @ part.M_elastic @ static, static.T @ part.A @ static)
@@ -163,17 +169,17 @@ def _with_attachment(
 
 
 def _mass_normalised(compliance: Real, columns: Real, M: Real) -> list[tuple[float, Real]]:
-    """(omega, column with unit modal mass) for each compliance 1/omega^2 that is not round-off."""
+    """(omega, column with unit modal mass) for each compliance 1/omega^2 above rounding errors."""
     kept = compliance > _ROUND_OFF * max(compliance.max(), 0.0)
     columns = columns[:, kept]
     columns = columns / np.sqrt(np.einsum("im,ij,jm->m", columns, M, columns))
-    # The eigenvectors are orthogonal only to some 1000 round-offs: one step of Newton's iteration brings that to one.
+    # The eigenvectors are orthogonal only to some 1000 eps; one Newton step for (X' M X)^(-1/2) reduces that to eps.
     columns = columns @ (1.5 * np.eye(columns.shape[1]) - 0.5 * columns.T @ M @ columns)
     return [(float(1.0 / np.sqrt(c)), column) for c, column in zip(compliance[kept], columns.T, strict=True)]
 
 
 def _tip_signs(elements: BeamElements, columns: Real) -> Real:
-    """Signs (m,) that make the tip's largest displacement positive, or its largest rotation where it only turns."""
+    """Signs (m,) that make the tip's largest displacement positive, or its largest rotation if it is not displaced."""
     length = elements.mesh.nodes[-1]
     tip = elements.motion(np.array([length]), columns)[0]
     displacement, turn = tip[:3], length * tip[3:]

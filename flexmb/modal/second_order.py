@@ -1,17 +1,17 @@
-"""Second-order field of a beam: the motion of its axis and sections that grows with the squares of modal coordinates.
+"""Second-order field of a beam: the motion of axis and sections that is quadratic in the modal coordinates.
 
 The modal coordinates measure strain: curvature and twist kappa = theta' of the modes, stretch and shears Gamma =
 [e, gamma_y, gamma_z], all in axes that turn with the section, are linear in eta, so that the strain energy
-1/2 eta' K eta stays exact. The beam's kinematics R' = R kappa~, r' = R (e_x + Gamma) then give its rotation vector and
-position to second order
+1/2 eta' K eta is exact. The beam's kinematics R' = R kappa~, r' = R (e_x + Gamma) then give the rotation vector and the
+position to second order,
 
     theta_2 = 1/2 int theta x theta' dx
     u_2'    = theta_2 x e_x + 1/2 theta x (theta x e_x) + theta x Gamma
 
-with theta = psi eta of first order. With bending alone only u_2 = -1/2 int (v'^2 + w'^2) dx along the axis is left: the
-beam shortens, which is the cause of centrifugal stiffening, gravity stiffening and buckling. Bending in two planes
-together with torsion also turns the sections and moves them sideways; without that a beam would not buckle laterally.
-The integrals start at the root, which moves by the modes alone.
+with theta = psi eta of first order. For bending alone, u_2 is the foreshortening -1/2 int (v'^2 + w'^2) dx along the
+axis, which causes centrifugal stiffening, gravity stiffening and buckling. Bending in two planes together with torsion
+also turns the sections and displaces them laterally, which causes lateral buckling. The integrals start at the root,
+whose motion is of first order.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _X = np.array([1.0, 0.0, 0.0])
 def beam_second_order(elements: BeamElements, columns: Real, x: Real, offset: Real) -> SecondOrder:
     """Field (n,3,m,m) of points at `offset` (n,3) m from the axis points x (n,), in the sections of these.
 
-    `columns` (size,m) are the modes. A point off the axis turns with its section: to second order
-    theta_2 x o + 1/2 theta x (theta x o) is added to the axis' displacement.
+    `columns` (size,m) are the modes. A point off the axis turns with its section, which adds
+    theta_2 x o + 1/2 theta x (theta x o) to the displacement of the axis.
     """
     where, place = np.unique(np.concatenate([[0.0], x]), return_inverse=True)
     axis = _axis(elements, columns, where).map(lambda G: G[place[1:]])
@@ -42,9 +42,9 @@ def beam_second_order(elements: BeamElements, columns: Real, x: Real, offset: Re
 
 
 def _axis(elements: BeamElements, columns: Real, x: Real) -> SecondOrder:
-    """Field of the axis at ascending x (n,), the first of them 0: integrals added up piece by piece.
+    """Field of the axis at ascending x (n,), the first of which is 0, by cumulative sums over the pieces in between.
 
-    int_0^x theta_2 is x int theta_2' - int x theta_2'.
+    int_0^x theta_2 = x int theta_2' - int x theta_2' by parts, which needs no nested integral.
     """
     breaks = np.union1d(elements.mesh.nodes, x)
     s, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
@@ -65,7 +65,7 @@ def _integrals(elements: BeamElements, columns: Real, x: Real, weight: Real) -> 
 
 
 def _rates(elements: BeamElements, columns: Real, x: Real) -> tuple[Real, Real]:
-    """By pairs of modes (n,m,m,3): theta_2', and u_2' without theta_2 x e_x."""
+    """For pairs of modes (n,m,m,3): theta_2', and u_2' without theta_2 x e_x."""
     theta = np.swapaxes(elements.motion(x, columns)[:, 3:], 1, 2)
     strain, curvature = (np.swapaxes(each, 1, 2) for each in elements.strain(x, columns))
     turning = _symmetric(np.cross(theta[:, :, None], curvature[:, None]))
@@ -74,5 +74,5 @@ def _rates(elements: BeamElements, columns: Real, x: Real) -> tuple[Real, Real]:
 
 
 def _symmetric(product: Real) -> Real:
-    """Half the sum with the modes exchanged, (n,m,m,3)."""
+    """The part (n,m,m,3) that is symmetric in the modes."""
     return 0.5 * (product + np.swapaxes(product, 1, 2))

@@ -12,10 +12,10 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class SectionTable:
-    """Stations of a beam, sorted along x (m); before the first and beyond the last the section stays constant.
+    """Stations of a beam, sorted along x (m); the section is constant before the first and beyond the last.
 
     EA N; EIy, EIz, GJ N m^2; GAy, GAz N (None for Euler-Bernoulli); mass kg/m; rotary (rho Iy, rho Iz) kg m.
-    Two stations at the same x make a jump.
+    Two stations at the same x are a jump.
     """
 
     x: Real

@@ -1,7 +1,7 @@
-"""Where a beam's inertia sits: stations along the axis (Gauss points or element nodes) and rigid lumps.
+"""The inertia of a beam: stations along the axis (Gauss points or element nodes) and rigid lumps.
 
-The finite-element mass matrix and the inertia points handed to the dynamics are both sums over these stations, so that
-they agree to round-off.
+The finite-element mass matrix and the inertia points of the equations of motion are sums over the same stations, so
+that they agree to round-off.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Lump:
 
 
 def quadrature(mesh: ElementMesh, table: SectionTable, cuts: Sequence[float] | Real = ()) -> tuple[Real, Real]:
-    """Gauss points and weights (n,) on every piece between nodes, stations and cuts, so that kinks cost no accuracy."""
+    """Gauss points and weights (n,) on each piece between nodes, stations and cuts: kinks cost no accuracy."""
     others = np.concatenate([table.x, cuts])
     inside = others[(others > mesh.nodes[0]) & (others < mesh.nodes[-1])]
     breaks = np.unique(np.concatenate([mesh.nodes, inside]))
@@ -59,8 +59,8 @@ def inertia_stations(
 ) -> Stations:
     """The beam's own inertia: at the Gauss points ("consistent") or at the element nodes ("lumped").
 
-    Lumped: each node receives the inertia weighted by its hat function. `points = "line"` leaves the section's inertia
-    out. Stations without mass are dropped. No Gauss point's interval reaches across one of the `cuts` (m).
+    Lumped: each node receives the inertia weighted by its hat function. `points = "line"` omits the section's inertia.
+    Stations without mass are left out. The intervals of the Gauss points end at the `cuts` (m).
     """
     x, weight = quadrature(mesh, table, cuts)
     mass = weight * table.at(table.mass, x)
@@ -80,7 +80,7 @@ def inertia_stations(
 
 
 def lumps(body: BeamBody) -> tuple[Lump, ...]:
-    """The tip masses of `body`. Raises ValueError for one with inertia but no mass, or off the beam."""
+    """The tip masses of `body`. Raises ValueError for one without mass, or beyond the ends of the beam."""
     found = []
     for tip in body.tip_masses:
         inertia = np.array(tip.inertia_kg_m2, dtype=float)

@@ -1,1 +1,1 @@
-"""Coordinates and speeds: read from a state, their rates, and steps on the manifold of rotations."""
+"""Coordinates and speeds: taken from a state, their rates, and increments on the manifold of rotations."""

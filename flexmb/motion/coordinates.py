@@ -1,7 +1,6 @@
-"""Coordinates and speeds: read from the integrator's vector, their rates, and the forces of springs and motors along
-them.
+"""Coordinates and speeds: taken from the integrator's vector, their rates, and the forces of springs and motors.
 
-Both algorithms, Jain's recursion and Frisch's matrices, start here.
+The recursion and Frisch's equations share this module.
 """
 
 from flexmb.connectors.along_hinges import add_loads_along_hinges, power_along_hinges
@@ -29,7 +28,11 @@ from flexmb.tables.functions import evaluate
 
 @helper
 def load_state(t, y, c, w):
-    """Take q and u from y = [q, u, ...], functions of time at t: prescribed coordinates exact, quaternions unit."""
+    """Set w.q and w.u from y = [q, u, ...], and the functions of time at t.
+
+    Prescribed coordinates and speeds take the values of their functions, and quaternions are normalised, so that the
+    drift of an integrator in either does not enter the forces.
+    """
     nq = w.q.shape[0]
     for i in range(nq):
         w.q[i] = y[i]
@@ -51,7 +54,7 @@ def load_state(t, y, c, w):
 
 @helper
 def evaluate_functions(t, c, w):
-    """Values, rates and accelerations of all functions of time into w.function."""
+    """Write the values, rates and accelerations of all functions of time to w.function."""
     for f in range(c.function.shape[0]):
         value, rate, acceleration = evaluate(
             c.function[f].kind, c.function[f].data, c.function[f].start, c.function[f].stop, c.table, t
@@ -74,13 +77,13 @@ def normalise_quaternions(q, c):
 
 @kernel
 def project(t, y, c):
-    """Put y back on the configuration manifold: unit quaternions, prescribed coordinates and speeds exact."""
+    """Project y to the configuration manifold: unit quaternions, prescribed coordinates and speeds as given."""
     put_back(t, y, c)
 
 
 @sweep
 def put_back(t, y, c):
-    """The same within other kernels."""
+    """`project` as a part of other kernels."""
     if has(c, QUATERNIONS):
         normalise_quaternions(y, c)
     if has(c, PRESCRIBED):
@@ -89,7 +92,7 @@ def put_back(t, y, c):
 
 @helper
 def _prescribe(t, y, c):
-    """Prescribed coordinates and speeds at the values of their functions."""
+    """Set prescribed coordinates and speeds in y to the values and rates of their functions."""
     nu = c.speed.shape[0]
     nq = y.shape[0] - nu - 1
     for j in range(nu):
@@ -104,7 +107,7 @@ def _prescribe(t, y, c):
 
 @helper
 def configuration_rate(c, w, rate):
-    """qdot(q, u) into `rate`; quaternions are taken raw, so that their norm is an invariant of the flow."""
+    """Write qdot(q, u) to `rate`; quaternions are not normalised, so that their norm is an invariant of the flow."""
     for k in range(c.body.shape[0]):
         catalogue.rate(c, c.body[k].hinge_kind, w.raw, c.body[k].q_index, w.u, c.body[k].u_index, rate)
         if has(c, MODES):
@@ -117,7 +120,7 @@ def configuration_rate(c, w, rate):
 
 @helper
 def store_slope(c, w, power, dy):
-    """dy/dt of y = [q, u, work]: the rates of q and u, and the power that `work` collects."""
+    """dy/dt of y = [q, u, work]: the rates of q and u, and the power, whose integral is `work`."""
     configuration_rate(c, w, dy)
     nq, nu = w.q.shape[0], w.u.shape[0]
     for j in range(nu):
@@ -127,12 +130,12 @@ def store_slope(c, w, power, dy):
 
 @helper
 def hinge_forces(c, w):
-    """Springs, dampers, friction and motors of scalar coordinates, and of spherical hinges, into w.speed.applied."""
+    """Write the forces of springs, dampers, friction and motors of hinges and wheels to w.speed.applied."""
     if not (
         has(c, DAMPERS) or has(c, SPRINGS) or has(c, MOTORS) or has(c, BALL_SPRINGS)
         or has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS)
     ):  # fmt: skip
-        return  # they are zero from the start
+        return  # the workspace was made with zeros
     for j in range(w.u.shape[0]):
         force = 0.0
         if has(c, DAMPERS):
@@ -154,7 +157,7 @@ def hinge_forces(c, w):
 
 @helper
 def _ball_springs(c, w):
-    """Take the torques of isotropic springs of spherical hinges off w.speed.applied."""
+    """Subtract the torques of the isotropic springs of spherical hinges from w.speed.applied."""
     for k in range(c.body.shape[0]):
         if some(c.body[k].ball_spring != 0.0):
             i = c.body[k].q_index
@@ -165,7 +168,7 @@ def _ball_springs(c, w):
 
 @helper
 def speed_power(c, w):
-    """Power of all dampers, motors, drives and friction along the speeds (W)."""
+    """Power in W of all dampers, motors, drives and friction along the speeds."""
     total = 0.0
     for j in range(w.u.shape[0]):
         rate = w.u[j]

@@ -1,4 +1,4 @@
-"""Coordinates moved by finite increments of the speeds' motion, q o exp(increment): for methods on Lie groups."""
+"""Retraction: coordinates after a finite motion at constant speeds, q o exp(increment), for Lie-group integrators."""
 
 from flexmb.hinges import catalogue
 from flexmb.jit.features import has
@@ -8,17 +8,17 @@ from flexmb.tables.features import QUATERNIONS
 
 @kernel
 def move(y, increment, result, c):
-    """Coordinates of result = those of y moved for a unit of time at the constant speeds `increment` (nu,).
+    """Write the coordinates of y after a unit of time at the constant speeds `increment` (nu,) to result.
 
-    Quaternions turn about carried axes by their exact exponential; the origin of a free hinge, whose velocity is held
-    in turning axes, follows its screw motion.
+    Quaternions are multiplied by the exact exponential of the rotation vector in outboard axes. The translation of a
+    free hinge, whose velocity is constant in turning axes, follows the screw motion.
     """
     move_by(y, increment, result, c)
 
 
 @sweep
 def move_by(y, increment, result, c):
-    """The same within other kernels."""
+    """`move` as a part of other kernels."""
     for k in range(c.body.shape[0]):
         i, j = c.body[k].q_index, c.body[k].u_index
         if not has(c, QUATERNIONS) or c.body[k].quaternion < 0:

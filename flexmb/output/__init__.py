@@ -1,1 +1,1 @@
-"""Output: folders and files that are written, and text that is shown."""
+"""Output: writing files and folders safely, and printing text."""

@@ -1,4 +1,4 @@
-"""Tables for the terminal whose names and figures are never cut; see `flexmb.output.terminal` for where they appear."""
+"""Tables for the terminal in which names and numbers are never truncated (`flexmb.output.terminal` prints them)."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from rich.text import Text
 
 from flexmb.output.printable import printable
 
-GAP = 2  # columns between two columns
-LEAST_PROSE = 16  # columns that prose is given before a row is written below its name instead
-INDENT = 2
-ABOUT = "dim italic"  # style of a caption
+_GAP = 2  # spaces between two columns
+_PROSE_MIN_WIDTH = 16  # narrower columns of prose are not printed: rows are then printed as blocks
+_INDENT = 2  # of the cells of a row that is printed as a block
+_CAPTION_STYLE = "dim italic"
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column: `whole` cells stay in one line, others are folded between words; `right` is where figures stand."""
+    """A column. Cells of a `whole` column stay in one line, others are wrapped; `right` aligns them to the right."""
 
     heading: str
     whole: bool
@@ -29,25 +29,26 @@ class Column:
 
 
 def names(*headings: str) -> tuple[Column, ...]:
-    """Columns of names, by which a reader or a program finds a row: whole."""
+    """Columns of names, by which a reader or a program finds a row; never wrapped."""
     return tuple(Column(heading, whole=True) for heading in headings)
 
 
 def figures(*headings: str) -> tuple[Column, ...]:
-    """Columns of numbers, with their units perhaps: whole, at the right."""
+    """Columns of numbers, possibly with units; never wrapped, aligned to the right."""
     return tuple(Column(heading, whole=True, right=True) for heading in headings)
 
 
 def prose(*headings: str) -> tuple[Column, ...]:
-    """Columns of sentences and of lists, which are folded where there is no room."""
+    """Columns of sentences and lists, which are wrapped to the available width."""
     return tuple(Column(heading, whole=False) for heading in headings)
 
 
 class Listing:
-    """A table under a title and above a caption: anything that rich prints.
+    """A table with a title above and a caption below, which rich can print.
 
-    Columns of prose share the width that names and figures leave them. Where that is too little, every row is its first
-    cell in a line of its own, and the other cells below it, each after its heading. Without headings, no head.
+    Columns of prose share the width that names and figures leave. If that is too little, each row is printed as its
+    first cell in a line of its own, and the other cells below it, each after its heading. If all headings are empty,
+    no head is printed.
     """
 
     def __init__(self, *columns: Column, title: str = "", caption: str = "") -> None:
@@ -56,7 +57,7 @@ class Listing:
         self._rows: list[tuple[Text, ...]] = []
 
     def add(self, *cells: str | Text) -> None:
-        """A row; text is shown literally, and as one line."""
+        """Add a row; text is shown literally and as one line. ValueError unless there is a cell for each column."""
         if len(cells) != len(self._columns):
             raise ValueError(f"a row of {len(cells)} cells in a table of {len(self._columns)} columns")
         self._rows.append(tuple(_one_line(cell) for cell in cells))
@@ -70,23 +71,23 @@ class Listing:
         else:
             yield from self._beside_each_other(widths, "-" if options.ascii_only else "─")
         for line in _folded(Text(self._caption), options.max_width) if self._caption else ():
-            yield _unbroken(line, ABOUT)
+            yield _unbroken(line, _CAPTION_STYLE)
 
     def _widths(self, room: int) -> list[int] | None:
-        """Of each column, in a table that is at most `room` wide; None where it cannot be."""
+        """Widths of the columns in a table that is at most `room` wide; None if it cannot be so narrow."""
         headings = tuple(Text(column.heading) for column in self._columns)
         columns = list(zip(headings, *self._rows, strict=True))
         full = [max(cell.cell_len for cell in cells) for cells in columns]
         least = [
-            width if column.whole else max(min(width, LEAST_PROSE), *map(_longest_word, cells))
+            width if column.whole else max(min(width, _PROSE_MIN_WIDTH), *map(_longest_word, cells))
             for column, width, cells in zip(self._columns, full, columns, strict=True)
         ]
-        left = room - GAP * (len(full) - 1) - sum(least)
+        left = room - _GAP * (len(full) - 1) - sum(least)
         if left < 0:
             return None
         widths = least.copy()
         for place, i in enumerate(sorted(range(len(full)), key=lambda i: full[i] - least[i])):
-            more = min(full[i] - least[i], left // (len(full) - place))  # who wants little gets it, the others share
+            more = min(full[i] - least[i], left // (len(full) - place))  # in ascending order of need, equal shares
             widths[i] += more
             left -= more
         return widths
@@ -95,7 +96,7 @@ class Listing:
         headings = tuple(Text(column.heading, "bold") for column in self._columns)
         if any(heading.plain for heading in headings):
             yield from self._row(headings, widths)
-            yield _unbroken(Text((" " * GAP).join(rule * width for width in widths)), "dim")
+            yield _unbroken(Text((" " * _GAP).join(rule * width for width in widths)), "dim")
         for row in self._rows:
             yield from self._row(row, widths)
 
@@ -108,7 +109,7 @@ class Listing:
             line = Text()
             for part, column, width in zip(parts, self._columns, widths, strict=True):
                 blank = " " * (width - part.cell_len)
-                line.append_text(Text(blank) + part if column.right else part + Text(blank)).append(" " * GAP)
+                line.append_text(Text(blank) + part if column.right else part + Text(blank)).append(" " * _GAP)
             yield _unbroken(line)
 
     def _below_each_other(self, room: int) -> Iterator[Text]:
@@ -116,8 +117,8 @@ class Listing:
             yield _unbroken(first, "bold")
             for column, cell in zip(self._columns[1:], others, strict=True):
                 told = Text(f"{column.heading}: " if column.heading else "").append_text(cell)
-                for line in _folded(told, room - INDENT) if cell.plain else ():
-                    yield _unbroken(Text(" " * INDENT).append_text(line))
+                for line in _folded(told, room - _INDENT) if cell.plain else ():
+                    yield _unbroken(Text(" " * _INDENT).append_text(line))
 
 
 def _one_line(cell: str | Text) -> Text:
@@ -126,14 +127,14 @@ def _one_line(cell: str | Text) -> Text:
 
 
 def _unbroken(text: Text, style: str = "") -> Text:
-    """A line that is printed as it is, however narrow the terminal."""
+    """A line that is printed unchanged at any width of the terminal."""
     line = Text(style=style, no_wrap=True, overflow="ignore").append_text(text)
     line.rstrip()
     return line
 
 
 def _folded(text: Text, width: int) -> list[Text]:
-    """Lines of at most `width`, but where a single word is longer: words are not broken."""
+    """The text as lines of at most `width`, except where a single word is longer: words are not broken."""
     breaks, used = [], 0
     for word in re.finditer(r"\S+\s*", text.plain):
         if used and used + cell_len(word.group().rstrip()) > width:

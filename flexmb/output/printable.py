@@ -1,12 +1,12 @@
-"""Text from files and from other people's code on its way to a terminal, a report or a chart."""
+"""Text from files and other code made safe for a terminal, a report or a chart."""
 
 from __future__ import annotations
 
 
 def printable(text: str) -> str:
-    """`text` with whatever does not print (escape sequences, changes of direction, lone surrogates) written out.
+    """`text` with unprintable characters (escape sequences, changes of direction, lone surrogates) as escapes.
 
-    Line breaks stay.
+    Line breaks are kept.
     """
     if text.isprintable():
         return text
@@ -15,6 +15,6 @@ def printable(text: str) -> str:
 
 
 def chart_text(text: str) -> str:
-    """`text` as matplotlib shows it: dollars are no formula, and a legend leaves out nothing."""
+    """`text` escaped for matplotlib, which reads dollars as formulas and hides legend entries that begin with "_"."""
     shown = printable(text).replace("$", r"\$")
     return f" {shown}" if shown.startswith("_") else shown

@@ -1,8 +1,8 @@
-"""Readers of what a command prints that go away early, as `head -1` does.
+"""Commands whose output is a pipe that its reader closes early, such as `head -1`.
 
-A command goes on to its end then, and its exit code is the one that it would have with all of its output read: it
-computes, judges and writes files, and stopping in the midst of that because of a closed pipe would lose them. Python
-raises an error instead, at the first write that nobody reads or when it flushes at exit.
+The command runs to its end and has the same exit code as if all of its output were read: it computes, judges and
+writes files, which a closed pipe must not interrupt. Python's default is an error at the next write, or when it
+flushes at exit.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class _Pipe(io.FileIO):
-    """A pipe of which the other end may be closed: from then on it takes everything and passes nothing on."""
+    """A pipe whose other end may be closed: from then on everything written is discarded."""
 
     def write(self, content: Buffer, /) -> int:
         try:
@@ -31,16 +31,16 @@ class _Pipe(io.FileIO):
 
 
 def outlive_readers() -> None:
-    """Let this process go on where the reader of its stdout or its stderr has closed the pipe."""
+    """Let this process continue when the reader of its stdout or stderr closes the pipe."""
     sys.stdout, sys.stderr = _outliving(sys.stdout), _outliving(sys.stderr)
 
 
 def _outliving(stream: TextIO) -> TextIO:
-    """The stream, or where it is a pipe or a socket one in its place that outlives its reader."""
+    """The stream itself, or a stream that survives its reader if it is a pipe or a socket."""
     try:
         number = stream.fileno()
         mode = os.fstat(number).st_mode
-    except (AttributeError, OSError, ValueError):  # there is none, it is closed, or it is no file
+    except (AttributeError, OSError, ValueError):  # there is no stream, it is closed, or it is not a file
         return stream
     if not (stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)):
         return stream

@@ -1,4 +1,4 @@
-"""What both command lines print on."""
+"""The console of both command lines."""
 
 from __future__ import annotations
 
@@ -6,29 +6,29 @@ from typing import Any
 
 from rich.console import Console, ConsoleDimensions
 
-ENDLESS = 1_000_000  # columns: no line of ours is as long
+_UNLIMITED = 1_000_000  # columns, more than any line has
 
 
 class Terminal(Console):
-    """A console that cuts nothing, and where nobody watches folds nothing either.
+    """A console that never truncates text, and wraps it only on a terminal.
 
-    What goes into a pipe or a file is read by programs: a line stays a line there, whatever COLUMNS says. On a terminal
-    tables fold sentences to its width; a line that is longer goes on in the terminal's next.
+    Output to a pipe or a file is read by programs: there every line stays one line, whatever COLUMNS says. On a
+    terminal tables wrap sentences to its width; other long lines continue in the next line of the terminal.
     """
 
     def __init__(self, *, stderr: bool = False) -> None:
-        super().__init__(stderr=stderr, markup=False, emoji=False)  # names and paths stand in what it prints
+        super().__init__(stderr=stderr, markup=False, emoji=False)  # names and paths may contain [ ] and : :
 
     @property
     def size(self) -> ConsoleDimensions:
-        """Of the screen, or without an end to its lines where there is none."""
+        """The size of the terminal; lines of unlimited width if the output is not a terminal."""
         found = super().size
-        return found if self.file.isatty() else ConsoleDimensions(ENDLESS, found.height)
+        return found if self.file.isatty() else ConsoleDimensions(_UNLIMITED, found.height)
 
     @size.setter
     def size(self, new: tuple[int, int]) -> None:
         self._width, self._height = new
 
     def print(self, *objects: Any, soft_wrap: bool | None = True, **others: Any) -> None:
-        """As of rich, which by default would break words that are longer than the terminal is wide."""
+        """rich's `print` with soft wrapping as default; rich's own breaks words longer than the terminal's width."""
         super().print(*objects, soft_wrap=soft_wrap, **others)

@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 
 def version_of(distribution: str) -> str:
-    """The version; "source" of a source tree that is on the path but not installed."""
+    """The version; "source" for a source tree that is on the path but not installed."""
     try:
         return version(distribution)
     except PackageNotFoundError:

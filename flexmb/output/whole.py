@@ -1,6 +1,6 @@
-"""Files that appear whole or not at all: each is written beside its place and put there at the end.
+"""Atomic writing of files: each is written under a temporary name beside its place and renamed at the end.
 
-A process that is killed, and a disk that is full, leave what was there before. So does an error while writing.
+If the process is killed, the disk is full or writing fails, the previous file remains.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PART = ".part-"  # how the names of unfinished files begin
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # the disk, what a user may have of it, what a file may be
+PART = ".part-"  # prefix of temporary names
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # disk full, quota exceeded, file too large
 REMEDY = "it was not written; free some space, or write elsewhere"
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A path beside `path`, of the same ending, to be written by the caller; at the end it takes the place of `path`.
+    """A path beside `path`, with the same suffix, for the caller to write; at the end it is renamed to `path`.
 
-    A link is followed; what is no file, such as a pipe or `/dev/stdout`, is written to as it is. A file that is there
-    keeps its permissions. OSError names `path`, whatever failed.
+    Links are followed. Anything but a regular file, such as a pipe or `/dev/stdout`, is written directly. An existing
+    file keeps its permissions. An OSError names `path`, whatever failed.
     """
     place = path.resolve() if path.is_symlink() else path
     beside = place.with_name(f"{PART}{secrets.token_hex(6)}{place.suffix}")
@@ -43,21 +43,21 @@ def whole_file(path: Path) -> Iterator[Path]:
         finally:
             beside.unlink(missing_ok=True)
     except OSError as error:
-        if error.filename not in (None, str(beside), str(path)):  # another file's, which this one waits for
+        if error.filename not in (None, str(beside), str(path)):  # the caller's error, about another file
             raise
         why = error.strerror or str(error)
-        remedy = f": {REMEDY}" if error.errno in FULL and REMEDY not in why else ""
+        remedy = f": {REMEDY}" if error.errno in _NO_SPACE and REMEDY not in why else ""
         raise OSError(error.errno, why + remedy, str(path)) from None
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Put a text (UTF-8, line ends as they are) or bytes into a file, whole or not at all."""
+    """Write a text (UTF-8, line ends unchanged) or bytes to a file atomically."""
     with whole_file(path) as beside:
         beside.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
 
 
 def save_figure(figure: Figure, path: Path, **settings: Any) -> Path:
-    """Write a picture, as PNG where `path` has no ending; returns where it is. `settings` are those of `savefig`."""
+    """Write a picture, as PNG if `path` has no suffix; returns its path. `settings` are those of `savefig`."""
     path = path if path.suffix else path.with_name(f"{path.name}.png")
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as beside:
@@ -66,16 +66,16 @@ def save_figure(figure: Figure, path: Path, **settings: Any) -> Path:
 
 
 def take_away(path: Path) -> None:
-    """Remove what an earlier command has left, before a new one begins: were it killed, the old would pass for its own.
+    """Remove the result of an earlier command before a new one begins: if that is killed, no old result remains.
 
-    What is no file, such as `/dev/stdout`, stays.
+    Anything but a regular file, such as `/dev/stdout`, is left alone.
     """
     if path.is_file() and not _is_stream(path):
         path.unlink()
 
 
 def clear_parts(folder: Path) -> None:
-    """Remove what processes that were killed while they wrote have left in a folder; nobody may write there now."""
+    """Remove the temporary files of killed processes from a folder, to which no process may be writing."""
     for part in folder.glob(f"{PART}*"):
         part.unlink(missing_ok=True)
 
@@ -87,18 +87,18 @@ def _is_stream(path: Path) -> bool:
 
 
 def _mode(place: Path) -> int | None:
-    """Permissions of the file that is there, None where there is none; OSError where it must stay as it is."""
+    """Permissions of an existing file, None if there is none; OSError for a folder or a file that is read-only."""
     if place.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     if not place.exists():
         return None
-    if not os.access(place, os.W_OK):  # to take its place would be to ignore that
+    if not os.access(place, os.W_OK):  # renaming would replace it all the same
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     return stat.S_IMODE(place.stat().st_mode)
 
 
 def _settle(file: Path, mode: int | None) -> None:
-    """Have the content on the disk before the name: after a loss of power there would be an empty file."""
+    """Flush the content to the disk before renaming: otherwise a power failure could leave an empty file."""
     with file.open("rb") as stream:
         os.fsync(stream.fileno())
     if mode is not None:

@@ -1,9 +1,9 @@
-"""General kernels, compiled before anybody needs them: when flexmb is installed.
+"""Compilation of the general kernels when flexmb is installed.
 
-scenes.py  small scenes that between them reach every kernel
-uses.py    what is asked of them
-make.py    several processes that ask it, into a folder: `python -m flexmb.ready.make FOLDER`
+scenes.py  small scenes that together reach every kernel
+uses.py    calls on these scenes that together compile every kernel
+make.py    runs the uses in several processes: `python -m flexmb.ready.make FOLDER`
 
-Kernels of what a user's scene contains are faster by some tenths and take seconds to compile; a general kernel takes
-every scene, so one set serves all. flexmb/jit/cache.py finds them beside what users compile themselves.
+A general kernel runs every scene, so that one set of them serves all users. Special kernels, for the features of one
+scene, are faster by a tenth to a third and take seconds to compile. flexmb/jit/cache.py finds both.
 """

@@ -1,7 +1,7 @@
 """Compile all general kernels: `python -m flexmb.ready.make FOLDER [--processor x86-64-v3]`.
 
-Several processes share out the uses of `flexmb.ready.uses`. What is already in the folder of the installation is not
-compiled again; what no use asks for any more is deleted from it. The build hook runs this where flexmb is installed.
+Several processes divide the uses of `flexmb.ready.uses` among themselves. Kernels that are already in the folder are
+not compiled again; kernels that no use needs any more are deleted. The build hook runs this at installation.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from flexmb.jit.once import compiled_once
 from flexmb.output.whole import whole_file
 
 KERNELS = "*.kernel"
-UNUSED = 0  # the time of files that no use has asked for; those that are read get another, whatever the clock says
+UNUSED = 0  # modification time that marks unused files; reading a kernel sets another one
 
 
 def make(folder: Path, processes: int, processor: str = "") -> list[Path]:
-    """The kernels in the folder, after all uses: for this processor, or another one by LLVM's name.
+    """The kernels in the folder after all uses, for this processor or another one by LLVM's name.
 
-    RuntimeError where a use failed, when all others are through and what they compiled is in the folder.
+    RuntimeError if a use has failed, raised after all others have finished and their kernels are in the folder.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with compiled_once(folder / MADE_BY):  # of two installations at once, the second finds what the first has made
+    with compiled_once(folder / MADE_BY):  # of two simultaneous installations, the second waits and finds the kernels
         return _made(folder, processes, processor)
 
 
@@ -63,7 +63,7 @@ def _made(folder: Path, processes: int, processor: str) -> list[Path]:
 
 @contextmanager
 def _environment(made: Path, processor: str) -> Iterator[None]:
-    """Of processes that are started meanwhile: numba reads it when it is imported."""
+    """Set the environment of the processes that are started within; numba reads it when it is imported."""
     before = dict(os.environ)
     os.environ |= {"FLEXMB_KERNELS": "general", "NUMBA_CACHE_DIR": str(made), "OPENBLAS_NUM_THREADS": "1"}
     if processor:
@@ -76,15 +76,15 @@ def _environment(made: Path, processor: str) -> Iterator[None]:
 
 
 def _uses() -> dict[str, object]:
-    from flexmb.ready.uses import uses  # it imports all mechanics, with the environment of who makes kernels
+    from flexmb.ready.uses import uses  # it imports numba, which must happen in the environment of the workers
 
     return dict(uses())
 
 
 def _use(name: str) -> tuple[str, float, str]:
-    """In a process of its own: the name, how long it took (s), and what went wrong."""
+    """Run one use, in a worker process; returns its name, the time (s), and the traceback of a failure or ""."""
     start = perf_counter()
-    logging.getLogger("flexmb.jit").setLevel(logging.ERROR)  # everything is compiled here, and who waits knows it
+    logging.getLogger("flexmb.jit").setLevel(logging.ERROR)  # no messages that kernels are being compiled
     try:
         _uses()[name]()
     except Exception:
@@ -93,7 +93,7 @@ def _use(name: str) -> tuple[str, float, str]:
 
 
 def _at_a_time() -> int:
-    """Processes: one for each core, and for each 2 GiB of memory, of which a compiler comes to need most."""
+    """Number of processes: one for each core, but with 2 GiB of memory each, which compiling may need."""
     cores = os.cpu_count() or 1
     if not hasattr(os, "sysconf"):
         return cores
@@ -105,7 +105,7 @@ def main(words: Sequence[str] | None = None) -> None:
     """The command line."""
     parser = argparse.ArgumentParser(prog="python -m flexmb.ready.make", description=__doc__)
     parser.add_argument("folder", type=Path, help="flexmb/ready/kernels of the installation")
-    parser.add_argument("--processor", default="", help="LLVM's name of another one than this")
+    parser.add_argument("--processor", default="", help="LLVM's name of another processor")
     parser.add_argument("--processes", type=int, default=_at_a_time())
     asked = parser.parse_args(words)
     start = perf_counter()

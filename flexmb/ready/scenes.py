@@ -1,4 +1,4 @@
-"""Small scenes that between them reach every kernel; what they contain matters little, as kernels hold it all."""
+"""Small scenes that together reach every kernel. General kernels contain all features, whatever the scene contains."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ def pendulum() -> SceneBuilder:
 
 
 def panelled(modes: int, level: Level) -> SceneBuilder:
-    """The same with a beam, whose modes are condensed where they are many."""
+    """The pendulum with a beam, whose modes are condensed if they are many."""
     builder = pendulum().beam("panel", length=1.0, elements=8, modes=modes, level=level, section=SECTION)
     return builder.weld("root", "bob", "panel").marker("tip", "panel", node="tip")
 
 
 def spinner() -> SceneBuilder:
-    """What can spin steadily: no gravity, and springs on nothing that turns."""
+    """A scene that has steady spins: without gravity, and without a spring on the spinning hinge."""
     builder = _bob(0.0).revolute("pivot", "ground", "bob")
     builder.beam("panel", length=1.0, elements=4, modes=2, level="full", section=SECTION)
     return builder.weld("root", "bob", "panel").marker("tip", "panel", node="tip")
 
 
 def looped() -> SceneBuilder:
-    """A parallelogram: crank and rocker on the ground, and a coupler whose far end is closed."""
+    """A parallelogram: crank and rocker on the ground, and a coupler, closed at its far end."""
     builder = _bob(-9.81).revolute("pivot", "ground", "bob", angle=1.0)
     for name in ("coupler", "rocker"):
         builder.rigid_body(name, mass=1.0, com=(0.5, 0.0, 0.0), inertia=(1e-2, 1e-1, 1e-1))
@@ -40,13 +40,13 @@ def looped() -> SceneBuilder:
 
 
 def looped_at_rest_shape() -> SceneBuilder:
-    """The same with a beam whose inertia is that of its rest shape: its closures are solved for in another way."""
+    """The parallelogram with a ruthless beam, whose closures are solved in another way."""
     builder = looped().beam("panel", length=1.0, elements=8, modes=2, level="ruthless", section=SECTION)
     return builder.weld("root", "bob", "panel").marker("tip", "panel", node="tip")
 
 
 def with_events(builder: SceneBuilder, coordinate: str) -> s.Scene:
-    """The scene with events that watch a rate, time and a signal: a coordinate strikes, then is latched."""
+    """The scene with events that watch a rate, time and a signal, with an impact and a latch of a coordinate."""
     builder.sense_marker("place", "centre", "position")
     builder.event("strikes", f"{coordinate}.rate", -1e-3, s.Impact(coordinate=coordinate, restitution=0.5))
     builder.event("is held", "time", 5e-4, s.Latch(coordinate=coordinate))
@@ -55,7 +55,7 @@ def with_events(builder: SceneBuilder, coordinate: str) -> s.Scene:
 
 
 def with_feedback(builder: SceneBuilder, **sampling: float) -> s.Scene:
-    """The scene with a controller on its marker's height; continuous, or sampled with `period` and `delay` (s)."""
+    """The scene with a controller of its marker's height, continuous, or sampled with `period` and `delay` (s)."""
     builder.sense_marker("place", "centre", "position")
     builder.pid("servo", "place[1]", kp=1.0, ki=1.0, **sampling)
     signal = s.ControlSignal(source="servo")
@@ -63,7 +63,7 @@ def with_feedback(builder: SceneBuilder, **sampling: float) -> s.Scene:
 
 
 def slewed() -> s.Scene:
-    """A body that flies freely, turned by the law that flexmb brings along."""
+    """A free-flying body with the attitude law of flexmb."""
     builder = _bob(0.0).free("flight", "ground", "bob")
     builder.sense_marker("orientation", "centre", "orientation")
     builder.sense_marker("gyro", "centre", "angular_velocity", frame="marker")

@@ -1,6 +1,7 @@
-"""What is asked of the scenes, one function for each kind of use: together they compile every general kernel.
+"""Calls on the scenes, one function for each kind of use, which together compile every general kernel.
 
-A use is whole and small, so that several processes can share them out. What two of them need, one compiles.
+A use is small and independent of the others, so that several processes can divide them among themselves. A kernel that
+two uses need is compiled by one of them.
 """
 
 from __future__ import annotations
@@ -26,8 +27,7 @@ from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS, ON_CHAINS, RUNNING, WITH_JACOBIAN
-from flexmb.system.batch import compile_batch
-from flexmb.system.compile import compile
+from flexmb.system.compile import compile, compile_batch
 
 Use = Callable[[], object]
 BODIES: tuple[tuple[int, Level, Elimination], ...] = (
@@ -39,7 +39,7 @@ BATCHED: tuple[Method, ...] = ("rk4", "dop853")
 
 
 def uses() -> Iterator[tuple[str, Use]]:
-    """By name, those that take longest to compile first; neighbours need few kernels together, so that none waits."""
+    """The uses by name, those that take longest first. Neighbours share few kernels, for which one would wait."""
     yield "linear models", _linear_models
     yield "laws that a scene may name", _laws
     yield "batches", _batches

@@ -14,19 +14,18 @@ import numpy as np
 
 from flexmb.output.whole import whole_file
 from flexmb.run.channels import channels_of, unit
+from flexmb.run.run_arrays import RunArrays
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-    from flexmb.run.trajectory import Trajectory
-
 AXES = {3: ("axis", ("x", "y", "z")), 4: ("component", ("w", "x", "y", "z"))}
 """Dimension and its labels of the last axis of vectors and quaternions."""
 
 
-def write_npz(trajectory: Trajectory, path: Path) -> None:
+def write_npz(trajectory: RunArrays, path: Path) -> None:
     """`names` (n,), `units` (n,), `values` (T,n), `scene`: text and numbers only, nothing that has to be unpickled."""
     names, units, values = zip(*trajectory.columns(), strict=True)
     path = path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz")  # as NumPy names it
@@ -36,7 +35,7 @@ def write_npz(trajectory: Trajectory, path: Path) -> None:
         )
 
 
-def data_frame(trajectory: Trajectory) -> pandas.DataFrame:
+def data_frame(trajectory: RunArrays) -> pandas.DataFrame:
     """One column a channel, time as the index; `attrs` has the units by name, and the scene."""
     try:
         import pandas
@@ -50,7 +49,7 @@ def data_frame(trajectory: Trajectory) -> pandas.DataFrame:
     return frame
 
 
-def write_parquet(trajectory: Trajectory, path: Path) -> None:
+def write_parquet(trajectory: RunArrays, path: Path) -> None:
     """One column a channel, its unit in the metadata of its field; the scene in those of the file."""
     try:
         import pyarrow
@@ -65,7 +64,7 @@ def write_parquet(trajectory: Trajectory, path: Path) -> None:
         parquet.write_table(table, beside)
 
 
-def dataset(trajectory: Trajectory) -> xarray.Dataset:
+def dataset(trajectory: RunArrays) -> xarray.Dataset:
     """A variable a channel, (t), (t, axis) or, of quaternions, (t, component); units in `attrs`, as usual there."""
     try:
         import xarray
@@ -85,7 +84,7 @@ def dataset(trajectory: Trajectory) -> xarray.Dataset:
     return xarray.Dataset(found, coords={"t": time, **coordinates}, attrs={"scene": trajectory.scene})
 
 
-def write_recording(trajectory: Trajectory, path: Path) -> None:
+def write_recording(trajectory: RunArrays, path: Path) -> None:
     """A recording for the viewer rerun: markers as moving frames with their paths, all other channels as curves."""
     try:
         import rerun
@@ -99,7 +98,7 @@ def write_recording(trajectory: Trajectory, path: Path) -> None:
         recording.disconnect()
 
 
-def _record(rerun: Any, recording: Any, trajectory: Trajectory) -> None:
+def _record(rerun: Any, recording: Any, trajectory: RunArrays) -> None:
     """Log markers, their paths and all other channels."""
     time = [rerun.TimeColumn("t", duration=trajectory.t)]
     recording.log("markers", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
@@ -138,7 +137,7 @@ def _blueprint(blueprint: Any) -> Any:
     return blueprint.Blueprint(blueprint.Horizontal(blueprint.Spatial3DView(origin="/", name="markers"), curves))
 
 
-def _channels(trajectory: Trajectory) -> Iterator[tuple[str, str, Real]]:
+def _channels(trajectory: RunArrays) -> Iterator[tuple[str, str, Real]]:
     """(name, unit, values (T,k)) of channels, with coordinates and speeds."""
     for names, values in ((trajectory.q_names, trajectory.q), (trajectory.u_names, trajectory.u)):
         for i, (name, units) in enumerate(names):

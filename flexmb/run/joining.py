@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+from flexmb.run.run_arrays import MarkerPath, RunArrays
 from flexmb.typing import Real
 
-if TYPE_CHECKING:
-    from flexmb.run.trajectory import MarkerPath, Trajectory
+Run = TypeVar("Run", bound=RunArrays)
 
 SAME_NAMES = (
     "q_names", "u_names", "markers", "loads", "wheel_loads", "energy", "connectors", "hinge_forces",
 )  # fmt: skip
 
 
-def joined(first: Trajectory, later: Trajectory) -> Trajectory:
+def joined(first: Run, later: Run) -> Run:
     """See `Trajectory.then`; the later run may have no output where the first one ended."""
     for key in SAME_NAMES:
         strange = set(getattr(first, key)) ^ set(getattr(later, key))
@@ -51,7 +51,7 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
     return _ended(whole, later)
 
 
-def _ended(whole: Trajectory, later: Trajectory) -> Trajectory:
+def _ended(whole: Run, later: Run) -> Run:
     return replace(
         whole, status=later.status, message=later.message, stopped_at=later.stopped_at,
         restart=later.restart, events=whole.events + later.events,
@@ -71,7 +71,7 @@ def _path(a: MarkerPath, b: MarkerPath, kept: int) -> MarkerPath:
     return type(b)(*(np.concatenate([getattr(a, f.name)[:kept], getattr(b, f.name)]) for f in fields(b)))
 
 
-def _of_some(first: Trajectory, later: Trajectory, kept: int, key: str) -> dict[str, Real]:
+def _of_some(first: RunArrays, later: RunArrays, kept: int, key: str) -> dict[str, Real]:
     """Drives, signals, powers: one of the runs alone may have a name, or another number of columns under it.
 
     What is not driven takes no load and no power, and is zero then; a signal that there is not is NaN.

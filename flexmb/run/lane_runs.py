@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from copy import copy as fresh_copy
 from functools import partial
 from typing import NamedTuple
 
@@ -152,7 +153,7 @@ class Controlled:
     """Of a system with controllers, which begin anew in each run."""
 
     def __init__(self, system: System, method: Integrator) -> None:
-        self._own, self._method = system._anew(), method
+        self._own, self._method = fresh_copy(system), method
         self._solve = Integration(self._own, algorithms.chosen("articulated"), self._own.route(), method)
 
     def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:

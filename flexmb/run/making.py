@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexmb.integrate.settings import FINEST_RTOL, Settings
 from flexmb.run.channels import channels_of, distance
+from flexmb.run.run_arrays import RunArrays
 from flexmb.system.tree_system import System
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.run.trajectory import Trajectory
 
 TIGHTER = 100.0  # of rtol and atol: the error of the second run is a hundredth of the first one's
 HALF = 4.0 / 3.0  # error over its change where the step is halved, of a method of order two; less of higher orders
@@ -27,10 +24,10 @@ class Making:
     system: System
     times: Real
     settings: Settings
-    again: Callable[[Settings], Trajectory]
+    again: Callable[[Settings], RunArrays]
 
 
-def error_estimate(trajectory: Trajectory, made_by: Making) -> dict[str, Real]:
+def error_estimate(trajectory: RunArrays, made_by: Making) -> dict[str, Real]:
     """Distance (T,) of every channel from that of a second run, a hundred times as tight or in half the step.
 
     NaN after the end of a second run that stops earlier. ValueError where the settings cannot be tighter.

@@ -32,9 +32,9 @@ class Observed(Protocol):
     """A system, or a closed loop around one, as outputs are asked of it."""
 
     @property
-    def _observation(self) -> Observation: ...
+    def observation(self) -> Observation: ...
 
-    def _observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None: ...
+    def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None: ...
 
 
 def batch(observed: Observed, motion: tuple[Any, ...], observing: Any, n: int) -> Sampler:
@@ -44,7 +44,7 @@ def batch(observed: Observed, motion: tuple[Any, ...], observing: Any, n: int) -
     motion: a right-hand side with its constants and workspace; `observing` is a kernel of these and of the outputs.
     """
     rhs, constants, workspace = motion
-    out, slope = observed._observation.outputs(), np.empty(n)
+    out, slope = observed.observation.outputs(), np.empty(n)
     entry = settled(observe_samples, INDEX, INDEX, VECTOR, MATRIX, VECTOR, MATRIX)
     moving = addresses(rhs, STATUS, REAL, VECTOR, VECTOR, constants, workspace)
     found, *_, outputs = addresses(observing, NOTHING, constants, workspace, out)
@@ -58,7 +58,7 @@ def observe(system: Observed, algorithm: Algorithm, times: Real, states: Real, s
 
     `sampled` does many at once; what it leaves is evaluated as a single state is, with its errors and warnings.
     """
-    rows, done, many = np.zeros((len(states), system._observation.width)), 0, 1
+    rows, done, many = np.zeros((len(states), system.observation.width)), 0, 1
     try:
         while done < len(states):
             if sampled is not None:
@@ -67,7 +67,7 @@ def observe(system: Observed, algorithm: Algorithm, times: Real, states: Real, s
                 many = 2 * many if perf_counter() - start < PATIENCE / 2.0 else max(1, many // 2)
                 if done == some.stop:
                     continue
-            system._observe_row(float(times[done]), states[done], algorithm, rows[done])
+            system.observe_row(float(times[done]), states[done], algorithm, rows[done])
             done += 1
     except (DynamicsError, KeyboardInterrupt) as trouble:
         return Rows(rows[:done], trouble)

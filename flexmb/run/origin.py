@@ -59,10 +59,10 @@ def origin(system: System, t: float, state: Given, method: str) -> Beginning:
     if isinstance(state, Restart):
         return _taken_up(system, state, method)
     if state is None:
-        found = system.initial_state if t == 0.0 else system._admissible(t, system._scene_state(t), "scene")
+        found = system.initial_state if t == 0.0 else system.admissible(system.scene_state(t), "scene")
     elif isinstance(state, State):
         system.layout.entering(state)
-        found = system._admissible(t, pack(state), "state")
+        found = system.admissible(system.layout.known(t, pack(state)), "state")
     elif isinstance(state, Mapping):
         found = _named(system, t, state)
     else:
@@ -92,11 +92,11 @@ def _count_rows(system: System, t: float, motion: Real) -> None:
     try:
         system.initial_state  # noqa: B018 - counts them
     except ClosureError:
-        system._begin_at(t, motion)
+        system.closures.begin_at(t, motion)
 
 
 def _named(system: System, t: float, values: Values) -> State:
-    places, y = names_of_places(system), system._scene_state(t)
+    places, y = names_of_places(system), system.scene_state(t).y
     given = np.zeros(len(y), bool)
     for name, value in values.items():
         if name not in places:
@@ -112,7 +112,7 @@ def _named(system: System, t: float, values: Values) -> State:
             raise ValueError(f"{called} is {value}, and another name gives the same coordinates other values")
         y[place], given[place] = numbers, True
     _, whole = system.layout.whole(t, y)
-    found = system._admissible(t, whole, given)
+    found = system.admissible(system.layout.known(t, whole), given)
     _refuse_other_than_prescribed(system, whole, found, given)
     return found
 

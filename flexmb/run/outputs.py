@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from time import perf_counter
 
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED
 from flexmb.run.observing import observe
 from flexmb.run.propagate import Integration, Raw
-from flexmb.run.trajectory import Statistics, Trajectory, gathered
-from flexmb.scene.problems import SceneWarning
+from flexmb.run.run_arrays import Statistics
+from flexmb.run.trajectory import Trajectory, gathered
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, NotFiniteError
@@ -18,10 +17,7 @@ from flexmb.typing import Real
 
 
 def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve: Integration) -> Trajectory:
-    """Evaluate everything observable at the samples reached, of a run by `solve`.
-
-    Warns (`SceneWarning`) where steps were too long for a singular position that the run came near.
-    """
+    """Evaluate everything observable at the samples reached, of a run by `solve`."""
     start = perf_counter()
     rows, trouble = observe(solve.feedback or system, algorithm, times, raw.states, solve.batch)
     status, stopped_at, message = raw.status, raw.t, ending(system, raw)
@@ -30,10 +26,9 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve:
         message = f"stopped at t = {stopped_at:g} s" + (
             f", while outputs were evaluated: {status.advice}" if status is Status.INTERRUPTED else f": {trouble}"
         )
-    doubt = _doubt(system, solve)
+    doubt = doubt_about(system, solve)
     if status is Status.OK and doubt is not None:
         message = f"{message}; {doubt}"
-        warnings.warn(f'scene "{system.scene.name}": {doubt}', SceneWarning, stacklevel=3)
     states = raw.states[: len(rows)]
     signals, power = ({}, {}) if solve.feedback is None else solve.feedback.course(times, states)
     q_names, u_names = system.state_names
@@ -47,7 +42,7 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve:
         u=states[:, system.nq : system.nq + system.nu],
         q_names=q_names,
         u_names=u_names,
-        **gathered(system._observation, rows),
+        **gathered(system.observation, rows),
         work=states[:, -1],
         signals=signals,
         power=power,
@@ -72,8 +67,8 @@ def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:
     return Status.NONFINITE if isinstance(trouble, NotFiniteError) else Status.NOT_POSITIVE_DEFINITE
 
 
-def _doubt(system: System, solve: Integration) -> str | None:
-    """Of a run that ended well all the same."""
+def doubt_about(system: System, solve: Integration) -> str | None:
+    """Where steps were too long for a singular position that a run came near, if it ended well all the same."""
     if solve.noticed is None:
         return None
     t, fault = solve.noticed

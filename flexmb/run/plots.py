@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,19 +12,17 @@ from matplotlib.figure import Figure
 
 from flexmb.output.printable import chart_text
 from flexmb.output.whole import save_figure
+from flexmb.run.run_arrays import RunArrays
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.run.trajectory import Trajectory
 
 _SIZE = (9.0, 5.5)  # inches
 _RESOLUTION = 120  # dots per inch
 _MOST = 10  # curves of a panel: matplotlib has ten colours, and more names do not fit beside them
 
 
-def write_plots(trajectory: Trajectory, folder: Path) -> list[Path]:
+def write_plots(trajectory: RunArrays, folder: Path) -> list[Path]:
     """Write markers, energy, momentum, loads and drives, as far as the run has them; returns the paths."""
-    wanted: dict[str, tuple[Callable[[Trajectory, Figure], None], bool]] = {
+    wanted: dict[str, tuple[Callable[[RunArrays, Figure], None], bool]] = {
         "markers": (_markers, bool(trajectory.markers)),
         "energy": (_energy, True),
         "momentum": (_momentum, True),
@@ -34,7 +32,7 @@ def write_plots(trajectory: Trajectory, folder: Path) -> list[Path]:
     return [_write(trajectory, folder / f"{name}.png", draw) for name, (draw, present) in wanted.items() if present]
 
 
-def _write(trajectory: Trajectory, path: Path, draw: Callable[[Trajectory, Figure], None]) -> Path:
+def _write(trajectory: RunArrays, path: Path, draw: Callable[[RunArrays, Figure], None]) -> Path:
     figure = Figure(figsize=_SIZE, layout="constrained")
     draw(trajectory, figure)
     stopped = "" if trajectory.finished else f": {trajectory.message.split(':')[0]}"
@@ -66,13 +64,13 @@ def _draw(panel: Axes, t: Real, curves: dict[str, Real], size: Callable[[Real], 
         panel.set_title(f"the {_MOST} largest of {len(curves)}", fontsize="small")
 
 
-def _markers(trajectory: Trajectory, figure: Figure) -> None:
+def _markers(trajectory: RunArrays, figure: Figure) -> None:
     for axis, panel in enumerate(_rows(figure, "x (m)", "y (m)", "z (m)")):
         curves = {name: path.position[:, axis] for name, path in trajectory.markers.items()}
         _draw(panel, trajectory.t, curves, np.ptp)  # how far each moves, wherever it is
 
 
-def _energy(trajectory: Trajectory, figure: Figure) -> None:
+def _energy(trajectory: RunArrays, figure: Figure) -> None:
     above, below = _rows(figure, "energy (J)", "drift (J)")
     for kind, energy in trajectory.energy.items():
         if np.any(energy):
@@ -83,13 +81,13 @@ def _energy(trajectory: Trajectory, figure: Figure) -> None:
     below.plot(trajectory.t, trajectory.energy_drift, label="total - start - work")
 
 
-def _momentum(trajectory: Trajectory, figure: Figure) -> None:
+def _momentum(trajectory: RunArrays, figure: Figure) -> None:
     for part, panel in enumerate(_rows(figure, "angular (N m s)", "linear (N s)")):
         for axis in range(3):
             panel.plot(trajectory.t, trajectory.momentum[:, 3 * part + axis], label="xyz"[axis])
 
 
-def _loads(trajectory: Trajectory, figure: Figure) -> None:
+def _loads(trajectory: RunArrays, figure: Figure) -> None:
     """Magnitudes: components of many hinges in one chart are not legible; the CSV has them."""
     loads = trajectory.loads | trajectory.wheel_loads
     for part, panel in enumerate(_rows(figure, "|torque| (N m)", "|force| (N)")):
@@ -97,7 +95,7 @@ def _loads(trajectory: Trajectory, figure: Figure) -> None:
         _draw(panel, trajectory.t, curves, np.max)
 
 
-def _drives(trajectory: Trajectory, figure: Figure) -> None:
+def _drives(trajectory: RunArrays, figure: Figure) -> None:
     (panel,) = _rows(figure, "drive load (N or N m)")
     curves = {
         name if drive.shape[1] == 1 else f"{name}[{i}]": drive[:, i]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from copy import copy
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,7 +13,7 @@ import numpy as np
 from flexmb.entry import articulated
 from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.memory import Memory
+from flexmb.integrate.memory import Memory, memory
 from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, problem, stiff_problem
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import CROSSED, Watch
@@ -21,7 +22,7 @@ from flexmb.motion import coordinates
 from flexmb.run.interruption import interruptible
 from flexmb.run.observing import Sampler, batch
 from flexmb.run.origin import Beginning
-from flexmb.run.switching import segment_ends
+from flexmb.run.switching import clock_of
 from flexmb.run.taking_up import refuse_other_division
 from flexmb.scene.tree import watches_signals
 from flexmb.system import algorithms
@@ -166,28 +167,36 @@ def integration(
         found.forget()
     except IndexError:
         if system.scene.controllers:  # they write into functions of time: of a system that nobody else has
-            system = system._anew()
+            system = copy(system)
             route = system.route(algorithm, stabilise)
         found = Integration(system, algorithms.chosen(algorithm), route, integrator)
     yield found
     spare.append(found)
 
 
+def unmoved(begin: Beginning, status: Status = Status.OK, fault: int = 0) -> Raw:
+    """A run that has only begun, as if an integration had ended there."""
+    nothing = np.empty((0, len(begin.y)))
+    return Raw(
+        nothing, status, fault, begin.state.t, [0] * COUNTS, 0.0, 0.0, interrupted=False, y=begin.y,
+        memory=memory(len(begin.y), 0),
+    )  # fmt: skip
+
+
 def integrate(
     solve: Integration, begin: Beginning, times: Real, settings: Settings, watch: Watch | None = None,
-    breaks: bool = False, beyond: float = 0.0, goes_on: bool = False,
+    breaks: bool = False, goes_on: bool = False,
 ) -> Raw:  # fmt: skip
     """Run over the whole time, after what has to be compiled for it.
 
     breaks: something is due at its end, where even a method of equal steps has to end one, and every method a leap.
-    beyond (s): how much further it may go, to leap over where it ends. goes_on: it is a piece of a run, at whose end
-    sampled controllers do not act yet.
+    goes_on: it is a part of a run, at whose end sampled controllers do not act yet.
     """
     system, method = solve.system, settings.integrator
     accuracy = settings.accuracy(system.nq, system.nu)
-    ends = segment_ends(system, begin.state.t, times[-1] + beyond, method.fixed, breaks)
     counts = np.zeros(COUNTS, np.int64)
-    y, clock, accuracy = solve.begin(begin, Clock(times, ends), accuracy, counts)
+    clock = clock_of(system, begin.state.t, times, method.fixed, breaks)
+    y, clock, accuracy = solve.begin(begin, clock, accuracy, counts)
     memory: Memory | None = method.memory(len(y)) if begin.memory is None else begin.memory
     if begin.memory is not None and method.fixed:
         refuse_other_division(begin.memory, clock.times, float(clock.segment_ends[0]), accuracy.step)

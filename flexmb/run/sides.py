@@ -9,7 +9,6 @@ import numpy as np
 
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import UNKNOWN, Watch, watch
-from flexmb.run.origin import Beginning
 from flexmb.run.propagate import Integration, Raw
 from flexmb.run.situation import Situation
 from flexmb.scene.schema import SceneEvent
@@ -22,13 +21,10 @@ class Sides:
     """`side` and `came` as in `Watch`, by the name of an event."""
 
     def __init__(
-        self, situation: Situation, settings: Settings, integration: Callable[[], AbstractContextManager[Integration]],
-        elsewhere: Callable[[Raw, Real], Beginning],
-    ) -> None:  # fmt: skip
-        """elsewhere: where a piece ended, with another motion y = [q, u, work] there."""
+        self, situation: Situation, settings: Settings, integration: Callable[[], AbstractContextManager[Integration]]
+    ) -> None:
         self.side, self.came = dict[str, int](), dict[str, int]()
-        self._situation, self._settings = situation, settings
-        self._integration, self._elsewhere = integration, elsewhere
+        self._situation, self._settings, self._integration = situation, settings, integration
 
     def start(self, watched: Sequence[SceneEvent], y: Real) -> None:
         """Where a run starts."""
@@ -70,7 +66,7 @@ class Sides:
         rate = self._situation.rate_of(event.watch)
         if not self.is_signal(event):
             return float(y[self._situation.places[event.watch]] - event.level), 0.0 if rate is None else float(y[rate])
-        begin = self._elsewhere(raw, y)
+        begin = self._situation.going_on(self._situation.with_motion(raw, y))
         with self._integration() as solve:
             assert solve.feedback is not None
             place = solve.feedback.place_of(event.watch)
@@ -158,5 +154,5 @@ class Sides:
             return {}
         with self._integration() as solve:
             assert solve.feedback is not None
-            signals = solve.feedback.signals(self._elsewhere(raw, y))
+            signals = solve.feedback.signals(self._situation.going_on(self._situation.with_motion(raw, y)))
             return {event.name: float(signals[solve.feedback.place_of(event.watch)] - event.level) for event in events}

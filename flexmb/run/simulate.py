@@ -11,26 +11,24 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 
 from flexmb.integrate.catalogue import INTEGRATORS
-from flexmb.integrate.control import COUNTS
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
-from flexmb.run.eventful import EventfulRun
+from flexmb.run.driver import Driver
 from flexmb.run.interruption import Interrupted
 from flexmb.run.making import Making
-from flexmb.run.origin import Beginning, Values, origin, start_time
+from flexmb.run.origin import Values, origin, start_time
 from flexmb.run.outputs import observed
-from flexmb.run.propagate import Raw, integrate, integration
+from flexmb.run.propagate import integration, unmoved
 from flexmb.run.restart import Restart
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_times
 from flexmb.run.trajectory import Trajectory
-from flexmb.run.within_leaps import ends_within
 from flexmb.scene.check import check_and_warn
+from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
-from flexmb.system.mechanics import Precision
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import PrecisionWarning, State
@@ -107,33 +105,23 @@ def simulate(
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
+    begin = origin(system, t, state, method)
+    start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)
+    if start is not None and start.status != Status.OK:
+        raw = unmoved(begin, Status(start.status), start.fault)
+        with integration(system, algorithm, stabilise, chosen.integrator) as solve:
+            return observed(system, times, raw, algorithm, solve)
     same: dict[str, Any] = {"t_start": t, "state": state, "algorithm": algorithm, "stabilise": stabilise}
-    made_by = Making(system, times, chosen, partial(_again, system, t_end, samples=times, **same))
-    with integration(system, algorithm, stabilise, chosen.integrator) as solve:
-        begin = origin(system, t, state, method)
-        start = system.start_precision if state is None and t == 0.0 else system._precision_if_doubtful(begin.state)
-        if start is not None and start.status != Status.OK:
-            return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve)
-        if not system.scene.events:
-            again = begin._replace(y=begin.y.copy())
-            raw = integrate(solve, begin, times, chosen)
-            trajectory = observed(system, times, raw, algorithm, solve)
-    if not system.scene.events:
-        beyond = ends_within(system, raw, times[-1])
-        if beyond:
-            with integration(system, algorithm, stabilise, chosen.integrator) as solve:
-                raw = integrate(solve, again, times, chosen, beyond=beyond)
-                trajectory = observed(system, times, raw, algorithm, solve)
-        trajectory = replace(trajectory, made_by=made_by)
-    else:
-        run = EventfulRun(system, times, chosen, algorithm, stabilise, begin.events)
-        trajectory, raw = run(begin)
-    restart = run.restart if system.scene.events else _restart(system, raw, method)
-    trajectory = replace(trajectory, restart=restart)
+    again = partial(_again, system, t_end, samples=times, **same)
+    made_by = None if system.scene.events else Making(system, times, chosen, again)
+    driver = Driver(system, times, chosen, algorithm, stabilise, begin.events, made_by)
+    trajectory = driver(begin)
+    for doubt in driver.doubts:
+        warnings.warn(doubt, SceneWarning, stacklevel=2)
     if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
-    if raw.interrupted or trajectory.status is Status.INTERRUPTED:
+    if driver.was_interrupted or trajectory.status is Status.INTERRUPTED:
         raise Interrupted(trajectory)
     return trajectory
 
@@ -183,19 +171,3 @@ def _end(t_end: float) -> float:
         return arguments.number("t_end", t_end)
     except ValueError:  # not finite
         return float(t_end) if isinstance(t_end, float) else np.inf
-
-
-def _not_begun(begin: Beginning, start: Precision, settings: Settings) -> Raw:
-    """The result of a run whose first state has no accelerations."""
-    nothing, memory = np.empty((0, len(begin.y))), settings.integrator.memory(len(begin.y))
-    return Raw(
-        nothing, Status(start.status), start.fault, begin.state.t, [0] * COUNTS, 0.0, 0.0, interrupted=False,
-        y=begin.y, memory=memory,
-    )  # fmt: skip
-
-
-def _restart(system: System, raw: Raw, method: Method) -> Restart | None:
-    """Of a run that did not fail, nor leap over its end."""
-    if raw.memory is not None and raw.status in (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED):
-        return Restart(method, system.scene, raw.t, raw.memory, raw.controllers)
-    return None

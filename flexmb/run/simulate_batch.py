@@ -18,7 +18,8 @@ from flexmb.run.samples import OUTPUT_BYTES, sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
 from flexmb.run.switching import refuse_times
 from flexmb.scene.schema import Scene
-from flexmb.system.batch import Batch, compile_batch, number_of_threads
+from flexmb.system.batch import Batch, number_of_threads
+from flexmb.system.compile import compile_batch
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.typing import Real

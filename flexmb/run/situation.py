@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import assert_never
 
 import numpy as np
 from msgspec.structs import replace
 
 from flexmb.integrate.settings import Settings
+from flexmb.run.event_record import EventRecord
 from flexmb.run.impulses import struck
+from flexmb.run.origin import Beginning
+from flexmb.run.propagate import Raw
 from flexmb.run.resting import off_stop, on_stop
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release
 from flexmb.scene.functions import Constant
@@ -28,26 +30,6 @@ Accelerations = Callable[[float, Real], Real]
 """(nu,) at a time (s) and y = [q, u, work]."""
 
 
-@dataclass(frozen=True)
-class EventRecord:
-    """An event that happened at t (s).
-
-    impulses: by coordinate, what its hinge or wheel exerted along it (N s or N m s), of held ones too; energy_change
-    (J), which the work of the trajectory counts; before, after: the states. closures: by closure, what it exerted,
-    (6,) [N m s; N s] on body_b about frame B, World axes. NaN what redundant closures leave open. early (s):
-    by how much it happened before its instant, not zero only where that is at a singular position of a closed chain.
-    """
-
-    name: str
-    t: float
-    impulses: dict[str, float]
-    energy_change: float
-    before: State
-    after: State
-    closures: dict[str, Real] = field(default_factory=dict)
-    early: float = 0.0
-
-
 class Situation:
     """The scene as events have left it, with its system; systems that come back are not built again."""
 
@@ -56,11 +38,37 @@ class Situation:
         self.system = system
         self._settings = settings
         self.given = given or system.scene
-        self._paths = scalar_paths(system.scene)
         self._built = [system]
-        q, u = system.state_names
-        self.places = {name: i for i, (name, _) in enumerate((*q, *u))}
+
+    @cached_property
+    def _paths(self) -> dict[str, str]:
+        """Of scalar coordinates in the scene, by name; events change none of them."""
+        return scalar_paths(self.given)
+
+    @cached_property
+    def places(self) -> dict[str, int]:
         """Of coordinates and speeds in [q, u, work], by name."""
+        q, u = self.system.state_names
+        return {name: i for i, (name, _) in enumerate((*q, *u))}
+
+    @property
+    def speeds(self) -> slice:
+        """Places of all speeds in [q, u, work]."""
+        return slice(self.system.nq, self.system.nq + self.system.nu)
+
+    def apart(self, y: Real) -> tuple[Real, Real]:
+        """[q, u, work], and the states of controllers, which events do not touch."""
+        motion = self.speeds.stop
+        return np.r_[y[:motion], y[-1]], y[motion:-1]
+
+    def with_motion(self, raw: Raw, motion: Real) -> Raw:
+        """What an integration left, with another motion [q, u, work]."""
+        return raw._replace(y=np.concatenate([motion[:-1], self.apart(raw.y)[1], motion[-1:]]))
+
+    def going_on(self, raw: Raw) -> Beginning:
+        """From where an integration ended; controllers know what they knew."""
+        state = self.system.layout.known(raw.t, np.r_[self.apart(raw.y)[0][:-1], 0.0])
+        return Beginning(state, raw.y, None, raw.controllers)
 
     def happen(self, event: SceneEvent, t: float, y: Real, accelerations: Accelerations) -> list[EventRecord]:
         """Do what an event says at time t to y = [q, u, work], in place; and have come to rest what does."""
@@ -197,7 +205,7 @@ class Situation:
             from flexmb.system.closed import ClosedSystem  # a tree needs none of it
 
             assert isinstance(self.system, ClosedSystem) and isinstance(before, ClosedSystem)
-            self.system._begin_at(t, y, before)
+            self.system.closures.begin_at(t, y, before.closures)
 
     def _state(self, t: float, y: Real) -> State:
         return self.system.state(y[: self.system.nq].copy(), y[self.system.nq : -1].copy(), t)

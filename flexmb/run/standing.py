@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.run.situation import Accelerations, EventRecord, Situation
+from flexmb.run.event_record import EventRecord
+from flexmb.run.situation import Accelerations, Situation
 from flexmb.scene.events import Impact
 from flexmb.scene.schema import SceneEvent
 from flexmb.typing import Real

@@ -7,6 +7,7 @@ from typing import NamedTuple, assert_never
 
 import numpy as np
 
+from flexmb.integrate.problem import Clock
 from flexmb.scene.check import check_run
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
@@ -91,6 +92,17 @@ def segment_ends(system: System, t_start: float, t_end: float, equal_steps: bool
     if watches_signals(system.scene):
         ends = sorted({*ends, *found.turns(t_start, t_end)})
     return np.array([*ends, t_end, *[t_end] * is_switch])
+
+
+def clock_of(system: System, t_start: float, times: Real, equal_steps: bool, breaks: bool) -> Clock:
+    """The clock of a run from t_start (s) with these output times (T,) s; breaks: see `segment_ends`.
+
+    A leap over a singular position near the end of the run may go on beyond it, up to where a function switches.
+    """
+    found, t_end = timing_of(system), times[-1]
+    ends = segment_ends(system, t_start, t_end, equal_steps, breaks)
+    switches = [time for time in found.switches if time >= t_end]
+    return Clock(times, ends, -inf if breaks else float(min([*switches, found.end])))
 
 
 def refuse_times(system: System, t_start: float, t_end: float) -> None:

@@ -4,29 +4,25 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flexmb.output.whole import whole_file
 from flexmb.run import exports
 from flexmb.run.joining import joined
 from flexmb.run.making import Making, error_estimate
-from flexmb.run.restart import Restart
-from flexmb.run.situation import EventRecord
-from flexmb.run.trajectory_form import refuse_torn, refuse_torn_path
-from flexmb.scene.angles import Angles, angles_of
+from flexmb.run.run_arrays import MarkerPath, RunArrays, refuse_torn
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes
-from flexmb.system.observables import ENERGIES, Observation, undetermined_loads
+from flexmb.system.observables import ENERGIES, Observation
 from flexmb.system.section_loads import SectionBalance, SectionLoads
 from flexmb.tables.state import State
-from flexmb.tables.status import Status
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
@@ -35,47 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class MarkerPath:
-    """Motion of a marker in World axes.
-
-    position (T,3) m; quaternion (T,4) scalar first, marker to World components, without jumps of sign; velocity and
-    acceleration (T,6) [angular; linear], the linear one being the classical acceleration of the marker point.
-    """
-
-    position: Real
-    quaternion: Real
-    velocity: Real
-    acceleration: Real
-
-    def angles(self, sequence: str = "zyx") -> Angles:
-        """Angles (T,3) rad of a gimbal's `sequence` of axes, without whole turns of jumps; (T,) where singular.
-
-        See `flexmb.scene.angles.angles_of`.
-        """
-        refuse_torn_path("path", self)
-        found = angles_of(self.quaternion, sequence)
-        return Angles(np.unwrap(found.values, axis=0), found.singular)
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """The cost of a run: seconds of compiling (or of reading compiled kernels), of integrating, of evaluating outputs.
-
-    `factorisations` counts those of a matrix of the size of the state, or of its exponential.
-    """
-
-    evaluations: int
-    accepted_steps: int
-    rejected_steps: int
-    jacobians: int
-    factorisations: int
-    compile_s: float
-    run_s: float
-    output_s: float
-
-
-@dataclass(frozen=True)
-class Trajectory:
+class Trajectory(RunArrays):
     """One run, at the T output times that were reached.
 
     t (T,) s; q (T,nq) and u (T,nu), in the order of `q_names`, `u_names`, which are (name, unit); markers by name;
@@ -90,49 +46,13 @@ class Trajectory:
     determine, of redundant closures, are NaN: see `undetermined`.
     """
 
-    scene: str
-    status: Status
-    message: str
-    stopped_at: float
-    t: Real
-    q: Real
-    u: Real
-    q_names: tuple[tuple[str, str], ...]
-    u_names: tuple[tuple[str, str], ...]
-    markers: dict[str, MarkerPath]
-    loads: dict[str, Real]
-    wheel_loads: dict[str, Real]
-    drives: dict[str, Real]
-    energy: dict[str, Real]
-    momentum: Real
-    work: Real
-    statistics: Statistics
-    connectors: dict[str, Real] = field(default_factory=dict)
-    hinge_forces: dict[str, Real] = field(default_factory=dict)
-    restart: Restart | None = None
-    signals: dict[str, Real] = field(default_factory=dict)
-    power: dict[str, Real] = field(default_factory=dict)
-    events: tuple[EventRecord, ...] = ()
     made_by: Making | None = field(default=None, repr=False, compare=False)
     """The system and the settings of the run; None where it was put together otherwise."""
-
-    def __post_init__(self) -> None:
-        """TypeError or ValueError for parts that do not belong together; asked once more by what works with them."""
-        refuse_torn(self)
 
     def __repr__(self) -> str:
         """What a prompt shows: how the run ended and what there is, not thousands of numbers."""
         size = f"{len(self.t)} times, {len(self.q_names)} coordinates, {len(self.markers)} markers"
         return f"<Trajectory of {self.scene!r}: {self.message}; {size}>"
-
-    @property
-    def undetermined(self) -> dict[str, NDArray[np.bool_]]:
-        """What the motion does not determine, where closures suppress what others suppress already (docs/notation.md).
-
-        By name of a hinge or closure, which components (6,) of `loads` are NaN, at one output time or more; by
-        "<name>.drive" which (n,) of `drives`. Empty where all loads are determined.
-        """
-        return undetermined_loads(self.loads, self.drives)
 
     def error_estimate(self) -> dict[str, Real]:
         """Error (T,) of every channel, in its unit (orientations: rad), by a second, tighter run from start to end.
@@ -149,17 +69,11 @@ class Trajectory:
         NaN what the motion does not determine in these axes. See `System.hinge_loads`.
         """
         system, found = self._making("a hinge's frame").system, {name: load.copy() for name, load in self.loads.items()}
-        for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
-            loads = {name: load[i] for name, load in self.loads.items()}
-            at = system._loads_in(*system.layout.whole(float(t), y), loads, axes, about)
+        for i, state in enumerate(map(State, self.q, self.u, self.t.tolist())):
+            at = system.referred_loads(state, {name: load[i] for name, load in self.loads.items()}, axes, about)
             for name, load in at.items():
                 found[name][i] = load
         return found
-
-    @property
-    def _states(self) -> Real:
-        """(T,nq+nu+1) [q, u, 0]."""
-        return np.column_stack([self.q, self.u, np.zeros(len(self.t))])
 
     def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
         """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).
@@ -171,8 +85,8 @@ class Trajectory:
         refuse_feedback(system.scene, "a section's load")
         balance = SectionBalance(system, body, x)
         loads = np.zeros((len(self.t), len(balance.x), 6))
-        for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
-            loads[i] = balance.at(*system.layout.whole(float(t), y))
+        for i, state in enumerate(map(State, self.q, self.u, self.t.tolist())):
+            loads[i] = balance.at(system.all_loads(state))
         return balance.loads(loads)
 
     def _making(self, wanted: str) -> Making:
@@ -187,10 +101,6 @@ class Trajectory:
                 f"this trajectory is not one run as simulate made it, and {wanted} needs that: ask each run for itself"
             )
         return made_by
-
-    @property
-    def finished(self) -> bool:
-        return self.status is Status.OK
 
     @property
     def last_state(self) -> State:
@@ -224,63 +134,6 @@ class Trajectory:
                 f"the runs cannot be joined: one ended at {self.stopped_at:g} s, the other began at {later.t[0]:g} s"
             )
         return joined(self, later)
-
-    @property
-    def total_energy(self) -> Real:
-        """Sum of all kinds of energy (T,) J."""
-        refuse_torn(self)
-        return np.sum(list(self.energy.values()), axis=0)
-
-    @property
-    def energy_drift(self) -> Real:
-        """Energy gained beyond the work done (T,) J: zero but for the error of the integration."""
-        return self.total_energy - self.total_energy[0] - (self.work - self.work[0])
-
-    @property
-    def energy_scale(self) -> float:
-        """The scale of a drift of energy (J): the largest change of work or of any kind of energy."""
-        refuse_torn(self)
-        changes = [float(np.ptp(each)) for each in (self.work, *self.energy.values())]
-        return max(*changes, float(np.max(self.energy["kinetic"])))
-
-    @property
-    def momentum_drift(self) -> Real:
-        """Change of momentum since the start (T,6): zero only for scenes without external forces."""
-        refuse_torn(self)
-        return self.momentum - self.momentum[0]
-
-    def columns(self) -> Iterator[tuple[str, str, Real]]:
-        """(name, unit, values (T,)) of every scalar channel, time first."""
-        refuse_torn(self)
-        yield "t", "s", self.t
-        for i, (name, unit) in enumerate(self.q_names):
-            yield name, unit, self.q[:, i]
-        for i, (name, unit) in enumerate(self.u_names):
-            yield name, unit, self.u[:, i]
-        for name, path in self.markers.items():
-            yield from _vector(f"{name}.position", "m", path.position)
-            for i, axis in enumerate("wxyz"):
-                yield f"{name}.quaternion.{axis}", "1", path.quaternion[:, i]
-            yield from _spatial(name, ("angular_velocity", "velocity"), ("rad/s", "m/s"), path.velocity)
-            yield from _spatial(name, ("angular_acceleration", "acceleration"), ("rad/s^2", "m/s^2"), path.acceleration)
-        for name, load in (self.loads | self.wheel_loads | self.connectors).items():
-            yield from _spatial(name, ("torque", "force"), ("N m", "N"), load)
-        for name, drive in self.drives.items():
-            for i in range(drive.shape[1]):
-                yield f"{name}.drive[{i}]", "N or N m", drive[:, i]
-        for name, force in self.hinge_forces.items():
-            yield f"{name}.hinge_force", "N or N m", force[:, 0]
-        for kind, energy in self.energy.items():
-            yield f"energy.{kind}", "J", energy
-        yield "energy.total", "J", self.total_energy
-        yield "work", "J", self.work
-        yield from _spatial("momentum", ("angular", "linear"), ("N m s", "N s"), self.momentum)
-        for name, signals in self.signals.items():
-            for i in range(signals.shape[1]):
-                yield f"signal.{name}[{i}]", "", signals[:, i]
-        for name, power in self.power.items():
-            for i in range(power.shape[1]):
-                yield f"power.{name}[{i}]", "W", power[:, i]
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write all channels, one row a time, under a header "name [unit]"; 17 digits: they read back exactly."""
@@ -364,13 +217,3 @@ def _continuous_quaternions(rotations: Real) -> Real:
     return quaternions * np.cumprod(np.r_[1.0, np.where(turns, -1.0, 1.0)])[:, None]
 
 
-def _vector(name: str, unit: str, values: Real) -> Iterator[tuple[str, str, Real]]:
-    for i, axis in enumerate("xyz"):
-        yield f"{name}.{axis}", unit, values[:, i]
-
-
-def _spatial(
-    name: str, parts: tuple[str, str], units: tuple[str, str], values: Real
-) -> Iterator[tuple[str, str, Real]]:
-    yield from _vector(f"{name}.{parts[0]}", units[0], values[:, :3])
-    yield from _vector(f"{name}.{parts[1]}", units[1], values[:, 3:])

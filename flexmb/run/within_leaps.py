@@ -14,7 +14,7 @@ import numpy as np
 
 from flexmb.integrate.watch import Watch
 from flexmb.run.propagate import Raw
-from flexmb.run.switching import timing_of
+from flexmb.run.situation import Situation
 from flexmb.system.tree_system import System
 from flexmb.tables.status import Status
 from flexmb.typing import Real
@@ -22,42 +22,47 @@ from flexmb.typing import Real
 AT_SINGULAR_POSITIONS = (Status.CLOSURE_SINGULAR, Status.BRANCH_UNKNOWN, Status.CLOSURE_OPEN)
 
 Further = Callable[[Raw, float], Raw]
-"""On from where a piece ended to a time (s), whatever comes to its level meanwhile."""
+"""On from where a segment ended to a time (s), whatever comes to its level meanwhile."""
 
 
-def goes_on(raw: Raw, span: float, further: Further, speeds: slice) -> bool:
-    """Whether a run can be taken up where a piece ended, for `span` (s), as it moves and the other way.
-
-    speeds: their places in y.
-    """
-    back = raw.y.copy()
-    back[speeds] *= -1.0
-    return all(
-        further(raw._replace(y=y), raw.t + span).status not in AT_SINGULAR_POSITIONS for y in (raw.y, back)
-    )  # fmt: skip
-
-
-def placed(raw: Raw, levels: Watch, times: Real, further: Further, speeds: slice) -> tuple[Raw, float]:
-    """A piece that came to a level, as it ends for the event, and how long (s) before the level that is.
+def placed(situation: Situation, raw: Raw, levels: Watch, times: Real, further: Further) -> tuple[Raw, float]:
+    """A segment that came to a level, as it ends for the event, and how long (s) before the level that is.
 
     times (T,) s of its samples.
     """
     start, end = levels.leap.tolist()
-    if not start < raw.t < end or goes_on(raw, end - start, further, speeds):
+    if not start < raw.t < end or _goes_on(situation, raw, end - start, further):
         return raw, 0.0
     before = raw.states[times[: len(raw.states)] <= start]
     return raw._replace(states=before, y=levels.before.copy(), t=start), raw.t - start
 
 
-def ends_within(system: System, raw: Raw, t: float) -> float:
-    """How long (s) leaps last near a time that a run did not come to, for a singular position; 0 where they do not, or
-    where the scene's profiles end before."""
-    longest = longest_leap(system, raw) if raw.status in AT_SINGULAR_POSITIONS and system.scene.closures else 0.0
-    return longest if t - raw.t <= longest <= timing_of(system).end - t and longest < np.inf else 0.0
+def too_near(situation: Situation, raw: Raw, t_start: float, due: float, further: Further) -> float:
+    """How long (s) before a time that is due an event has to happen, after a run that was to end there; 0 for not.
+
+    t_start (s): before it nothing can happen.
+    """
+    longest = _longest_leap(situation.system, raw)
+    if longest >= due - t_start:
+        return 0.0
+    if raw.status is Status.OK:
+        is_near = raw.t == due and not _goes_on(situation, raw, longest, further)
+    else:
+        is_near = raw.status in AT_SINGULAR_POSITIONS and due - raw.t <= longest
+    return longest if is_near else 0.0
 
 
-def longest_leap(system: System, raw: Raw) -> float:
-    """How long (s) a leap may last where a piece ended; infinite at rest."""
+def _goes_on(situation: Situation, raw: Raw, span: float, further: Further) -> bool:
+    """Whether a run can be taken up where a segment ended, for `span` (s), as it moves and the other way."""
+    back = raw.y.copy()
+    back[situation.speeds] *= -1.0
+    return all(
+        further(raw._replace(y=y), raw.t + span).status not in AT_SINGULAR_POSITIONS for y in (raw.y, back)
+    )  # fmt: skip
+
+
+def _longest_leap(system: System, raw: Raw) -> float:
+    """How long (s) a leap may last where a segment ended; infinite at rest."""
     from flexmb.closure.leap import LEAP  # trees need none of it
     from flexmb.system.closed import ClosedSystem
 

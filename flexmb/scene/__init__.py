@@ -1,1 +1,1 @@
-"""Scenes: what a multibody system consists of, read, checked and written, without physics and without a compiler."""
+"""Descriptions of multibody systems (scenes): schema, builder, files and checks, without physics or compiled code."""

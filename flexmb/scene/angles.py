@@ -1,4 +1,4 @@
-"""Orientations as angles about successively carried axes, as gimbals turn."""
+"""Orientations as angles of successive rotations about carried axes, as in a gimbal."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from flexmb.scene.quaternions import about, rotation_matrix
 from flexmb.typing import Real
 
 SEQUENCES = tuple(a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c)
-# Sine of the angle between the outer axes; below it, rounding takes half of the digits of either outer angle.
+# Gimbal lock: sine of the angle between the outer axes below which either outer angle has less than half its digits.
 LOCKED = 1e-8
 
 
 class Angles(NamedTuple):
-    """values (...,3) rad of the three rotations; singular (...): where the outer axes align (gimbal lock).
+    """values (...,3) rad of the three rotations; singular (...): whether the outer axes align (gimbal lock).
 
-    There only the sum or the difference of the outer angles is determined: the third is set to zero.
+    In gimbal lock only the sum or the difference of the outer angles is determined, and the third angle is set to zero.
     """
 
     values: Real
@@ -28,16 +28,16 @@ class Angles(NamedTuple):
 def angles_of(quaternion: ArrayLike, sequence: str = "zyx") -> Angles:
     """Angles of quaternions (...,4), scalar first, about the axes of a gimbal's `sequence`.
 
-    "zyx": about z, then the carried y, then the carried x (yaw, pitch, roll). The middle angle is within +-pi/2 where
-    all three axes differ, else (as in "zxz") from 0 to pi; the others are within +-pi. ValueError for another sequence,
-    or a quaternion of length zero.
+    "zyx": about z, then the carried y, then the carried x (yaw, pitch, roll). The middle angle is within +-pi/2 if all
+    three axes differ, and otherwise (as in "zxz") from 0 to pi; the others are within +-pi. ValueError for any other
+    sequence, or a quaternion of length zero.
     """
     if sequence not in SEQUENCES:
-        raise ValueError(f"{sequence!r} is no sequence of three axes: use one of {', '.join(SEQUENCES)}")
+        raise ValueError(f"{sequence!r} is not a sequence of three axes: use one of {', '.join(SEQUENCES)}")
     i, j, k = ("xyz".index(letter) for letter in sequence)
     R = rotation_matrix(quaternion)
     proper = i == k
-    last = 3 - i - j  # the axis beside the first two
+    last = 3 - i - j  # the axis that is neither of the first two
     even = 1.0 if (j - i) % 3 == 1 else -1.0
     if proper:
         across = np.hypot(R[..., i, j], R[..., i, last])
@@ -59,6 +59,6 @@ def angles_of(quaternion: ArrayLike, sequence: str = "zyx") -> Angles:
 
 
 def _about_each(axis: str, angles: Real) -> Real:
-    """(...,3,3) turns about one axis by angles (...)."""
+    """Rotations (...,3,3) about one axis by angles (...)."""
     flat = np.array([about(axis, angle) for angle in np.ravel(angles)]).reshape(-1, 3, 3)
     return flat.reshape(*np.shape(angles), 3, 3)

@@ -1,4 +1,4 @@
-"""Bodies of a scene: rigid, beam, raw points and modes, SID file; their nodes; wheels and point masses."""
+"""Bodies of a scene: rigid, beam, raw points and modes, SID file; and their nodes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 class SceneStruct(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Every struct of the schema refuses unknown keys and is frozen."""
+    """Base of all structs of the schema, which are frozen and refuse unknown keys."""
 
 
 class Node(SceneStruct, frozen=True, kw_only=True):
@@ -45,7 +45,7 @@ class RigidBody(SceneStruct, frozen=True, kw_only=True, tag="rigid", tag_field="
 
 
 class BeamStation(SceneStruct, frozen=True, kw_only=True):
-    """Section properties at one station; between stations they vary linearly.
+    """Section properties at one station; they vary linearly between stations.
 
     x is the beam axis, y and z the principal section axes: `EIz` resists bending in the x-y plane.
     Shear stiffnesses are used by Timoshenko beams only; rotary inertias per length are rho*Iy, rho*Iz, and the
@@ -65,7 +65,7 @@ class BeamStation(SceneStruct, frozen=True, kw_only=True):
 
 
 class TipMass(SceneStruct, frozen=True, kw_only=True):
-    """A rigid lump fixed to the beam section at `x_m`; part of the body, hence of its modes."""
+    """A rigid lump fixed to the beam section at `x_m`; it is part of the body and of its modes."""
 
     x_m: float
     mass_kg: float
@@ -82,9 +82,9 @@ class BeamNode(SceneStruct, frozen=True, kw_only=True):
 
 
 class Modes(SceneStruct, frozen=True, kw_only=True):
-    """Which modes represent the body: the `count` lowest of the wanted families, clamped at the root or free-free.
+    """The modes of a beam: the `count` lowest of the chosen families, clamped at the root or free-free.
 
-    `static` adds attachment modes (unit tip force and moment in the wanted families) to the eigenmodes; with `count` 0
+    `static` adds attachment modes (unit tip force and moment in the chosen families) to the eigenmodes; with `count` 0
     they are the only modes.
     """
 
@@ -103,9 +103,9 @@ class Modes(SceneStruct, frozen=True, kw_only=True):
 class BeamBody(SceneStruct, frozen=True, kw_only=True, tag="beam", tag_field="kind"):
     """A straight beam along +x of the body frame, root at the origin.
 
-    `bending_y` is deflection along y (resisted by EIz), `bending_z` along z. `points` says how the section's inertia is
-    carried: "line" drops rotary inertia of bending and of torsion in the inertia points, "rotary" gives each point a
-    rotating inertia tensor, "section" puts four massy points on each section (no rotating tensor, exactly polynomial).
+    `bending_y` is deflection along y (resisted by EIz), `bending_z` along z. `points` is the model of the section's
+    inertia: "line" omits the rotary inertia of bending and of torsion, "rotary" gives each inertia point a tensor that
+    turns with it, "section" has four point masses on each section (the kinetic energy is then a polynomial).
     """
 
     name: str
@@ -127,7 +127,7 @@ class InertiaPoint(SceneStruct, frozen=True, kw_only=True):
     `translation_modes[n]` and `rotation_modes[n]` are the point's displacement and rotation for unit modal
     coordinate n. `com_offset_m` is the mass centre's offset from the point, turning with it. `second_translation[n][k]`
     and `second_rotation[n][k]`, m x m vectors G_nk, add 1/2 sum G_nk eta_n eta_k to displacement and rotation vector at
-    level "stiffened"; only their symmetric part acts.
+    level "stiffened"; only their symmetric part has an effect.
     """
 
     mass_kg: float
@@ -143,8 +143,9 @@ class InertiaPoint(SceneStruct, frozen=True, kw_only=True):
 class ModalNode(SceneStruct, frozen=True, kw_only=True):
     """A node of a raw modal body with its mode shapes.
 
-    For level "stiffened" its second-order field too: `second_translation` and `second_rotation` as at an InertiaPoint,
-    or `force_stiffness`, the three geometric stiffness matrices (m x m) under a unit force at the node along x, y, z.
+    For level "stiffened" it also has a second-order field: `second_translation` and `second_rotation` as in an
+    InertiaPoint, or `force_stiffness`, the geometric stiffness matrices (m x m) under a unit force at the node along x,
+    y and z.
     """
 
     name: str
@@ -160,16 +161,16 @@ class ModalNode(SceneStruct, frozen=True, kw_only=True):
 class ModalBody(SceneStruct, frozen=True, kw_only=True, tag="modal", tag_field="kind"):
     """Raw points and modes, inline (`points`) or in an `.npz` beside the scene file (`file`).
 
-    The `.npz` holds mass (n,), position (n,3), translation_modes (n,3,m), and optionally rotation_modes (n,3,m),
+    The `.npz` has mass (n,), position (n,3), translation_modes (n,3,m), and optionally rotation_modes (n,3,m),
     inertia (n,3,3), com_offset (n,3), stiffness (m,m), damping (m,m).
     `boundary` "clamped-free" asserts that the modes vanish at the body origin.
 
-    Level "stiffened" needs the second-order field of the points (`second_translation` of each, in the `.npz`
-    second_translation and optionally second_rotation (n,3,m,m)), or instead geometric stiffness matrices (m x m), here
-    or in the `.npz`: `gravity_stiffness[a]` (3,m,m) under the forces mass times unit acceleration along axis a on all
-    points, and `gradient_stiffness[a][b]` (3,3,m,m) under mass times the points' coordinate b along axis a. What a
-    finite-element code gives for spin about z is gradient_stiffness [x][x] + [y][y], for angular acceleration about z
-    [x][y] - [y][x]. Matrices are positive where the load stiffens.
+    Level "stiffened" needs the second-order field of the points: `second_translation` of each point, or in the `.npz`
+    second_translation and optionally second_rotation (n,3,m,m). Alternatively, geometric stiffness matrices (m x m)
+    are given here or in the `.npz`: `gravity_stiffness[a]` (3,m,m) under the forces mass times unit acceleration along
+    axis a on all points, and `gradient_stiffness[a][b]` (3,3,m,m) under mass times the points' coordinate b along axis
+    a. The geometric stiffness that a finite-element code computes for spin about z is gradient_stiffness [x][x] +
+    [y][y], that for angular acceleration about z is [x][y] - [y][x]. Matrices are positive if the load stiffens.
     """
 
     name: str
@@ -185,10 +186,10 @@ class ModalBody(SceneStruct, frozen=True, kw_only=True, tag="modal", tag_field="
 
 
 class SidBody(SceneStruct, frozen=True, kw_only=True, tag="sid", tag_field="kind"):
-    """A body from a Standard Input Data file (Wallrapp 1994), whose nodes are those of the file.
+    """A body from a Standard Input Data file (Wallrapp 1994), which also defines its nodes.
 
-    `compile` reads it as a raw modal body with the same sums. The adapters of other codes refuse it: for them, convert
-    the file by `flexmb import`.
+    `compile` converts it to a raw modal body with the same modal integrals. The adapters of other codes refuse it: for
+    them, convert the file by `flexmb import`.
     """
 
     name: str

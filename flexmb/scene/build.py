@@ -1,7 +1,7 @@
-"""Writing a scene in Python: a fluent builder that appends the schema's structs.
+"""A builder for scenes in Python, each of whose methods appends a struct of the schema.
 
 Argument names are the schema's keys without their unit. Every value is SI; quaternions are scalar-first, have unit
-length and map outboard components to inboard ones. Arrays are accepted wherever tuples are.
+length and map outboard components to inboard ones. Arrays are accepted in place of tuples.
 """
 
 from __future__ import annotations
@@ -50,13 +50,13 @@ def linear(**displacement: Unpack[Displacement]) -> s.LinearCoordinate:
 
 
 def _divided(options: Mapping[str, Any], kind: type) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The options that a typed dictionary names, and all others."""
+    """The options that a typed dictionary declares, and all others."""
     own = {key: value for key, value in options.items() if key in kind.__annotations__}
     return own, {key: value for key, value in options.items() if key not in own}
 
 
 class SceneBuilder(ConnectorMaker, FeedbackMaker):
-    """Collects bodies, hinges and what acts on them; every method returns the builder, `scene()` the checked Scene.
+    """Collects the parts of a scene; every method returns the builder, and `scene()` returns the checked Scene.
 
     >>> pendulum = (
     ...     SceneBuilder("pendulum", gravity=(0, 0, -9.81))
@@ -68,9 +68,9 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
     """
 
     def scene(self, *, t_end: float | None = None) -> s.Scene:
-        """The scene, checked; raises SceneError listing every problem. `t_end` (s) also checks what the run needs.
+        """The scene, checked; raises SceneError, which lists all problems. `t_end` (s) adds the checks of a run.
 
-        What is doubtful is for `check_scene` to return, and for runs to warn of.
+        Doubtful values are accepted here; `check_scene` returns them, and runs warn of them.
         """
         with collector_paused():
             data = self._head | {key: plain(items) for key, items in self._lists.items()}
@@ -87,7 +87,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         """A rigid body of `mass` (kg) with centre of mass `com` (m, body frame).
 
         `inertia` (kg m²): 3x3 about the centre of mass in body axes, or the three principal moments. `nodes`: names and
-        positions (m), or Node structs where a node is turned.
+        positions (m), or Node structs, which can be turned.
         """
         tensor = plain(inertia)
         if len(tensor) == 3 and all(isinstance(moment, float | int) for moment in tensor):
@@ -103,8 +103,8 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
     ) -> Self:  # fmt: skip
         """A beam along +x of `length` (m), root at the body origin.
 
-        `section`: one BeamStation for a uniform beam (see `beam_section`), or stations from 0 to `length`. `modes`: how
-        many clamped-free modes, or a Modes struct. `nodes`: names and stations (m); "root" and "tip" exist anyway.
+        `section`: one BeamStation for a uniform beam (see `beam_section`), or stations from 0 to `length`. `modes`: the
+        number of clamped-free modes, or a Modes struct. `nodes`: names and stations (m); "root" and "tip" always exist.
         `model`: `theory` ("euler-bernoulli" or "timoshenko"), `mass` ("consistent" or "lumped"), `points` ("section",
         "rotary" or "line") and `tip_masses`, see BeamBody.
         """
@@ -126,7 +126,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
     ) -> Self:  # fmt: skip
         """A flexible body of raw points and modes: `points` (see `inertia_points`) or an `.npz` `file`.
 
-        `stiffness`, `damping`: modal matrices (m,m), if the file does not hold them. `gravity_stiffness` (3,m,m) and
+        `stiffness`, `damping`: modal matrices (m,m), if they are not in the file. `gravity_stiffness` (3,m,m) and
         `gradient_stiffness` (3,3,m,m): geometric stiffness under unit loads (see ModalBody).
         """
         return self._append(
@@ -149,8 +149,8 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         """One rotation about the unit vector `axis` (inboard hinge axes).
 
         Initial `angle` (rad) and `rate` (rad/s), spring `stiffness` (N m/rad) about `rest` (rad), `damping`
-        (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time; and where it sits, as of
-        every hinge.
+        (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time; nodes and offsets as for
+        every hinge (`flexmb.scene.options.Placement`).
         """
         refuse_others("a Revolute", options, TurningHinge)
         angle, placement = _divided(options, Angle)
@@ -165,7 +165,8 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         """One translation along the unit vector `axis` (inboard hinge axes).
 
         Initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m), `damping` (N s/m), motor
-        `force` (N) or `prescribed` displacement (m) as functions of time; and where it sits, as of every hinge.
+        `force` (N) or `prescribed` displacement (m) as functions of time; nodes and offsets as for every hinge
+        (`flexmb.scene.options.Placement`).
         """
         refuse_others("a Prismatic", options, SlidingHinge)
         displacement, placement = _divided(options, Displacement)
@@ -224,8 +225,8 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         angular_velocity: ArrayLike = ZERO, stiffness: float = 0.0, damping: float = 0.0,
         **placement: Unpack[GivenHinge],
     ) -> Self:  # fmt: skip
-        """Three rotations: initial `quaternion`, relative `angular_velocity` (rad/s, outboard axes), `given` where both
-        are kept, spring `stiffness` (N m/rad) and `damping` (N m s/rad)."""
+        """Three rotations: initial `quaternion` and relative `angular_velocity` (rad/s, outboard axes), `given` if
+        closures must keep both, spring `stiffness` (N m/rad) and `damping` (N m s/rad)."""
         return self._append(
             s.Spherical, name=name, parent=parent, child=child, quaternion=quaternion,
             angular_velocity=angular_velocity, stiffness=stiffness, damping=damping, **placement,
@@ -245,13 +246,13 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         angular_velocity: ArrayLike = ZERO, velocity: ArrayLike = ZERO, **placement: Unpack[GivenHinge],
     ) -> Self:  # fmt: skip
         """Six freedoms: initial `position` (m, inboard axes), `quaternion`, and relative `angular_velocity` (rad/s) and
-        `velocity` (m/s) of the outboard origin, both in outboard axes; `given` where all are kept."""
+        `velocity` (m/s) of the outboard origin, both in outboard axes; `given` if closures must keep all of them."""
         return self._append(
             s.Free, name=name, parent=parent, child=child, position=position, quaternion=quaternion,
             angular_velocity=angular_velocity, velocity=velocity, **placement,
         )  # fmt: skip
 
-    # What acts on the tree, and what is asked of it
+    # Loads, further inertia, outputs, events and closures
 
     def wheel(
         self, name: str, body: str, *, axis: ArrayLike, mass: float, axial_inertia: float, transverse_inertia: float,
@@ -273,7 +274,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
     ) -> Self:  # fmt: skip
         """A point mass (kg) at a node plus `offset` (m), free along orthonormal `directions` (node axes).
 
-        `coordinates`: one `linear` for each direction, at rest and without spring if not given.
+        `coordinates`: one `linear` for each direction; by default at rest and without springs.
         """
         return self._append(
             s.PointMass, name=name, body=body, node=node, offset=offset, mass=mass, directions=directions,
@@ -306,7 +307,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         self, name: str, watch: str, level: float, *actions: s.Action,
         crossing: Literal["rising", "falling", "either"] = "either",
     ) -> Self:  # fmt: skip
-        """What happens where `watch` comes to `level`: `Latch`, `Release`, `Impact`, `Change`, `EndRun`, in this order.
+        """Actions when `watch` reaches `level`: `Latch`, `Release`, `Impact`, `Change`, `EndRun`, in the given order.
 
         `watch`: "time", a scalar coordinate such as "pivot.rotation" or "wheel.angle", a rate, "pivot.rotation.rate" or
         "wheel.speed", or one number of a sensor or controller, "height[2]".
@@ -322,10 +323,10 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         type: Literal["weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar"],
         body_a: str, body_b: str, *, axis: ArrayLike = Z_AXIS, **frames: Unpack[ClosureFrames],
     ) -> Self:  # fmt: skip
-        """A loop closure between nodes of two bodies of the tree ("ground" too), plus fixed offsets in node axes (m).
+        """A loop closure between nodes of two bodies of the tree, or of a body and "ground".
 
-        `axis`: unit vector with the same components in frames A and B. `frames`: `node_a`, `position_a` and
-        `quaternion_a` of frame A, and the same of B.
+        `axis`: unit vector with the same components in frames A and B. `frames`: `node_a`, and `position_a` (m) and
+        `quaternion_a`, the fixed offset in node axes, of frame A; likewise of frame B.
         """
         return self._append(
             s.Closure, name=name, type=type, body_a=body_a, body_b=body_b, axis=axis, **frames

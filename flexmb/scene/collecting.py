@@ -1,4 +1,4 @@
-"""Structs of a scene made from values named without units, and collected by kind: what all builders of scenes share."""
+"""Common base of the builders: makes structs of a scene from values named without units, and collects them by kind."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from flexmb.scene.units import split_unit
 
 
 def make(kind: type[msgspec.Struct], place: Any = ROOT, **values: Any) -> Any:
-    """A schema struct from values named without units; SceneError (at `place`) where a value has a wrong type."""
+    """A schema struct from values named without units.
+
+    TypeError for an unknown name; SceneError, which names the place, for a value of a wrong type.
+    """
     keys = {split_unit(key)[0]: key for key in kind.__struct_fields__}
     for name in values:
         if name not in keys:
@@ -25,7 +28,7 @@ def make(kind: type[msgspec.Struct], place: Any = ROOT, **values: Any) -> Any:
 
 
 def _collections() -> dict[type, str]:
-    """The scene's collection each kind of struct is appended to, read from the schema."""
+    """The collection of a scene for each kind of struct, from the schema."""
     table = {}
     for key, hint in get_type_hints(s.Scene).items():
         for item in get_args(hint):
@@ -44,7 +47,7 @@ class Collector:
     def __init__(
         self, name: str, *, gravity: ArrayLike = ZERO, description: str = "", allow: Sequence[s.Waiver] = ()
     ) -> None:
-        """`gravity`: uniform acceleration (m/s²) in World axes. `allow`: doubts that are meant, see `Scene`."""
+        """`gravity`: uniform acceleration (m/s²) in World axes. `allow`: doubts that are intended, see `Scene`."""
         self._head: dict[str, Any] = {
             "name": name, "description": description, "allow": list(allow), "gravity_m_s2": plain(gravity)
         }  # fmt: skip

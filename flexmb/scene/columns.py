@@ -1,6 +1,6 @@
-"""Many structs at once: those of one kind together, the values of a key as an array.
+"""Structs grouped by kind, and the values of a key as an array.
 
-What looks at a scene of 10^5 bodies has no time to look at one value after another.
+Checks of scenes with 10^5 bodies use these, because a loop over single values would take too long.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from flexmb.typing import Real
 
 
 class Alike(NamedTuple):
-    """Structs of one kind; `owners`: the numbers of the items that they are, or are part of."""
+    """Structs of one kind; `owners`: the indices of the items that they are, or that contain them."""
 
     kind: type[msgspec.Struct]
     owners: Sequence[int]
@@ -27,7 +27,7 @@ class Alike(NamedTuple):
 
 
 def column(structs: Sequence[Any], key: str, *shape: int) -> Real:
-    """(len, *shape) numbers that structs of one kind have under a key."""
+    """Array (len, *shape) of the values of a key in structs of one kind."""
     values: Any = map(attrgetter(key), structs)
     for _ in shape:
         values = chain.from_iterable(values)
@@ -35,7 +35,7 @@ def column(structs: Sequence[Any], key: str, *shape: int) -> Real:
 
 
 def alike(items: Sequence[Any]) -> list[Alike]:
-    """The items of a collection and all structs inside them, kind by kind."""
+    """The items of a collection and all structs inside them, grouped by kind."""
     found: list[Alike] = []
     waiting: list[tuple[Sequence[int], Sequence[Any]]] = [(range(len(items)), items)]
     while waiting:
@@ -52,7 +52,7 @@ def alike(items: Sequence[Any]) -> list[Alike]:
 def _inside(group: Alike, key: str) -> tuple[list[int], list[Any]]:
     """Owners and structs below a key."""
     values = list(map(attrgetter(key), group.structs))
-    if not any(values):  # None and empty tuples; a struct is true
+    if not any(values):  # all are None or empty tuples; a struct is true
         return [], []
     pairs = [
         (owner, each)
@@ -65,13 +65,13 @@ def _inside(group: Alike, key: str) -> tuple[list[int], list[Any]]:
 
 @cache
 def struct_keys(kind: type[msgspec.Struct]) -> tuple[str, ...]:
-    """Keys below which structs may stand."""
+    """Keys whose values can contain structs."""
     return _keys(kind, lambda node: isinstance(node, inspect.StructType))
 
 
 @cache
 def number_keys(kind: type[msgspec.Struct]) -> tuple[str, ...]:
-    """Keys below which real numbers may stand, those of structs inside left out."""
+    """Keys whose values can contain real numbers other than those of inner structs."""
     return _keys(kind, lambda node: isinstance(node, inspect.FloatType))
 
 

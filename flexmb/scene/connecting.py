@@ -1,4 +1,4 @@
-"""The part of the builder that joins bodies by springs, dampers, actuators, bushings and friction."""
+"""The builder's methods for connectors: springs, dampers, actuators, bushings and friction."""
 
 from __future__ import annotations
 

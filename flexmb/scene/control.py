@@ -1,12 +1,13 @@
-"""Feedback in a scene: sensors, controllers that read them, and by `ControlSignal` what the controllers' outputs drive.
+"""Feedback in a scene: sensors, controllers that read them, and actuation by `ControlSignal`.
 
-A *signal* is a number that a sensor measures or a controller puts out. Inputs of controllers name them: a sensor
-("gyro", all its numbers) or one of them ("gyro[2]"), or a controller that is listed before ("filter", "filter[0]").
-A `flexmb.scene.functions.ControlSignal` takes the place of a function of time wherever a torque or a force stands.
+A *signal* is a number that a sensor measures or a controller computes. The inputs of a controller are named: a sensor
+("gyro", all its numbers), one of its numbers ("gyro[2]"), or a controller listed before ("filter", "filter[0]"). A
+`flexmb.scene.functions.ControlSignal` can replace the function of time of any torque or force.
 
-A controller without `period_s` is continuous: its states are integrated with the motion. With a period it acts at
-`offset_s`, `offset_s + period_s`, ...: it reads its inputs there, and `delay_s` later its outputs change, to be held
-until they change again. Before that they are zero. No step of an integrator crosses such an instant.
+A controller without `period_s` is continuous: its states are integrated with the motion. With a period it is sampled at
+`offset_s`, `offset_s + period_s`, ...: it reads its inputs at these instants, and its outputs change `delay_s` later
+and are held until the next change. Before the first change they are zero. No step of an integrator crosses such an
+instant.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ Matrix = tuple[tuple[float, ...], ...]
 
 
 class CoordinateSensor(SceneStruct, frozen=True, kw_only=True, tag="coordinate", tag_field="kind"):
-    """Coordinates, or their speeds, of a hinge, wheel or point mass, or of `<body>.modes`: `of` names it.
+    """Coordinates, or their speeds, of a hinge, wheel or point mass, or of `<body>.modes`, whichever `of` names.
 
-    Quantity "rate" of a spherical or free hinge has its speeds: the angular velocity in outboard axes first.
+    The "rate" of a spherical or free hinge consists of its speeds, the angular velocity in outboard axes first.
     """
 
     name: str
@@ -31,10 +32,10 @@ class CoordinateSensor(SceneStruct, frozen=True, kw_only=True, tag="coordinate",
 
 
 class MarkerSensor(SceneStruct, frozen=True, kw_only=True, tag="marker", tag_field="kind"):
-    """Motion of a marker, three numbers in World axes or its own; of "orientation" four, a quaternion to World.
+    """Motion of a marker: three numbers in World axes or its own axes, or the "orientation" as a quaternion to World.
 
-    The quaternion is scalar-first, its scalar part never negative. "specific_force" is acceleration minus gravity, what
-    an accelerometer shows.
+    The quaternion is scalar-first, its scalar part never negative. "specific_force" is acceleration minus gravity, the
+    reading of an accelerometer.
     """
 
     name: str
@@ -47,7 +48,7 @@ class MarkerSensor(SceneStruct, frozen=True, kw_only=True, tag="marker", tag_fie
 
 
 class DistanceSensor(SceneStruct, frozen=True, kw_only=True, tag="distance", tag_field="kind"):
-    """Distance of two markers (m) and its rate (m/s), two numbers: how far bodies are apart, how long a spring is."""
+    """Distance of two markers (m) and its rate (m/s), two numbers."""
 
     name: str
     marker_a: str
@@ -57,8 +58,8 @@ class DistanceSensor(SceneStruct, frozen=True, kw_only=True, tag="distance", tag
 class LoadSensor(SceneStruct, frozen=True, kw_only=True, tag="load", tag_field="kind"):
     """Total load across a hinge, six numbers [torque; force] on the outboard body about the hinge point, World axes.
 
-    `hinge` may name a closure: then on body_b about its frame. By algorithm "articulated" it costs little in trees; in
-    closed chains and by others, half a millisecond each time.
+    `hinge` may name a closure: the load is then that on body_b about its frame. With algorithm "articulated" it costs
+    little in trees; in closed chains and with other algorithms, half a millisecond for each evaluation.
     """
 
     name: str
@@ -66,10 +67,10 @@ class LoadSensor(SceneStruct, frozen=True, kw_only=True, tag="load", tag_field="
 
 
 class DriveSensor(SceneStruct, frozen=True, kw_only=True, tag="drive", tag_field="kind"):
-    """Load of the drive that moves or holds a coordinate, prescribed or latched (N or N m); of a free one 0.
+    """Load of the drive of a prescribed or latched coordinate (N or N m); 0 for a free coordinate.
 
-    What is beyond its spring, damper and motor, as in `drives` of a run. `coordinate`: "<hinge>.<key>" of a scalar
-    coordinate, such as "root.rotation", or "<wheel>.angle".
+    Like `drives` of a run, it does not include spring, damper and motor of the coordinate. `coordinate`:
+    "<hinge>.<key>" of a scalar coordinate, such as "root.rotation", or "<wheel>.angle".
     """
 
     name: str
@@ -83,7 +84,7 @@ class TimeSensor(SceneStruct, frozen=True, kw_only=True, tag="time", tag_field="
 
 
 class ProfileSensor(SceneStruct, frozen=True, kw_only=True, tag="profile", tag_field="kind"):
-    """A function of time and its rate, two numbers: a reference to follow."""
+    """A function of time and its rate, two numbers, for example a reference to be tracked."""
 
     name: str
     function: Function
@@ -101,11 +102,11 @@ class _Controller(SceneStruct, frozen=True, kw_only=True, tag_field="kind"):
 
 
 class StateSpace(_Controller, frozen=True, kw_only=True, tag="state_space"):
-    """A linear controller of states x, inputs u and outputs y.
+    """A linear controller with states x, inputs u and outputs y.
 
-    x' = A x + B u, y = C x + D u; with a period x becomes A x + B u when it acts, after y = C x + D u.
-    A (n,n), B (n,m), C (p,n), D (p,m), x(0) = `initial` (n,), zero if left out. Without states D alone; D is zero if
-    left out.
+    Continuous: x' = A x + B u, y = C x + D u. Sampled: at each sample y = C x + D u, then x := A x + B u. A (n,n),
+    B (n,m), C (p,n), D (p,m); x(0) = `initial` (n,), by default zero. Without states only D is given; with states D is
+    zero by default.
     """
 
     A: Matrix = ()
@@ -116,12 +117,12 @@ class StateSpace(_Controller, frozen=True, kw_only=True, tag="state_space"):
 
 
 class Pid(_Controller, frozen=True, kw_only=True, tag="pid"):
-    """y = kp e + integral of ki e + kd e', e = setpoint - input; between `lower` and `upper`.
+    """y = kp e + integral of ki e + kd e', e = setpoint - input, limited to the range `lower` to `upper`.
 
-    Inputs are one number, the measured one, or with a second one the setpoint in place of `setpoint`. The derivative is
-    that of e behind a filter of the time constant `filter_s`, which starts at the first e; without `filter_s`, which is
-    for a period only, the difference to the e before. A limit that is reached takes back the integral in the time
-    `tracking_s`, kp / ki if left out.
+    The input is the measured number; a second input replaces `setpoint`. The derivative is that of e after a
+    first-order filter with the time constant `filter_s`, which starts at the first e; a sampled controller without
+    `filter_s` uses the difference from the previous e. At a limit, back-calculation with the time constant
+    `tracking_s`, by default kp / ki, prevents wind-up of the integral.
     """
 
     kp: float = 0.0
@@ -135,16 +136,16 @@ class Pid(_Controller, frozen=True, kw_only=True, tag="pid"):
 
 
 class Saturation(_Controller, frozen=True, kw_only=True, tag="saturation"):
-    """Each input, not below `lower` and not above `upper`."""
+    """Each input, limited to the range `lower` to `upper`."""
 
     lower: float
     upper: float
 
 
 class GainTable(_Controller, frozen=True, kw_only=True, tag="gain_table"):
-    """A gain g(x) by the first input x, linear between `values` at `points` and constant beyond, times all others.
+    """Gain scheduling: g(x) times all inputs after the first, where x is the first input.
 
-    With the first input alone the output is g(x) itself.
+    g is linear between `values` at `points` and constant beyond. If x is the only input, the output is g(x) itself.
     """
 
     points: tuple[float, ...]
@@ -152,10 +153,10 @@ class GainTable(_Controller, frozen=True, kw_only=True, tag="gain_table"):
 
 
 class UserLaw(_Controller, frozen=True, kw_only=True, tag="user"):
-    """A function of one's own, "module:function", of `outputs` numbers: see `flexmb.user_function`.
+    """A user's function, "module:function", that computes `outputs` numbers: see `flexmb.user_function`.
 
-    function(t, inputs, state, parameters, outputs, change) writes `outputs` and `change`: the rate of `state`, or with
-    a period its next value. The state starts at `initial`.
+    function(t, inputs, state, parameters, outputs, change) writes `outputs` and `change`: the rate of `state`, or its
+    next value if the controller is sampled. The state starts at `initial`.
     """
 
     function: str

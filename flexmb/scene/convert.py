@@ -1,4 +1,4 @@
-"""Plain data to typed structs, with errors that name the place and the remedy."""
+"""Conversion of plain data to typed structs, with errors that name the place and the remedy."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def plain(value: Any) -> Any:
 
 
 def to_struct(data: Any, kind: type[Struct], scene: str = "", place: Place = ROOT) -> Struct:
-    """`data` (plain) as a `kind`: every type, key and length is checked; `place` is where it stands in the scene.
+    """Plain `data` as a `kind`, with all types, keys and lengths checked; `place` is its place in the scene.
 
-    Raises SceneError with the path, the names on it, and the remedy: for an unknown key the nearest one, and the unit
-    expected where only the unit is wrong.
+    Raises SceneError with the path, the names on it, and the remedy: for an unknown key the nearest one, or the
+    expected unit if only the unit is wrong.
     """
     try:
         return msgspec.convert(data, kind)
@@ -39,16 +39,16 @@ def to_struct(data: Any, kind: type[Struct], scene: str = "", place: Place = ROO
 
 
 def refuse_wrong_types(struct: msgspec.Struct) -> None:
-    """SceneError, as of `to_struct`, where a struct holds values that its kind does not allow."""
+    """SceneError, like that of `to_struct`, if a struct contains values that its kind does not allow."""
     kind = type(struct)
-    try:  # in a binary form, which takes a fraction of the time
+    try:  # encoding and decoding in binary form takes a fraction of the time
         _DECODERS.setdefault(kind, msgspec.msgpack.Decoder(kind)).decode(_ENCODER.encode(struct))
     except (msgspec.MsgspecError, TypeError, ValueError, OverflowError):
         to_struct(plain(struct), kind)
 
 
 def label(collection: str, item: Any) -> str:
-    """How messages name an item of a collection: `hinge "pivot"`; "" for items without a name."""
+    """The name of an item in messages, such as `hinge "pivot"`; "" for items without a name."""
     field = "body" if collection == "modal_states" else "name"
     name = item.get(field) if isinstance(item, dict) else getattr(item, field, None)
     return f'{KINDS[collection]} "{name}"' if collection in KINDS and isinstance(name, str) else ""
@@ -86,7 +86,7 @@ def _explain(message: str, data: Any, kind: Any, place: Place) -> Defect:
 
 
 def _below(node: inspect.Type, step: str | int, value: Any) -> inspect.Type:
-    """The type one step below `node`; of a union, the alternative that `value` announces with its `kind`."""
+    """The type one step below `node`; in a union, the alternative that the `kind` of `value` selects."""
     below: inspect.Type = node
     if isinstance(node, inspect.StructType):
         below = next((field.type for field in node.fields if field.encode_name == step), node)
@@ -127,7 +127,7 @@ def _tags(node: inspect.Type) -> str:
 
 
 def _unknown_key(word: str, node: inspect.StructType) -> str:
-    """A wrong unit, a key that lives one table deeper, or a misspelling."""
+    """The remedy for an unknown key: a wrong unit, a key that belongs one table deeper, or a misspelling."""
     keys = [field.encode_name for field in node.fields]
     stems = {split_unit(key)[0]: key for key in keys if split_unit(key)[1]}
     same = [stem for stem in stems if word == stem or word.startswith(stem + "_")]

@@ -1,4 +1,4 @@
-"""Events: what happens where something that a run watches passes a level, located in the step and not at its end."""
+"""Events: actions when a watched quantity passes a level, at an instant that is located within the step."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from flexmb.scene.functions import Function
 
 
 class Latch(SceneStruct, frozen=True, kw_only=True, tag="latch", tag_field="kind"):
-    """The coordinate is held where it is, by an impulse that takes its speed away; its drive load is an output then.
+    """An impulse stops the coordinate, which is then held at its value; its drive load is an output.
 
-    Its motor is off while it is held; its spring stays. `coordinate`: "<hinge>.<key>" of a scalar coordinate, such as
-    "root.rotation", or "<wheel>.angle".
+    While it is held, its motor is off and its spring acts. `coordinate`: "<hinge>.<key>" of a scalar coordinate, such
+    as "root.rotation", or "<wheel>.angle".
     """
 
     coordinate: str
 
 
 class Release(SceneStruct, frozen=True, kw_only=True, tag="release", tag_field="kind"):
-    """A coordinate that is latched or prescribed is free, with the spring, damper and motor that the scene gives it."""
+    """A latched or prescribed coordinate becomes free, with the spring, damper and motor that it has in the scene."""
 
     coordinate: str
 
 
 class Impact(SceneStruct, frozen=True, kw_only=True, tag="impact", tag_field="kind"):
-    """An impulse along the coordinate turns its speed over, to `restitution` times as much: contact with a stop.
+    """Contact with a stop: an impulse along the coordinate reverses its speed, multiplied by `restitution`.
 
-    With `rests`, a body that is pressed against the stop comes to rest on it where its rebound is below the error that
-    the run allows: it is held there, until the stop would have to pull.
+    With `rests`, the coordinate comes to rest on the stop when it is pressed against it and its rebound is below the
+    error tolerance of the run. It is held there until the stop would have to pull.
     """
 
     coordinate: str
@@ -37,9 +37,9 @@ class Impact(SceneStruct, frozen=True, kw_only=True, tag="impact", tag_field="ki
 
 
 class Change(SceneStruct, frozen=True, kw_only=True, tag="change", tag_field="kind"):
-    """Another value in the scene from then on, to switch a load or a motor, for example.
+    """A value in the scene changes at the event, for example to switch a load or a motor.
 
-    `path` is one of `Scene.with_values`, as "push.function" or "pivot.rotation.stiffness_Nm_rad".
+    `path` is a path of `Scene.with_values`, such as "push.function" or "pivot.rotation.stiffness_Nm_rad".
     """
 
     path: str
@@ -47,19 +47,19 @@ class Change(SceneStruct, frozen=True, kw_only=True, tag="change", tag_field="ki
 
 
 class EndRun(SceneStruct, frozen=True, kw_only=True, tag="end", tag_field="kind"):
-    """The run ends there, finished."""
+    """The run ends, with status OK."""
 
 
 Action = Latch | Release | Impact | Change | EndRun
 
 
 class SceneEvent(SceneStruct, frozen=True, kw_only=True):
-    """What happens, whenever `watch` comes to `level` from below (rising), from above (falling) or either way.
+    """Actions whenever `watch` reaches `level` from below (rising), from above (falling) or from either side.
 
     `watch`: "time" (s); a scalar coordinate, "<hinge>.<key>" or "<wheel>.angle" (m or rad); its rate,
-    "<hinge>.<key>.rate" or "<wheel>.speed"; or a signal: one number of a sensor or controller, "height[2]", whose
-    number may be left out where there is only one. What is at its level when the run begins has been there before.
-    Actions are done in their order, at the same time.
+    "<hinge>.<key>.rate" or "<wheel>.speed"; or a signal, one number of a sensor or controller, "height[2]", whose index
+    may be omitted if there is only one. An event whose quantity starts at its level does not fire until the quantity
+    has left the level and returned. The actions are performed in the given order at the same instant.
     """
 
     name: str

@@ -1,6 +1,6 @@
-"""The part of the builder that measures and controls.
+"""The builder's methods for sensors and controllers.
 
-What controllers put out acts through a `flexmb.scene.functions.ControlSignal` in place of a function of time.
+Outputs of controllers act through a `flexmb.scene.functions.ControlSignal` in place of a function of time.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class FeedbackMaker(Collector):
         return self._append(s.LoadSensor, name=name, hinge=hinge)
 
     def sense_drive(self, name: str, coordinate: str) -> Self:
-        """The load of the drive of a prescribed or latched coordinate, "pivot.rotation"; of a free one 0."""
+        """The load of the drive of a prescribed or latched coordinate, "pivot.rotation"; 0 for a free one."""
         return self._append(s.DriveSensor, name=name, coordinate=coordinate)
 
     def sense_time(self, name: str) -> Self:
@@ -50,20 +50,20 @@ class FeedbackMaker(Collector):
         return self._append(s.ProfileSensor, name=name, function=function)
 
     def state_space(self, name: str, inputs: str | Sequence[str], **law: Unpack[LinearLaw]) -> Self:
-        """A linear controller: `A`, `B`, `C`, `D`, `initial`; `period`, `offset`, `delay` (s) where it is sampled."""
+        """A linear controller: `A`, `B`, `C`, `D`, `initial`; `period`, `offset`, `delay` (s) if it is sampled."""
         refuse_others("a StateSpace", law, LinearLaw)
         return self._append(s.StateSpace, name=name, inputs=_several(inputs), **law)
 
     def pid(self, name: str, inputs: str | Sequence[str], **law: Unpack[PidLaw]) -> Self:
         """kp e + integral of ki e + kd e', e = setpoint - input: gains, `setpoint`, `filter` (s), `lower`, `upper`,
-        `tracking` (s); `period`, `offset`, `delay` (s) where it is sampled."""
+        `tracking` (s); `period`, `offset`, `delay` (s) if it is sampled."""
         refuse_others("a Pid", law, PidLaw)
         return self._append(s.Pid, name=name, inputs=_several(inputs), **law)
 
     def saturation(
         self, name: str, inputs: str | Sequence[str], *, lower: float, upper: float, **sampling: Unpack[Sampling]
     ) -> Self:
-        """Inputs between limits."""
+        """The inputs, limited to a range."""
         refuse_others("a Saturation", sampling, Sampling)
         return self._append(s.Saturation, name=name, inputs=_several(inputs), lower=lower, upper=upper, **sampling)
 
@@ -71,7 +71,7 @@ class FeedbackMaker(Collector):
         self, name: str, inputs: str | Sequence[str], *, points: ArrayLike, values: ArrayLike,
         **sampling: Unpack[Sampling],
     ) -> Self:  # fmt: skip
-        """A gain by the first input, linear between `values` at `points`, times all others."""
+        """A gain that depends on the first input, linear between `values` at `points`, times all other inputs."""
         refuse_others("a GainTable", sampling, Sampling)
         return self._append(
             s.GainTable, name=name, inputs=_several(inputs), points=points, values=values, **sampling
@@ -80,9 +80,9 @@ class FeedbackMaker(Collector):
     def user_law(
         self, name: str, inputs: str | Sequence[str], function: str | Callable[..., Any], **law: Unpack[OwnLaw]
     ) -> Self:
-        """A function of one's own, which a module has at its top level, or its name "module:function".
+        """A user's function, defined at the top level of a module, or its name "module:function".
 
-        `outputs`: how many; `initial` state; `parameters`; `period`, `offset`, `delay` (s) where it is sampled.
+        Number of `outputs`; `initial` state; `parameters`; `period`, `offset`, `delay` (s) if it is sampled.
         """
         refuse_others("a UserLaw", law, OwnLaw)
         address = function if isinstance(function, str) else _address(function)
@@ -94,12 +94,12 @@ def _several(inputs: str | Sequence[str]) -> Sequence[str]:
 
 
 def _address(function: Callable[..., Any]) -> str:
-    """ "module:function", by which a scene finds it again; ValueError for one that no module has at its top level."""
+    """The name "module:function" of a function; ValueError for one that is not at the top level of a module."""
     plain = getattr(function, "py_func", function)
     name = getattr(plain, "__qualname__", repr(plain))
     if "<" in name:
         raise ValueError(
-            f"{name} exists inside of another function only, where no file finds it: define it by def at the top level "
-            "of a module"
+            f"{name} is defined inside another function, where a scene file cannot refer to it: define it by def at "
+            "the top level of a module"
         )
     return f"{plain.__module__}:{name}"

@@ -1,11 +1,11 @@
-"""Scenes as TOML files: build -> file -> build is the identity.
+"""Scenes as TOML files; a scene that is written and read again is equal, bit for bit.
 
-Keys at their default are left out, floats are written so that they read back bit for bit. A body that refers to a file
-(`.npz`, SID) names it relative to the scene's folder in TOML, and by its absolute path in a loaded `Scene`. So a folder
-can be moved as a whole, and a Scene can be used without knowing where it came from.
+Keys with their default value are omitted. A body that refers to a file (`.npz`, SID) has a path relative to the scene's
+folder in TOML, and an absolute path in a loaded `Scene`. Thus a folder can be moved as a whole, and a Scene can be used
+from any folder.
 
-The writer is our own because people read scenes, and the usual library writes each component of a vector on a line of
-its own. The reader is Python's; the tests hold the two together on random scenes.
+The reader is Python's. The writer is part of flexmb because the usual library writes each component of a vector on a
+line of its own, which people cannot read; tests check the two against each other on random scenes.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from flexmb.scene.problems import Defect, SceneError
 from flexmb.scene.reading import Unreadable, parse_toml, read_text
 from flexmb.scene.schema import Scene
 
-LINE = 110  # characters: longer arrays are written one item a line
+LINE = 110  # characters: longer arrays are written with one item per line
 
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:
-    """Read a scene file; file references become absolute. Raises SceneError naming place and remedy, or OSError.
+    """Read a scene file; file references become absolute. Raises SceneError with place and remedy, or OSError.
 
-    Types, keys and lengths are checked here, the physics by `check_scene`.
+    Types, keys and lengths are checked here; `check_scene` checks the physics.
     """
     path = Path(path)
     try:
@@ -44,13 +44,13 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
-    """Write a scene file; file references become relative to its folder (which must exist)."""
+    """Write a scene file; file references become relative to its folder, which must exist."""
     path = Path(path)
     write_whole(path, dumps(scene, path.parent))
 
 
 def loads(text: str, folder: str | os.PathLike[str] | None = None, *, name: str = "<text>") -> Scene:
-    """A scene from TOML text; with a `folder`, file references are made absolute from there. `name` is for errors."""
+    """A scene from TOML text; file references become absolute, relative to `folder`. `name` is used in errors."""
     try:
         data = parse_toml(text)
     except Unreadable as error:
@@ -60,7 +60,7 @@ def loads(text: str, folder: str | os.PathLike[str] | None = None, *, name: str 
 
 
 def dumps(scene: Scene, folder: str | os.PathLike[str] | None = None) -> str:
-    """A scene as TOML text; with a `folder`, file references are made relative to it."""
+    """A scene as TOML text; file references become relative to `folder`, if given."""
     if folder is not None:
         scene = _with_files(scene, lambda file: _relative(file, folder))
     table = _sparse(scene)
@@ -75,7 +75,7 @@ def dumps(scene: Scene, folder: str | os.PathLike[str] | None = None) -> str:
 
 
 def inline(value: Any) -> str:
-    """One value (struct, array, number, string) as TOML on one line, keys at their default left out."""
+    """One value (struct, array, number, string) as TOML on one line, without keys that have their default value."""
     return _value(_sparse(value), 0)
 
 
@@ -101,7 +101,7 @@ def _with_files(scene: Scene, change: Any) -> Scene:
 
 
 def _sparse(value: Any) -> Any:
-    """A struct as a dict of its tag and whatever differs from the default; tuples and lists of them alike."""
+    """A struct as a dict of its tag and all values that differ from the default; likewise sequences of structs."""
     if isinstance(value, msgspec.Struct):
         config = value.__struct_config__
         table: dict[str, Any] = {str(config.tag_field): config.tag} if config.tag is not None else {}
@@ -120,7 +120,7 @@ def _is_tables(value: Any) -> bool:
 
 
 def _value(value: Any, used: int, indent: str = "") -> str:
-    """One TOML value, inline; `used` characters of its line are taken already."""
+    """One TOML value, inline, for a line that already has `used` characters."""
     match value:
         case bool():
             return "true" if value else "false"
@@ -133,17 +133,17 @@ def _value(value: Any, used: int, indent: str = "") -> str:
         case dict():
             return "{ " + ", ".join(f"{key} = {_value(item, 0)}" for key, item in value.items()) + " }"
         case list():
-            # An inline table may not hold a line break, so only arrays outside of one are broken up: used > 0 there.
+            # An inline table may not contain line breaks: only arrays outside of one, where used > 0, are broken up.
             flat = "[" + ", ".join(_value(item, 0) for item in value) + "]"
             if used == 0 or used + len(flat) <= LINE or not any(isinstance(item, list | dict) for item in value):
                 return flat
             deeper = indent + "  "
             lines = [deeper + _value(item, len(deeper) if isinstance(item, list) else 0, deeper) for item in value]
             return "[\n" + ",\n".join(lines) + ",\n" + indent + "]"
-    raise TypeError(f"TOML has no place for a {type(value).__name__}")
+    raise TypeError(f"TOML cannot represent a {type(value).__name__}")
 
 
 def _string(text: str) -> str:
-    """A basic TOML string: JSON's escapes are TOML's, but for DEL. Several lines stay several lines."""
+    """A TOML string; its escapes are those of JSON, and that of DEL. Line breaks are kept in a multi-line string."""
     lines = [json.dumps(line, ensure_ascii=False)[1:-1].replace("\x7f", "\\u007f") for line in text.split("\n")]
     return f'"{lines[0]}"' if len(lines) == 1 else '"""\n' + "\n".join(lines) + '"""'

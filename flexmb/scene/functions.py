@@ -1,7 +1,7 @@
-"""Named functions of time: the closed list a scene may use for prescribed motion and for loads.
+"""Functions of time for prescribed motions and loads.
 
-Every function is twice continuously differentiable where a prescribed motion needs it. `value` is in the unit of the
-key it is used under (rad, m, N, Nm). A scene file stores them as tables with a `kind`, for example
+Those that a prescribed motion accepts are twice continuously differentiable. `value` has the unit of the key for which
+the function is given (rad, m, N, Nm). A scene file stores a function as a table with a `kind`, for example
 ``{kind = "spin_up", rate = 4.0, duration_s = 15.0}``.
 """
 
@@ -70,7 +70,7 @@ class Pulse(_Function, frozen=True, tag="pulse", kw_only=True):
 class Table(_Function, frozen=True, tag="table", kw_only=True):
     """Quintic spline through samples; defined on [times_s[0], times_s[-1]] only.
 
-    The run must lie inside that interval: it is checked before the run starts.
+    A run must lie within this interval, which is checked before it starts.
     """
 
     times_s: tuple[float, ...]
@@ -80,8 +80,8 @@ class Table(_Function, frozen=True, tag="table", kw_only=True):
 class ControlSignal(_Function, frozen=True, tag="signal", kw_only=True):
     """`gain` times an output of a controller: feedback as torque of a hinge or wheel, or as force or torque of a load.
 
-    `source` names the controller, or one of several outputs: "attitude[2]". In a run it is what the controller says;
-    where a scene is looked at by itself, at one state or in a linear model, it is zero: the loop is open.
+    `source` names the controller, or one of its outputs: "attitude[2]". In single evaluations and linear models, which
+    have no controllers, the signal is zero.
     """
 
     source: str

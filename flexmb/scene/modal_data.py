@@ -1,4 +1,4 @@
-"""The arrays of a raw points-and-modes body, whether they stand in the scene or in an `.npz` beside it."""
+"""The arrays of a raw modal body, from the scene or from an `.npz` file."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class ModalArrays(NamedTuple):
 
     @property
     def given(self) -> dict[str, Real]:
-        """By name, those that are there."""
+        """The arrays that are not None, by name."""
         return {name: array for name, array in self._asdict().items() if array is not None}
 
 
@@ -46,9 +46,10 @@ REQUIRED = ("mass", "position", "translation_modes")
 
 
 def modal_arrays(body: ModalBody) -> ModalArrays:
-    """Arrays of `body` with zeros for whatever is optional and not given.
+    """Arrays of `body`, with zeros for optional ones that are not given.
 
-    Raises OSError where the file cannot be read, and ValueError naming an array that is missing or has a wrong shape.
+    Raises OSError if the file cannot be read, and ValueError, which names the array, if one is missing or has a wrong
+    shape.
     """
     given = read_arrays(body.file, ModalArrays._fields) if body.file is not None else _from_points(body.points)
     for name in OF_BODY:
@@ -60,9 +61,9 @@ def modal_arrays(body: ModalBody) -> ModalArrays:
 
 
 def node_arrays(node: ModalNode) -> dict[str, Real]:
-    """The second-order data that a node has: second_translation, second_rotation (3,m,m), force_stiffness (3,m,m).
+    """The second-order data of a node: second_translation, second_rotation (3,m,m), force_stiffness (3,m,m), if given.
 
-    ValueError names one with a wrong shape.
+    ValueError for a wrong shape.
     """
     m, given = len(node.translation_modes), {}
     for name in ("second_translation", "second_rotation", "force_stiffness"):
@@ -87,7 +88,7 @@ def inertia_points(
 ) -> tuple[InertiaPoint, ...]:
     """Inertia points of a scene from arrays in the layout of the `.npz` (see ModalArrays).
 
-    ValueError names an array with a wrong shape.
+    ValueError for a wrong shape.
     """
     optional = {
         "rotation_modes": rotation_modes, "inertia": inertia, "com_offset": com_offset,
@@ -134,7 +135,7 @@ def _from_points(points: tuple[InertiaPoint, ...]) -> dict[str, Real]:
 
 
 def _modes(name: str, listed: list[tuple[tuple[float, float, float], ...]]) -> Real:
-    """Mode shapes listed per point and mode (n,m,3) as (n,3,m)."""
+    """Mode shapes listed by point and mode (n,m,3) as (n,3,m)."""
     counts = sorted({len(modes) for modes in listed})
     if len(counts) > 1:
         raise ValueError(f'"{name}" has {counts[0]} modes at one point and {counts[-1]} at another')

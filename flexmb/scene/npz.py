@@ -1,4 +1,4 @@
-"""Named arrays from an `.npz` of unknown origin: only of known kinds, sizes bounded before anything is unpacked."""
+"""Safe reading of an `.npz` file of unknown origin: only known arrays, whose sizes are checked before unpacking."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from flexmb.scene.reading import MIB, Unreadable, allowance, regular_size
 from flexmb.typing import Real
 
 REAL, BOOLEAN, TEXT = "fiu", "b", "U"  # kinds of NumPy's types
-WORD = 256  # bytes of a text, at most
+WORD = 256  # largest size of a text in bytes
 HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 ENCRYPTED = 0x1
-ONE_ARRAY, ARCHIVE = np.lib.format.MAGIC_PREFIX, b"PK"  # how such files begin
+ONE_ARRAY, ARCHIVE = np.lib.format.MAGIC_PREFIX, b"PK"  # first bytes of an .npy file and of a zip archive
 DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OverflowError, ValueError)
 PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 def read_arrays(file: str, known: Collection[str]) -> dict[str, Real]:
-    """Arrays by name as float64. OSError, or ValueError naming the file, the array, and the remedy.
+    """Arrays by name as float64. Raises OSError, or ValueError with the file, the array and the remedy.
 
-    Names not `known`, doubled names, objects, text, complex numbers, and sizes that no such file can hold are refused
-    from the headers, before anything is unpacked.
+    Unknown and repeated names, objects, text, complex numbers, and sizes that a file of this size cannot contain are
+    refused on the basis of the headers, before anything is unpacked.
     """
     try:
         found = unpacked(file, dict.fromkeys(known, REAL))
@@ -38,14 +38,14 @@ def read_arrays(file: str, known: Collection[str]) -> dict[str, Real]:
 
 
 def unpacked(file: str | os.PathLike[str], kinds: Mapping[str, str]) -> dict[str, NDArray[Any]]:
-    """Arrays by name, of the kinds that each may have. OSError, or Unreadable as `read_arrays` says."""
+    """Arrays by name, each of the given kinds of types. Raises OSError, or Unreadable as in `read_arrays`."""
     try:
         left = allowance(regular_size(file))
         with open(file, "rb") as stream:
             begin = stream.read(len(ONE_ARRAY))
         if begin == ONE_ARRAY:
             raise Unreadable("it holds one array", "save the arrays by name with numpy.savez")
-        if not begin.startswith(ARCHIVE):  # zip readers find their contents from the end, and take anything in front
+        if not begin.startswith(ARCHIVE):  # zip readers start from the end of a file and accept any prefix
             raise Unreadable("it does not begin as an .npz archive", "write it with numpy.savez")
         found: dict[str, NDArray[Any]] = {}
         with zipfile.ZipFile(file) as archive:
@@ -60,7 +60,7 @@ def unpacked(file: str | os.PathLike[str], kinds: Mapping[str, str]) -> dict[str
     except OSError as error:
         if error.filename is not None:
             raise
-        # The zip reader moves to where a damaged table of contents says, which may be before the start of the file.
+        # A damaged table of contents can refer to a position before the start of the file.
         raise Unreadable(f"it is not an .npz archive of plain arrays ({error})", "write it with numpy.savez") from None
     except DAMAGED as error:
         raise Unreadable(f"it is not an .npz archive of plain arrays ({error})", "write it with numpy.savez") from None
@@ -78,7 +78,7 @@ def _name(member: zipfile.ZipInfo, known: Collection[str], found: Collection[str
 
 
 def _read(stream: IO[bytes], name: str, limit: int, kinds: str) -> NDArray[Any]:
-    """One array; Unreadable where its header asks for more than `limit` bytes or is not of these kinds."""
+    """One array; Unreadable if its header specifies more than `limit` bytes or another kind of type."""
     version = np.lib.format.read_magic(stream)
     if version not in HEADERS:
         raise Unreadable(f'"{name}" has a header of version {version}', "write it with numpy.savez")
@@ -94,5 +94,5 @@ def _read(stream: IO[bytes], name: str, limit: int, kinds: str) -> NDArray[Any]:
         raise Unreadable(f'"{name}" {needed}, more than a file of this size can hold', f"check its shape {shape}")
     data = stream.read(count * dtype.itemsize + 1)
     if len(data) != count * dtype.itemsize:
-        raise Unreadable(f'"{name}" does not hold the numbers that its shape {shape} asks for', "write it anew")
+        raise Unreadable(f'"{name}" does not have the numbers that its shape {shape} needs', "write it again")
     return np.frombuffer(data, dtype).reshape(shape, order="F" if columns_first else "C")

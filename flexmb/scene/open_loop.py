@@ -1,4 +1,4 @@
-"""A scene without its feedback: what is controlled, by itself."""
+"""A scene without its feedback: the open loop of the controlled system."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from flexmb.scene.values import PathError, with_values
 
 
 def open_loop(scene: Scene) -> Scene:
-    """The scene without sensors and controllers; what they drove stays where it was, with value 0.
+    """The scene without sensors and controllers, and with the value 0 in place of every signal of a controller.
 
-    Nor are there events that watch their signals or change controllers.
+    Events that watch signals or change controllers are removed, too.
     """
     left = msgspec.structs.replace(scene, sensors=(), controllers=())
     if scene.events:
@@ -27,7 +27,7 @@ def open_loop(scene: Scene) -> Scene:
 
 
 def _can_happen(scene: Scene, event: SceneEvent) -> bool:
-    """Whether what it changes is in the scene."""
+    """Whether everything that an event changes exists in the scene."""
     try:
         with_values(scene, {action.path: action.value for action in event.actions if isinstance(action, Change)})
     except PathError:
@@ -36,7 +36,7 @@ def _can_happen(scene: Scene, event: SceneEvent) -> bool:
 
 
 def _silent(item: Any) -> Any:
-    """A struct, or a tuple of some, with every signal inside it zero; the same one where there is none."""
+    """A struct, or a tuple of structs, with zero in place of all signals inside; the same object if there is none."""
     if isinstance(item, ControlSignal):
         return Constant(value=0.0)
     if isinstance(item, tuple):
@@ -48,9 +48,9 @@ def _silent(item: Any) -> Any:
 
 
 def refuse_feedback(scene: Scene, what: str, instead: str = "run the scene by simulate") -> None:
-    """NotImplementedError for a scene with controllers, which `what` would ignore; the message says what to do."""
+    """NotImplementedError for a scene with controllers, which `what` does not support; the message has the remedy."""
     if scene.controllers:
         raise NotImplementedError(
-            f'scene "{scene.name}" has controllers, and {what} knows of none: give it flexmb.open_loop(scene), or '
+            f'scene "{scene.name}" has controllers, which {what} does not support: give it flexmb.open_loop(scene), or '
             f"{instead}"
         )

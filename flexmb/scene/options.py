@@ -1,7 +1,6 @@
-"""Keyword arguments that methods of the builder have in common or that few scenes need, as typed dictionaries.
+"""Keyword arguments of the builder's methods that are shared or rarely needed, as typed dictionaries.
 
-Type checkers and editors know their names, and other names are refused when a call is made. A name that is not given
-has the default of the schema.
+Type checkers and editors know their names; calls refuse other names. Omitted arguments have the defaults of the schema.
 """
 
 from __future__ import annotations
@@ -16,14 +15,14 @@ from flexmb.scene.problems import closest
 
 
 def refuse_others(what: str, names: Iterable[str], known: type) -> None:
-    """TypeError for a name that a typed dictionary does not have, with the nearest that it has."""
+    """TypeError for a name that a typed dictionary does not declare, with the nearest name that it declares."""
     for name in names:
         if name not in known.__annotations__:
             raise TypeError(f'{what} has no "{name}": {closest(name, known.__annotations__)}')
 
 
 class Placement(TypedDict, total=False):
-    """Where a hinge sits: nodes of parent and child, and the hinge frames' fixed offsets from them (node axes, m)."""
+    """Hinge frames: nodes of parent and child, and fixed offsets from them (node axes, m)."""
 
     parent_node: str
     child_node: str
@@ -34,7 +33,7 @@ class Placement(TypedDict, total=False):
 
 
 class Angle(TypedDict, total=False):
-    """An angular coordinate: initial `angle` (rad) and `rate` (rad/s), `given` where both are kept, spring
+    """An angular coordinate: initial `angle` (rad) and `rate` (rad/s), `given` if closures must keep both, spring
     `stiffness` (N m/rad) about `rest` (rad), `damping` (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as
     functions of time."""
 
@@ -49,9 +48,9 @@ class Angle(TypedDict, total=False):
 
 
 class Displacement(TypedDict, total=False):
-    """A linear coordinate: initial `position` (m) and `rate` (m/s), `given` where both are kept, spring `stiffness`
-    (N/m) about `rest` (m), `damping` (N s/m), motor `force` (N) or `prescribed` displacement (m) as functions of
-    time."""
+    """A linear coordinate: initial `position` (m) and `rate` (m/s), `given` if closures must keep both, spring
+    `stiffness` (N/m) about `rest` (m), `damping` (N s/m), motor `force` (N) or `prescribed` displacement (m) as
+    functions of time."""
 
     position: float
     rate: float
@@ -64,22 +63,22 @@ class Displacement(TypedDict, total=False):
 
 
 class GivenHinge(Placement, total=False):
-    """Where a hinge sits that has no scalar coordinates, and whether all its initial values are kept, `given`."""
+    """Frames of a hinge without scalar coordinates, and whether closures must keep all its initial values, `given`."""
 
     given: bool
 
 
 class TurningHinge(Placement, Angle, total=False):
-    """Where a hinge sits, and its one angle."""
+    """Frames of a hinge with one angle, and the angle."""
 
 
 class SlidingHinge(Placement, Displacement, total=False):
-    """Where a hinge sits, and its one displacement."""
+    """Frames of a hinge with one displacement, and the displacement."""
 
 
 class BeamOptions(TypedDict, total=False):
-    """How a beam becomes points and modes, see `flexmb.scene.schema.BeamBody`: `theory`, `mass` matrix, inertia
-    `points`; and rigid lumps fixed to it, `tip_masses`."""
+    """Model of a beam, see `flexmb.scene.schema.BeamBody`: `theory`, `mass` matrix, inertia `points`; and rigid lumps
+    fixed to it, `tip_masses`."""
 
     theory: Literal["euler-bernoulli", "timoshenko"]
     mass: Literal["consistent", "lumped"]
@@ -121,7 +120,7 @@ class ClosureFrames(TypedDict, total=False):
 
 
 class SpringEnds(TypedDict, total=False):
-    """Where a spring's ends are: nodes of its two bodies, and fixed offsets from them (node axes, m)."""
+    """Ends of a spring: nodes of its two bodies, and fixed offsets from them (node axes, m)."""
 
     node_a: str
     node_b: str
@@ -130,7 +129,7 @@ class SpringEnds(TypedDict, total=False):
 
 
 class LoadLaw(TypedDict, total=False):
-    """How a spring resists a displacement x: `preload` + `stiffness` x + `stiffening`[0] x² ..., or `loads` over
+    """Load of a spring at a displacement x: `preload` + `stiffness` x + `stiffening`[0] x² ..., or `loads` over
     `table`; and `damping`."""
 
     preload: float
@@ -174,8 +173,8 @@ class FrictionOptions(TypedDict, total=False):
 
 
 class Sampling(TypedDict, total=False):
-    """When a controller acts: every `period` (s) from `offset` (s) on, its outputs changing `delay` (s) later; without
-    a period always."""
+    """Sampling of a controller: every `period` (s) from `offset` (s) on, with outputs that change `delay` (s) later;
+    without a period the controller is continuous."""
 
     period: float | None
     offset: float
@@ -194,7 +193,7 @@ class LinearLaw(Sampling, total=False):
 
 class PidLaw(Sampling, total=False):
     """Gains `kp`, `ki`, `kd`, constant `setpoint`, time constant `filter` (s) of the derivative, limits `lower` and
-    `upper`, time `tracking` (s) in which a limit takes back the integral."""
+    `upper`, time constant `tracking` (s) of the anti-windup."""
 
     kp: float
     ki: float
@@ -207,7 +206,7 @@ class PidLaw(Sampling, total=False):
 
 
 class OwnLaw(Sampling, total=False):
-    """Number of `outputs`, `initial` state and `parameters` of a function of one's own."""
+    """Number of `outputs`, `initial` state and `parameters` of a user's function."""
 
     outputs: int
     initial: ArrayLike

@@ -1,4 +1,4 @@
-"""The problems of a scene: what is wrong or doubtful, where, and what to write instead."""
+"""Problems of a scene: what is wrong or doubtful, its place, and the remedy."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Place:
         return Place(self.path + "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps), self.names)
 
     def named(self, label: str) -> Place:
-        """The same place with one more name on the way."""
+        """The same place with one more name."""
         return Place(self.path, (*self.names, label))
 
     def __str__(self) -> str:
@@ -28,7 +28,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Defect:
-    """One defect of a scene: `where` is path and names, `what` the defect, `remedy` what to write instead."""
+    """A defect of a scene: `where` has path and names, `what` is the defect, `remedy` says what to write instead."""
 
     where: str
     what: str
@@ -40,23 +40,23 @@ class Defect:
 
 @dataclass(frozen=True)
 class Doubt(Defect):
-    """What a sound scene may have, but few do: it runs as it is. `waiver` in the scene's `allow` says that it is meant.
+    """A value that is valid but unusual, such as an error of units causes; the scene runs.
 
-    An error of a factor of a thousand usually looks like this, and so does a scene in millimetres.
+    `waiver` in the scene's `allow` declares it as intended, for example in a scene in millimetres.
     """
 
     waiver: str
 
     def __str__(self) -> str:
-        return f'{super().__str__()}; if it is meant, write allow = ["{self.waiver}"] in the scene'
+        return f'{super().__str__()}; if it is intended, write allow = ["{self.waiver}"] in the scene'
 
 
 class SceneWarning(UserWarning):
-    """A scene that runs, of which something is doubtful; the message says where, and how to waive it."""
+    """A scene that runs but has doubtful values; the message says where, and how to waive the warning."""
 
 
 class SceneError(ValueError):
-    """A scene that cannot be simulated; `problems` lists every defect found."""
+    """A scene that cannot be simulated; `problems` lists all defects found."""
 
     def __init__(self, scene: str, problems: Iterable[Defect]) -> None:
         self.scene = scene
@@ -67,7 +67,7 @@ class SceneError(ValueError):
 
 
 def in_short(scene: str, doubts: Sequence[Doubt]) -> str:
-    """The text of a warning: the first doubt of each kind in full, of the others their number."""
+    """The text of a warning: the first doubt of each kind in full, and the number of the others."""
     kinds: dict[str, list[Doubt]] = {}
     for doubt in doubts:
         kinds.setdefault(doubt.waiver, []).append(doubt)
@@ -77,7 +77,7 @@ def in_short(scene: str, doubts: Sequence[Doubt]) -> str:
 
 
 def closest(word: str, known: Iterable[str]) -> str:
-    """A remedy for an unknown word: the nearest known one, or all of them."""
+    """The remedy for an unknown word: the nearest known word, or all known words."""
     words = sorted(known)
     near = get_close_matches(word, words, n=1)
     if near:

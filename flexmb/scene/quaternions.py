@@ -1,4 +1,4 @@
-"""Rotations of a scene's frames, in numpy alone: importing SciPy's takes longer than a scene's first evaluation.
+"""Rotations of a scene's frames by numpy alone, because importing SciPy takes longer than a first evaluation.
 
 Quaternions are scalar first; R_AB maps components in B to components in A.
 """
@@ -12,11 +12,11 @@ from flexmb.typing import Real
 
 
 def rotation_matrix(quaternion: ArrayLike) -> Real:
-    """R (...,3,3) of quaternions (...,4), which are scaled to unit length; ValueError where one is zero."""
+    """R (...,3,3) of quaternions (...,4), which are normalised; ValueError if one is zero."""
     given = np.asarray(quaternion, dtype=float)
     size = np.linalg.norm(given, axis=-1, keepdims=True)
     if np.any(size == 0.0):
-        raise ValueError("a quaternion of length zero is no rotation")
+        raise ValueError("a quaternion of length zero is not a rotation")
     w, x, y, z = np.moveaxis(given / size, -1, 0)
     rows = (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
@@ -27,9 +27,9 @@ def rotation_matrix(quaternion: ArrayLike) -> Real:
 
 
 def quaternion_of(R: Real) -> Real:
-    """Unit quaternions (...,4) of rotation matrices (...,3,3); of both signs the one whose first nonzero is positive.
+    """Unit quaternions (...,4) of rotation matrices (...,3,3), with the sign that makes the first nonzero positive.
 
-    Each is found from its largest component, so that no digits are lost near half a turn: Markley, J. Guidance 31
+    Each is computed from its largest component, so that no digits are lost near half a turn: Markley, J. Guidance 31
     (2008) 440.
     """
     trace = np.trace(R, axis1=-2, axis2=-1)
@@ -47,14 +47,14 @@ def quaternion_of(R: Real) -> Real:
 
 
 def rotation_by(vector: ArrayLike) -> Real:
-    """R (...,3,3) of rotation vectors (...,3) in rad: a turn about each by its length."""
+    """R (...,3,3) of rotation vectors (...,3) in rad: rotation about each by its length."""
     v = np.asarray(vector, dtype=float)
     half = np.linalg.norm(v, axis=-1, keepdims=True) / 2.0
     return rotation_matrix(np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * v], axis=-1))
 
 
 def about(axis: str, angle: float) -> Real:
-    """R (3,3) of a turn by `angle` (rad) about "x", "y" or "z"."""
+    """R (3,3) of a rotation by `angle` (rad) about "x", "y" or "z"."""
     i = "xyz".index(axis)
     j, k = (i + 1) % 3, (i + 2) % 3
     R = np.eye(3)

@@ -1,4 +1,4 @@
-"""Reading files that somebody else wrote: only regular files, of a sensible size, in UTF-8, not nested too deeply."""
+"""Safe reading of files of unknown origin: regular files only, of limited size, in UTF-8, not nested too deeply."""
 
 from __future__ import annotations
 
@@ -13,24 +13,23 @@ from pathlib import Path
 from typing import Any
 
 MIB = 2**20
-TEXT_LIMIT = 16 * MIB  # of a file that people write; tomllib takes some 10 s for it
-# An archive may unpack to this many bytes at most, and to this many times its own size. Zeros shrink a thousandfold,
-# but a file of nothing but zeros holds no data.
+TEXT_LIMIT = 16 * MIB  # for text files; tomllib takes some 10 s for this size
+# An archive may unpack to FREE bytes plus RATIO times its own size. Only zeros shrink by more (a thousandfold).
 FREE, RATIO = 64 * MIB, 40
-DEEPEST = 64  # parts of a dotted key: no scene and no run file has more than three
-# Comments and texts, whose dots are none of keys.
+DEEPEST = 64  # parts of a dotted key; no scene and no run file has more than three
+# Comments and strings, whose dots do not belong to keys.
 PROSE = re.compile(
     r"""#[^\n]*+|\"{3}(?:[^"\\]|\\.|"{1,2}(?!"))*+\"{3}|'{3}.*?'{3}|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'""", re.DOTALL
 )
-MOST_DOTS = 100_000  # in keys: tomllib makes a table for each, which takes 10 us and half a kilobyte
-# The search starts only where a word begins and never backtracks (possessive quantifiers): a search from every letter
-# of a long word would take a time that grows with the square of its length.
+MOST_DOTS = 100_000  # in keys: tomllib creates a table for each, which takes 10 us and half a kilobyte
+# Matches start at word boundaries only and never backtrack (possessive quantifiers): otherwise the time would grow with
+# the square of the length of a word.
 DOTTED = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
 DOT = re.compile(r"""\.(?=[ \t]*+(?:[A-Za-z_"'-]|[\w-]++[ \t]*+[.=\]]))""")
 
 
 class Unreadable(ValueError):
-    """A file whose content is not what it has to be: `what`, with the line if there is one, and the `remedy`."""
+    """A file with invalid content: `what` is wrong, with the line if it is known, and the `remedy`."""
 
     def __init__(self, what: str, remedy: str) -> None:
         self.what, self.remedy = what, remedy
@@ -44,20 +43,20 @@ def regular_size(path: str | os.PathLike[str]) -> int:
     except ValueError:  # a NUL in the name
         raise OSError(errno.EINVAL, "this cannot be the name of a file", str(path)) from None
     if not stat.S_ISREG(found.st_mode):
-        raise OSError(errno.EINVAL, "this is no regular file but a folder, a pipe or a device: name a file", str(path))
+        raise OSError(errno.EINVAL, "this is a folder, a pipe or a device: name a regular file", str(path))
     return found.st_size
 
 
 def read_bytes(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> bytes:
-    """A regular file as it stands, of at most `limit` bytes. OSError, or Unreadable."""
+    """The content of a regular file of at most `limit` bytes. OSError, or Unreadable."""
     size = regular_size(path)
     if size > limit:
-        raise Unreadable(f"{size / MIB:.0f} MiB are more than such a file may have, {limit // MIB} MiB", "divide it")
+        raise Unreadable(f"its size is {size / MIB:.0f} MiB, and the limit is {limit // MIB} MiB", "divide it")
     return Path(path).read_bytes()
 
 
 def read_text(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> str:
-    """Text of a regular file, with any line ends and with or without a byte order mark. OSError, or Unreadable."""
+    """Text of a regular file, with any kind of line ends, with or without byte order mark. OSError, or Unreadable."""
     data = read_bytes(path, limit)
     try:
         text = data.decode("utf-8-sig")
@@ -69,7 +68,7 @@ def read_text(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> str:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """TOML as a dict. Unreadable names line and column."""
+    """TOML as a dict. Raises Unreadable with line and column."""
     if _many_dots(text) and _many_dots(PROSE.sub('""', text)):
         raise Unreadable(f"there are more than {MOST_DOTS} dots in keys", "write arrays of tables, [[name]]")
     if DOTTED.search(text):
@@ -89,5 +88,5 @@ def _many_dots(text: str) -> bool:
 
 
 def allowance(size: int) -> int:
-    """How many bytes a file of `size` bytes may unpack to."""
+    """The number of bytes to which a file of `size` bytes may unpack."""
     return FREE + RATIO * size

@@ -1,4 +1,4 @@
-"""The written form of the schema, generated from it: ``python -m flexmb.scene.reference [FOLDER]``.
+"""Generator of the schema's documentation: ``python -m flexmb.scene.reference [FOLDER]``.
 
 Writes `scene.schema.json` (for editors and validators) and `scene-reference.md` (a table for each struct) to FOLDER, by
 default `docs`.
@@ -39,13 +39,13 @@ def json_schema() -> str:
     """The JSON Schema of a scene."""
     schema = msgspec.json.schema(Scene)
     for struct in schema["$defs"].values():
-        if "description" in struct:  # a docstring: Python 3.13 takes its indentation away, older ones keep it
+        if "description" in struct:  # a docstring, whose indentation is removed by Python 3.13 only
             struct["description"] = cleandoc(struct["description"])
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
 def reference() -> str:
-    """The reference in Markdown: every struct that a scene may hold, in the order it is first met."""
+    """The reference in Markdown: every struct of a scene, in the order of its first appearance."""
     sections = [INTRODUCTION]
     for struct in _structs(inspect.type_info(Scene), set()):
         kind = f' (`{struct.tag_field} = "{struct.tag}"`)' if struct.tag is not None else ""

@@ -1,4 +1,4 @@
-"""Inertia tensors and beam sections from the numbers a user has at hand."""
+"""Inertia tensors and beam sections from dimensions and material data."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ def cylinder_inertia(mass: float, radius: float, length: float, axis: Literal["x
 def beam_section(
     *, E: float, G: float, A: float, Iy: float, Iz: float, rho: float, **shape: Unpack[SectionShape]
 ) -> BeamStation:
-    """Section of a homogeneous beam at station `x` (m), 0 if not given.
+    """Section of a homogeneous beam at station `x` (m), by default 0.
 
     E, G: elastic moduli (Pa); A: area (m²); Iy, Iz: second moments of area about the section's y and z (m⁴), so that
-    `Iz` resists bending in the x-y plane; rho: density (kg/m³). J: torsion constant (m⁴), Iy + Iz (exact for a circle
-    only) if not given. `shear_factor` k gives the Timoshenko stiffness k G A; 5/6, that of a rectangle, if not given.
+    `Iz` resists bending in the x-y plane; rho: density (kg/m³). J: torsion constant (m⁴), by default Iy + Iz, which is
+    exact for a circle only. `shear_factor` k gives the Timoshenko stiffness k G A; by default 5/6, that of a rectangle.
     TypeError for any other name.
     """
     refuse_others("a beam section", shape, SectionShape)

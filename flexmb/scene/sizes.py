@@ -1,7 +1,7 @@
-"""What the models of flexible bodies take of memory and time, estimated before anything is made.
+"""Estimates of the memory and time that models of flexible bodies need, before they are made.
 
-A number in a file, such as `elements`, makes arrays that grow with its square. The factors below were measured (peak of
-memory and time of one processor, to a factor of two) on beams of 50 to 400 elements with 8 to 100 modes.
+The memory of a model can grow with the square of a number in a file, such as `elements`. The factors below were
+measured (peak memory and processor time, within a factor of two) on beams of 50 to 400 elements with 8 to 100 modes.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ from typing import NamedTuple
 from flexmb.scene.bodies import BeamBody, Level
 
 MOST_BYTES = 2**32
-"""Memory that the model of one body may take while it is made, as much as the outputs of a run may."""
-MOST_MODES = 2_000  # of one body: its matrices are decomposed as a whole, in minutes
-ENDLESS = 10**18  # whole numbers of files have any number of digits, and floats overflow
-_COORDINATES = {"axial": 1, "torsion": 1, "bending_y": 2, "bending_z": 2}  # of an element, twice in bending with shear
+"""Limit of the memory that the model of one body may need while it is made, the same as for the outputs of a run."""
+MOST_MODES = 2_000  # of one body: the dense eigenproblem of its matrices takes minutes
+ENDLESS = 10**18  # larger integers, which files can contain, are replaced by this one, so that floats do not overflow
+_COORDINATES = {"axial": 1, "torsion": 1, "bending_y": 2, "bending_z": 2}  # per element; bending with shear: twice
 _PER_COORDINATE = 170.0  # bytes, times the square of the number of coordinates
-_PER_PAIR = 130.0  # bytes of each inertia point and pair of modes, of second order
-_PER_TRIPLE = 500.0  # bytes of each triple of modes, of first order
-_POINTS = {"line": 6, "rotary": 6, "section": 24}  # of an element
-_SPEED = 8.6e5  # coordinates cubed in a millisecond of one processor, by the dense eigenproblem
-PLENTY, PER_MODE = 200, 8  # elements that no beam is asked about, and beyond that for each mode
+_PER_PAIR = 130.0  # bytes per inertia point and pair of modes, level stiffened
+_PER_TRIPLE = 500.0  # bytes per triple of modes, level linear
+_POINTS = {"line": 6, "rotary": 6, "section": 24}  # inertia points per element
+_SPEED = 8.6e5  # cube of the number of coordinates per millisecond, of the dense eigenproblem
+PLENTY, PER_MODE = 200, 8  # doubt "many_elements": more than PLENTY and more than PER_MODE for each mode
 
 
 class Estimate(NamedTuple):
@@ -31,13 +31,13 @@ class Estimate(NamedTuple):
 
     @property
     def words(self) -> str:
-        """For messages."""
+        """The estimate as text."""
         took = f"{self.time:.0f} s" if self.time < 120.0 else f"{self.time / 60.0:.3g} min"
         return f"about {self.memory / 2**30:.2g} GiB and {took}"
 
 
 def beam_estimate(body: BeamBody, modes: int) -> Estimate:
-    """Of a beam with so many modal coordinates, static ones included."""
+    """The estimate for a beam with this number of modes, attachment modes included."""
     shear = 2 if body.theory == "timoshenko" else 1
     elements, modes = float(min(body.elements, ENDLESS)), min(modes, ENDLESS)
     size = elements * sum(
@@ -51,7 +51,7 @@ def beam_estimate(body: BeamBody, modes: int) -> Estimate:
 
 
 def modes_memory(level: Level, points: float, modes: int) -> float:
-    """Bytes of the tables of a level for a body with so many inertia points and modes."""
+    """Bytes of the tables of a level for a body with these numbers of inertia points and modes."""
     match level:
         case "stiffened":
             return _PER_PAIR * points * float(modes) ** 2

@@ -1,4 +1,4 @@
-"""Stops on which something may come to rest: the names that a run gives to their loads and to leaving them."""
+"""Stops on which a coordinate can come to rest: their load signals, and the events that end the contact."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flexmb.scene.schema import Scene, SceneEvent
 
 
 def resting(scene: Scene) -> Iterator[tuple[SceneEvent, Impact]]:
-    """Events by which something may come to rest, each with the impact that lets it."""
+    """Events with an impact after which a coordinate may come to rest, each with this impact."""
     for event in scene.events:
         for action in event.actions:
             if isinstance(action, Impact) and action.rests:
@@ -18,22 +18,22 @@ def resting(scene: Scene) -> Iterator[tuple[SceneEvent, Impact]]:
 
 
 def load_of(event: SceneEvent) -> str:
-    """The name of the signal that is the load of its stop, along the coordinate (N or N m)."""
+    """The name of the signal with the load of the stop along the coordinate (N or N m)."""
     return f"{event.name}: stop"
 
 
 def leaving(event: SceneEvent) -> str:
-    """The name of the event by which what rests on its stop leaves it."""
+    """The name of the event that ends the contact."""
     return f"{event.name}: leaves"
 
 
 def stop_sensor(event: SceneEvent, action: Impact) -> DriveSensor:
-    """What measures the load of a stop."""
+    """The sensor of the load of a stop."""
     return DriveSensor(name=load_of(event), coordinate=action.coordinate)
 
 
 def leaves(event: SceneEvent, coordinate: str, push: int) -> SceneEvent:
-    """The event by which what rests on a stop leaves it; push: the sign of loads of the stop."""
+    """The event that ends the contact with a stop, when its load changes sign; `push` is the sign of the load."""
     return SceneEvent(
         name=leaving(event), watch=load_of(event), level=0.0, crossing="falling" if push > 0 else "rising",
         actions=(Release(coordinate=coordinate),),

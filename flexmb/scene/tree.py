@@ -29,7 +29,7 @@ Item = TypeVar("Item", bound=Hinge | PointMass)
 
 
 class Branch(NamedTuple):
-    """A body and the hinge that joins it to its parent."""
+    """A body and its inboard hinge."""
 
     body: Body
     hinge: Hinge
@@ -52,7 +52,7 @@ class NamedCoordinate(NamedTuple):
 def ordered(scene: Scene) -> tuple[Branch, ...]:
     """Bodies depth-first from the ground, each with its inboard hinge; siblings in the order of the scene's hinges.
 
-    Every parent precedes its children and every subtree is contiguous. Raises ValueError where the scene is no tree.
+    Every parent precedes its children, and every subtree is contiguous. Raises ValueError if the scene is not a tree.
     """
     bodies = {body.name: body for body in scene.bodies}
     outboard: dict[str, list[Hinge]] = {name: [] for name in (GROUND, *bodies)}
@@ -76,8 +76,9 @@ def ordered(scene: Scene) -> tuple[Branch, ...]:
 def rest_frames(body: Body) -> dict[str, NodeFrame]:
     """Rest frames of all nodes of a body by name, implicit ones included.
 
-    Implicit are "origin" (rigid, beam, clamped modal: the body frame), and "root" and "tip" of a beam. A free-free
-    modal body has "origin" only where it lists one. The nodes of a SID body are in its file: ValueError.
+    Implicit nodes are "origin", the body frame (of rigid bodies, beams and clamped modal bodies), and "root" and "tip"
+    of a beam. A free-free modal body has an "origin" only if it lists one. ValueError for a SID body, whose nodes are
+    in its file.
     """
     origin = {"origin": NodeFrame(ZERO, IDENTITY)}
     match body:
@@ -97,7 +98,7 @@ def rest_frames(body: Body) -> dict[str, NodeFrame]:
 
 
 def node_frame(body: Body, node: str) -> NodeFrame:
-    """Rest frame of `node` on `body`; ValueError names the nodes there are."""
+    """Rest frame of `node` on `body`; ValueError, which lists the body's nodes, if there is no such node."""
     frames = rest_frames(body)
     if node not in frames:
         raise ValueError(f'body "{body.name}" has no node "{node}"; its nodes are {", ".join(frames)}')
@@ -131,7 +132,7 @@ def with_coordinates(item: Item, changed: Iterable[Coordinate]) -> Item:
 
 
 def scalar_paths(scene: Scene) -> dict[str, str]:
-    """Scalar coordinates as states name them, "<hinge>.<key>" and "<wheel>.angle", and the paths of their structs.
+    """Names of scalar coordinates in states, "<hinge>.<key>" and "<wheel>.angle", and the paths of their structs.
 
     Paths are those of `Scene.with_values`.
     """
@@ -145,7 +146,7 @@ def scalar_paths(scene: Scene) -> dict[str, str]:
 
 
 def rate_name(coordinate: str, path: str) -> str:
-    """How states name the rate of a scalar coordinate, which has a path as of `scalar_paths`."""
+    """The name in states of the rate of a scalar coordinate, from the name and the path in `scalar_paths`."""
     if path.startswith("wheels."):
         return f"{coordinate.removesuffix('.angle')}.speed"
     return f"{coordinate}.rate"
@@ -154,7 +155,7 @@ def rate_name(coordinate: str, path: str) -> str:
 def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMass | Wheel, int]:
     """The item along whose coordinate a connector acts, and the number of the coordinate among its scalar ones.
 
-    ValueError where there is none, or where the connector does not say which.
+    ValueError if there is none, or if the connector does not determine which.
     """
     items = {item.name: item for item in (*scene.hinges, *scene.point_masses, *scene.wheels)}
     sort = "angle" if connector.ANGULAR else "displacement"
@@ -178,7 +179,7 @@ def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMas
 
 
 def watches_signals(scene: Scene) -> bool:
-    """Whether an event watches what only sensors and controllers say, or will: the load of a stop."""
+    """Whether any event watches, or may later watch (the load of a stop), a signal of a sensor or controller."""
     if not scene.events:
         return False
     rests = any(isinstance(action, Impact) and action.rests for event in scene.events for action in event.actions)
@@ -186,9 +187,10 @@ def watches_signals(scene: Scene) -> bool:
 
 
 def watchable(scene: Scene) -> dict[str, str]:
-    """What an event may watch without a look at sensors, by the name it gives: "time", a scalar coordinate, its rate.
+    """Quantities that events can watch without evaluating sensors: "time", scalar coordinates and their rates, by name.
 
-    A sensor of time or of the only coordinate of a hinge, wheel or point mass stands for what it measures.
+    Sensors of time, or of the only coordinate of a hinge, wheel or point mass, are included: their names map to the
+    quantity that they measure.
     """
     paths = scalar_paths(scene)
     found = {"time": "time"} | {name: name for name in paths}

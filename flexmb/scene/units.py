@@ -1,4 +1,4 @@
-"""The unit at the end of a schema key: "stiffness_Nm_rad" is the stem "stiffness" and the unit N m/rad."""
+"""Units of the schema's keys: "stiffness_Nm_rad" has the stem "stiffness" and the unit N m/rad."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ UNITS = {
     "m_rad": "m/rad",
 }  # fmt: skip
 
-# The suffix cannot tell kg/m from kg m: a mass moment of inertia per length is kg m²/m.
+# In these keys the suffix means kg m, not kg/m: moments of inertia per length have the unit kg m²/m.
 ROTARY = ("rotary_y_kg_m", "rotary_z_kg_m")
 
 
 def split_unit(key: str) -> tuple[str, str]:
-    """Stem and unit of a schema key, the longest unit suffix winning; the unit is "" where the key carries none."""
+    """Stem and unit of a schema key, by the longest suffix that is a unit; the unit is "" if there is none."""
     parts = key.split("_")
     for start in range(1, len(parts)):
         suffix = "_".join(parts[start:])

@@ -1,4 +1,4 @@
-"""A scene with other values at paths such as "rod.mass_kg" or "bodies.rod.nodes.tip.position_m"."""
+"""Scenes with other values at paths such as "rod.mass_kg" or "bodies.rod.nodes.tip.position_m"."""
 
 from __future__ import annotations
 
@@ -18,16 +18,15 @@ EVERY = "*"
 
 
 class PathError(ValueError):
-    """A path that leads to nothing in a scene, or to what cannot be changed so; the message says how far it leads."""
+    """A path that does not exist in a scene, or a value that cannot be used there; the message names the step."""
 
 
 def with_values(scene: Any, values: Mapping[str, Any]) -> Any:
-    """The scene with other values; paths go by keys, items of an array by their name, number or `*` for all of them.
+    """The scene with other values. Steps of a path are keys; items of an array are chosen by name, number or `*` (all).
 
-    The array that an item is in may be left out where one item alone has that name. A number takes another number,
-    which is whole where it counts something; an array takes one of the same length; what is a structure, as a function
-    of time or nothing (None), takes a structure of the schema or None. PathError names what does not fit. The scene is
-    checked when it is run.
+    The array of an item may be omitted if only one item has the name. Numbers are replaced by numbers (counts by whole
+    ones), arrays by arrays of the same length, structures (such as functions of time) and None by structures of the
+    schema or None. Raises PathError if a path or a value does not fit. The scene is checked when it is run.
     """
     for path, value in values.items():
         scene = changed_at(scene, path, partial(_replaced, new=value, path=path))
@@ -35,24 +34,24 @@ def with_values(scene: Any, values: Mapping[str, Any]) -> Any:
 
 
 def changed_at(scene: Any, path: str, change: Callable[[Any], Any]) -> Any:
-    """The scene with `change` applied where the path leads, in all places of a path with `*`; PathError."""
+    """The scene with `change` applied at a path, for a path with `*` at all its places; PathError."""
     return _changed(scene, _in_full(scene, path), path, change)
 
 
 def number_at(path: str, old: Any, new: float) -> float:
-    """The number `new` in place of `old`, as its kind; PathError where it is none, or not whole and has to be."""
+    """The number `new` with the type of `old`; PathError if `old` is not a number, or `new` not whole for a count."""
     if isinstance(old, bool) or not isinstance(old, int | float):
-        remedy = "write it into the scene first" if old is None else "lead the path to a number"
-        raise PathError(f'parameter "{path}" is no number but {type(old).__name__}: {remedy}')
+        remedy = "write it into the scene first" if old is None else "give the path of a number"
+        raise PathError(f'parameter "{path}" is not a number but {type(old).__name__}: {remedy}')
     if isinstance(old, float):
         return float(new)
     if not float(new).is_integer():
-        raise PathError(f'parameter "{path}" counts something: {new:g} is no whole number')
+        raise PathError(f'parameter "{path}" is a count: {new:g} is not a whole number')
     return int(new)
 
 
 def _in_full(scene: Any, path: str) -> list[str]:
-    """The steps of a path, with the array that its first item is in."""
+    """The steps of a path, beginning with the array of its first item."""
     steps = path.split(".")
     if steps[0] in scene.__struct_fields__:
         return steps
@@ -68,7 +67,7 @@ def _in_full(scene: Any, path: str) -> list[str]:
 
 
 def _changed(node: Any, steps: list[str], path: str, change: Callable[[Any], Any]) -> Any:
-    """A part of a scene, changed where `steps` lead."""
+    """A part of a scene, changed at the end of `steps`."""
     if not steps:
         return change(node)
     step, rest = steps[0], steps[1:]
@@ -81,18 +80,18 @@ def _changed(node: Any, steps: list[str], path: str, change: Callable[[Any], Any
         if not chosen:
             raise _no_way(path, step, [getattr(item, "name", str(index)) for index, item in enumerate(node)])
         return tuple(_changed(item, rest, path, change) if i in chosen else item for i, item in enumerate(node))
-    raise PathError(f'parameter "{path}": nothing lies below {step}, as {node!r} has no parts: end the path before it')
+    raise PathError(f'parameter "{path}": {node!r} has no parts, so there is no "{step}": end the path before it')
 
 
 def _replaced(old: Any, new: Any, path: str) -> Any:
-    """`new` in place of `old`, of the same kind."""
+    """The replacement `new` of `old`, checked to be of the same kind."""
     if old is None or isinstance(old, msgspec.Struct):
         return _structure(old, new, path)
     if isinstance(old, tuple):
         return _array(old, new, path)
     if isinstance(old, str):
         if not isinstance(new, str):
-            raise PathError(f'parameter "{path}" is a word: give one, not {new!r}')
+            raise PathError(f'parameter "{path}" is a string: give one, not {new!r}')
         return new
     if isinstance(new, bool) or not isinstance(new, Real):
         raise PathError(f'parameter "{path}" is a number: give one, not {new!r}')
@@ -100,7 +99,7 @@ def _replaced(old: Any, new: Any, path: str) -> Any:
 
 
 def _structure(old: Any, new: Any, path: str) -> Any:
-    """A structure, or a function of time as a file writes it."""
+    """A structure of the schema, or a function of time in the form of a file (a dict)."""
     if new is None or isinstance(new, msgspec.Struct):
         return new
     if isinstance(new, dict) and (old is None or isinstance(old, Function)):
@@ -126,11 +125,11 @@ def _no_way(path: str, step: str, known: Iterable[str]) -> PathError:
 
 
 def parsed(assignment: str) -> tuple[str, Any]:
-    """Path and value of a word of a command line, `rod.mass_kg=2.0`; the value is written as in TOML. PathError."""
+    """Path and value of an argument of a command line, `rod.mass_kg=2.0`, whose value is in TOML; PathError."""
     path, equals, text = assignment.partition("=")
     if not equals:
-        raise PathError(f'"{assignment}" sets nothing: write name=value, such as rod.mass_kg=2.0')
+        raise PathError(f'"{assignment}" is not an assignment: write name=value, such as rod.mass_kg=2.0')
     try:
         return path.strip(), parse_toml(f"value = {text}")["value"]
     except Unreadable as problem:
-        raise PathError(f'"{assignment}": the value is not written as in TOML: {problem}') from None
+        raise PathError(f'"{assignment}": the value is not valid TOML: {problem}') from None

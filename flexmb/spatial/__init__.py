@@ -1,1 +1,1 @@
-"""Algebra of spatial vectors, rotations and inertias, as scalars that the compiler keeps in registers."""
+"""Algebra of spatial vectors, rotations and inertias, as tuples of scalars that the compiler keeps in registers."""

@@ -85,9 +85,9 @@ def rotate_inertia(r, p):
 
 @helper
 def rotate_without(r, p, row):
-    """The same of an inertia whose row and column 2 (rotation about z) or 5 (displacement along z) vanish.
+    """`rotate_inertia` for an inertia whose row and column 2 (rotation about z) or 5 (translation along z) vanish.
 
-    They are not read.
+    The vanishing elements are not read.
     """
     a, b, c = p
     if row == 2:
@@ -114,7 +114,7 @@ def _plus_cross_sym(b, p, c):
 
 @helper
 def shift_inertia(p, d):
-    """phi P phi': inertia about Q of a body known about O, with d from Q to O (same axes).
+    """phi P phi': the inertia about Q from that about O; d leads from Q to O (same axes).
 
     C_Q = C, B_Q = B + skew(d) C, A_Q = A - B_Q skew(d) - (B skew(d))'.
     """
@@ -161,7 +161,7 @@ def outer_inertia(x, y, s):
 
 @helper
 def less_outer(p, gain, force):
-    """P - gain force', for spatial vectors of one direction: what an axis takes with it."""
+    """P - gain force', symmetric because gain and force are parallel: the elimination of a hinge with a single axis."""
     (a, b, c), (u, v), (x, y) = p, gain, force
     angular = (
         a[0] - u[0] * x[0], a[1] - u[1] * x[1], a[2] - u[2] * x[2],
@@ -181,7 +181,10 @@ def less_outer(p, gain, force):
 
 @helper
 def add_product(a, i, s, x, y):
-    """Add s x y' of 6-vectors x, y to the spatial inertia in a: one term of a sum that is symmetric."""
+    """Add s x y' of 6-vectors x, y to the spatial inertia in a.
+
+    Only the stored elements of x y' are added; the sum over all terms must be symmetric.
+    """
     for n in range(3):
         a[i + n] += s * x[n] * y[n]
         a[i + 15 + n] += s * x[3 + n] * y[3 + n]

@@ -1,4 +1,4 @@
-"""Dense symmetric positive definite systems in the compiled code: Cholesky by rows, so that inner loops run on."""
+"""Dense symmetric positive definite systems in compiled code: Cholesky by rows, whose inner loops are contiguous."""
 
 from math import sqrt
 
@@ -8,10 +8,11 @@ from flexmb.spatial.pivots import SINGULAR
 
 @helper
 def cholesky_rows(U, n):
-    """Upper factor of U' U in place of the upper triangle of U[:n,:n]; returns -1.
+    """Cholesky factor U of U' U in place, in the upper triangle of U[:n,:n]; returns -1.
 
-    Where the matrix is not positive definite to round-off, or not finite, the row of the pivot that shows it. Two rows
-    are made at a time, four rows above taken off both at once: what is loaded serves eight products.
+    If the matrix is not positive definite to round-off, or not finite, returns the row of the first such pivot. Two
+    rows are computed at a time, from each of which four finished rows are subtracted at once: every number that is
+    loaded takes part in two products.
     """
     for m in range(0, n, 2):
         d, floor = U[m, m], SINGULAR * U[m, m]
@@ -70,7 +71,10 @@ def _subtract(s, a, y):
 
 @helper
 def _subtract_four(rows, m, n, y, z):
-    """Four finished rows off rows y (m) and z (m + 1), from column m + 1 on; branches have nothing in common."""
+    """Subtract four finished rows from rows y (m) and z (m + 1), from column m + 1 on.
+
+    In a mass matrix all factors are zero if the rows belong to another branch of the tree: then nothing is done.
+    """
     s0, s1, s2, s3 = rows[0, m], rows[1, m], rows[2, m], rows[3, m]
     t0, t1, t2, t3 = rows[0, m + 1], rows[1, m + 1], rows[2, m + 1], rows[3, m + 1]
     if s0 == 0.0 and s1 == 0.0 and s2 == 0.0 and s3 == 0.0 and t0 == 0.0 and t1 == 0.0 and t2 == 0.0 and t3 == 0.0:

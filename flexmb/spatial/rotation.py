@@ -5,7 +5,7 @@ from flexmb.jit.lanes import every, select
 from flexmb.spatial.scalar import atan2, sincos, sqrt
 from flexmb.spatial.vector import add, cross, dot, scale
 
-_SMALL = 0.25  # square of the angle below which series are taken
+_SMALL = 0.25  # square of the angle below which series are used; see `_series` for their truncation error
 
 
 @helper
@@ -79,8 +79,8 @@ def rotation_vector(w, x, y, z):
 
 @helper
 def quaternion_of_matrix(R):
-    """Unit quaternion, scalar first, of a rotation matrix, by the largest of its components: no cancellation."""
-    d = 1.0 + R[0] + R[4] + R[8]  # rows of 4 q q', of which each is q but for a factor
+    """Unit quaternion, scalar first, of a rotation matrix, from its largest component, which avoids cancellation."""
+    d = 1.0 + R[0] + R[4] + R[8]  # the rows of 4 q q' follow from R, and each of them is a multiple of q
     q = d, R[7] - R[5], R[2] - R[6], R[3] - R[1]
     d, q = _larger(d, q, 1.0 + R[0] - R[4] - R[8], (R[7] - R[5], 1.0 + R[0] - R[4] - R[8], R[1] + R[3], R[2] + R[6]))
     d, q = _larger(d, q, 1.0 - R[0] + R[4] - R[8], (R[2] - R[6], R[1] + R[3], 1.0 - R[0] + R[4] - R[8], R[5] + R[7]))
@@ -91,7 +91,7 @@ def quaternion_of_matrix(R):
 
 @helper
 def _larger(d, q, d2, q2):
-    """Of two diagonal elements with their rows, the larger one."""
+    """The larger of two diagonal elements of q q', with its row."""
     second = d2.real > d.real
     return select(second, d2, d), (
         select(second, q2[0], q[0]),
@@ -103,9 +103,9 @@ def _larger(d, q, d2, q2):
 
 @helper
 def _series(t2):
-    """`exponential_coefficients` by series: the closed forms cancel at small angles.
+    """`exponential_coefficients` by series, because the closed forms suffer from cancellation at small angles.
 
-    The first term left out is below 1e-14 of the value for b2, b3 and below 1e-17 for the others.
+    The first omitted term is below 1e-14 of the value for b2, b3 and below 1e-17 for the others.
     """
     # Horner: sum over k of (-t2)^k / (2k + m)!, m = 1, 2, 3
     a1 = 1.0 / 362880.0 - t2 * (1.0 / 39916800.0 - t2 * (1.0 / 6227020800.0 - t2 * (1.0 / 1307674368000.0)))

@@ -1,7 +1,7 @@
-"""Vectors and matrices for every mode of a body, whose components are rows of a table: one column for each mode.
+"""Tables with a vector for each mode of a body: components are rows, modes are columns.
 
-`column6` and its like take the column of one mode; `strips6` and its like the columns of a strip of modes at once
-(`flexmb.jit.strips`), with which the functions of `flexmb.spatial` compute as with single ones.
+`column6` and the like take the column of one mode; `strips6` and the like take the columns of a strip of modes at once
+(`flexmb.jit.strips`), to which the functions of `flexmb.spatial` apply as to single columns.
 """
 
 from flexmb.jit.kernel import helper
@@ -22,7 +22,7 @@ def column6(a, n):
 
 @helper
 def column_sym(a, n):
-    """The same as a symmetric matrix."""
+    """Column n of six rows as a symmetric matrix."""
     return a[0, n], a[1, n], a[2, n], a[3, n], a[4, n], a[5, n]
 
 
@@ -77,13 +77,13 @@ def total6(w, V):
 
 @helper
 def total_sym(w, s):
-    """Of a symmetric matrix."""
+    """The sum over the modes of a strip of symmetric matrices."""
     return total(w, s[0]), total(w, s[1]), total(w, s[2]), total(w, s[3]), total(w, s[4]), total(w, s[5])
 
 
 @helper
 def axpy3(v, x, rows):
-    """Three rows, to each of which x times its number of v is added: rows + v x'."""
+    """rows + v x': three rows, to each of which x times one component of v is added."""
     return v[0] * x + rows[0], v[1] * x + rows[1], v[2] * x + rows[2]
 
 

@@ -1,7 +1,7 @@
-"""Elementary functions of the numbers that kernels compute with: floats, eight copies in lanes, and duals.
+"""Elementary functions of the numbers in kernels: floats, lanes (eight copies of a scene) and duals.
 
-Which of them is decided when a kernel is compiled, by the numbers that its workspace holds: see `flexmb.jit.lanes` and
-`flexmb.jit.duals`. Comparisons in kernels look at real parts, `x.real`, which of a dual is the number without its
+The type of the workspace's numbers decides at compile time which functions are meant: see `flexmb.jit.lanes` and
+`flexmb.jit.duals`. Comparisons in kernels use the real part `x.real`, which for a dual is the value without its
 derivatives.
 """
 

@@ -1,8 +1,8 @@
 """Spatial vectors as values: motions V = (w, v) and A = (alpha, a), forces F = (tau, f), angular part first.
 
-A pair of the 3-tuples of `flexmb.spatial.vector`: the compiler keeps all six components in registers, so that an
-equation between spatial vectors costs what it costs written out. Names end in 6 where vector.py has the same operation
-for three components. phi is Jain and Rodriguez' shift operator (4) of a point O seen from Q, with d from Q to O.
+A spatial vector is a pair of 3-tuples of `flexmb.spatial.vector`. The compiler keeps all six components in registers,
+so that operations on spatial vectors cost no more than on their components. Names end in 6 where vector.py has the same
+operation for three components. phi is the shift operator of Jain and Rodriguez (4) from O to Q; d leads from Q to O.
 """
 
 from flexmb.jit.kernel import helper
@@ -61,7 +61,7 @@ def dot6(V, F):
 
 @helper
 def less6(s, V, F):
-    """s - V' F: what a load, or a motion, leaves of s; the angular part is taken off first."""
+    """s - V' F, the angular part subtracted first (which fixes the rounding)."""
     return s - dot(V[0], F[0]) - dot(V[1], F[1])
 
 
@@ -79,23 +79,23 @@ def times6_t(R, V):
 
 @helper
 def shift_motion(V, d):
-    """phi' V: the motion of O as a point of a body whose motion is known about Q."""
+    """phi' V: the velocity of the body's point O from its velocity at Q."""
     return V[0], plus_cross(V[1], V[0], d)
 
 
 @helper
 def shift_acceleration(A, V, d):
-    """Acceleration of O as a point of a body that moves by V, A about Q: phi' A and the centripetal w x (w x d)."""
+    """Acceleration of the body's point O from its velocity V and acceleration A at Q: phi' A + [0; w x (w x d)]."""
     return A[0], plus_cross(plus_cross(A[1], A[0], d), V[0], cross(V[0], d))
 
 
 @helper
 def shift_force(F, d):
-    """phi F: the force about Q of one that is known about O."""
+    """phi F: a force about Q from the same force about O."""
     return plus_cross(F[0], d, F[1]), F[1]
 
 
 @helper
 def plus6(s, V, F):
-    """s + V' F; the angular part is added first."""
+    """s + V' F, the angular part added first (which fixes the rounding)."""
     return s + dot(V[0], F[0]) + dot(V[1], F[1])

@@ -1,7 +1,8 @@
 """3-vectors and 3x3 matrices as scalar tuples.
 
-Tuples, not arrays: the compiler keeps every component in a register and removes the calls, so kernels read like the
-equations and cost nothing. A matrix is a 9-tuple, row by row; a symmetric one a 6-tuple (xx, yy, zz, xy, xz, yz).
+With tuples in place of arrays the compiler keeps every component in a register and inlines all calls, so that kernels
+read like the equations at no cost. A matrix is a 9-tuple, row by row; a symmetric one a 6-tuple (xx, yy, zz, xy, xz,
+yz).
 """
 
 from flexmb.jit.kernel import helper
@@ -46,7 +47,7 @@ def cross(a, b):
 
 @helper
 def plus_cross(a, b, c):
-    """a + b x c; in this order two fused operations a component."""
+    """a + b x c; in this order each component takes two fused multiply-adds."""
     return a[0] + b[1] * c[2] - b[2] * c[1], a[1] + b[2] * c[0] - b[0] * c[2], a[2] + b[0] * c[1] - b[1] * c[0]
 
 
@@ -213,7 +214,7 @@ def add3(a, i, v):
 
 @helper
 def store9(a, i, m):
-    # written out: elements may be of different types, which a loop over a tuple does not allow
+    # without a loop, because the elements may be of different types (floats and duals)
     a[i] = m[0]
     a[i + 1] = m[1]
     a[i + 2] = m[2]
@@ -240,7 +241,7 @@ def add9(a, i, m):
 
 @helper
 def store_sym(a, i, s):
-    # written out as in store9
+    # without a loop, as in store9
     a[i] = s[0]
     a[i + 1] = s[1]
     a[i + 2] = s[2]

@@ -1,7 +1,7 @@
-"""Scenes made from scenes: other models of the same flexible bodies, to compare models or to find a cheaper one.
+"""Scenes derived from scenes: other models of the same flexible bodies, to compare models or to find a cheaper one.
 
-A surrogate is a scene like any other, and every engine gets the same one, so that a coarser model is never mistaken for
-a difference between codes.
+A surrogate is an ordinary scene, and all engines get the same one, so that the error of a coarser model is never
+mistaken for a difference between codes.
 """
 
 from flexmb.surrogate.points import modal_points as modal_points

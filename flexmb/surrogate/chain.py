@@ -1,4 +1,4 @@
-"""A beam taken apart into a chain of bodies; whatever was attached to the beam moves to the piece at that place."""
+"""Replacement of a beam by a chain of bodies; whatever is attached to the beam is attached to the piece there."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexmb.scene.schema import BeamBody, Body, Hinge, Scene
 
 
 class NodePlace(NamedTuple):
-    """Where a node of the beam went: number of the piece from the root, its body, and the node's name there."""
+    """The new place of a node of the beam: number of the piece from the root, its body, and the node's name there."""
 
     piece: int
     body: str
@@ -22,7 +22,7 @@ class NodePlace(NamedTuple):
 
 
 def beams_named(scene: Scene, body: str | None) -> list[BeamBody]:
-    """The beam `body` in a list, or all beams if None. ValueError where there is no such beam."""
+    """The beam `body` in a list, or all beams if None. ValueError if there is no such beam."""
     beams = [each for each in scene.bodies if isinstance(each, BeamBody) and body in (None, each.name)]
     if body is not None and not beams:
         raise ValueError(_no_beam(scene, body))
@@ -30,18 +30,18 @@ def beams_named(scene: Scene, body: str | None) -> list[BeamBody]:
 
 
 def inboard_hinge(scene: Scene, beam: BeamBody) -> Hinge:
-    """The hinge that joins the beam to its parent."""
+    """The hinge between the beam and its parent."""
     return next(hinge for hinge in scene.hinges if hinge.child == beam.name)
 
 
 def in_pieces(
     scene: Scene, beam: BeamBody, pieces: Sequence[Body], joints: Sequence[Hinge], places: Mapping[str, NodePlace]
 ) -> Scene:
-    """The scene with `pieces` and the `joints` between them in the place of `beam`.
+    """The scene with `pieces` and the `joints` between them in place of `beam`.
 
-    `places`, by node of the beam, say where its hinges, wheels, point masses, loads, markers, closures and connectors
-    go. The joints follow the beam's inboard hinge. Raises ValueError for a beam with an initial modal state: pieces
-    start undeformed.
+    `places` maps nodes of the beam to the new places of its hinges, wheels, point masses, loads, markers, closures and
+    connectors. The joints follow the beam's inboard hinge. Raises ValueError for a beam with an initial modal state,
+    because the pieces start undeformed.
     """
     if any(state.body == beam.name for state in scene.modal_states):
         raise ValueError(f'beam "{beam.name}": its pieces start undeformed; leave out its modal state')
@@ -76,7 +76,7 @@ def in_pieces(
 
 
 def piece_at(ends: Sequence[float], x: float) -> int:
-    """The piece between two of the `ends` (m, ascending) that holds x; on a cut, the one toward the tip."""
+    """The number of the piece between two of the `ends` (m, ascending) that contains x; at a cut the outer one."""
     return min(int(np.searchsorted(ends, x, side="right")) - 1, len(ends) - 2)
 
 
@@ -86,7 +86,7 @@ def outward(joints: Sequence[Hinge], root: int) -> list[Hinge]:
 
 
 def stiffness_damping(beam: BeamBody) -> float:
-    """Damping over stiffness (s) of every part: 2 zeta/omega of the first mode, whose damping it reproduces."""
+    """Ratio (s) of damping and stiffness of all parts: 2 zeta/omega of the first mode, whose damping is thus exact."""
     if not np.any(beam.modes.damping_ratio):
         return 0.0
     model = flexible_model(beam)
@@ -94,9 +94,9 @@ def stiffness_damping(beam: BeamBody) -> float:
 
 
 def _no_beam(scene: Scene, name: str) -> str:
-    """Why `name` cannot be taken apart."""
+    """The message that `name` is not a beam."""
     found = next((each for each in scene.bodies if each.name == name), None)
     if found is None:
         return f'scene "{scene.name}" has no beam "{name}"'
     kind = type(found).__struct_config__.tag
-    return f'body "{name}" is no beam (kind "{kind}"): only a body given by its sections can be taken apart'
+    return f'body "{name}" is not a beam (kind "{kind}"): only beams, given by their sections, can be divided'

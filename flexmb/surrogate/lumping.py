@@ -1,6 +1,6 @@
-"""A flexible body without its flexibility: the rigid body with the same inertia points and the same nodes at rest.
+"""The rigid body with the same inertia points and the same nodes at rest as a flexible body.
 
-It uses nothing of the native modal preprocessing and repeats only its documented choice of inertia points.
+It is independent of the native modal preprocessing, and repeats only its documented choice of inertia points.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Inertia:
 
 
 def combine(parts: Sequence[Inertia]) -> Inertia:
-    """One rigid body made of several, by Steiner's theorem."""
+    """Several rigid bodies as one, by Steiner's theorem."""
     mass = sum(part.mass for part in parts)
     com = sum((part.mass * part.com for part in parts), np.zeros(3)) / (mass or 1.0)
     inertia = sum((part.inertia + steiner(part.mass, part.com - com) for part in parts), np.zeros((3, 3)))
@@ -50,7 +50,7 @@ def section_properties(body: BeamBody, x: Real, *keys: str) -> tuple[Real, ...]:
 
 
 def quadrature(body: BeamBody, cuts: Sequence[float]) -> tuple[Real, Real]:
-    """Gauss points and weights (n,) between the cuts (ascending), also broken at the stations, where sections kink."""
+    """Gauss points and weights (n,) between the cuts (ascending) and stations, where the sections have kinks."""
     inside = [station.x_m for station in body.stations if cuts[0] < station.x_m < cuts[-1]]
     ends = np.unique([*cuts, *inside])
     s, w = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
@@ -82,7 +82,7 @@ def _lumps(lumps: Sequence[TipMass]) -> list[Inertia]:
 
 
 def _lumped_beam(body: BeamBody) -> Inertia:
-    """A beam whose inertia sits at its element nodes: each node receives the inertia weighted by its hat function."""
+    """A beam with lumped masses: each element node receives the inertia weighted by its hat function."""
     nodes = np.linspace(0.0, body.length_m, body.elements + 1)
     x, weight = quadrature(body, tuple(nodes))
     hats = np.maximum(0.0, 1.0 - np.abs(x[:, None] - nodes) * body.elements / body.length_m)
@@ -96,7 +96,7 @@ def _lumped_beam(body: BeamBody) -> Inertia:
 
 
 def rigid_equivalent(body: Body) -> RigidBody:
-    """The body with its modes left out. A rigid body is returned as it is; a SID body raises ValueError."""
+    """The body without its modes. A rigid body is returned unchanged; a SID body raises ValueError."""
     match body:
         case RigidBody():
             return body

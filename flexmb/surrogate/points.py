@@ -1,4 +1,4 @@
-"""Beams replaced by the raw inertia points and modes that they are made of."""
+"""Beams as raw modal bodies with the same inertia points and modes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from flexmb.typing import Real
 def modal_points(scene: Scene) -> Scene:
     """The scene with every beam as raw inertia points and modes, so that other codes get exactly the same data.
 
-    A beam of level "stiffened" also brings the second-order field of its points and nodes.
+    A beam of level "stiffened" also has the second-order field of its points and nodes.
     """
     return replace(scene, bodies=tuple(_modal(each) if isinstance(each, BeamBody) else each for each in scene.bodies))
 

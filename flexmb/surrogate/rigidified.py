@@ -9,6 +9,6 @@ from flexmb.surrogate.lumping import rigid_equivalent
 
 
 def rigidify(scene: Scene) -> Scene:
-    """Every flexible body replaced by the rigid body with the same inertia and nodes; modal states are dropped."""
+    """The scene with rigid bodies of the same inertia and nodes in place of flexible ones, without modal states."""
     bodies = tuple(each if isinstance(each, SidBody) else rigid_equivalent(each) for each in scene.bodies)
     return replace(scene, bodies=bodies, modal_states=())

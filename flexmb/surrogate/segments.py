@@ -34,7 +34,7 @@ from flexmb.surrogate.chain import (
 from flexmb.surrogate.lumping import beam_piece, quadrature, rigid_body, section_properties
 
 _X: Vector = (1.0, 0.0, 0.0)
-# A family of motion that turns sections: axis letter, its vector, station stiffness. Order of the successive turns.
+# Families of motion that turn sections: axis letter, axis, stiffness of a station; in the order of the rotations.
 _TURNS = {
     "bending_y": ("z", (0.0, 0.0, 1.0), "EIz_Nm2"),
     "bending_z": ("y", (0.0, 1.0, 0.0), "EIy_Nm2"),
@@ -55,14 +55,14 @@ class _Cut:
 def finite_segments(scene: Scene, body: str | None, n: int) -> Scene:
     """The beam `body` (all beams if None) as rigid segments joined by sprung hinges.
 
-    The beam is divided into n elements of length l with a hinge in the middle of each (so half an element is rigid at
-    the root and at the tip): springs EI/l for each bending plane and GJ/l for torsion among the beam's mode families,
-    more exactly the inverse of the compliance integrated over the element. If "axial" is among them, slides at the
-    element boundaries carry EA/l. The error of the first frequency is O(n^-2), and so is that of finite deflection in a
-    plane; in space it is O(n^-1), because a hinge turns about one axis after the other. Segments are named
-    `<beam>.seg00` ... and hinges `<beam>.h01` ... (slides `<beam>.a01` ...) from the root. Modal damping becomes
-    proportional to stiffness, exact for the first mode. Raises ValueError for what segments cannot carry: Timoshenko
-    shear, initial modal states.
+    The beam is divided into n elements of length l with a hinge in the middle of each, so that half an element is rigid
+    at the root and at the tip. The springs are EI/l for each bending plane and GJ/l for torsion, as far as these are
+    among the beam's mode families; for varying sections, the inverse of the compliance integrated over the element. If
+    "axial" is among the families, prismatic hinges at the element boundaries have springs EA/l. The error of the first
+    frequency is O(n^-2), and so is that of finite deflection in a plane; in space it is O(n^-1), because the rotations
+    of a hinge are successive. Segments are named `<beam>.seg00` ... and hinges `<beam>.h01` ... (prismatic ones
+    `<beam>.a01` ...) from the root. Modal damping becomes proportional to stiffness, exact for the first mode. Raises
+    ValueError for Timoshenko shear and initial modal states, which segments do not have.
     """
     for beam in beams_named(scene, body):
         scene = _segmented(scene, beam, n)
@@ -71,7 +71,7 @@ def finite_segments(scene: Scene, body: str | None, n: int) -> Scene:
 
 def _segmented(scene: Scene, beam: BeamBody, n: int) -> Scene:
     if beam.theory == "timoshenko":
-        raise ValueError(f'beam "{beam.name}": finite segments carry no shear; use theory "euler-bernoulli"')
+        raise ValueError(f'beam "{beam.name}": finite segments have no shear; use theory "euler-bernoulli"')
     cuts = _cuts(beam, n)
     ends = [0.0, *(cut.x for cut in cuts), beam.length_m]
     places = {}
@@ -84,10 +84,10 @@ def _segmented(scene: Scene, beam: BeamBody, n: int) -> Scene:
 
 
 def _cuts(beam: BeamBody, n: int) -> list[_Cut]:
-    """Hinges along the beam: turning ones in the middles of the elements, slides at the boundaries between them.
+    """Hinges along the beam: rotations in the middles of the elements, translations at the boundaries between them.
 
-    The outer slides also carry the compliance of the half elements beyond them, so that the whole stretches as the beam
-    does under a tip load.
+    The outer translations include the compliance of the elements at the ends, so that the chain stretches like the beam
+    under a tip load.
     """
     if n < 2:
         raise ValueError(f'beam "{beam.name}": finite segments need at least 2 elements, got {n}')
@@ -143,7 +143,7 @@ def _slide(beam: BeamBody, cut: _Cut, lag: float, placement: dict) -> Hinge:
 
 
 def _turn(beam: BeamBody, cut: _Cut, lag: float, placement: dict) -> Hinge:
-    """A hinge with one turn for each family that turns sections: revolute for one, else a gimbal."""
+    """A hinge with one rotation for each family that turns sections: revolute for one, else a gimbal."""
     letters, axes, turns = "", [], []
     for family, (letter, axis, key) in _TURNS.items():
         if family in beam.modes.families:
@@ -157,7 +157,7 @@ def _turn(beam: BeamBody, cut: _Cut, lag: float, placement: dict) -> Hinge:
 
 
 def _spring(beam: BeamBody, key: str, cut: _Cut) -> float:
-    """Stiffness between the ends of the cut's piece of beam: the inverse of its integrated compliance."""
+    """Stiffness of the piece of beam that the cut represents: the inverse of its integrated compliance."""
     x, weight = quadrature(beam, (cut.start, cut.end))
     (section,) = section_properties(beam, x, key)
     return float(1.0 / np.sum(weight / section))

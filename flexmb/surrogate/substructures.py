@@ -1,8 +1,8 @@
 """A beam as a chain of flexible pieces welded to one another: finite deflection from modes of small deflection.
 
-Each piece deforms little in its own frame, which turns with the section at its root, so that the chain converges to the
-geometrically exact beam as the pieces become short. That needs attachment modes: a piece bends under the forces and
-moments of its neighbours, which the eigenmodes of a free tip cannot follow however many pieces there are.
+The deformation of each piece is small in its own frame, which turns with the section at its root. The chain converges
+to the geometrically exact beam as the pieces become short, provided that they have attachment modes: neighbours load a
+piece with forces and moments at its tip, and eigenmodes with a free tip do not span the resulting deflections.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from flexmb.surrogate.chain import (
     stiffness_damping,
 )
 
-_NUMBERS = tuple(key for key in BeamStation.__struct_fields__ if key != "x_m")
+_SECTION_KEYS = tuple(key for key in BeamStation.__struct_fields__ if key != "x_m")
 
 
 def substructured(
@@ -34,22 +34,22 @@ def substructured(
 ) -> Scene:
     """The beam `body` (all beams if None) as `pieces` equal flexible pieces, welded section to section.
 
-    A piece has the attachment modes of its beam's mode families (unit forces and moments at its tip: one mode for axial
-    motion, one for torsion, two for each plane of bending), clamped at its own root, and as many `eigenmodes` of the
-    clamped piece besides. Its level is the beam's unless `level` is given. The chain converges to the geometrically
+    A piece is clamped at its own root. It has the attachment modes of its beam's mode families (unit forces and moments
+    at its tip: one mode for axial motion, one for torsion, two for each plane of bending) and, in addition,
+    `eigenmodes` eigenmodes. Its level is the beam's unless `level` is given. The chain converges to the geometrically
     exact beam with the square of the length of a piece at level "full", and with its third power at "stiffened"; where
-    the twist varies along the beam, that also falls to the square unless the modes of a piece include an eigenmode of
-    torsion. Sections, theory, tip masses and the choice of inertia points stay; modal damping becomes proportional to
-    stiffness, exact for the beam's first mode.
+    the twist varies along the beam, the third power requires an eigenmode of torsion in each piece. Sections, theory,
+    tip masses and the choice of inertia points are those of the beam; modal damping becomes proportional to stiffness,
+    exact for the beam's first mode.
 
-    Pieces are named `<beam>.p00` ... and welds `<beam>.w01` ... from the root; a node on a cut, or a tip mass, belongs
-    to the piece toward the tip. Raises ValueError for a body that is no beam or is rigid, for fewer than one piece, for
-    an initial modal state, and for torsion of pieces without rotary inertia.
+    Pieces are named `<beam>.p00` ... and welds `<beam>.w01` ... from the root; a node or a tip mass at a cut belongs to
+    the outer piece. Raises ValueError for a body that is not a beam or is rigid, for fewer than one piece, for an
+    initial modal state, and for torsion of pieces without rotary inertia.
     """
     if pieces < 1:
-        raise ValueError(f"a beam is split into one piece at least, got {pieces}")
+        raise ValueError(f"a beam is divided into at least one piece, got {pieces}")
     if eigenmodes < 0:
-        raise ValueError(f"a piece has no fewer than zero eigenmodes, got {eigenmodes}")
+        raise ValueError(f"the number of eigenmodes of a piece is {eigenmodes}: give zero or more")
     for beam in beams_named(scene, body):
         scene = _split(scene, beam, pieces, level or beam.level, eigenmodes)
     return scene
@@ -62,7 +62,7 @@ def _split(scene: Scene, beam: BeamBody, count: int, level: Level, eigenmodes: i
     places = {}
     for name, frame in rest_frames(beam).items():
         piece = piece_at(ends, frame.position[0])
-        # Names stay: the beam's root is the root of the first piece, its tip the tip of the last one.
+        # Nodes keep their names: the beam's root is the root of the first piece, its tip the tip of the last one.
         places[name] = NodePlace(piece, _piece_name(beam, piece), name)
     lag = stiffness_damping(beam)
     parts = [_piece(beam, i, ends, places, replace(beam.modes, count=eigenmodes), level, lag) for i in range(count)]
@@ -73,14 +73,14 @@ def _split(scene: Scene, beam: BeamBody, count: int, level: Level, eigenmodes: i
 def _piece(
     beam: BeamBody, number: int, ends: list[float], places: dict[str, NodePlace], modes: Modes, level: Level, lag: float
 ) -> BeamBody:
-    """Piece `number` between two of the `ends` (m), `lag` (s) its damping over its stiffness."""
+    """Piece `number` between two of the `ends` (m); `lag` (s) is the ratio of its damping and its stiffness."""
     start, end = ends[number], ends[number + 1]
     last = end == beam.length_m
     piece = replace(
         beam,
         name=_piece_name(beam, number),
         length_m=end - start,
-        # Two elements carry every attachment mode, even with lumped masses; each further eigenmode adds half a wave.
+        # Two elements resolve the attachment modes, even with lumped masses; each further eigenmode adds half a wave.
         elements=max(-(-beam.elements // (len(ends) - 1)), 2 + modes.count),
         stations=_sections(beam, start, end),
         modes=replace(modes, boundary="clamped-free", static=True, damping_ratio=0.0),
@@ -96,7 +96,7 @@ def _piece(
     )
     if "torsion" in modes.families and twisting_points(beam) and not twisting_points(piece):
         raise ValueError(
-            f'beam "{beam.name}": its pieces cannot be twisted, as nothing in them has inertia about the axis; give '
+            f'beam "{beam.name}": its pieces cannot be twisted, because they have no inertia about the axis; give '
             'sections rotary inertia and choose points "section" or "rotary", or leave "torsion" out of the families'
         )
     if lag == 0.0:
@@ -107,7 +107,7 @@ def _piece(
 
 
 def _sections(beam: BeamBody, start: float, end: float) -> tuple[BeamStation, ...]:
-    """Stations from `start` to `end` (m), measured from `start`; of two at one x the piece gets the one on its side."""
+    """Stations from `start` to `end` (m), measured from `start`; at a jump, the piece gets the station on its side."""
     stations = sorted(beam.stations, key=lambda station: station.x_m)
     xs = [station.x_m for station in stations]
     inside = [station for station in stations if start < station.x_m < end]
@@ -121,7 +121,7 @@ def _between(stations: list[BeamStation], right: int, x: float) -> BeamStation:
     a, b = stations[max(right - 1, 0)], stations[min(right, len(stations) - 1)]
     share = (x - a.x_m) / (b.x_m - a.x_m) if b.x_m > a.x_m else 0.0
     values = {}
-    for key in _NUMBERS:
+    for key in _SECTION_KEYS:
         at_a, at_b = getattr(a, key), getattr(b, key)
         values[key] = at_a if share == 0.0 or None in (at_a, at_b) else at_a + share * (at_b - at_a)
     return replace(a, x_m=x, **values)

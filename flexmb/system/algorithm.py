@@ -37,10 +37,7 @@ class Route(NamedTuple):
 
 @dataclass(frozen=True)
 class DynamicsAlgorithm:
-    """A way from a state to its accelerations, and what it can do besides.
-
-    `observe` takes y = [q, u, work] and raises DynamicsError where there are no accelerations.
-    """
+    """A way from a state to its accelerations, and what it can do besides."""
 
     name: Algorithm
     summary: str
@@ -52,8 +49,9 @@ class DynamicsAlgorithm:
     """These tables with the system's workspace."""
     fresh: Callable[[Mechanics], tuple[Any, ...]]
     """The same with a workspace of their own."""
-    observe: Callable[[Mechanics, float, Real], None]
-    """Fills everything observable of a tree, the system's `Outputs`."""
+    observe: Callable[[Mechanics, float, Real], None] | None = None
+    """Fills everything observable of a tree, the system's `Outputs`, at y = [q, u, work]; DynamicsError where there
+    are no accelerations. None where inverse dynamics of the accelerations is all that it takes."""
     route: Callable[[Mechanics], Route] | None = None
     """For runs of trees; None where it is for single states."""
     observing: Any = None

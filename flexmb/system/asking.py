@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flexmb.building.links import BodyLink
 from flexmb.closure.asked import AskedFor, Value, Wishes
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.hinges import Free, Spherical
+from flexmb.system.tree_system import System
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.building.links import BodyLink
-    from flexmb.system.tree_system import System
 
 
 class _Item(NamedTuple):
@@ -65,7 +63,7 @@ def _is_given(y: Real, value: Value, item: _Item, nq: int) -> bool:
 
 
 def _items(system: System) -> Iterator[_Item]:
-    for link in system._links:
+    for link in system.links:
         name = link.hinge.name
         yield from _of_hinge(link, system.coordinate(name).start, system.speed(name).start)
         modes = f"{link.name}.modes"
@@ -75,7 +73,7 @@ def _items(system: System) -> Iterator[_Item]:
 
 
 def _modes(system: System) -> Iterator[Value]:
-    for link in system._links:
+    for link in system.links:
         q, u = (_all(place(f"{link.name}.modes")) for place in (system.coordinate, system.speed))
         yield (*q, *(system.nq + j for j in u)), u
 

@@ -1,6 +1,6 @@
 """Many copies of one system: accelerations of many states at once, in lanes and threads.
 
-    batch = compile_batch(scenes)            each copy with masses, lengths, stiffnesses ... of its own
+    batch = flexmb.compile_batch(scenes)     each copy with masses, lengths, stiffnesses ... of its own
     found = batch.accelerations(q, u)        (n,nq), (n,nu) -> (n,nu)
 
 Copies of one system, which differ in their states only, are asked by `System.accelerations_batch`. A copy that fails
@@ -26,10 +26,7 @@ from flexmb.jit.bundle import broaden
 from flexmb.jit.direct import ADDRESS, address, addresses, settled
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import INDEX, MATRIX, NOTHING, STATUS, VECTOR, WHOLE
-from flexmb.scene.check import check_and_warn
-from flexmb.scene.schema import Scene
-from flexmb.system.compile import assembled
-from flexmb.system.tree_system import System
+from flexmb.system.free_motion import FreeMotion
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
 from flexmb.tables.lane_tables import LaneWorkspace, lane_constants, lane_workspace, structural_difference
@@ -85,10 +82,10 @@ class Batch:
     has another structure than the first.
     """
 
-    def __init__(self, systems: Sequence[System]) -> None:
-        self.systems = _listed("systems", systems)
+    def __init__(self, systems: Sequence[FreeMotion]) -> None:
+        self.systems = listed("systems", systems)
         for i, system in enumerate(self.systems):
-            if not isinstance(system, System):
+            if not isinstance(system, FreeMotion):
                 raise TypeError(f"systems[{i}] is a {type(system).__name__}: compile_batch makes a batch of scenes")
             _refuse_other_structure(i, system, self.systems[0])
         self.shares_constants = len(self.systems) == 1
@@ -107,7 +104,7 @@ class Batch:
         """Copied and pickled as its systems are, which is as their scenes."""
         return Batch, (self.systems,)
 
-    def system(self, copy: int) -> System:
+    def system(self, copy: int) -> FreeMotion:
         """That of a copy; ValueError or TypeError for the number of a copy that there is not."""
         place = arguments.index("copy", copy, sys.maxsize if self.shares_constants else len(self.systems))
         return self.systems[0 if self.shares_constants else place]
@@ -230,20 +227,7 @@ def _entry() -> Any:
     return settled(lanes.accelerations, ADDRESS, WHOLE, WHOLE, MATRIX, MATRIX, VECTOR, MATRIX, INDEX)
 
 
-def compile_batch(scenes: Sequence[Scene]) -> Batch:
-    """Check scenes of one structure and turn them into a batch, one copy for each.
-
-    They may differ in all numbers: masses, inertias, lengths, axes, stiffnesses, dampings, loads, functions, initial
-    states. Raises SceneError for a scene that is wrong, TypeError for anything but scenes, ValueError where there is
-    none, or where one has another structure than the first: another hinge, level, mode or load, or another name.
-    """
-    scenes = _listed("scenes", scenes)
-    for scene in scenes:
-        check_and_warn(scene)
-    return Batch([assembled(scene, "explicit") for scene in scenes])
-
-
-def _listed(name: str, given: Iterable[Any]) -> tuple[Any, ...]:
+def listed(name: str, given: Iterable[Any]) -> tuple[Any, ...]:
     """At least one."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise TypeError(f"{name} is a {type(given).__name__}: give a list, of one for each copy")
@@ -253,7 +237,7 @@ def _listed(name: str, given: Iterable[Any]) -> tuple[Any, ...]:
     return found
 
 
-def _refuse_other_structure(i: int, system: System, first: System) -> None:
+def _refuse_other_structure(i: int, system: FreeMotion, first: FreeMotion) -> None:
     if system.layout != first.layout:
         one, other = first.layout.q, system.layout.q
         strange = sorted(name for name in {**one, **other} if one.get(name) != other.get(name))

@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flexmb.entry import composite
 from flexmb.jain.places import matrices
 from flexmb.motion import coordinates
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
-from flexmb.system.mechanics import Mechanics
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
     from flexmb.closure.closures import ClosedMotion, Closures
-
-
-def _own(system: Mechanics) -> tuple[Any, ...]:
-    return system.constants, system._w, system._matrices
-
-
-def _fresh(system: Mechanics) -> tuple[Any, ...]:
-    return system.constants, system.workspace(), matrices(system.constants)
-
-
-def _observe(system: Mechanics, t: float, y: Real) -> None:
-    system._observe_rates(t, y, "composite")
 
 
 def _closed_motion(closures: Closures, t: float, y: Real) -> ClosedMotion:
@@ -35,9 +22,8 @@ ALGORITHM = DynamicsAlgorithm(
     "composite",
     "the mass matrix and its Cholesky factors",
     lambda: composite.accelerations,
-    _own,
-    _fresh,
-    _observe,
+    lambda system: (system.constants, system.own_workspace, system.own_matrices),
+    lambda system: (system.constants, system.workspace(), matrices(system.constants)),
     route=lambda system: Route(
         lambda: (system.constants, system.composite_workspace()), composite.rhs, coordinates.project
     ),

@@ -4,36 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from flexmb.entry import articulated, tangent
 from flexmb.entry.observation import observe
 from flexmb.integrate.problem import Linear
 from flexmb.motion import coordinates, retraction
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.mechanics import Mechanics
-from flexmb.tables.status import OK
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
     from flexmb.closure.closures import ClosedMotion, Closures
 
 
-def _own(system: Mechanics) -> tuple[Any, Any]:
-    return system.recursion_constants, system._recursion_w
-
-
 def _fresh(system: Mechanics) -> tuple[Any, Any]:
     return system.recursion_constants, system.recursion_workspace()
-
-
-def _observe(system: Mechanics, t: float, y: Real) -> None:
-    w = system._recursion_w
-    status = system._recur(t, y, np.empty_like(y))
-    if status != OK:
-        system._check(status, int(w.fault[0]))
-    system._observe_recursion()
-    system._trust(t, y, w)
 
 
 def _linear(system: Mechanics) -> Linear:
@@ -53,9 +37,9 @@ ALGORITHM = DynamicsAlgorithm(
     "articulated",
     "the O(N) recursion",
     lambda: articulated.accelerations,
-    _own,
+    lambda system: (system.recursion_constants, system.own_recursion_workspace),
     _fresh,
-    _observe,
+    Mechanics.observe_recursion,
     route=_route,
     observing=observe,
     closed_motion=_closed_motion,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
+from functools import partial
 from typing import TYPE_CHECKING, Any, assert_never
 
 import numpy as np
@@ -29,15 +30,14 @@ from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.asking import asked, everything
 from flexmb.system.evaluator import Evaluator
+from flexmb.system.free_motion import Given
 from flexmb.system.load_axes import Axes
 from flexmb.system.observables import Evaluation
 from flexmb.system.section_loads import AllLoads
-from flexmb.system.tree_system import Given, System, copied
+from flexmb.system.tree_system import System, copied
 from flexmb.tables import arguments
-from flexmb.tables.features import asking
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, finite_result, pack
-from flexmb.tables.status import Status
 from flexmb.typing import Index, Real, Record
 
 if TYPE_CHECKING:
@@ -58,21 +58,16 @@ class ClosedSystem(System):
 
     def __init__(self, scene: s.Scene) -> None:
         super().__init__(scene)
-        own = closure_constants(scene, self.constants, self._closure_ports)
-        slowest = slowest_mode(self._links)
+        own = closure_constants(scene, self.constants, self.closure_ports)
+        slowest = slowest_mode(self.links)
         tree = scene.closures, self.constants, own, self.layout, self.workspace, slowest
-        self._closures = self._own.closures = Closures(*tree, self._check)  # this thread's own
+        self._closures = self.own.closures = Closures(*tree, self.check_status)  # this thread's own
         self._start: State | None = None
 
     @per_thread
     def closures(self) -> Closures:
         """From Python, for what takes several steps."""
         return self._closures.for_thread()
-
-    def _anew(self) -> ClosedSystem:
-        """The same scene turned into other arrays."""
-        with asking(self.kernels):
-            return ClosedSystem(self.scene)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As of a tree."""
@@ -99,21 +94,6 @@ class ClosedSystem(System):
         self.initial_state  # noqa: B018 - counts them
         return self.closures.rank
 
-    def _begin_at(self, t: float, y: Real, before: ClosedSystem | None = None) -> None:
-        """Go on at y = [q, u, work], which closes all closures, where the scene's own values may not.
-
-        The independent rows are those of the scene before, of as many prescribed speeds, or are counted there.
-        """
-        if before is not None and np.array_equal(self._is_prescribed, before._is_prescribed):
-            self.closures.count_as(before.closures)
-        else:
-            self.closures.linearise(t, y)
-            self.closures.count_rows()
-
-    @property
-    def _is_prescribed(self) -> NDArray[np.bool_]:
-        return self.constants.speed["prescribed"] >= 0
-
     def _as_asked(self, t: float, y: Real, wish: AskedFor) -> Real:
         """y = [q, u, work] with closed closures; warns of what it does not keep."""
         found = consistent(self.closures, t, y, wish)
@@ -128,9 +108,12 @@ class ClosedSystem(System):
             )
         return found
 
-    def _admissible(self, t: float, y: Real, given: Given = "guess") -> State:
-        """The nearest state that closes all closures; ClosureError where y leaves them open by more than `FAR`."""
-        rough = super()._admissible(t, y).y
+    def admissible(self, state: State, given: Given = "guess") -> State:
+        """The nearest state that closes all closures; ClosureError where this one leaves them open by more than `FAR`.
+
+        As of a tree.
+        """
+        t, rough = self.layout.entering(super().admissible(state))
         self.closures.linearise(t, rough)
         errors = self.closures.errors()
         if not np.max(np.abs(errors), initial=0.0) <= FAR:
@@ -169,7 +152,7 @@ class ClosedSystem(System):
 
     def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
         found = self._on_chains(algorithm)(self.closures, t, y)
-        self._trust(t, y, self.closures)
+        self.check_precision(t, y, self.closures)
         return found
 
     def hinge_loads(
@@ -190,28 +173,28 @@ class ClosedSystem(System):
                 "leave accelerations out, or prescribe coordinates"
             )
         t, y = self.layout.entering(state)
-        return self._referred(self._motion(t, y, "articulated"), t, y, axes, about)
+        return self._referred(self._motion(t, y, "articulated"), state, axes, about)
 
-    def _loads_in(
-        self, t: float, y: Real, loads: dict[str, Real], axes: Axes, about: tuple[str, str] | None
+    def referred_loads(
+        self, state: State, loads: dict[str, Real], axes: Axes = "world", about: tuple[str, str] | None = None
     ) -> dict[str, Real]:
         """Where some are not determined, what is in other axes is found anew, but not where controllers act."""
+        t, y = self.layout.entering(state)
         if self.scene.controllers or all(np.all(np.isfinite(load)) for load in loads.values()):
-            return super()._loads_in(t, y, loads, axes, about)
-        return self._referred(self._motion_or_across(t, y, "articulated"), t, y, axes, about)
+            return super().referred_loads(state, loads, axes, about)
+        return self._referred(self._motion_or_across(t, y, "articulated"), state, axes, about)
 
     def _referred(
-        self, motion: ClosedMotion, t: float, y: Real, axes: Axes, about: tuple[str, str] | None
+        self, motion: ClosedMotion, state: State, axes: Axes, about: tuple[str, str] | None
     ) -> dict[str, Real]:
         """Loads of a motion in other axes about a node, NaN what it does not determine."""
-        found = super()._loads_in(t, y, self._by_load(motion.hinges, motion.closures), axes, about)
+        refer = partial(super().referred_loads, state, axes=axes, about=about)
+        found = refer(self._by_load(motion.hinges, motion.closures))
         if motion.spread is None:
-            return {name: finite_result(load, t) for name, load in found.items()}
-        changes = [
-            super(ClosedSystem, self)._loads_in(t, y, each, axes, about) for each in self._changes(motion.spread)
-        ]
+            return {name: finite_result(load, state.t) for name, load in found.items()}
+        changes = [refer(each) for each in self._changes(motion.spread)]
         for name, load in found.items():
-            finite_result(load, t)
+            finite_result(load, state.t)
             found[name] = np.where(motion.spread.leaves_open(np.array([each[name] for each in changes])), np.nan, load)
         return found
 
@@ -224,44 +207,35 @@ class ClosedSystem(System):
         """By null load, how loads change by name (6,), World axes."""
         return [self._by_load(*each) for each in zip(spread.hinges, spread.closures, strict=True)]
 
-    def _all_loads(self, t: float, y: Real) -> AllLoads:
+    def all_loads(self, state: State) -> AllLoads:
         """With the loads that may be others; those of `exerted` are the least."""
+        t, y = self.layout.entering(state)
         motion = self._motion(t, y, "articulated")
-        self._outputs(t, y, motion)
-        found = self._with_closures(self._observation.evaluation(t), motion.closures, t)
+        found = self._evaluation(t, y, motion._replace(spread=None))
         self._inverse(t, y, found.accelerations)
         spread = motion.spread
-        return AllLoads(found) if spread is None else AllLoads(found, self._changes(spread), spread.rounding)
-
-    def _with_closures(self, found: Evaluation, closures: Real, t: float) -> Evaluation:
-        loads = zip(self._observation.names.closures, finite_result(closures, t), strict=True)
-        return replace(found, loads=found.loads | dict(loads))
+        more = () if spread is None else (self._changes(spread), spread.rounding)
+        return AllLoads(t, found, self.own_workspace, *more)
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
-        """With the closures' loads too; NaN what the motion does not determine."""
-        motion = self._motion(t, y, algorithm)
-        self._outputs(t, y, motion)
-        found = self._with_closures(self._observation.evaluation(t), motion.closures, t)
-        spread = motion.spread
-        if spread is not None:
-            unknown = self._by_load(spread.leaves_open(spread.hinges), spread.leaves_open(spread.closures))
-            for name, load in found.loads.items():
-                load[unknown[name]] = np.nan
-            driven = spread.leaves_open(spread.drives)
-            for name, places in self._observation.names.driven.items():
-                found.drives[name][driven[places]] = np.nan
-        return found
+        return self._evaluation(t, y, self._motion(t, y, algorithm))
 
-    def _observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
-        """As of a tree, with the loads of closures; NaN what the motion does not determine."""
-        motion = self._motion_or_across(t, y, algorithm)
-        self._outputs(t, y, motion)
-        self._observation.fill(row, t, motion.closures)
+    def _evaluation(self, t: float, y: Real, motion: ClosedMotion) -> Evaluation:
+        return self.observation.evaluation(self._row(t, y, motion))
+
+    def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
+        """As of a tree; in a run, at a singular position too."""
+        row[:] = self._row(t, y, self._motion_or_across(t, y, algorithm))
+
+    def _row(self, t: float, y: Real, motion: ClosedMotion) -> Real:
+        """With the loads of closures too; NaN what the motion does not determine."""
+        self.observe_motion(t, y, motion.accelerations, motion.drives, motion.hinges)
+        row = self.observation.row(t, motion.closures)
         if motion.spread is not None:
-            parts = self._observation.columns_of(row[None])
-            parts["loads"][0][motion.spread.leaves_open(motion.spread.hinges)] = np.nan
-            parts["closures"][0][motion.spread.leaves_open(motion.spread.closures)] = np.nan
-            parts["drives"][0][motion.spread.leaves_open(motion.spread.drives)] = np.nan
+            parts, spread = self.observation.columns_of(row[None]), motion.spread
+            for name, changes in (("loads", spread.hinges), ("closures", spread.closures), ("drives", spread.drives)):
+                parts[name][0][spread.leaves_open(changes)] = np.nan
+        return row
 
     def _motion_or_across(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
         """The motion; in a run through a singular position, where nothing determines it, the mean of those beside."""
@@ -282,19 +256,13 @@ class ClosedSystem(System):
             _of_both(before.spread, after.spread),
         )
 
-    def _outputs(self, t: float, y: Real, motion: ClosedMotion) -> None:
-        """Fills the outputs, all but the loads of closures."""
-        out = self._out
-        out.rates[:], out.drives[:], out.loads[:] = motion.accelerations, motion.drives, motion.hinges
-        self._observe_motion(t, y)
-
     def determined_loads(self, state: State) -> dict[str, NDArray[np.bool_]]:
         """Which components (6,) of the loads of hinges and closures are determined by the motion; World axes.
 
         The others, in overconstrained mechanisms of rigid bodies, are NaN wherever loads are given (`evaluate`).
         """
         hinges, closures = self.closures.determined(*self.layout.entering(state))
-        names = [link.hinge.name for link in self._links], [closure.name for closure in self.scene.closures]
+        names = [link.hinge.name for link in self.links], [closure.name for closure in self.scene.closures]
         return dict(zip(names[0], hinges, strict=True)) | dict(zip(names[1], closures, strict=True))
 
     def closure_operators(self, state: State) -> ClosureOperators:
@@ -361,18 +329,12 @@ class ClosedSystem(System):
         if self.closures.rank < 0:
             self.initial_state  # noqa: B018 - counts the independent rows
         locked = self.closures.mobility == 0 < self.closures.rank  # a tree of welds is not locked by its closures
-        if locked and not np.any(self._is_prescribed):
+        if locked and not np.any(self.constants.speed["prescribed"] >= 0):
             names = ", ".join(f'"{closure.name}"' for closure in self.scene.closures)
             raise ClosureError(
                 f"closures {names} leave none of the {self.nu} free speeds: the mechanism is locked. Free a "
                 "hinge, or let bodies deform"
             )
-
-    def fault_name(self, status: int, fault: int) -> str:
-        """Name of the closure or body that the number of a failure stands for."""
-        if status in (Status.CLOSURE_SINGULAR, Status.CLOSURE_OPEN, Status.BRANCH_UNKNOWN):
-            return self.scene.closures[fault].name
-        return super().fault_name(status, fault)
 
 
 def _remembered(chain: Closed) -> list[Record | Real | Index]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import get_args
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, get_args
 
 from flexmb.jain.elimination import Elimination
 from flexmb.scene.bodies import SidBody
@@ -12,6 +13,9 @@ from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.features import Kernels, asking
+
+if TYPE_CHECKING:
+    from flexmb.system.batch import Batch
 
 
 def compile(  # noqa: A001  (used as flexmb.compile)
@@ -52,6 +56,21 @@ def assembled(scene: Scene, elimination: Elimination = "fastest") -> System:
             return ClosedSystem(scene)
     with collector_paused():
         return System(scene, elimination)
+
+
+def compile_batch(scenes: Sequence[Scene]) -> Batch:
+    """Check scenes of one structure and turn them into a batch, one copy for each.
+
+    They may differ in all numbers: masses, inertias, lengths, axes, stiffnesses, dampings, loads, functions, initial
+    states. Raises SceneError for a scene that is wrong, TypeError for anything but scenes, ValueError where there is
+    none, or where one has another structure than the first: another hinge, level, mode or load, or another name.
+    """
+    from flexmb.system.batch import Batch, listed  # lanes are for those who ask for many states
+
+    scenes = listed("scenes", scenes)
+    for scene in scenes:
+        check_and_warn(scene)
+    return Batch([assembled(scene, "explicit") for scene in scenes])
 
 
 def _read(scene: Scene) -> Scene:

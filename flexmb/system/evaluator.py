@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from flexmb.entry.gate import NOBODY, GateNotes, gate
+from flexmb.entry.object_access import may_read_objects
 from flexmb.jit.direct import Direct, addresses, direct
-from flexmb.jit.objects import readable
 from flexmb.jit.pointer import REAL, STATUS, VECTOR
+from flexmb.system import algorithms
 from flexmb.system.algorithm import DynamicsAlgorithm
 from flexmb.system.mechanics import Mechanics
 from flexmb.tables.per_thread import per_thread
@@ -35,7 +36,7 @@ class Evaluator(partial):  # a partial, so that a call takes no way through Pyth
         """tables: what the algorithm's kernel takes after t and y, the workspace second."""
         careful, w = _Careful(system, algorithm, tables), tables[1]
         call: Any = careful
-        if readable():
+        if may_read_objects():
             behind = addresses(algorithm.kernel(), STATUS, REAL, VECTOR, *tables)
             call = gate(
                 system.layout.quaternions, careful.rates, system.nq, w.speed, w.doubt, behind, careful.notes, careful
@@ -50,8 +51,14 @@ class Evaluator(partial):  # a partial, so that a call takes no way through Pyth
         return self._careful.shown
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy is made by the copied system."""
-        return self._careful.system.evaluator, (self._careful.algorithm.name,)
+        """A copy is made of the copied system."""
+        return fresh_evaluator, (self._careful.system, self._careful.algorithm.name)
+
+
+def fresh_evaluator(system: Mechanics, algorithm: str) -> Evaluator:
+    """With a workspace of its own; ValueError for an algorithm that there is not."""
+    chosen = algorithms.chosen(algorithm)
+    return Evaluator(system, chosen, chosen.fresh(system))
 
 
 class _Careful:
@@ -77,10 +84,10 @@ class _Careful:
         t, y = self.system.layout.packed(t, q, u)
         status = self._evaluate(t, y)
         if status != OK:
-            self.system._check(status, int(self._w.fault[0]))
+            self.system.check_status(status, int(self._w.fault[0]))
         self.rates[:] = self._w.speed["acceleration"]
         finite_result(self.rates, t)
-        self.system._trust(t, y, self._w)
+        self.system.check_precision(t, y, self._w)
         return self.shown
 
     @property

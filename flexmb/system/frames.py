@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,11 +11,9 @@ from flexmb.modal.flexible_model import FlexibleNode
 from flexmb.scene.bodies import SidBody
 from flexmb.scene.quaternions import rotation_by, rotation_matrix
 from flexmb.scene.tree import GROUND, rest_frames
+from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables.arrays import Workspace
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.system.tree_system import System
 
 
 class Pose(NamedTuple):
@@ -43,29 +41,29 @@ def link_pose(w: Workspace, k: int) -> Pose:
     return Pose(w.body["pose_rotation"][k].reshape(3, 3), w.body["pose_position"][k])
 
 
-def body_pose(system: System, w: Workspace, k: int) -> Pose:
+def body_pose(arrays: SceneArrays, w: Workspace, k: int) -> Pose:
     """Of the frame of body k as the scene has it, undeformed."""
-    pose, at = link_pose(w, k), system._links[k].outboard
+    pose, at = link_pose(w, k), arrays.links[k].outboard
     if at.deforms:
         return pose
     rotation = pose.rotation @ at.frame.T
     return Pose(rotation, pose.position - rotation @ at.origin)
 
 
-def node_pose(system: System, w: Workspace, body: str, node: str) -> Pose:
+def node_pose(arrays: SceneArrays, w: Workspace, body: str, node: str) -> Pose:
     """Of a node, which moves with the deformation; ValueError where there is no such body or node."""
     if body == GROUND:
         return AT_GROUND
-    names = system.body_names
+    names = arrays.body_names
     if body not in names:
         raise ValueError(f'there is no body "{body}"; there are {", ".join([GROUND, *names])}')
     k = names.index(body)
     try:
-        at = system._links[k].node(node)
+        at = arrays.links[k].node(node)
     except (KeyError, ValueError) as error:
-        raise ValueError(_without_node(system, body, node)) from error
+        raise ValueError(_without_node(arrays, body, node)) from error
     pose = link_pose(w, k)
-    turn, position = deformed(at, w.eta[k, : system._links[k].mode_count])
+    turn, position = deformed(at, w.eta[k, : arrays.links[k].mode_count])
     return Pose(pose.rotation @ turn, pose.position + pose.rotation @ position)
 
 
@@ -78,23 +76,23 @@ def deformed(at: FlexibleNode, eta: Real) -> tuple[Real, Real]:
     return rotation_by(theta) @ at.rotation, position
 
 
-def hinge_frames(system: System, w: Workspace) -> dict[str, HingeFrames]:
+def hinge_frames(arrays: SceneArrays, w: Workspace) -> dict[str, HingeFrames]:
     """Of every hinge and point mass, and of closures: frames A and B, and the origin of B."""
-    found = {link.hinge.name: hinge_frames_of(system, w, k) for k, link in enumerate(system._links)}
-    closures = enumerate(system.scene.closures)
-    return found | {closure.name: closure_frames_of(system, w, i) for i, closure in closures}
+    found = {link.hinge.name: hinge_frames_of(arrays, w, k) for k, link in enumerate(arrays.links)}
+    closures = enumerate(arrays.scene.closures)
+    return found | {closure.name: closure_frames_of(arrays, w, i) for i, closure in closures}
 
 
-def closure_frames_of(system: System, w: Workspace, i: int) -> HingeFrames:
+def closure_frames_of(arrays: SceneArrays, w: Workspace, i: int) -> HingeFrames:
     """Frames A and B of closure i, and the origin of B."""
-    sides = closure_sides(system.scene.closures[i])
-    a, b = (_of_side(w, sides[j], *system._closure_ports[2 * i + j]) for j in range(2))
+    sides = closure_sides(arrays.scene.closures[i])
+    a, b = (_of_side(w, sides[j], *arrays.closure_ports[2 * i + j]) for j in range(2))
     return HingeFrames(a.rotation, b.rotation, b.position)
 
 
-def hinge_frames_of(system: System, w: Workspace, k: int) -> HingeFrames:
+def hinge_frames_of(arrays: SceneArrays, w: Workspace, k: int) -> HingeFrames:
     """Of the hinge of body k. The dynamics turns both frames so that a hinge axis is z: turned back here."""
-    body, back = system.constants.body[k], system._links[k].turn.T
+    body, back = arrays.constants.body[k], arrays.links[k].turn.T
     parent, own = link_pose(w, int(body["parent"])), link_pose(w, k)
     inward, outward = int(body["inboard_port"]), int(body["outboard_port"])
     placed = body["placement_rotation"].reshape(3, 3) if inward < 0 else _port(w, inward)[0]
@@ -117,7 +115,7 @@ def _port(w: Workspace, port: int) -> tuple[Real, Real]:
     return w.port["R"][port].reshape(3, 3), w.port["r"][port]
 
 
-def _without_node(system: System, body: str, node: str) -> str:
-    found = next((each for each in system.scene.bodies if each.name == body), None)  # none for a point mass
+def _without_node(arrays: SceneArrays, body: str, node: str) -> str:
+    found = next((each for each in arrays.scene.bodies if each.name == body), None)  # none for a point mass
     nodes = "" if found is None or isinstance(found, SidBody) else f'; its nodes are {", ".join(rest_frames(found))}'
     return f'body "{body}" has no node "{node}"{nodes}'

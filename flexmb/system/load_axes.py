@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from flexmb.system.frames import hinge_frames, node_pose
+from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.system.tree_system import System
 
 Axes = Literal["world", "inboard", "outboard"]
 
 
 def referred(
-    system: System, w: Workspace, loads: dict[str, Real], axes: Axes, about: tuple[str, str] | None
+    arrays: SceneArrays, w: Workspace, loads: dict[str, Real], axes: Axes, about: tuple[str, str] | None
 ) -> dict[str, Real]:
     """Loads (6,) of hinges and closures, World axes about their own points, in other axes about a node.
 
@@ -27,8 +25,8 @@ def referred(
     arguments.one_of("axes", axes, get_args(Axes))
     if axes == "world" and about is None:
         return loads
-    frames = hinge_frames(system, w)
-    point = None if about is None else _node(system, w, about)
+    frames = hinge_frames(arrays, w)
+    point = None if about is None else _node(arrays, w, about)
     found = {}
     for name, load in loads.items():
         torque, force = load[:3], load[3:]
@@ -41,7 +39,7 @@ def referred(
     return found
 
 
-def _node(system: System, w: Workspace, about: tuple[str, str]) -> Real:
+def _node(arrays: SceneArrays, w: Workspace, about: tuple[str, str]) -> Real:
     if isinstance(about, str) or len(about) != 2:
         raise ValueError(f"about is {about!r}: give body and node, such as ('panel', 'tip')")
-    return node_pose(system, w, *about).position
+    return node_pose(arrays, w, *about).position

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexmb.modal.cross import cross_matrix
 from flexmb.system.frames import AT_GROUND, body_pose, link_pose
+from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.system.tree_system import System
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +51,14 @@ class MassProperties:
         return moments, axes * np.array([1.0, 1.0, np.sign(np.linalg.det(axes))])
 
 
-def mass_properties(system: System, w: Workspace, inertias: Real, body: str | None) -> MassProperties:
+def mass_properties(arrays: SceneArrays, w: Workspace, inertias: Real, body: str | None) -> MassProperties:
     """Of a body and all that it carries, or of all bodies: inertias (N,21) of links, which are where `w` has them."""
-    names, parent = system.body_names, system.constants.body["parent"]
+    names, parent = arrays.body_names, arrays.constants.body["parent"]
     if body is None:
         counted, frame = list(range(len(names))), AT_GROUND
     elif body in names:
         first = names.index(body)
-        counted, frame = _carried(parent.tolist(), first), body_pose(system, w, first)
+        counted, frame = _carried(parent.tolist(), first), body_pose(arrays, w, first)
     else:
         raise ValueError(f'there is no body "{body}"; there are {", ".join(names)}')
     found = zip(*(_of_link(inertias[k]) for k in counted), strict=True)

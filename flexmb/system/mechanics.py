@@ -3,31 +3,36 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Set
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.entry import articulated, composite, unsplit
 from flexmb.entry.consistent import consistent_accelerations, held_hinges
-from flexmb.entry.observation import Outputs, observe, observe_motion, transmitted
+from flexmb.entry.observation import observe, observe_motion, transmitted
+from flexmb.jain.elimination import Elimination
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR
+from flexmb.scene import schema as s
 from flexmb.system.factors import MassMatrixFactors
+from flexmb.system.observables import Observation
+from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.per_thread import Own, per_thread
-from flexmb.tables.state import DynamicsError, Layout, PrecisionWarning, State, finite_result
+from flexmb.tables.state import DynamicsError, PrecisionWarning, State, finite_result
 from flexmb.tables.status import OK, Status
 from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
+    from flexmb.frisch.errata import Erratum
     from flexmb.frisch.nested_system import NestedSystem
-    from flexmb.system.evaluator import Evaluator
 
 FEW_DIGITS = 4.0  # below it `PrecisionWarning` says so
 
@@ -73,37 +78,28 @@ class ConsistentMotion(NamedTuple):
     tau: Real
 
 
-class Mechanics:
-    """Everything that a `System` can be asked about its equations of motion. Each thread has workspaces of its own."""
+class Mechanics(SceneArrays):
+    """The equations of motion of a scene, and the tables and kernels for them; each thread has workspaces of its own.
 
-    constants: Constants
-    recursion_constants: Constants  # the same with bodies eliminated as chosen
-    layout: Layout
-    nq: int
-    nu: int
-    _w: Workspace
-    _recursion_w: Workspace
-    _out: Outputs
+    Methods of a state examine what they are given. Those of t and y = [q, u, work] do not: they are for numbers that
+    have been examined.
+    """
 
-    def __init__(self) -> None:
-        self._own = Own()
+    def __init__(self, scene: s.Scene, elimination: Elimination) -> None:
+        super().__init__(scene, elimination)
+        self.own = Own()
+        self._nested: dict[Set[Erratum], NestedSystem] = {}
 
-    @property
-    def body_names(self) -> tuple[str, ...]:
-        """Bodies in the order of the dynamics, point masses last."""
-        raise NotImplementedError
+    def nested_system(self, errata: Set[Erratum]) -> NestedSystem:
+        """Frisch's equations of this scene with these defects of the print, built at the first call.
 
-    def nested(self, algorithm: Any = "frisch") -> NestedSystem:
-        """Frisch's equations of this scene."""
-        raise NotImplementedError
+        ValueError where the print does not apply: a body whose modes are not clamped at its hinge point.
+        """
+        from flexmb.frisch.nested_system import NestedSystem  # who uses the recursion waits for none of it
 
-    def evaluator(self, algorithm: Any = "articulated") -> Evaluator:
-        """Of an algorithm, with workspaces of its own."""
-        raise NotImplementedError
-
-    def _evaluator(self, algorithm: Any) -> Evaluator:
-        """Of an algorithm that there is, with the workspace that this thread has here."""
-        raise NotImplementedError
+        if errata not in self._nested:
+            return self._nested.setdefault(errata, NestedSystem(self.constants, self.links, self.layout, errata))
+        return self._nested[errata]
 
     def workspace(self) -> Workspace:
         """A fresh workspace for `rhs`; one per thread."""
@@ -130,7 +126,7 @@ class Mechanics:
         Of all speeds, prescribed ones too. Raises DynamicsError where M is not positive definite.
         """
         factors = MassMatrixFactors(self.constants, self.workspace, *self.layout.entering(state))
-        self._check(factors.status, factors.fault)
+        self.check_status(factors.status, factors.fault)
         if factors.is_doubtful:
             self._judge(self._precision(factors))
         return factors
@@ -144,7 +140,7 @@ class Mechanics:
         tree. Raises DynamicsError where M is not positive definite, or cannot be told from a singular matrix.
         """
         precision = self.precision(state)
-        self._check(precision.status, precision.fault)
+        self.check_status(precision.status, precision.fault)
         return precision.digits
 
     def precision(self, state: State) -> Precision:
@@ -180,20 +176,26 @@ class Mechanics:
         used = np.where(self._is_modal, 0.0, arguments.vector("accelerations", accelerations, self.nu))
         rates = self.layout.rates("accelerations", used)
         *_, held, w = self._held.held
-        self._check(self._held(t, y, rates), int(w.fault[0]))
-        self._trust(t, y, w, held)
+        self.check_status(self._held(t, y, rates), int(w.fault[0]))
+        self.check_precision(t, y, w, held)
         rates = w.speed["acceleration"].copy()
         return ConsistentMotion(rates, self.inverse_dynamics(state, rates))
 
     def applied(self, state: State) -> Real:
         """Hinge springs, dampers and motors (nu,): the tau that M udot + c of the free motion equals."""
         t, y = self.layout.entering(state)
-        self._check(self._accelerate(t, y))
-        return finite_result(self._w.speed["applied"].copy(), t)
+        self.check_status(self._accelerate(t, y))
+        return finite_result(self.own_workspace.speed["applied"].copy(), t)
 
-    def fault_name(self, status: int, fault: int) -> str:
-        """Name of the body that the number of a failure stands for."""
-        return self.body_names[fault]
+    def precision_if_doubtful(self, state: State) -> Precision | None:
+        """`precision` of a state, None where no pivot there is so small that it may be rounding.
+
+        Asked of the right-hand side, which a run needs compiled anyway; kernels of the precision few runs need.
+        """
+        w = self.own_recursion_workspace
+        t, y = self.layout.entering(state)
+        status = self._recur(t, y, np.empty_like(y))
+        return None if status == OK and not w.doubt[0] else self.precision(state)
 
     def _inverse(self, t: float, y: Real, rates: Real) -> tuple[Real, Real]:
         """tau (nu,), and the loads (N,6) that the hinges then transmit, World axes."""
@@ -201,67 +203,105 @@ class Mechanics:
         self._invert(t, y, rates, tau, loads)
         return tau, loads
 
-    def _observe_rates(self, t: float, y: Real, algorithm: str) -> None:
-        """Everything observable with the accelerations of an algorithm, and the loads of hinges by inverse dynamics."""
-        rates, out = self._evaluator(algorithm)(t, y[: self.nq], y[self.nq : -1]), self._out
-        out.rates[:], out.drives[:] = rates, self._w.speed["drive"]
+    def _follow_recursion(self, t: float, y: Real) -> None:
+        """The recursion at one state, with its errors and warnings; leaves all that it found in its workspace."""
+        w = self.own_recursion_workspace
+        self.check_status(self._recur(t, y, np.empty_like(y)), int(w.fault[0]))
+        self.check_precision(t, y, w)
+
+    # What fills the outputs of this thread, `observation.out`
+
+    def observe_recursion(self, t: float, y: Real) -> None:
+        """Everything observable of the free motion, by the recursion."""
+        self._follow_recursion(t, y)
+        self._observe_recursion()
+
+    def observe_rates(self, t: float, y: Real, rates: Real) -> None:
+        """Everything observable with accelerations (nu,): hinge loads by inverse dynamics, drives as the workspace
+        has them."""
+        out = self.observation.out
+        out.rates[:], out.drives[:] = rates, self.own_workspace.speed["drive"]
         out.loads[:] = self._inverse(t, y, out.rates)[1]
         self._observe_motion(t, y)
 
-    # Kernels with the tables that they are called with, each thread's own; found when asked for, which compiles them
+    def observe_motion(self, t: float, y: Real, rates: Real, drives: Real, loads: Real) -> None:
+        """Everything observable with accelerations (nu,), driving loads (nu,) and hinge loads (N,6) found elsewhere."""
+        out = self.observation.out
+        out.rates[:], out.drives[:], out.loads[:] = rates, drives, loads
+        self._observe_motion(t, y)
+
+    # What each thread has of its own
+
+    @per_thread
+    def own_workspace(self) -> Workspace:
+        """For `constants`."""
+        return self.workspace()
+
+    @per_thread
+    def own_recursion_workspace(self) -> Workspace:
+        """For `recursion_constants`."""
+        return self.recursion_workspace()
+
+    @per_thread
+    def observation(self) -> Observation:
+        """The arrays that are filled with everything observable at one state, with their names."""
+        return Observation(self.observed_names, self.nu)
+
+    @per_thread
+    def own_matrices(self) -> Matrices:
+        """Made when first asked for: they are as large as the mass matrix."""
+        return matrices(self.constants)
+
+    @per_thread
+    def own_joint(self) -> Joint:
+        """What the unsplit recursion writes besides the workspace."""
+        return unsplit.joint(self.constants)
+
+    # Kernels with the tables that they are called with; found when asked for, which compiles them
 
     @per_thread
     def _recur(self) -> Direct:
         """(t, y, dy): the right-hand side by the recursion; a status code."""
-        return direct(articulated.rhs, STATUS, REAL, VECTOR, VECTOR, self.recursion_constants, self._recursion_w)
+        tables = self.recursion_constants, self.own_recursion_workspace
+        return direct(articulated.rhs, STATUS, REAL, VECTOR, VECTOR, *tables)
 
     @per_thread
     def _observe_recursion(self) -> Direct:
         """(): everything observable where `_recur` was just evaluated."""
-        return direct(observe, NOTHING, self.recursion_constants, self._recursion_w, self._out)
+        return direct(observe, NOTHING, self.recursion_constants, self.own_recursion_workspace, self.observation.out)
 
     @per_thread
     def _transmit(self) -> Direct:
         """(loads): those of all hinges where `_recur` was just evaluated."""
-        return direct(transmitted, NOTHING, self.recursion_constants, self._recursion_w, MATRIX)
+        return direct(transmitted, NOTHING, self.recursion_constants, self.own_recursion_workspace, MATRIX)
 
     @per_thread
     def _observe_motion(self) -> Direct:
         """(t, y): markers, wheel loads, energy and momentum of out.rates, accelerations found elsewhere."""
-        return direct(observe_motion, NOTHING, REAL, VECTOR, self.constants, self._w, self._out)
+        return direct(observe_motion, NOTHING, REAL, VECTOR, self.constants, self.own_workspace, self.observation.out)
 
     @per_thread
     def _accelerate(self) -> Direct:
         """(t, y): the recursion with every body eliminated explicitly; a status code."""
-        return direct(articulated.accelerations, STATUS, REAL, VECTOR, self.constants, self._w)
+        return direct(articulated.accelerations, STATUS, REAL, VECTOR, self.constants, self.own_workspace)
 
     @per_thread
     def _invert(self) -> Direct:
         """(t, y, rates, tau, loads)."""
-        return direct(
-            articulated.inverse_dynamics, NOTHING, REAL, VECTOR, VECTOR, self.constants, self._w, VECTOR, MATRIX
-        )
+        tables = self.constants, self.own_workspace
+        return direct(articulated.inverse_dynamics, NOTHING, REAL, VECTOR, VECTOR, *tables, VECTOR, MATRIX)
 
     @per_thread
     def _fill_mass_matrix(self) -> Direct:
         """(t, y, M)."""
-        return direct(composite.mass_matrix, NOTHING, REAL, VECTOR, self.constants, self._w, self._matrices, MATRIX)
+        tables = self.constants, self.own_workspace, self.own_matrices
+        return direct(composite.mass_matrix, NOTHING, REAL, VECTOR, *tables, MATRIX)
 
     @per_thread
     def _held(self) -> Direct:
         """(t, y, rates): accelerations with every hinge and wheel held at `rates`; a status code."""
         tables = held_hinges(self.constants, self.workspace())
         return direct(consistent_accelerations, STATUS, REAL, VECTOR, VECTOR, self.constants, *tables)
-
-    @per_thread
-    def _matrices(self) -> Matrices:
-        """Made when first asked for: they are as large as the mass matrix."""
-        return matrices(self.constants)
-
-    @per_thread
-    def _joint(self) -> Joint:
-        """What the unsplit recursion writes besides the workspace."""
-        return unsplit.joint(self.constants)
 
     @cached_property
     def _is_modal(self) -> NDArray[np.bool_]:
@@ -281,14 +321,14 @@ class Mechanics:
         made = partial(workspace, held, self.nq, self.nu)
         return self._precision(MassMatrixFactors(self.constants, made, t, y, held))
 
-    def _trust(self, t: float, y: Real, w: _Doubting, held: Constants | None = None) -> None:
+    def check_precision(self, t: float, y: Real, w: _Doubting, held: Constants | None = None) -> None:
         """What an evaluation that met small pivots, w.doubt, is worth: see `_judge`."""
         if w.doubt[0]:
             self._judge(self._precision_at(t, y, held))
 
     def _judge(self, precision: Precision) -> None:
         """DynamicsError where inertias are not positive definite beyond rounding, a warning where few digits stay."""
-        self._check(precision.status, precision.fault)
+        self.check_status(precision.status, precision.fault)
         if precision.is_low:
             warnings.warn(precision.warning, PrecisionWarning, stacklevel=4)
 
@@ -300,10 +340,10 @@ class Mechanics:
         owner = _owner(self.constants, condition.speed)
         return Precision(status, owner, self.body_names[owner], condition.digits)
 
-    def _check(self, status: int, fault: int | None = None) -> None:
+    def check_status(self, status: int, fault: int | None = None) -> None:
         """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
         if status != OK:
-            place = self.fault_name(status, int(self._w.fault[0]) if fault is None else fault)
+            place = self.fault_name(status, int(self.own_workspace.fault[0]) if fault is None else fault)
             error = DynamicsError(Status(status).advice.format(body=f'"{place}"'))
             error.status = Status(status)
             raise error

@@ -95,7 +95,6 @@ class Observation:
         of = shapes(speeds, *counts)
         at = np.array(list(names.markers.values()), dtype=np.int64).reshape(-1, 2)
         self.names, self._shapes, self._at = names, of, (at[:, 0].copy(), at[:, 1].copy())
-        self._places = places(of)
         self.columns = places(of | {"drives": (speeds,), "closures": (len(names.closures), 6)})
         """Where each part of a row lies: what `out.every` has, then drives and the loads of closures."""
         self.width = max(place.stop for place, _ in self.columns.values())
@@ -106,32 +105,32 @@ class Observation:
         """Fresh arrays of the same kind."""
         return outputs(self._shapes, *self._at)
 
-    def fill(self, row: Real, t: float, closures: Real) -> None:
-        """Copy what was filled last, and the loads (C,6) of closures, into a row (width,).
-
-        DynamicsError where a number is not finite.
-        """
-        every = len(self.out.every)
+    def row(self, t: float, closures: Real) -> Real:
+        """(width,) What was filled last, with the loads (C,6) of closures; DynamicsError where it is not finite."""
+        row, every = np.empty(self.width), len(self.out.every)
         row[:every] = finite_result(self.out.every, t)
         row[every : every + len(self.out.drives)] = self.out.drives
-        row[every + len(self.out.drives) :] = finite_result(closures, t).ravel()
+        if len(closures):
+            row[every + len(self.out.drives) :] = finite_result(closures, t).ravel()
+        return row
 
     def columns_of(self, rows: Real) -> dict[str, Real]:
         """Parts of rows (T,width) by the names in `columns`, (T, ...) each, which are views."""
         return {name: rows[:, place].reshape(len(rows), *shape) for name, (place, shape) in self.columns.items()}
 
-    def evaluation(self, t: float) -> Evaluation:
-        """A copy of what was filled last; DynamicsError where a number is not finite."""
-        names, found = self.names, parts(finite_result(self.out.every, t).copy(), self._places)
+    def evaluation(self, row: Real) -> Evaluation:
+        """A row (width,) by the names of the scene; arrays are parts of it."""
+        names, found = self.names, parts(row, self.columns)
         return Evaluation(
             accelerations=found["rates"],
             markers={
                 name: MarkerMotion(row[:3], row[3:12].reshape(3, 3), row[12:18], row[18:24])
                 for name, row in zip(names.markers, found["markers"], strict=True)
             },
-            loads=dict(zip(names.hinges, found["loads"], strict=True)),
+            loads=dict(zip(names.hinges, found["loads"], strict=True))
+            | dict(zip(names.closures, found["closures"], strict=True)),
             wheel_loads=dict(zip(names.wheels, found["wheel_loads"], strict=True)),
-            drives={name: self.out.drives[places] for name, places in names.driven.items()},
+            drives={name: found["drives"][places] for name, places in names.driven.items()},
             energy=dict(zip(ENERGIES, found["energy"].tolist(), strict=True)),
             momentum=found["momentum"],
             connectors=dict(zip(names.connectors, found["connectors"], strict=True)),

@@ -11,7 +11,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,15 +24,13 @@ from flexmb.scene.problems import SceneWarning
 from flexmb.scene.quaternions import rotation_by
 from flexmb.scene.tree import node_frame
 from flexmb.system.frames import Pose, body_pose, closure_frames_of, hinge_frames_of, link_pose
+from flexmb.system.observables import Evaluation
+from flexmb.system.scene_arrays import SceneArrays
 from flexmb.system.turning_points import turning
 from flexmb.tables import arguments
 from flexmb.tables.arrays import NODE_AXES, TORQUE, Workspace
 from flexmb.tables.state import finite_result
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.system.observables import Evaluation
-    from flexmb.system.tree_system import System
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +100,15 @@ class SectionLoads:
 
 
 class AllLoads(NamedTuple):
-    """What is exerted on the bodies of a system at one state. Where the motion does not determine all of it, `changes`:
-    other loads (6,) of hinges and closures that go with the same motion, less those in `exerted`, by name; changes of
-    `rounding` or less are none."""
+    """What is exerted on the bodies of a system at time t (s), and a workspace that has their motion.
 
+    Where the motion does not determine all of it, `changes`: other loads (6,) of hinges and closures that go with the
+    same motion, less those in `exerted`, by name; changes of `rounding` or less are none.
+    """
+
+    t: float
     exerted: Evaluation
+    motion: Workspace
     changes: Sequence[dict[str, Real]] = ()
     rounding: float = 0.0
 
@@ -121,9 +123,9 @@ class _Outer(NamedTuple):
 class SectionBalance:
     """Section loads of one beam of a system at fixed cuts, state by state."""
 
-    def __init__(self, system: System, body: str, x: Any) -> None:
-        self._system, self.body = system, body
-        self._beam = _beam(system, body)
+    def __init__(self, arrays: SceneArrays, body: str, x: Any) -> None:
+        self._arrays, self.body = arrays, body
+        self._beam = _beam(arrays, body)
         if self._beam.mass == "lumped":
             warnings.warn(_lumped(self._beam), SceneWarning, stacklevel=3)
         cuts = arguments.finite("x", np.atleast_1d(arguments.array("x", x)))
@@ -131,20 +133,19 @@ class SectionBalance:
             raise ValueError(f'x: give positions from 0 to {self._beam.length_m:g} m along beam "{body}", in a row')
         self.x = cuts
         self._cuts, self._places = np.unique(cuts, return_inverse=True)
-        self._k = system.body_names.index(body)
-        self._outboard = np.flatnonzero(system.constants.body["parent"] == self._k).tolist()
+        self._k = arrays.body_names.index(body)
+        self._outboard = np.flatnonzero(arrays.constants.body["parent"] == self._k).tolist()
         self.sections = beam_sections(self._beam, self._cuts)
 
-    def at(self, t: float, y: Real) -> Real:
-        """Loads (X,6) as `SectionLoads` has them at y = [q, u, work], NaN what the motion does not determine.
+    def at(self, state: AllLoads) -> Real:
+        """Loads (X,6) as `SectionLoads` has them at a state, NaN what the motion does not determine.
 
         DynamicsError where a number is not finite.
         """
-        system, k = self._system, self._k
-        exerted, changes, rounding = system._all_loads(t, y)
-        w = system._w
-        pose = body_pose(system, w, k)
-        m = system._links[k].mode_count
+        arrays, k = self._arrays, self._k
+        t, exerted, w, changes, rounding = state
+        pose = body_pose(arrays, w, k)
+        m = arrays.links[k].mode_count
         eta, etad, etadd = w.eta[k, :m], w.etad[k, :m], w.etadd[k, :m]
         inertial = self._inertial(_motion_in(pose, link_pose(w, k), w, k), eta, etad, etadd)
 
@@ -190,9 +191,9 @@ class SectionBalance:
 
     def _outer(self, w: Workspace, pose: Pose, exerted: Evaluation) -> list[_Outer]:
         """All that others exert on the beam, with where along it."""
-        system, k, scene = self._system, self._k, self._system.scene
+        arrays, k, scene = self._arrays, self._k, self._arrays.scene
         loads, wheels = exerted.loads, exerted.wheel_loads
-        constants = system.constants
+        constants = arrays.constants
         found: list[_Outer] = []
 
         def add(node: str, torque: Real, force: Real, point: Real, *, at: bool = True) -> None:
@@ -201,12 +202,12 @@ class SectionBalance:
             about = torque + np.cross(point - pose.position, force)
             found.append(_Outer(beyond, np.concatenate([pose.rotation.T @ about, pose.rotation.T @ force])))
 
-        own = system._links[k]
+        own = arrays.links[k]
         load = loads[own.hinge.name]  # a section at the hinge itself transmits its load: the hinge is not beyond
-        add(own.outboard_end.node, load[:3], load[3:], hinge_frames_of(system, w, k).point, at=False)
+        add(own.outboard_end.node, load[:3], load[3:], hinge_frames_of(arrays, w, k).point, at=False)
         for j in self._outboard:
-            link, load = system._links[j], loads[system._links[j].hinge.name]
-            add(link.inboard_end.node, -load[:3], -load[3:], hinge_frames_of(system, w, j).point)
+            link, load = arrays.links[j], loads[arrays.links[j].hinge.name]
+            add(link.inboard_end.node, -load[:3], -load[3:], hinge_frames_of(arrays, w, j).point)
         carrier = link_pose(w, k)
         rows = range(int(constants.body[k]["wheel_start"]), int(constants.body[k]["wheel_stop"]))
         for wheel, row in zip((each for each in scene.wheels if each.body == self.body), rows, strict=True):
@@ -234,7 +235,7 @@ class SectionBalance:
             for side, sign in zip(closure_sides(closure), (-1.0, 1.0), strict=True):
                 if side.body == self.body:
                     load = sign * loads[closure.name]
-                    add(side.node, load[:3], load[3:], closure_frames_of(system, w, i).point)
+                    add(side.node, load[:3], load[3:], closure_frames_of(arrays, w, i).point)
         return found
 
     def _in_sections(self, wrench: Real, eta: Real) -> Real:
@@ -288,8 +289,8 @@ def _lumped(beam: BeamBody) -> str:
     )
 
 
-def _beam(system: System, body: str) -> BeamBody:
-    beams = {each.name: each for each in system.scene.bodies if isinstance(each, BeamBody)}
+def _beam(arrays: SceneArrays, body: str) -> BeamBody:
+    beams = {each.name: each for each in arrays.scene.bodies if isinstance(each, BeamBody)}
     if body not in beams:
         raise ValueError(f'"{body}" is no beam of the scene; these are: {", ".join(beams) or "none"}')
     return beams[body]

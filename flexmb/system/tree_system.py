@@ -11,170 +11,49 @@ speeds in the same order. `system.coordinate(name)` and `system.speed(name)` giv
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flexmb.building.assemble import assemble
-from flexmb.building.connector_arrays import between_nodes
-from flexmb.building.links import links
-from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
-from flexmb.entry.observation import Outputs
-from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
+from flexmb.jain.elimination import ELIMINATIONS, Elimination
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
-from flexmb.scene.connectors import AlongHinge, HingeSpring
 from flexmb.system import algorithms, labels
 from flexmb.system.algorithm import Algorithm, Route
-from flexmb.system.evaluator import Evaluator
+from flexmb.system.free_motion import FreeMotion
 from flexmb.system.load_axes import Axes, referred
 from flexmb.system.mass_properties import MassProperties, mass_properties
-from flexmb.system.mechanics import Mechanics, Precision
-from flexmb.system.observables import Evaluation, Names, Observation
+from flexmb.system.observables import Evaluation
 from flexmb.system.section_loads import AllLoads, SectionBalance, SectionLoads
 from flexmb.tables import arguments
-from flexmb.tables.arrays import Workspace
-from flexmb.tables.features import GENERAL, Kernels, asking
-from flexmb.tables.per_thread import per_thread
+from flexmb.tables.features import Kernels, asking
 from flexmb.tables.state import State, finite_result
-from flexmb.tables.status import OK, Status
-from flexmb.typing import Index, Real
+from flexmb.typing import Real
 
 if TYPE_CHECKING:
     from flexmb.frisch.nested_system import NestedSystem, Partitions
     from flexmb.jain.operators import Operators, SpatialOperators
     from flexmb.system.batch import Batch, BatchAccelerations
 
-Given = Literal["guess", "scene", "state"] | NDArray[np.bool_]
-"""What of a state is asked for: nothing, what a scene gives, all of it, or the values (nq+nu+1,) that are named."""
-
 _NO_CLOSURES = np.zeros((0, 6))
 
 
-class System(Mechanics):
+class System(FreeMotion):
     """A checked scene turned into arrays; made by `compile`. Threads may share it: each has workspaces of its own."""
 
     def __init__(self, scene: s.Scene, elimination: Elimination = "fastest") -> None:
-        super().__init__()
-        self.scene = scene
+        super().__init__(scene, elimination)
         self._asked: Elimination = elimination
-        self._links = links(scene)
-        self._wheels = wheels_by_body(scene)
-        self._numbering = Numbering(self._links, self._wheels)
-        assembled = assemble(scene, self._links, self._numbering)
-        self.constants, markers, self._closure_ports = assembled.constants, assembled.markers, assembled.closures
-        self.signals = assembled.signals
-        """By number among the functions of time, those that controllers drive in a run; zero outside of one."""
-        self.layout = self._numbering.layout
-        self.nq, self.nu = self.layout.nq, self.layout.nu
-        self._markers, self.recursion_constants = markers, with_elimination(self.constants, elimination)
         self.rhs, self.project = articulated.rhs, coordinates.project
-        self._nested: dict[str, NestedSystem] = {}
         self.kept: dict[Any, Any] = {}
         """What runs find once and keep for the next one."""
         self._operators: SpatialOperators | None = None
 
-    def _anew(self) -> System:
-        """The same scene turned into other arrays."""
-        with asking(self.kernels):
-            return System(self.scene, self._asked)
-
-    @property
-    def kernels(self) -> Literal["general", "special"]:
-        """Which kernels run it: those that take every scene, or those compiled for its kind; see `compile`."""
-        return "general" if GENERAL in self.constants.features() else "special"
-
-    @per_thread
-    def _w(self) -> Workspace:
-        return self.workspace()
-
-    @per_thread
-    def _recursion_w(self) -> Workspace:
-        return self.recursion_workspace()
-
-    @per_thread
-    def _observation(self) -> Observation:
-        hinges, wheels = [link.hinge.name for link in self._links], [*self._wheel_names()]
-        closures, driven = [closure.name for closure in self.scene.closures], self._driven([*hinges, *wheels])
-        connectors = [each.name for each in between_nodes(self.scene)], [*_along_hinges(self.scene)]
-        return Observation(Names(self._markers, hinges, wheels, closures, driven, *connectors), self.nu)
-
-    @property
-    def _out(self) -> Outputs:  # type: ignore[override]
-        return self._observation.out
-
-    @per_thread
-    def _evaluators(self) -> dict[str, Evaluator]:
-        """By algorithm."""
-        return {}
-
     def __reduce__(self) -> tuple[Any, ...]:
         """Copied and pickled as its scene: addresses are of one process, and arrays are parts of each other."""
         return copied, (System, self.kernels, self.scene, self._asked)
-
-    @property
-    def body_names(self) -> tuple[str, ...]:
-        """Bodies in the order of the dynamics, point masses last."""
-        return tuple(link.name for link in self._links)
-
-    def coordinate(self, name: str) -> slice:
-        """Place in q of a hinge, "<body>.hinge", "<body>.modes", wheel or point mass."""
-        return _find(self._numbering.q, name)
-
-    def speed(self, name: str) -> slice:
-        """Place in u of a hinge, "<body>.hinge", "<body>.modes", wheel or point mass."""
-        return _find(self._numbering.u, name)
-
-    def state(self, q: Real, u: Real, t: float = 0.0) -> State:
-        """State from q (nq,), u (nu,) and t (s), copies; quaternions need not have unit length, they are scaled.
-
-        Raises ValueError where lengths do not fit, numbers are not finite or a quaternion is zero, and TypeError for
-        anything but real numbers.
-        """
-        return self.layout.state(q, u, t)
-
-    @property
-    def initial_state(self) -> State:
-        """The scene's state at t = 0; prescribed coordinates have their functions' values."""
-        return self.layout.known(0.0, self._at_start.copy())
-
-    def _admissible(self, t: float, y: Real, given: Given = "guess") -> State:
-        """The state at time t (s) that y (nq+nu+1,) = [q, u, work] stands for; prescribed motions are as they are then.
-
-        Of closed chains the nearest one that closes all closures; ClosureError where that is far. It keeps what is
-        given where it can, and warns where not.
-        """
-        y = np.r_[y[:-1], 0.0]
-        self.project(t, y, self.constants)
-        return self.layout.known(t, y)
-
-    def _scene_state(self, t: float) -> Real:
-        """(nq+nu+1,) [q, u, 0] of the scene's initial values, with prescribed motions as they are at time t (s)."""
-        y: Real = self._at_start.copy()
-        self.project(t, y, self.constants)
-        return y
-
-    @cached_property
-    def _at_start(self) -> Real:
-        """(nq+nu+1,) [q, u, 0] of the scene at t = 0."""
-        q, u = np.zeros(self.nq), np.zeros(self.nu)
-        for link in self._links:
-            name = link.hinge.name
-            q[self.coordinate(name)], u[self.speed(name)] = link.kind.state(link.hinge)
-        for wheel in self.scene.wheels:
-            q[self.coordinate(wheel.name)], u[self.speed(wheel.name)] = wheel.angle_rad, wheel.speed_rad_s
-        for modal in self.scene.modal_states:
-            name = f"{modal.body}.modes"
-            if self.coordinate(name).stop > self.coordinate(name).start:
-                q[self.coordinate(name)] = modal.coordinates
-                u[self.speed(name)] = modal.rates or 0.0
-        y = np.concatenate([q, u, [0.0]])
-        self.project(0.0, y, self.constants)
-        return y
 
     @property
     def elimination(self) -> dict[str, str]:
@@ -189,13 +68,9 @@ class System(Mechanics):
 
         ValueError where the print does not apply: a body whose modes are not clamped at its hinge point.
         """
-        from flexmb.frisch.nested_system import NestedSystem  # who uses the recursion waits for none of it
-
         errata = algorithms.chosen(algorithm, algorithms.NESTED).errata
-        if algorithm not in self._nested:
-            made = NestedSystem(self.constants, self._links, self.layout, errata or frozenset())
-            return self._nested.setdefault(algorithm, made)
-        return self._nested[algorithm]
+        assert errata is not None  # of those that are nested
+        return self.nested_system(errata)
 
     def partitions(self, state: State, algorithm: Algorithm = "frisch") -> Partitions:
         """The partitioned equations of motion, Frisch (111), by the names of the paper."""
@@ -213,23 +88,6 @@ class System(Mechanics):
         for part in (found.M_m, found.a_m, found.b_m, found.V_m):
             finite_result(part, t)
         return found
-
-    def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
-        """udot (nu,) of the free motion under all loads; prescribed speeds have their functions' rates.
-
-        "articulated": the O(N) recursion; "unsplit": the same with modes and hinge of a body eliminated together;
-        "composite": mass matrix by composite bodies, bias by inverse dynamics, Cholesky's factors, partitioned for
-        prescribed speeds; "frisch": the nested-body equations of 1975, corrected, "frisch_as_printed": to the letter.
-        Frisch's equations are of first order in the deformation: they take bodies of level `full` as `linear`.
-        Raises DynamicsError where an inertia is not positive definite, or numbers are so large that they overflow.
-        """
-        if type(state) is not State or state.layout is not self.layout:
-            state = self.layout.owning(state)
-        try:
-            evaluator = self._own._evaluators[algorithm]  # not by way of the property, which costs as much as the call
-        except (AttributeError, KeyError):
-            evaluator = self._evaluator(algorithm)
-        return evaluator(state.t, state._q, state._u).copy()
 
     def accelerations_batch(self, q: Any, u: Any, t: Any = 0.0, *, threads: int | None = None) -> BatchAccelerations:
         """udot (n,nu) of many states at once, and a status (n,) for each: see `flexmb.system.batch.Batch`.
@@ -250,37 +108,6 @@ class System(Mechanics):
 
             found = self.kept.setdefault("batch", Batch([self]))
         return found
-
-    def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
-        """`accelerations` for a loop: `udot = evaluator(t, q, u)` writes into one array, by a workspace of its own.
-
-        A call costs a tenth of a microsecond besides the kernel, of the thread that calls it first; others may call it
-        too, each with an array and a workspace of its own, and wait half a microsecond longer. Compiled here, not at
-        its first call. NotImplementedError for closed chains.
-        """
-        chosen = algorithms.chosen(algorithm)
-        return Evaluator(self, chosen, chosen.fresh(self))
-
-    def _evaluator(self, algorithm: Any) -> Evaluator:
-        chosen = algorithms.chosen(algorithm)
-        if chosen.name not in self._evaluators:
-            self._evaluators[chosen.name] = Evaluator(self, chosen, chosen.own(self))
-        return self._evaluators[chosen.name]
-
-    @per_thread  # not `cached_property`: before Python 3.12 it holds a lock meanwhile, and this may have to compile
-    def start_precision(self) -> Precision | None:
-        """`_precision_if_doubtful` of the initial state, found once."""
-        return self._precision_if_doubtful(self.initial_state)
-
-    def _precision_if_doubtful(self, state: State) -> Precision | None:
-        """`precision` of a state, None where no pivot there is so small that it may be rounding.
-
-        Asked of the right-hand side, which a run needs compiled anyway; kernels of the precision few runs need.
-        """
-        w = self._recursion_w
-        t, y = self.layout.entering(state)
-        status = self._recur(t, y, np.empty_like(y))
-        return None if status == OK and not w.doubt[0] else self.precision(state)
 
     @cached_property
     def state_names(self) -> tuple[labels.Names, labels.Names]:
@@ -315,18 +142,19 @@ class System(Mechanics):
         """
         t, y = self.layout.entering(state)
         if accelerations is None:
-            loads, w = finite_result(self._free_loads(t, y), t), self._recursion_w
+            loads, w = finite_result(self._free_loads(t, y), t), self.own_recursion_workspace
         else:
             rates = self.layout.rates("accelerations", accelerations)
-            loads, w = finite_result(self._inverse(t, y, rates)[1], t), self._w
+            loads, w = finite_result(self._inverse(t, y, rates)[1], t), self.own_workspace
         return referred(self, w, self._by_hinge(loads), axes, about)
 
-    def _loads_in(
-        self, t: float, y: Real, loads: dict[str, Real], axes: Axes, about: tuple[str, str] | None
+    def referred_loads(
+        self, state: State, loads: dict[str, Real], axes: Axes = "world", about: tuple[str, str] | None = None
     ) -> dict[str, Real]:
-        """Loads of hinges and closures that were found at this state, World axes, in other axes about a node."""
+        """Loads of hinges and closures that were found at a state, World axes, in other axes about a node."""
+        t, y = self.layout.entering(state)
         self._inverse(t, y, np.zeros(self.nu))  # leaves poses as the equations of motion see them
-        return referred(self, self._w, loads, axes, about)
+        return referred(self, self.own_workspace, loads, axes, about)
 
     def section_loads(self, state: State, body: str, x: Any) -> SectionLoads:
         """Axial force, shear, bending and torsion across the sections of a beam at x (X,) m, of the free motion.
@@ -336,15 +164,15 @@ class System(Mechanics):
         deformation. Warns (`SceneWarning`) where the mass is lumped, which steps at nodes. NaN what redundant closures
         leave open. ValueError for anything but a beam, and positions off it.
         """
-        t, y = self.layout.entering(state)
         balance = SectionBalance(self, body, x)
-        return balance.loads(balance.at(t, y))
+        return balance.loads(balance.at(self.all_loads(state)))
 
-    def _all_loads(self, t: float, y: Real) -> AllLoads:
-        """Of hinges, closures, wheels and connectors; leaves the motion that the equations see in `_w`."""
+    def all_loads(self, state: State) -> AllLoads:
+        """Of hinges, closures, wheels and connectors, with the motion of all bodies."""
+        t, y = self.layout.entering(state)
         found = self._evaluate(t, y, "articulated")
         self._inverse(t, y, found.accelerations)
-        return AllLoads(found)
+        return AllLoads(t, found, self.own_workspace)
 
     def mass_properties(self, state: State, body: str | None = None) -> MassProperties:
         """Mass, mass centre and inertia of a body with all that it carries, or of the whole scene, at a state.
@@ -353,23 +181,23 @@ class System(Mechanics):
         shape, as momentum has it. ValueError for a body that there is not.
         """
         t, y = self.layout.entering(state)
-        self._out.rates[:] = 0.0
+        rates = self.observation.out.rates
+        rates[:] = 0.0
         self._observe_motion(t, y)
-        inertias = self._w.body["inertia"].copy()
-        if any(link.level.at_rest for link in self._links):
-            self._inverse(t, y, self._out.rates)  # leaves poses by rest shapes
-        return mass_properties(self, self._w, inertias, body)
+        inertias = self.own_workspace.body["inertia"].copy()
+        if any(link.level.at_rest for link in self.links):
+            self._inverse(t, y, rates)  # leaves poses by rest shapes
+        return mass_properties(self, self.own_workspace, inertias, body)
 
     def _free_loads(self, t: float, y: Real) -> Real:
         """(N,6) of the free motion, World axes."""
-        loads, w = np.zeros((len(self._links), 6)), self._recursion_w
-        self._check(self._recur(t, y, np.empty_like(y)), int(w.fault[0]))
-        self._trust(t, y, w)
+        loads = np.zeros((len(self.links), 6))
+        self._follow_recursion(t, y)
         self._transmit(loads)
         return loads
 
     def _by_hinge(self, loads: Real) -> dict[str, Real]:
-        return {link.hinge.name: loads[k] for k, link in enumerate(self._links)}
+        return {link.hinge.name: loads[k] for k, link in enumerate(self.links)}
 
     def energy(self, state: State) -> dict[str, float]:
         """Kinetic, strain, spring and gravity energy (J)."""
@@ -391,49 +219,27 @@ class System(Mechanics):
         return self._evaluate(*self.layout.packed(t, q, u), algorithm)
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
-        algorithms.chosen(algorithm).observe(self, t, y)
-        return self._observation.evaluation(t)
+        self._observe(t, y, algorithm)
+        observation = self.observation
+        return observation.evaluation(observation.row(t, _NO_CLOSURES))
 
-    def _observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
+    def _observe(self, t: float, y: Real, algorithm: Algorithm) -> None:
+        """Fills the outputs."""
+        chosen = algorithms.chosen(algorithm)
+        if chosen.observe is not None:
+            chosen.observe(self, t, y)
+        else:
+            self.observe_rates(t, y, self._evaluator(chosen)(t, y[: self.nq], y[self.nq : -1]))
+
+    def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
         """Everything observable at y = [q, u, work], which is not checked, into a row as `Observation.columns` has it.
 
         Raises DynamicsError as `evaluate` does.
         """
-        algorithms.chosen(algorithm).observe(self, t, y)
-        self._observation.fill(row, t, _NO_CLOSURES)
-
-    def fault_name(self, status: int, fault: int) -> str:
-        """Name of the body or connector that the number of a failure stands for."""
-        if status == Status.CONNECTOR_OVERTURNED:
-            return between_nodes(self.scene)[fault].name
-        return super().fault_name(status, fault)
-
-    def _wheel_names(self) -> Iterator[str]:
-        yield from (wheel.name for link in self._links for wheel in self._wheels.get(link.name, ()))
-
-    def _driven(self, names: Iterable[str]) -> dict[str, Index]:
-        """Places in u of the prescribed coordinates, by hinge or wheel."""
-        driven = self.constants.speed["prescribed"] >= 0
-        if not np.any(driven):
-            return {}
-        places = ((name, self.speed(name)) for name in names)
-        return {name: at.start + np.flatnonzero(driven[at]) for name, at in places if np.any(driven[at])}
-
+        self._observe(t, y, algorithm)
+        row[:] = self.observation.row(t, _NO_CLOSURES)
 
 def copied(kind: type[System], kernels: Kernels, *given: Any) -> System:
     """What a pickled system becomes again, run by the same kind of kernels."""
     with asking(kernels):
         return kind(*given)
-
-
-def _along_hinges(scene: s.Scene) -> Iterator[str]:
-    """Springs along hinges, then other laws, as the tables have them."""
-    along = [each for each in scene.connectors if isinstance(each, AlongHinge)]
-    yield from (each.name for each in along if isinstance(each, HingeSpring))
-    yield from (each.name for each in along if not isinstance(each, HingeSpring))
-
-
-def _find(places: dict[str, slice], name: str) -> slice:
-    if name not in places:
-        raise KeyError(f"no coordinates of that name: {name!r}; there are {', '.join(sorted(places))}")
-    return places[name]

@@ -1,1 +1,1 @@
-"""What kernels work on: the arrays of a scene and of an evaluation, its state, and the gate that arguments pass."""
+"""The data of kernels: arrays of a scene and of an evaluation, states, status codes, and checks of arguments."""

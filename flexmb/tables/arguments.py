@@ -1,7 +1,7 @@
-"""Arguments of public calls as the code behind them needs them: real numbers in arrays of the right shape, or an error.
+"""Conversion of the arguments of public calls to arrays of real numbers of the right shape, with clear errors.
 
-Integers and single precision are cast, sequences become arrays. What is not a real number, as complex ones, strings,
-booleans and None, is a TypeError; lengths that do not fit, masked entries, NaN and infinity are a ValueError.
+Integers and single precision are cast, sequences become arrays. Anything but real numbers (complex numbers, strings,
+booleans, None) is a TypeError; wrong lengths, masked entries, NaN and infinity are a ValueError.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 _FLOAT = np.dtype(float)
-_DEEPEST = 3  # sequences within each other, in which masked arrays are looked for
+_DEEPEST = 3  # levels of nested sequences that are searched for masked arrays
 
 
 def array(name: str, values: Any) -> Vector:
-    """An array of floats of any shape, in C's order, aligned and writable; the array itself where it is that."""
+    """An array of floats of any shape, C-contiguous, aligned and writable; the array itself if it is all of that."""
     if type(values) is np.ndarray and values.dtype is _FLOAT and values.flags.carray:
         return values
     _refuse_masked(name, values)
@@ -29,14 +29,14 @@ def array(name: str, values: Any) -> Vector:
     except ValueError:
         raise ValueError(f"{name}: rows of different lengths; give an array of numbers") from None
     if found.size == 0 and not isinstance(values, np.ndarray):
-        found = found.astype(float)  # an empty list has no type of its own
+        found = found.astype(float)  # an empty list has no type
     if found.dtype.kind not in "iuf":
         raise TypeError(f"{name}: real numbers are needed, not {_kind(values, found)}")
     return np.array(found, float, order="C")
 
 
 def shaped(name: str, values: Any, shape: tuple[int, ...]) -> Vector:
-    """An array of floats of a shape; whether they are finite is for the caller to ask."""
+    """An array of floats of a given shape, not checked for finite numbers."""
     found = array(name, values)
     if found.shape != shape:
         raise ValueError(f"{name} has the shape {found.shape}, and {shape} is needed")
@@ -44,9 +44,9 @@ def shaped(name: str, values: Any, shape: tuple[int, ...]) -> Vector:
 
 
 def held(name: str, values: Any, shape: tuple[int | None, ...], kinds: str = "iuf") -> None:
-    """Whether a field of a result is still an array of such a shape, None for any length; TypeError or ValueError.
+    """Check that a field of a result is still an array of this shape, None for any length; TypeError or ValueError.
 
-    Results are made by the library, but whoever has one can replace their arrays, or change the shapes in place.
+    Results are created by the library, but users can replace their arrays, or change shapes in place.
     """
     if not isinstance(values, np.ndarray) or values.dtype.kind not in kinds:
         wanted = "numbers" if "c" in kinds else "real numbers"
@@ -59,7 +59,7 @@ def held(name: str, values: Any, shape: tuple[int | None, ...], kinds: str = "iu
 
 
 def vector(name: str, values: Any, length: int) -> Vector:
-    """An array (length,) of floats; whether they are finite is for the caller to ask."""
+    """An array (length,) of floats, not checked for finite numbers."""
     found = array(name, values)
     if found.shape != (length,):
         raise ValueError(f"{name}: {length} numbers in a row are needed, got an array of shape {found.shape}")
@@ -67,7 +67,7 @@ def vector(name: str, values: Any, length: int) -> Vector:
 
 
 def finite(name: str, values: Vector) -> Vector:
-    """The array itself; ValueError where an entry is NaN or infinite."""
+    """The array itself; ValueError if an entry is NaN or infinite."""
     if not np.isfinite(values).all():
         place = np.unravel_index(int(np.argmin(np.isfinite(values))), values.shape)
         where = ", ".join(map(str, place))
@@ -76,14 +76,14 @@ def finite(name: str, values: Vector) -> Vector:
 
 
 def representable(result: Vector) -> Vector:
-    """The array itself; OverflowError where an entry is not finite: of arguments that are."""
+    """The array itself, computed from finite arguments; OverflowError if an entry is not finite."""
     if not np.isfinite(result).all():
         raise OverflowError("the result is not finite: the numbers given are so large that their products overflow")
     return result
 
 
 def number(name: str, value: Any) -> float:
-    """A finite float."""
+    """The value as a finite float; TypeError or ValueError."""
     if type(value) is not float:
         if not isinstance(value, Real) or isinstance(value, bool):
             raise TypeError(f"{name} is {value!r}: give a real number")
@@ -97,14 +97,14 @@ def number(name: str, value: Any) -> float:
 
 
 def whole(name: str, value: Any) -> int:
-    """An integer."""
+    """The value as an integer; TypeError for others."""
     if not isinstance(value, Integral) or isinstance(value, bool):
         raise TypeError(f"{name} is {value!r}: give a whole number")
     return int(value)
 
 
 def index(name: str, value: Any, length: int) -> int:
-    """The number of one of `length` things, counted from 0."""
+    """An index from 0 to `length` - 1; TypeError or ValueError."""
     found = whole(name, value)
     if not 0 <= found < length:
         raise ValueError(f"{name} is {found}: there are {length}, counted from 0")
@@ -112,7 +112,7 @@ def index(name: str, value: Any, length: int) -> int:
 
 
 def one_of(name: str, value: Any, known: Iterable[str]) -> str:
-    """A name that there is; ValueError for another, with those that there are."""
+    """The value if it is one of the known names; ValueError, which lists them, if not."""
     names = tuple(known)
     if not isinstance(value, str) or value not in names:
         raise ValueError(f"{name} is {value!r}: use one of {', '.join(map(repr, names))}")
@@ -120,7 +120,7 @@ def one_of(name: str, value: Any, known: Iterable[str]) -> str:
 
 
 def _refuse_masked(name: str, values: Any, place: tuple[int, ...] = ()) -> None:
-    """ValueError for an array, or sequence of arrays, in which an entry is masked: what is below a mask is no value."""
+    """ValueError for an array, or a sequence of arrays, with a masked entry, whose value is undefined."""
     if isinstance(values, np.ma.MaskedArray):
         if np.ma.is_masked(values):
             masked = np.argwhere(np.ma.getmaskarray(values))[0]

@@ -1,10 +1,10 @@
-"""The arrays kernels work on: one table of names, shapes and units.
+"""The arrays of kernels: names, shapes and units.
 
 N bodies (point masses included, as bodies without rotary inertia), numbered base to tip; P ports; S summed points;
-W wheels; L loads; C connectors between two ports; F functions of time; m the largest number of modes, as whole strips
-(`flexmb.jit.strips`): what is beyond the modes of a body is zero; nq, nu lengths of q and u. Everything about a
-body is in its frame: that of its hinge's outboard frame O where O does not deform relative to it, else the modal
-frame. Angular components come first. Units are SI. Every table is an array of records, so that code reads like
+W wheels; L loads; C connectors between two ports; F functions of time; m the largest number of modes, rounded up to
+whole strips (`flexmb.jit.strips`): entries beyond the modes of a body are zero; nq, nu lengths of q and u. All data of
+a body are in its frame: the outboard hinge frame O if the modes do not move O in the body, else the modal frame.
+Angular components come first. Units are SI. Most tables are arrays of records, so that code reads like
 ``c.body[k].parent``.
 
 A *port* is a frame fixed to a point of a body that may deform: where a hinge, wheel, load or marker sits.
@@ -33,15 +33,16 @@ def _record(*fields: tuple) -> np.dtype:
     return np.dtype(list(fields), align=True)
 
 
-BODY = _record(  # what rigid trees need comes first, so that it lies together
+BODY = _record(  # the fields that rigid bodies use come first, so that they share cache lines
     ("placement_position", _F, (3,)),  # O+ in the parent's frame
     ("placement_rotation", _F, (9,)),  # R_parent_O+
     # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; levels full and linear:
     # without the summed points
     ("rigid", _F, (10,)),
     ("parent", _I),  # -1 for ground
-    ("starts", _I),  # whether its parent's articulated inertia starts with what this body hands over, see `started`
-    ("started", _I),  # whether an outboard body starts its inertia: level rigid without wheels, its own is in `rigid`
+    # whether this body is the first in the inward sweep to add to its parent's inertia, and also adds the parent's own
+    ("starts", _I),
+    ("started", _I),  # whether an outboard body `starts` its inertia: for level rigid, without wheels
     ("axis", _I),  # of a hinge with one speed, along z: its row of a motion, ANGULAR_Z or LINEAR_Z; NO_AXIS for others
     ("q_index", _I),  # first hinge coordinate in q
     ("u_index", _I),  # first hinge speed in u
@@ -57,7 +58,7 @@ BODY = _record(  # what rigid trees need comes first, so that it lies together
     ("node", _I),  # place of the inboard port among its parent's nodes, where the parent's elimination is not EXPLICIT
     ("nodes", _I),  # number of such places: hinges of outboard bodies at ports that deform
     ("orthogonal", _I),  # whether the modal masses are diagonal
-    ("uncoupled", _I),  # whether modal stiffness and damping are diagonal
+    ("uncoupled", _I),  # whether modal stiffness and modal damping are diagonal
     ("eta_index", _I),  # first modal coordinate in q
     ("etad_index", _I),  # first modal speed in u
     ("inboard_port", _I),  # port of the inboard hinge frame O+ on the parent; -1: `placement` holds it, undeforming
@@ -80,9 +81,9 @@ SLOPE = _record(  # level linear: mode n of a body by eta_k
     ("coriolis", _F, (3,)),  # C1_kn - C1_nk, velocity-dependent force w . coriolis etad_k on the mode
     ("gyration", _F, (6,)),  # symmetric G_nk = 1/2 d2J/(deta_n deta_k)
 )
-# Summed at run time: points with rotating inertia or an offset mass centre; level linear: wheels; level stiffened: all.
+# Points summed at every evaluation: turning inertia, offset mass centres; level linear: wheels; stiffened: all.
 POINT = _record(
-    ("mass", _F),  # 0 where the mass is in the polynomial part, or in points of its own
+    ("mass", _F),  # 0 if the mass is in the polynomial part or in another point
     ("position", _F, (3,)),
     ("offset", _F, (3,)),  # mass centre from the point, in point axes
     ("inertia", _F, (6,)),  # about the mass centre
@@ -120,7 +121,7 @@ CONNECTOR = _record(
     ("stop", _I),
     ("row", _I),  # of `bushing`
     ("free_length", _F),
-    ("smoothing", _F),  # length below which a line loses its direction
+    ("smoothing", _F),  # length s in sqrt(d.d + s^2), see flexmb.connectors.line
     ("damping", _F),
 )
 END = _record(
@@ -136,7 +137,7 @@ HINGE_SPRING = _record(
     ("stop", _I),
     ("rest", _F),
     ("damping", _F),
-    ("lower", _F),  # stops; beyond all coordinates where there is none
+    ("lower", _F),  # stops; beyond all coordinates if there is none
     ("upper", _F),
     ("stop_stiffness", _F),
     ("stop_dissipation", _F),
@@ -154,7 +155,7 @@ SPEED = _record(
     ("stiffness", _F),
     ("damping", _F),
     ("rest", _F),
-    ("doubtful", _F),  # a pivot below is so small against all that the speed moves that it may be rounding
+    ("doubtful", _F),  # pivots below this, relative to all that the speed moves, may be rounding errors
 )
 FUNCTION = _record(
     ("kind", _I),
@@ -166,7 +167,7 @@ FUNCTION = _record(
 
 @bundle
 class Constants:
-    """Everything that does not change in a run."""
+    """The arrays that do not change in a run."""
 
     gravity: Real  # (3,) World axes, m/s^2
     body: Record  # (N,) BODY
@@ -192,30 +193,31 @@ class Constants:
     hinge_spring: Record  # (springs along coordinates,) HINGE_SPRING
     coordinate_law: Record  # (laws along coordinates that are no springs,) COORDINATE_LAW
     # (pieces,8) of load laws: left end, energy there, then coefficients, highest power first; the first piece of a law
-    # goes on below its left end
+    # also applies below its left end
     law: Real
     speed: Record  # (nu,) SPEED
     function: Record  # (F,) FUNCTION
-    table: Real  # (T,7) spline pieces: left end of the interval, then six coefficients, highest power first
-    kernels: Index  # (1,) which kernels run them: see `flexmb.tables.features`
+    table: Real  # (T,8) pieces of functions of time, see `flexmb.tables.pieces`
+    kernels: Index  # (1,) which kernels run this scene: see `flexmb.tables.features`
 
     def features(self) -> frozenset[str]:
-        """What kernels for these constants contain."""
+        """The features that kernels for these constants contain."""
         return features.features(self)
 
 
-# Every reduced body has nodes i = 0..C-1 where outboard bodies are hinged; vectors of all of them are stacked (6C).
+# Each reduced body has nodes i = 0..C-1, at which outboard bodies are hinged; their vectors are stacked (6C).
 REDUCED_NODE = _record(
     ("port", _I),
-    ("theta", _F, (6, 6)),  # Theta = phi' - Pi Lam M_fr: acceleration of the node by that of the body, modes yielding
+    # Theta = phi' - Pi Lam M_fr: acceleration of the node at unit acceleration of the body, without forces on the modes
+    ("theta", _F, (6, 6)),
 )
 
 
 @bundle
 class ReducedConstants(Constants):
-    """Constants of a scene some of whose bodies are reduced: their D_f is not factorised at run time, Appendix B.
+    """Constants of a scene with reduced bodies, whose D_f is not factorised (Appendix B of Jain & Rodriguez).
 
-    R reduced bodies; C the most nodes of one. Written for M_ff = L L'; Lam = M_ff^-1.
+    R reduced bodies; C the largest number of nodes of one. M_ff = L L', Lam = M_ff^-1.
     """
 
     compliance: Real  # (R,m,m) condensed: L^-1; Woodbury: Lam
@@ -227,20 +229,20 @@ class ReducedConstants(Constants):
     zeta: Real  # (R,21) at rest: M_rf Lam M_fr, as a spatial inertia
 
 
-BODY_STATE = _record(  # what every evaluation writes comes first, so that it lies together
+BODY_STATE = _record(  # the fields that every evaluation writes come first, so that they share cache lines
     ("rotation", _F, (9,)),  # R_parent_body
     ("arm", _F, (3,)),  # from the parent's reference (port or origin) to O, parent axes
     ("velocity", _F, (6,)),  # of the body frame, body axes
     ("bias", _F, (6,)),  # acceleration of O at zero udot and parent at rest, body axes
     ("inertia", _F, (21,)),  # rigid block of the articulated inertia about the body origin
     ("force", _F, (6,)),  # rigid part of the bias force
-    # of a hinge with a single axis, as flexmb.jain.hinge_solve has it
+    # for a hinge with a single axis, see flexmb.jain.hinge_solve:
     ("gain", _F, (6,)),  # G
     ("inertia_along", _F),  # D_R
     ("rate_at_rest", _F),  # D_R^-1 epsilon_R
     ("free_count", _I),
     ("accel", _F, (6,)),  # of the body frame, minus gravity, body axes
-    ("accel_hinge", _F, (6,)),  # of O without the deformation part, likewise; not written where O is the origin of all
+    ("accel_hinge", _F, (6,)),  # of O without modal accelerations; not written in scenes where O is always the origin
     ("hinge_inertia", _F, (21,)),  # P_R about O
     ("hinge_force", _F, (6,)),  # z_R about O (without P_R a)
     ("pose_rotation", _F, (9,)),  # R_World_body
@@ -266,12 +268,12 @@ CONNECTOR_STATE = _record(
     ("arm", _F, (3,)),  # from A to B, World axes
     ("upright", _F),  # of a bushing, square of the cosine of half its rotation
     ("energy", _F),
-    ("power", _F),  # of all that is not elastic
+    ("power", _F),  # of all non-elastic forces
 )
 ALONG_HINGE_STATE = _record(
     ("load", _F),  # along the coordinate
     ("energy", _F),
-    ("power", _F),  # of all that is not elastic
+    ("power", _F),  # of all non-elastic forces
 )
 SPEED_STATE = _record(
     ("acceleration", _F),  # udot
@@ -282,51 +284,51 @@ SPEED_STATE = _record(
 
 @bundle
 class Workspace:
-    """What one evaluation writes. One workspace per thread."""
+    """The arrays that one evaluation writes. One workspace per thread."""
 
     q: Real  # (nq,) quaternions normalised, prescribed coordinates exact
     u: Real  # (nu,)
     raw: Real  # (nq,) coordinates as the integrator has them
     rate: Real  # (nq,) qdot
     ground: Real  # (3,) acceleration of the ground, World axes: -gravity
-    angle: Real  # (N,) of hinges with a single axis of rotation, found again for all of them at once; their number is
-    sine: Real  # (N,) rounded up to a multiple of LANES
+    angle: Real  # (N,) of hinges with a single axis of rotation; the three have N rounded up to a multiple of LANES,
+    sine: Real  # (N,) because sines and cosines are computed for LANES angles at once
     cosine: Real  # (N,)
     body: Record  # (N,) BODY_STATE
     hinge: Record  # (N,) HINGE_STATE; not touched where every hinge has a single axis
-    eta: Real  # (N,m) modal coordinates as the level sees them: 0 for ruthless
+    eta: Real  # (N,m) modal coordinates in the inertia terms: 0 at level ruthless
     etad: Real  # (N,m)
     etadd: Real  # (N,m)
-    # modal blocks of the articulated inertia and bias force, then what `flexmb.jain.explicit` leaves of them
-    pff: Real  # (N,m,m) from the inward sweep on its upper triangle counts
-    pfr: Real  # (N,m,8) coupling to [angular; linear], two numbers for `flexmb.jain.explicit`
+    # modal blocks of the articulated inertia and bias force, then their factors (`flexmb.jain.explicit`)
+    pff: Real  # (N,m,m); the inward sweep uses its upper triangle only
+    pfr: Real  # (N,m,8) coupling to [angular; linear], and two more columns, see `flexmb.jain.explicit`
     zf: Real  # (N,m)
     inverse_pivot: Real  # (N,m)
     port: Record  # (P,) PORT_STATE
     port_mode: Real  # (P,6,m) [angular; linear] velocity per modal speed
-    point_mode: Real  # (6,m or 8) likewise of one summed point; scratch, as long as a strip without modes too
+    point_mode: Real  # (6,m or 8) likewise of one summed point; scratch, at least one strip long
     speed: Record  # (nu,) SPEED_STATE
     connector: Record  # (C,) CONNECTOR_STATE
     hinge_spring: Record  # ALONG_HINGE_STATE
     coordinate_law: Record  # ALONG_HINGE_STATE
     function: Real  # (F,3) value, rate, acceleration
-    fault: Index  # (1,) body where an evaluation failed
-    doubt: Index  # (1,) whether an evaluation met a pivot that may be rounding
-    displaced: Index  # (1,) whether modes and ports of ruthless bodies may not be at rest
+    fault: Index  # (1,) body at which an evaluation failed
+    doubt: Index  # (1,) whether an evaluation met a pivot that may consist of rounding errors
+    displaced: Index  # (1,) whether ruthless bodies may be deformed in this workspace, see `velocity_sweep`
 
 
 NODE_STATE = _record(  # node of a reduced body, axes of the body
     ("gamma", _F, (21,)),  # P_R^+ of the outboard body about the node: Gamma
-    ("force", _F, (6,)),  # z_R^+ of the outboard body about the node, then the force at the node without accelerations
+    ("force", _F, (6,)),  # y = z_R^+ of the outboard body about the node, then F_0
     ("theta", _F, (6, 6)),
-    ("carried", _F, (6, 6)),  # T Theta: force at the node by acceleration of the body
-    ("response", _F, (6,)),  # of the stacked right side
+    ("carried", _F, (6, 6)),  # T Theta: force at the node per acceleration of the body
+    ("response", _F, (6,)),  # Ups' z_f + Omega y, then the force F at the node
 )
 
 
 @bundle
 class ReducedWorkspace(Workspace):
-    """The workspace of a scene with reduced bodies. What does not change with the deformation is written once."""
+    """The workspace of a scene with reduced bodies, with the tables at rest as initial values."""
 
     gain: Real  # (R,1+C,m,8)
     node: Record  # (R,C) NODE_STATE

@@ -1,11 +1,11 @@
-"""What a scene contains, as names: kernels are compiled for these alone (see `flexmb.jit.features`).
+"""The features of a scene, for which its kernels are compiled (see `flexmb.jit.features`).
 
-A name stands for code that other scenes do without; that something is there in one body is enough.
+A feature is a name for code that not all scenes need. A scene has it if any of its bodies does.
 
-General kernels contain everything and serve all scenes. They come with the installation, so that nothing is compiled
-before the first run; special ones, for the features of one scene, are faster by a tenth to a third and take seconds to
-compile. Which of them a scene's tables ask for is decided once, when they are made, and kept in `Constants.kernels`:
-all that is derived from them asks for the same.
+General kernels contain all features and run every scene. They are compiled at installation, so that nothing needs to be
+compiled before the first run. Special kernels contain the features of one scene; they are faster by a tenth to a third
+and take seconds to compile. The choice is made once, when the tables of a scene are first used, and recorded in
+`Constants.kernels`, so that all tables derived from them use the same kernels.
 """
 
 from __future__ import annotations
@@ -14,26 +14,23 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 
 from flexmb.jit.features import GENERAL
 from flexmb.jit.installed import unfit
 from flexmb.jit.warmed import is_warm
-from flexmb.typing import Flags, Index, Record
-
-if TYPE_CHECKING:
-    from flexmb.tables.arrays import Constants
+from flexmb.typing import Flags, Index, Real, Record
 
 Kernels = Literal["auto", "general", "special"]
-_VARIABLE = "FLEXMB_KERNELS"  # of the environment: what is asked for where nobody says otherwise
+_VARIABLE = "FLEXMB_KERNELS"  # environment variable with the default choice
 UNDECIDED, EVERYTHING, ITS_OWN = range(3)  # `Constants.kernels`
 _ASKED: ContextVar[Kernels | None] = ContextVar("kernels", default=None)
 
-HINGE = "hinge"  # "hinge 1": the number of a kind in flexmb.hinges.catalogue
-LEVEL = "level"  # "level 1": the number of a level in flexmb.levels.body
-AXIS = "axis"  # "axis 2": the number of BODY's `axis`
+HINGE = "hinge"  # "hinge 1" is the kind with number 1 in flexmb.hinges.catalogue
+LEVEL = "level"  # "level 1" is the level with number 1 in flexmb.levels.body
+AXIS = "axis"  # "axis 2" is a hinge with `axis` = 2 in BODY
 SEVERAL = "several"  # hinges of several speeds or none, prescribed, or with O on a deforming node
 QUATERNIONS = "quaternions"
 INBOARD_NODES = "inboard nodes"  # hinges whose inboard frame sits on a deforming node
@@ -60,9 +57,26 @@ DAMPERS = "dampers"
 MODAL_DAMPING = "modal damping"
 
 
+class SceneTables(Protocol):
+    """What of `flexmb.tables.arrays.Constants` says what a scene contains; this module stands below that one."""
+
+    kernels: Index
+    body: Record
+    speed: Record
+    second_shape: Real
+    wheel: Record
+    load: Record
+    connector: Record
+    bushing: Record
+    hinge_spring: Record
+    friction: Record
+    function: Record
+    damping: Real
+
+
 @contextmanager
 def asking(kernels: Kernels | None) -> Iterator[None]:
-    """For the tables that this thread makes meanwhile, whatever the environment says; None: what it says."""
+    """Choose the kernels of tables that this thread makes within the context; None leaves the choice as it is."""
     before = _ASKED.set(kernels or _ASKED.get())
     try:
         yield
@@ -71,12 +85,12 @@ def asking(kernels: Kernels | None) -> Iterator[None]:
 
 
 def asked() -> Kernels:
-    """What this thread asks for, or the environment; ValueError for a value of FLEXMB_KERNELS that means nothing."""
+    """The choice of this thread, or of the environment; ValueError for an unknown value of FLEXMB_KERNELS."""
     found = _ASKED.get() or os.environ.get(_VARIABLE, "auto")
     match found:
         case "auto" | "general" | "special":
             return found
-        case "exact":  # as it was called before
+        case "exact":  # the former name
             return "special"
         case _:
             names = ", ".join(f'"{name}"' for name in get_args(Kernels))
@@ -84,15 +98,15 @@ def asked() -> Kernels:
 
 
 def as_asked() -> Index:
-    """(1,) For new tables: `Constants.kernels` as this thread asks."""
+    """`Constants.kernels` (1,) for new tables, by the choice of this thread."""
     return np.array([{"auto": UNDECIDED, "general": EVERYTHING, "special": ITS_OWN}[asked()]])
 
 
-def features(c: Constants) -> frozenset[str]:
-    """What kernels for these tables contain: GENERAL alone, or what is in them.
+def features(c: SceneTables) -> frozenset[str]:
+    """The features of the kernels for these tables: GENERAL alone, or those of the scene.
 
-    Undecided tables are run by general kernels where these came with the installation, unless the special ones were
-    compiled ahead (`flexmb.run.warm_up`); that is noted in them.
+    Undecided tables get general kernels if these are installed and the special ones were not compiled ahead
+    (`flexmb.run.warm_up`); the decision is recorded in the tables.
     """
     if c.kernels[0] == EVERYTHING:
         return frozenset({GENERAL})
@@ -103,8 +117,8 @@ def features(c: Constants) -> frozenset[str]:
     return found
 
 
-def contained(c: Constants) -> frozenset[str]:
-    """What is in the tables of a scene."""
+def contained(c: SceneTables) -> frozenset[str]:
+    """The features of a scene, from its tables."""
     body, speed = c.body, c.speed
     found = {
         SEVERAL: not np.all(_single(body, speed)),

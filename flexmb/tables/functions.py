@@ -8,18 +8,19 @@ from typing import assert_never
 
 import numpy as np
 
-from flexmb.jit.kernel import by_number, helper
-from flexmb.jit.lanes import every, select, some
+from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import every, select
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.spatial.scalar import cos, sin
 from flexmb.tables.arrays import FUNCTION
+from flexmb.tables.pieces import piece_at
 from flexmb.typing import Real, Record
 
 _CONSTANT, _RAMP, _SINE, _SMOOTH_STEP, _SPIN_UP, _PULSE, _TABLE = range(7)
 
 
 def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
-    """FUNCTION records (F,) and the table (T,7) of spline pieces."""
+    """FUNCTION records (F,) and the table (T,8) of spline pieces, as `flexmb.tables.pieces` has them."""
     out = np.zeros(len(functions), FUNCTION)
     pieces: list[tuple[float, ...]] = []
     for row, function in zip(out, functions, strict=True):
@@ -27,7 +28,7 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
         match function:
             case Constant(value=value):
                 row["kind"], row["data"] = _CONSTANT, (value, 0.0, 0.0, 0.0)
-            case ControlSignal():  # a run with feedback writes what its controllers say in here
+            case ControlSignal():  # a run with feedback writes the output of its controllers to `data`
                 row["kind"] = _CONSTANT
             case Ramp(value=value, rate=rate, start_s=begin):
                 row["kind"], row["data"] = _RAMP, (value, rate, begin, 0.0)
@@ -40,18 +41,18 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
             case Pulse(value=value, start_s=begin, duration_s=duration):
                 row["kind"], row["data"] = _PULSE, (value, begin, begin + duration, 0.0)
             case Table(times_s=times, values=values):
-                # here, because this import takes longer than everything else a run without tables imports
+                # imported here because it takes longer than all other imports of a run without tables
                 from scipy.interpolate import PPoly, make_interp_spline
 
                 row["kind"] = _TABLE
                 spline = PPoly.from_spline(make_interp_spline(times, values, k=5))
                 ends = zip(spline.x[:-1], spline.x[1:], strict=True)
-                # the spline's end knots repeat: their intervals have no length
-                pieces += [(left, *spline.c[:, i]) for i, (left, right) in enumerate(ends) if right > left]
+                # the intervals between repeated end knots have no length and are left out
+                pieces += [(left, 0.0, *spline.c[:, i]) for i, (left, right) in enumerate(ends) if right > left]
             case _:
                 assert_never(function)
         row["stop"] = len(pieces)
-    return out, np.array(pieces, dtype=float).reshape(-1, 7)
+    return out, np.array(pieces, dtype=float).reshape(-1, 8)
 
 
 @helper
@@ -92,51 +93,13 @@ def _spin_up(rate, duration, t):
 
 
 @helper
-def _piece_at(t, table, first, last):
-    """Left end and coefficients of the piece of a spline that time t is in."""
-    row = first
-    while row + 1 < last and t.real >= table[row + 1, 0]:
-        row += 1
-    return _piece(table, row)
-
-
-@helper
-def _pieces_at(t, table, first, last):
-    """The same of lanes, each of which may be in another piece."""
-    found = _piece(table, first)
-    for row in range(first + 1, last):
-        reached, now = t >= table[row, 0], _piece(table, row)
-        if not some(reached):
-            break
-        found = (
-            select(reached, now[0], found[0]),
-            select(reached, now[1], found[1]),
-            select(reached, now[2], found[2]),
-            select(reached, now[3], found[3]),
-            select(reached, now[4], found[4]),
-            select(reached, now[5], found[5]),
-            select(reached, now[6], found[6]),
-        )
-    return found
-
-
-@helper
-def _piece(table, row):
-    x = table[row]
-    return x[0], x[1], x[2], x[3], x[4], x[5], x[6]
-
-
-piece_at = by_number(_piece_at, _pieces_at)
-
-
-@helper
 def _spline(table, first, last, t):
     piece = piece_at(t, table, first, last)
     x = t - piece[0]
     value = 0.0
     rate = 0.0
     half = 0.0
-    for n in range(1, 7):  # Horner for the polynomial, its derivative and half its second derivative
+    for n in range(2, 8):  # Horner for the polynomial, its derivative and half its second derivative
         half = half * x + rate
         rate = rate * x + value
         value = value * x + piece[n]

@@ -1,7 +1,7 @@
-"""Constants and workspaces of eight copies at once: the same tables, whose floats are lanes.
+"""Constants and workspaces of eight copies at once: the same tables, with lanes in place of floats.
 
-A workspace of lanes goes with constants that all copies share, or with constants of lanes, where each copy has masses,
-lengths, stiffnesses and functions of its own. Integers, which say what a scene consists of, are shared in either case.
+A lane workspace is used with constants that all copies share, or with lane constants, in which each copy has its own
+masses, lengths, stiffnesses and functions. Integers, which describe the structure of a scene, are shared in both cases.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from flexmb.typing import Real, Record
 
 @bundle
 class LaneWorkspace(Workspace):
-    """What one evaluation of LANES copies writes."""
+    """The arrays that one evaluation of LANES copies writes."""
 
     numbers = LANE
 
 
 @bundle
 class LaneConstants(Constants):
-    """Everything that does not change in a run, of LANES copies of one structure."""
+    """The arrays that do not change in a run, of LANES copies of one structure."""
 
     numbers = LANE
 
@@ -37,12 +37,12 @@ class LaneConstants(Constants):
 
 
 def lane_workspace(w: Workspace) -> LaneWorkspace:
-    """For copies of a system with workspace w; one per thread."""
+    """A workspace for copies of a system with workspace w; one per thread."""
     return LaneWorkspace(**{field.name: in_lanes([getattr(w, field.name)] * LANES) for field in fields(w)})
 
 
 def lane_constants(copies: Sequence[Constants]) -> LaneConstants:
-    """Of LANES systems of one structure."""
+    """The constants of LANES systems of one structure."""
     return LaneConstants(
         **{field.name: in_lanes([getattr(c, field.name) for c in copies]) for field in fields(copies[0])},
         ground=in_lanes([-c.gravity for c in copies]),
@@ -51,7 +51,7 @@ def lane_constants(copies: Sequence[Constants]) -> LaneConstants:
 
 
 def structural_difference(a: Constants, b: Constants) -> str | None:
-    """Where two scenes differ in more than floats: the table's field and its place; None where they do not."""
+    """The table and the entry in which two scenes differ other than in floats; None if there is no such difference."""
     for field in fields(a):
         one, other = getattr(a, field.name), getattr(b, field.name)
         if one.shape != other.shape:

@@ -1,11 +1,11 @@
-"""What every thread has of its own in an object that threads share: workspaces, and calls that write into them.
+"""Properties that each thread has for itself in an object that threads share: workspaces, and calls that use them.
 
-Kernels let go of the interpreter's lock while they write into a workspace, and a question often takes several kernels,
-one after the other. A lock around each question would make threads wait for each other; a workspace for each thread
-makes nobody wait. It is made when a thread first needs it, and let go when the thread ends, or the object.
+Kernels release the interpreter's lock while they write to a workspace, and one public call often runs several kernels.
+A lock around each call would make threads wait for each other; a workspace for each thread does not. It is created
+when a thread first needs it, and released with the thread or the object.
 
-What is built once and only read needs no thread's own: of two that build it at once, either is right. So nothing here
-takes a lock, and a process that is forked off in the middle of anything finds none that is held.
+Values that are computed once and then only read need no copy for each thread: if two threads compute one at once,
+either result is right. Nothing here takes a lock, so that a forked process never inherits a lock that is held.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ Value = TypeVar("Value")
 
 
 class Own(local):
-    """What each thread keeps; a copy, in this process or another, begins with nothing."""
+    """The values of each thread; a copy, in this process or another, is empty."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Addresses are of one process, and threads too."""
+        """An empty object: threads, and the addresses in their values, belong to one process."""
         return Own, ()
 
 
 class per_thread(Generic[Value]):  # noqa: N801  (used as `functools.cached_property` is)
-    """A property that each thread finds once, when it first asks, and keeps.
+    """A property that is computed once for each thread, at its first access.
 
-    The object keeps them in its attribute `_own`. A value that is set on the object itself is there for all threads.
+    The values are in the object's attribute `own`. A value set on the object itself is shared by all threads.
     """
 
     def __init__(self, find: Callable[[Any], Value]) -> None:
@@ -46,10 +46,10 @@ class per_thread(Generic[Value]):  # noqa: N801  (used as `functools.cached_prop
         if instance is None:
             return self
         try:
-            return getattr(instance._own, self._name)  # type: ignore[no-any-return]
+            return getattr(instance.own, self._name)  # type: ignore[no-any-return]
         except AttributeError:
             pass
-        own: Own = instance.__dict__.setdefault("_own", Own())  # of two threads at once, both get the one that is kept
+        own: Own = instance.__dict__.setdefault("own", Own())  # atomic: two threads at once get the same object
         found = self._find(instance)
         setattr(own, self._name, found)
         return found

@@ -1,23 +1,23 @@
-"""A check whether numbers from outside can be used, which takes a fifth of a microsecond."""
+"""A fast check of the numbers of a state from outside (0.2 us)."""
 
 import math
 
 from flexmb.jit.kernel import helper, kernel
 
 SOUND, NOT_FINITE, NO_ORIENTATION = range(3)
-SHORTEST, LONGEST = 1e-200, 1e200  # squares of lengths that a quaternion may have: it is scaled to unit length
+SHORTEST, LONGEST = 1e-200, 1e200  # admissible squares of a quaternion's length, before it is scaled to unit length
 
 
 @helper
 def soundness(values, quaternions):
-    """SOUND, or why numbers (n,) cannot be used; `quaternions` (k,): where each starts among them."""
+    """SOUND, or the reason why numbers (n,) are invalid; `quaternions` (k,): the index at which each starts."""
     for i in range(values.shape[0]):
         if not math.isfinite(values[i]):
             return NOT_FINITE
     for k in range(quaternions.shape[0]):
         i = quaternions[k]
         q0, q1, q2, q3 = values[i], values[i + 1], values[i + 2], values[i + 3]
-        norm2 = q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3  # a power would be a function of numba's to compile first
+        norm2 = q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3  # powers would add a function to be compiled
         if not SHORTEST < norm2 < LONGEST:
             return NO_ORIENTATION
     return SOUND
@@ -25,5 +25,5 @@ def soundness(values, quaternions):
 
 @kernel
 def unsound(values, quaternions):
-    """The same for callers in Python."""
+    """`soundness` for callers in Python."""
     return soundness(values, quaternions)

@@ -1,7 +1,6 @@
-"""The state of a system at one time, the system it belongs to, and the error of a state that has no accelerations.
+"""The state of a system at one time, the layout of its coordinates, and errors of states without accelerations.
 
-Everything that enters a kernel from outside passes `Layout`, because kernels trust the lengths and types of their
-arrays.
+All states from outside pass `Layout` before they reach a kernel, because kernels do not check lengths and types.
 """
 
 from __future__ import annotations
@@ -21,13 +20,13 @@ _NONE: Index = np.zeros(0, np.int64)
 
 
 class DynamicsError(ArithmeticError):
-    """The accelerations do not exist at this state; the message names the body and the remedy, `status` the kind."""
+    """The accelerations do not exist at this state; the message names body and remedy, `status` the kind of failure."""
 
     status = Status.NOT_POSITIVE_DEFINITE
 
 
 class NotFiniteError(DynamicsError):
-    """A state is finite, but its accelerations or other results overflow."""
+    """The state is finite, but its accelerations or other results overflow."""
 
     status = Status.NONFINITE
 
@@ -37,14 +36,14 @@ class PrecisionWarning(SceneWarning):
 
 
 class _StateRow:
-    """An array of a state, seen through a new view at each look.
+    """An array of a state, of which each access returns a new view.
 
-    NumPy lets anybody change shape, strides and type of an array in place. Of a view that changes nothing else: the
-    array that kernels take stays as it was made.
+    NumPy allows users to change shape, strides and type of an array in place. Such a change of a view does not affect
+    the array that kernels use.
     """
 
     def __set_name__(self, owner: type, name: str) -> None:
-        self._kept = "_" + name
+        self._kept = "kernel_" + name
 
     def __get__(self, state: State | None, owner: type) -> Real:
         if state is None:
@@ -57,21 +56,21 @@ class _StateRow:
 
 
 class _KernelArrays:
-    """The arrays of a state as kernels take them, which nobody else holds."""
+    """The arrays of a state that kernels use; users only get views of them."""
 
-    _y: Real
-    _q: Real
-    _u: Real
+    kernel_y: Real
+    kernel_q: Real
+    kernel_u: Real
 
     def _keep(self, y: Real, nq: int, t: float) -> None:
         """y (nq+nu+1,) = [q, u, 0], which is not copied."""
-        y = y[:]  # the `base` of what users see is its owner, not this
-        self.__dict__.update(_y=y, _q=y[:nq], _u=y[nq:-1], t=t)
+        y = y[:]  # the `base` of users' views is then the owner of the data, not the array that kernels use
+        self.__dict__.update(kernel_y=y, kernel_q=y[:nq], kernel_u=y[nq:-1], t=t)
 
     @property
     def y(self) -> Real:
         """[q, u, 0] (nq+nu+1,), of which q and u are parts."""
-        return self._y[:]
+        return self.kernel_y[:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +78,9 @@ class State(_KernelArrays):
     """Coordinates q (nq,), speeds u (nu,) and time t (s).
 
     q and u are copied; their entries may be changed in place, their lengths may not. Quaternions need not have unit
-    length: they are scaled. `layout` says whose state it is; one that is made by hand belongs to any system whose
-    lengths it has. TypeError for what is not a row of real numbers, ValueError for rows that are not as long as the
-    layout says.
+    length; they are normalised. `layout` is that of the system to which the state belongs; without it, a state fits any
+    system with the same lengths. TypeError for anything but rows of real numbers, ValueError for rows whose lengths are
+    not those of the layout.
     """
 
     q: _StateRow = _StateRow()
@@ -90,7 +89,7 @@ class State(_KernelArrays):
     layout: Layout | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        q, u = arguments.array("q", self._q), arguments.array("u", self._u)
+        q, u = arguments.array("q", self.kernel_q), arguments.array("u", self.kernel_u)
         if q.ndim != 1 or u.ndim != 1:
             raise ValueError(f"q and u are rows of numbers, got arrays of shapes {q.shape} and {u.shape}")
         if self.layout is not None:
@@ -100,15 +99,15 @@ class State(_KernelArrays):
         self._keep(np.concatenate([q, u, [0.0]]), len(q), arguments.number("t", self.t))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy is made as the state was: q and u are parts of its own y, and as long as its layout says."""
+        """A copy is constructed like a new state, with a y of its own."""
         return State, (self.q, self.u, self.t, self.layout)
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Places of coordinates in q (nq,) and of speeds in u (nu,) by name; `quaternions` (k,): where each starts in q.
+    """Slices of coordinates in q (nq,) and of speeds in u (nu,) by name; `quaternions` (k,): where each starts in q.
 
-    Systems with equal layouts take each other's states.
+    Systems with equal layouts accept each other's states.
     """
 
     nq: int
@@ -118,18 +117,18 @@ class Layout:
     quaternions: Index = field(compare=False, repr=False)
 
     def state(self, q: Any, u: Any, t: Any = 0.0) -> State:
-        """A state that belongs here, finite; ValueError or TypeError for what does not fit."""
+        """A state of this layout with finite numbers; ValueError or TypeError for arrays that do not fit."""
         return self.known(*self.packed(t, q, u))
 
     def known(self, t: float, y: Real) -> State:
-        """A state of what is known to fit, without asking again."""
+        """A state from an array that is known to fit, without checks."""
         found = object.__new__(State)
         found.__dict__["layout"] = self
         found._keep(y, self.nq, t)
         return found
 
     def fitting(self, nq: int, nu: int) -> None:
-        """ValueError for rows of other lengths than these coordinates and speeds have."""
+        """ValueError unless the lengths are those of this layout."""
         if (nq, nu) != (self.nq, self.nu):
             raise ValueError(
                 f"this system has q of {self.nq} and u of {self.nu} entries, the state has {nq} and {nu}: it belongs "
@@ -139,26 +138,26 @@ class Layout:
     def entering(self, state: State) -> tuple[float, Real]:
         """Time and y = [q, u, 0], which is not copied, of a state of this system; ValueError or TypeError for others.
 
-        Asked by every public call: what fits costs one comparison and one small kernel.
+        Every public call does this. For a valid state it costs one comparison and one small kernel.
         """
         if type(state) is not State or state.layout is not self:
             state = self.owning(state)
-        if unsound(state._y, self.quaternions):
-            self._examine(state._y)
-        return state.t, state._y
+        if unsound(state.kernel_y, self.quaternions):
+            self._examine(state.kernel_y)
+        return state.t, state.kernel_y
 
     def owning(self, state: Any) -> State:
-        """A state that belongs here; ValueError or TypeError for others. Its numbers are not looked at.
+        """The state if it belongs to this layout; ValueError or TypeError for others. Its numbers are not checked.
 
-        One whose layout is this very one was held to it when it was made.
+        A state that has this very layout object was checked when it was made.
         """
         if type(state) is State and state.layout is self:
             return state
         if not isinstance(state, State):
             raise TypeError(f"a State is needed, not {type(state).__name__}: make one by system.state(q, u, t)")
         if type(state) is not State:
-            state = State(state.q, state.u, state.t, state.layout)  # what others have made of it is not known
-        self.fitting(len(state._q), len(state._u))
+            state = State(state.q, state.u, state.t, state.layout)  # subclasses may have changed its arrays
+        self.fitting(len(state.kernel_q), len(state.kernel_u))
         if state.layout is not None and state.layout != self:
             strange = [repr(name) for name, place in state.layout.q.items() if self.q.get(name) != place]
             raise ValueError(
@@ -178,7 +177,7 @@ class Layout:
         return arguments.number("t", t), y
 
     def whole(self, t: Any, y: Any) -> tuple[float, Real]:
-        """Time and y = [q, u, work]; ValueError or TypeError where they do not fit."""
+        """Time and y = [q, u, work]; ValueError or TypeError if they do not fit."""
         y = arguments.vector("y", y, self.nq + self.nu + 1)
         if unsound(y, self.quaternions):
             self._examine(y)
@@ -190,7 +189,7 @@ class Layout:
         return arguments.finite(name, found) if unsound(found, _NONE) else found
 
     def _examine(self, y: Real) -> None:
-        """ValueError for what `unsound` found."""
+        """Raise the ValueError for the entry that `unsound` has found."""
         arguments.finite("q", y[: self.nq])
         arguments.finite("u", y[self.nq : self.nq + self.nu])
         arguments.finite("work", y[self.nq + self.nu :])
@@ -201,7 +200,7 @@ class Layout:
 
 
 def finite_result(result: Real, t: float) -> Real:
-    """The result (any shape) itself; DynamicsError where an entry is not finite."""
+    """The result (any shape) itself; DynamicsError if an entry is not finite."""
     if unsound(result if result.ndim == 1 else result.ravel(), _NONE):
         raise NotFiniteError(
             f"the result at t = {t:g} s is not finite: coordinates, speeds, accelerations or functions of time are so "
@@ -212,4 +211,4 @@ def finite_result(result: Real, t: float) -> Real:
 
 def pack(state: State) -> Real:
     """y = [q, u, work], a copy."""
-    return state._y.copy()
+    return state.kernel_y.copy()

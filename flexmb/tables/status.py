@@ -1,4 +1,4 @@
-"""Status codes of a run: a kernel returns one instead of raising; each has advice on what to do."""
+"""Status codes, which kernels return in place of exceptions, and advice for each."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Status(IntEnum):
 
     @property
     def advice(self) -> str:
-        """What happened and what to try."""
+        """What happened, and what to try."""
         return _ADVICE[self]
 
 

@@ -1,4 +1,4 @@
-"""Workspaces of the recursion, of the sizes that a scene's constants ask for."""
+"""Workspaces of the recursion, sized for the constants of a scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flexmb.typing import Record
 
 
 def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
-    """Workspace of the right sizes; ports get their pose at rest, which is all that bodies without modes need."""
+    """A workspace of the right sizes; ports have their poses at rest, which are final for bodies without modes."""
     n, _, m = c.mfr.shape
     together = -(-n // LANES) * LANES
     fields: dict[str, Any] = {
@@ -32,7 +32,7 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "pfr": strip_zeros((n, m, ROW)),
         "port": ports_at_rest(c),
         "port_mode": strip_zeros((len(c.port), 6, m)),
-        "point_mode": strip_zeros((6, max(m, ROW))),  # a strip at least: eliminations put their sums there
+        "point_mode": strip_zeros((6, max(m, ROW))),  # at least one strip: eliminations store their sums there
         "speed": np.zeros(nu, a.SPEED_STATE),
         **connector_states(c),
         "function": np.zeros((len(c.function), 3)),
@@ -44,7 +44,7 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
 
 
 def connector_states(c: a.Constants) -> dict[str, Record]:
-    """What an evaluation of connectors writes."""
+    """The arrays that an evaluation of connectors writes."""
     return {
         "connector": np.zeros(len(c.connector), a.CONNECTOR_STATE),
         "hinge_spring": np.zeros(len(c.hinge_spring), a.ALONG_HINGE_STATE),
@@ -61,7 +61,7 @@ def ports_at_rest(c: a.Constants) -> Record:
 
 
 def _reduced(c: a.ReducedConstants, fields: dict[str, Any]) -> a.ReducedWorkspace:
-    """With the tables at rest, which is all that ruthless bodies need."""
+    """A workspace with reduced bodies; its tables are those at rest, which are final for ruthless bodies."""
     node, gain = np.zeros(c.node.shape, a.NODE_STATE), strip_zeros(c.gain.shape)
     gain[:] = c.gain
     node["theta"] = c.node["theta"]

@@ -1,6 +1,7 @@
 """python -m tests.benchmarks: measure every row of what must hold and print the table. 1 where a row is not met.
 
-With --write the measurements are kept, and docs/performance.md and its pictures are made of all that is kept.
+With --write the measurements are kept and appended to the history, and docs/performance.md, its pictures and
+docs/performance-history.md are made of all that is kept.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from tests.benchmarks.must_hold import history
 from tests.benchmarks.must_hold.catalogue import all_rows
 from tests.benchmarks.must_hold.kept import Kept, Scaling, read, write
 from tests.benchmarks.must_hold.measure import measured_row
@@ -25,7 +27,7 @@ def main(
         list[str] | None, typer.Option("--only", "-k", help="Rows and pictures with this in their names (repeat it).")
     ] = None,
     keep: Annotated[
-        bool, typer.Option("--write", help="Keep the measurements; write the page and its pictures.")
+        bool, typer.Option("--write", help="Keep the measurements; write the pages and their pictures.")
     ] = False,
     from_kept: Annotated[bool, typer.Option("--from-kept", help="Measure nothing: show what is kept.")] = False,
     scaling: Annotated[bool, typer.Option("--scaling", help="With --write: measure the curves of pictures.")] = False,
@@ -50,6 +52,9 @@ def main(
         write(results)
         draw(results)
         PAGE.write_text(page(results), encoding="utf-8")
+        points = history.append(results)
+        history.draw_history(points)
+        history.PAGE.write_text(history.history_page(points), encoding="utf-8")
     met = all(verdict(row, found.get(name)) == "met" for name, row in chosen.items())
     raise typer.Exit(0 if chosen and met else 1)
 

@@ -16,6 +16,7 @@ from crosscheck.running.sweep import sweep
 from flexmb.run.simulate import simulate
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
+from tests.crosscheck.sessions import here
 
 CASES = Path(__file__).parents[2] / "cases"
 BOOM = CASES / "deploying_boom"
@@ -92,7 +93,7 @@ def test_negative_controls_of_the_rigid_boom_are_noticed(tmp_path):
     for module in ("pinocchio", "mujoco"):
         pytest.importorskip(module)
     records = tmp_path / "records.jsonl"
-    sweep([load_case(BOOM / "rigid")], ("native", "pinocchio", "mujoco"), records)
+    sweep([load_case(BOOM / "rigid")], ("native", "pinocchio", "mujoco"), records, scheduler=here)
     outcome, _ = write_all(records, tmp_path)
     controls = [verdict for verdict in outcome.all if verdict.kind == "control"]
     assert {verdict.comparison for verdict in controls} == {

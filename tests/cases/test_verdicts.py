@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck.library.find import Case, shipped_cases
+from crosscheck.library.find import Case
 from crosscheck.report import write_all
 from crosscheck.running.sweep import sweep
+from tests.crosscheck.sessions import shipped
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", shipped_cases(), ids=lambda case: case.name)
+@pytest.mark.parametrize("case", shipped(), ids=lambda case: case.name)
 def test_every_verdict_is_as_expected(case: Case, tmp_path: Path) -> None:
     for library in ("pinocchio", "mujoco", "exudyn"):
         pytest.importorskip(library)

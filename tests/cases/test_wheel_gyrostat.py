@@ -18,6 +18,7 @@ from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
+from tests.crosscheck.sessions import here
 
 FAMILY = Path(__file__).parents[2] / "cases" / "wheel_gyrostat"
 CONSERVATIVE_RTOL = 1e-11  # at which drifts are promised
@@ -122,7 +123,7 @@ def test_negative_controls_of_the_torque_free_case_are_noticed(tmp_path):
     for module in ("pinocchio", "mujoco"):
         pytest.importorskip(module)
     records = tmp_path / "records.jsonl"
-    sweep([load_case(FAMILY / "torque_free")], ("native", "pinocchio", "mujoco"), records)
+    sweep([load_case(FAMILY / "torque_free")], ("native", "pinocchio", "mujoco"), records, scheduler=here)
     outcome, _ = write_all(records, tmp_path)
     controls = [verdict for verdict in outcome.all if verdict.kind == "control"]
     assert {verdict.comparison for verdict in controls} == {

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
-from crosscheck.library.find import Case, load_case
-from crosscheck.records.archive import Archive, read
-from crosscheck.records.kinds import CaseRecord, RunRecord
-from crosscheck.records.machine import environment
+from crosscheck.library.find import Case, load_case, shipped_cases
+from crosscheck.records.archive import read
+from crosscheck.records.kinds import CaseRecord
 from crosscheck.records.session import last_session
-from crosscheck.running.execute import execute
 from crosscheck.running.job import Job
-from crosscheck.running.plan import plan
-from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import sweep
+from crosscheck.running.scheduler import Event, Events, Work
+from crosscheck.running.sweep import run_planned, sweep
 
 CASE = Path(__file__).parent / "data" / "pendulum" / "single"
 PROVIDER = "tests.crosscheck.fake_engines:engines"
@@ -27,6 +26,24 @@ title = "Single pendulum"
 duration_s = 2.0
 samples = 21
 """
+
+
+@cache
+def shipped() -> tuple[Case, ...]:
+    """All cases of the library: to read them takes two seconds."""
+    return shipped_cases()
+
+
+def here(work: Work) -> Events:
+    """A scheduler without processes, which take a second each to start, and without limits: one job after the other."""
+    number = 0
+    while number < len(work.jobs):  # jobs may grow
+        found: list[Any] = []
+        yield Event(number, "started")
+        work.function(work.jobs[number], found.append)
+        yield from (Event(number, "emitted", content) for content in found)
+        yield Event(number, "ended")
+        number += 1
 
 
 def copy_case(folder: Path, run_file: str | None = None) -> Path:
@@ -38,14 +55,14 @@ def copy_case(folder: Path, run_file: str | None = None) -> Path:
     return target
 
 
-def run_case(case: Path, records: Path, asked: tuple[str, ...] = (), **options: object) -> SessionOutcome:
-    """Run a case folder and judge its records."""
-    sweep([load_case(case)], asked, records, provider=PROVIDER, limits=Limits(workers=2), **options)
+def run_case(case: Path, records: Path, asked: tuple[str, ...] = (), **options: Any) -> SessionOutcome:
+    """Run a case folder and judge its records; in this process, unless `scheduler` says where."""
+    sweep([load_case(case)], asked, records, **{"provider": PROVIDER, "scheduler": here, **options})
     return conclude(collect(last_session(read(records))))
 
 
 def compare_engines(
-    folder: Path, engines: tuple[str, ...], goals: str = '"marker:tip.position" = 1e-6'
+    folder: Path, engines: tuple[str, ...], goals: str = '"marker:tip.position" = 1e-6', **options: Any
 ) -> SessionOutcome:
     """All pairs of some engines on the pendulum."""
     names = ", ".join(f'"{name}"' for name in engines)
@@ -59,7 +76,7 @@ name = "all"
 variant = "rigid"
 goals = {{ {goals} }}
 """
-    return run_case(copy_case(folder, run_file), folder / "records.jsonl")
+    return run_case(copy_case(folder, run_file), folder / "records.jsonl", **options)
 
 
 def only(verdicts: list[Verdict], a: str, b: str) -> Verdict:
@@ -68,21 +85,13 @@ def only(verdicts: list[Verdict], a: str, b: str) -> Verdict:
     return found
 
 
-def sweep_here(
-    cases: Iterable[Case], asked: tuple[str, ...], records: Path, *, provider: str = PROVIDER, **_: object
-) -> None:
-    """What `sweep` records but for films, without its worker processes, which take a second each to start."""
-    run_here([plan(case, asked, provider) for case in cases], asked, records)
+def sweep_here(cases: Iterable[Case], asked: tuple[str, ...], records: Path, **options: Any) -> None:
+    """What `sweep` records, in this process."""
+    sweep(cases, asked, records, **{"provider": PROVIDER, **options, "scheduler": here})
 
 
 def run_here(
-    plans: Iterable[tuple[CaseRecord, list[Job]]], asked: tuple[str, ...], records: Path, **_: object
+    plans: Sequence[tuple[CaseRecord, list[Job]]], asked: tuple[str, ...], records: Path, **options: Any
 ) -> None:
     """What `run_planned` records, in this process."""
-    archive = Archive(records)
-    for record, jobs in plans:
-        archive.write(environment((record.case,), asked, confirms=True))
-        archive.write(record)
-        for job in jobs:
-            execute(job, lambda content: archive.write(content) if isinstance(content, RunRecord) else None)
-    archive.close()
+    run_planned(plans, asked, records, **{**options, "scheduler": here})

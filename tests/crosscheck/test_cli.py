@@ -17,20 +17,28 @@ from crosscheck.running.installed import EngineState
 from crosscheck.running.sweep import sweep
 from crosscheck.verify.against_case import verify_csv
 from tests.crosscheck.fake_engines import TOLERANCES, Pendulum
-from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
+from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, here, sweep_here
 
 WIDE = {"COLUMNS": "200"}
 
 
 @pytest.fixture
 def runner(monkeypatch: pytest.MonkeyPatch) -> CliRunner:
-    monkeypatch.setattr("crosscheck.running.sweep.sweep", functools.partial(sweep, provider=PROVIDER))
-    monkeypatch.setattr("crosscheck.verify.against_case.verify_csv", functools.partial(verify_csv, provider=PROVIDER))
+    """Runs the command line in this process, and fake engines in it too."""
+    monkeypatch.setattr("crosscheck.running.sweep.sweep", sweep_here)
+    monkeypatch.setattr(
+        "crosscheck.verify.against_case.verify_csv",
+        lambda *words, **more: verify_csv(*words, **more | {"provider": PROVIDER, "scheduler": here}),
+    )
     monkeypatch.setattr(cli.common.console, "_width", 200)
     return CliRunner()
 
 
-def test_run_writes_everything_and_ends_with_zero(runner: CliRunner, tmp_path: Path) -> None:
+def test_run_writes_everything_and_ends_with_zero(
+    runner: CliRunner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With worker processes, as users run it."""
+    monkeypatch.setattr("crosscheck.running.sweep.sweep", functools.partial(sweep, provider=PROVIDER))
     result = runner.invoke(cli.app, ["run", str(CASE), "--out", str(tmp_path)], env=WIDE)
     assert result.exit_code == 0, result.output
     assert {"report", "report.html", "verdicts.json", "summary.md", "junit.xml", "records.jsonl"} <= {
@@ -254,7 +262,7 @@ def test_a_template_takes_no_file_s_place(runner: CliRunner, tmp_path: Path) -> 
     file = csv_of(tmp_path / "my.csv")
     before = file.read_bytes()
     code, output = verify(runner, str(file), "--template")
-    assert (code, "is there already" in output, file.read_bytes() == before) == (2, True, True)
+    assert (code, "exists already" in output, file.read_bytes() == before) == (2, True, True)
 
 
 def test_a_coarse_csv_has_every_channel(runner: CliRunner, tmp_path: Path) -> None:

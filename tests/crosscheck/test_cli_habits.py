@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 from pathlib import Path
 
@@ -15,14 +14,14 @@ from crosscheck import cli
 from crosscheck.library import find
 from crosscheck.running.installed import EngineState
 from crosscheck.sealed.seal import read_results
-from tests.crosscheck.sessions import CASE, PROVIDER, sweep_here
+from tests.crosscheck.sessions import CASE, sweep_here
 
 
 @pytest.fixture(scope="module")
 def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Records of the small case, run once."""
     file = tmp_path_factory.mktemp("records") / "records.jsonl"
-    sweep_here((find.load_case(CASE),), (), file, provider=PROVIDER)
+    sweep_here((find.load_case(CASE),), (), file)
     return file
 
 
@@ -126,7 +125,7 @@ def test_compare_says_what_became_worse(runner: CliRunner, records: Path, tmp_pa
 
 
 def test_run_writes_what_can_be_compared(runner: CliRunner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("crosscheck.running.sweep.sweep", functools.partial(sweep_here, provider=PROVIDER))
+    monkeypatch.setattr("crosscheck.running.sweep.sweep", sweep_here)
     result = runner.invoke(cli.app, ["run", str(CASE), "--out", str(tmp_path), "--quiet"])
     assert (result.exit_code, result.stdout) == (0, "All 15 verdicts are as expected\n")
     assert read_results(tmp_path / "results.json").exit_code == 0

@@ -243,7 +243,8 @@ def written(write: object, name: str) -> str:
 
 
 def test_csv_headers_come_back(tmp_path: Path) -> None:
-    from flexmb.run.trajectory import MarkerPath, Statistics, Trajectory
+    from flexmb.run.run_arrays import MarkerPath, Statistics
+    from flexmb.run.trajectory import Trajectory
     from flexmb.tables.status import Status
 
     t, three, six = np.zeros(2), np.zeros((2, 3)), np.zeros((2, 6))

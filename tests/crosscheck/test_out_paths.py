@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import functools
 import shutil
 from pathlib import Path
 
@@ -15,10 +14,9 @@ from crosscheck.records import archive as archive_module
 from crosscheck.records.archive import Archive, read
 from crosscheck.records.kinds import RunRecord
 from crosscheck.report import ci
-from crosscheck.running.sweep import sweep
 from flexmb import cli as flexmb_cli
 from flexmb.output.writing import check_folder
-from tests.crosscheck.sessions import CASE, PROVIDER
+from tests.crosscheck.sessions import CASE, sweep_here
 
 WIDE = {"COLUMNS": "200"}
 SCENE = str(CASE / "scene.toml")
@@ -34,7 +32,7 @@ FILES = ("advise", "campbell")  # these write one file, whose folder is asked fo
 
 @pytest.fixture
 def runner(monkeypatch: pytest.MonkeyPatch) -> CliRunner:
-    monkeypatch.setattr("crosscheck.running.sweep.sweep", functools.partial(sweep, provider=PROVIDER))
+    monkeypatch.setattr("crosscheck.running.sweep.sweep", sweep_here)
     return CliRunner()
 
 

@@ -27,6 +27,7 @@ COMMANDS = {
     "flexmb check no-such-file": 2,
     "flexmb": 2,
 }
+ALIKE = ("crosscheck engines --json", "crosscheck report no-such-file", "flexmb schema", "flexmb check no-such-file")
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"}
 
 
@@ -50,7 +51,9 @@ def line_of(command: str, files: dict[str, str]) -> str:
     return shlex.join([sys.executable, "-c", f"from {package}.cli import main; main()", *words])
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    "command", [pytest.param(each, marks=pytest.mark.slow if each in ALIKE else []) for each in COMMANDS]
+)
 def test_nobody_reads_at_all(command: str, files: dict[str, str]) -> None:
     """Both streams are closed before the first word: the exit code is that of the command, and nothing complains."""
     line = f"({line_of(command, files)}; echo $? >&3) 3>&1 1>&4 2>&4"

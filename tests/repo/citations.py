@@ -104,7 +104,10 @@ def citations(root: Path, sources: Sources, packages: tuple[str, ...]) -> dict[P
         for path in sorted((root / package).rglob("*.py")):
             relative = path.relative_to(root).as_posix()
             in_folder = any(relative.startswith(f"{folder}/") for folder in sources.folders)
-            for name, text in texts(path.read_text(encoding="utf-8")).items():
+            source = path.read_text(encoding="utf-8")
+            if not in_folder and not any(name.split()[0] in source for name in sources.names):
+                continue  # before it is parsed
+            for name, text in texts(source).items():
                 if found := numbers(text, sources, in_folder):
                     cited[Place(relative, name)] = found
     return cited

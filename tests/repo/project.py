@@ -8,7 +8,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-SOURCES = ("flexmb", "crosscheck", "cases", "tests", "docs", ".ci")
+SOURCES = ("flexmb", "crosscheck", "cases", "examples", "tests", "docs", "paper", ".ci")
 TEXT = {".py", ".toml", ".md", ".cff", ".json", ".html", ".css", ".js", ".csv", ".txt", ""}
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
+import re
 from typing import get_args, get_type_hints
 
 import pytest
 
 import flexmb as fm
+from flexmb.scene import schema
+from tests.repo.project import ROOT
 
 FUNCTIONS = {
     "load_scene": ["path"],
@@ -68,3 +72,21 @@ def test_initial_state_is_a_value() -> None:
 def test_trajectory() -> None:
     fields = {name for kind in fm.Trajectory.__mro__ for name in (*vars(kind), *vars(kind).get("__annotations__", ()))}
     assert set(TRAJECTORY) <= fields
+
+
+def test_type_checkers_see_the_public_names() -> None:
+    """Each is imported under its own name, hence exported, from the module that has it when the program runs."""
+    tree = ast.parse((ROOT / "flexmb" / "__init__.py").read_text(encoding="utf-8"))
+    (block,) = [each for each in tree.body if isinstance(each, ast.If)]
+    imports = [each for each in block.body if isinstance(each, ast.ImportFrom)]
+    seen = {alias.asname: each.module for each in imports for alias in each.names if alias.name == alias.asname}
+    assert seen == fm._MODULE_OF | {"schema": "flexmb.scene"}
+    assert [each.module for each in imports if each.names[0].name == "*"] == ["flexmb.scene.schema"]
+    assert all(name[0].isupper() for name in schema.__all__)
+
+
+def test_every_public_name_is_on_a_page() -> None:
+    """Names of the schema are on the page of scenes, which lists all of them."""
+    pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "api").glob("*.md"))
+    assert set(re.findall(r"auto\w+:: flexmb\.(\w+)$", pages, re.MULTILINE)) == set(fm._MODULE_OF)
+    assert "automodule:: flexmb.scene.schema\n   :members:" in pages

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ast
+import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from tests.repo.project import ROOT
+from tests.repo.project import PYPROJECT, ROOT
 
 CHECKS = {
     "ruff": ["-m", "ruff", "check", "--no-cache", "."],
@@ -21,6 +24,33 @@ CHECKS = {
 def test_passes(check: str) -> None:
     run = subprocess.run([sys.executable, *CHECKS[check]], cwd=ROOT, capture_output=True, text=True, check=False)
     assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
+
+
+CIRCLES = {
+    "types": ("from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from flexmb.room import other\n", False),
+    "function": ("def ask():\n    from flexmb.room import other\n", False),
+    "none": ("", True),
+}
+
+
+@pytest.mark.parametrize("source, kept", CIRCLES.values(), ids=CIRCLES)
+def test_a_circle_inside_a_room_breaks_the_contract(tmp_path: Path, source: str, kept: bool) -> None:
+    [contract] = [each for each in PYPROJECT["tool"]["importlinter"]["contracts"] if each["type"] == "acyclic_siblings"]
+    files = {"flexmb/__init__.py": "", "crosscheck/__init__.py": "", "flexmb/room/__init__.py": ""}
+    files |= {"flexmb/room/one.py": source, "flexmb/room/other.py": "from flexmb.room import one\n"}
+    lines = [f"{key} = {json.dumps(value)}" for key, value in contract.items()]
+    files["pyproject.toml"] = "\n".join(
+        ["[tool.importlinter]", 'root_packages = ["flexmb", "crosscheck"]', "[[tool.importlinter.contracts]]", *lines]
+    )
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    run = subprocess.run(
+        [sys.executable, *CHECKS["import-linter"]], cwd=tmp_path, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+    )  # fmt: skip
+    assert (run.returncode == 0) == kept, run.stdout
+    assert kept or "No cycles are allowed in flexmb.room" in run.stdout
 
 
 def test_what_is_compiled_asserts_nothing() -> None:

@@ -80,6 +80,15 @@ def test_the_citation_is_one() -> None:
     assert found["license"] == PYPROJECT["project"]["license"]
 
 
+def test_the_address_of_the_repository_is_one() -> None:
+    """None until there is a public one, then the same in all places."""
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    address = PYPROJECT["project"].get("urls", {}).get("Repository")
+    assert citation.get("repository-code") == address
+    owner = address.rpartition("/")[0].rpartition("/")[2] if address else "OWNER"
+    assert f"uses: {owner}/" in (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
+
+
 def test_the_changelog_has_versions_with_dates_and_kinds_of_changes() -> None:
     """Keep a Changelog: newest first, each version dated, changes under six headings."""
     text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")

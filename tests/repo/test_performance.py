@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from math import inf, nan
 
@@ -10,6 +11,7 @@ import pytest
 from msgspec import structs
 
 from crosscheck.report.workprecision import Point, WorkPrecision
+from tests.benchmarks.must_hold import history
 from tests.benchmarks.must_hold.catalogue import all_rows
 from tests.benchmarks.must_hold.charts import dominated
 from tests.benchmarks.must_hold.kept import Kept, Results, read, write
@@ -55,6 +57,32 @@ def test_a_reason_is_shown_only_where_a_row_is_missed() -> None:
 def test_every_picture_is_kept_and_drawn() -> None:
     assert set(read().scaling) == set(PICTURES)
     assert all((FOLDER / f"{name}.svg").exists() for name in PICTURES)
+
+
+def test_the_history_ends_with_what_is_kept_and_is_drawn() -> None:
+    """A measurement that was kept and not appended would be lost with the next one."""
+    points = history.read_history()
+    last = {point.row: (point.date, point.commit, point.value) for point in points}
+    kept = {each.name: (each.date, each.commit, each.measured.value) for each in read().rows.values() if each.measured}
+    assert {name: last.get(name) for name in kept} == kept, "run `python -m tests.benchmarks --from-kept --write`"
+    assert history.PAGE.read_text(encoding="utf-8") == history.history_page(points)
+    shown = re.findall(r"pictures/history/(.*?\.svg)", history.history_page(points))
+    assert sorted(shown) == sorted(file.name for file in history.FOLDER.iterdir())
+
+
+def test_a_measurement_is_appended_once(tmp_path) -> None:
+    file = tmp_path / "history.jsonl"
+    first = history.append(read(), file)
+    assert first and history.append(read(), file) == first == history.read_history(file)
+    name, kept = next((name, kept) for name, kept in read().rows.items() if kept.measured is not None)
+    again = structs.replace(kept, commit="1234567")
+    assert [point.commit for point in history.append(Results({name: again}), file)][len(first) :] == ["1234567"]
+
+
+@pytest.mark.parametrize(("sense", "value", "margin"), [("at least", 3.0, 1.5), ("at most", 0.5, 4.0)])
+def test_a_higher_margin_is_better(sense, value: float, margin: float) -> None:
+    point = history.Point("2026-01-01", "1234567", HALF.name, value, value, value, "a machine")
+    assert history.margin(replace(HALF, sense=sense), point) == margin
 
 
 def test_another_figure_is_another_page() -> None:

@@ -56,6 +56,17 @@ def test_continuous_integration_leaves_no_tests_out() -> None:
     assert COMMANDS[1].rpartition(f"{start} ")[2].startswith("-m pytest ")
 
 
+PAGES = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md", "examples/README.md")
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_links_lead_somewhere(name: str) -> None:
+    """Those to files; the site's build checks the pages of docs."""
+    page = ROOT / name
+    links = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+    assert not [link for link in links if not (page.parent / link).exists()]
+
+
 def test_the_python_examples_run() -> None:
     """One after the other, as a reader would type them."""
     names: dict[str, Any] = {}

@@ -23,14 +23,20 @@ from crosscheck.library.find import shipped_folder
 from crosscheck.records.sources import sources
 from crosscheck.running.code_here import code_here
 from tests.repo.installations import called, fresh_environment, packages_of, said
+from tests.repo.project import ROOT
 
-# As a user's test; run as a program it does the same, so that both can be compared.
+# As a user's test; run as a program it does the same, so that both can be compared. Kernels are there already, those of
+# this checkout: the wheel of these tests was built without, and to compile them would take half a minute.
 USER = """
 import json
+import pathlib
 import sys
 
 import flexmb as fm
+from flexmb.jit import cache
 from flexmb.jit.cache import KernelCache
+
+cache.installed_directory = lambda: pathlib.Path(READY)
 
 
 def test_user():
@@ -44,7 +50,7 @@ def test_user():
     body = {"mass": 1.0, "com": (0.5, 0, 0), "inertia": (0.1, 0.1, 0.1)}
     scene = fm.SceneBuilder("a user's", gravity=(0, 0, -9.81)).rigid_body("rod", **body)
     scene = scene.revolute("pivot", "ground", "rod", axis=(0, 1, 0)).scene()
-    run = fm.simulate(scene, t_end=0.1)
+    run = fm.simulate(fm.compile(scene, kernels="general"), t_end=0.1)
     ours = {name: module for name, module in sys.modules.items() if name.partition(".")[0] in ("flexmb", "crosscheck")}
     told = {
         "place": getattr(fm, "__file__", ""),
@@ -57,7 +63,7 @@ def test_user():
 
 if __name__ == "__main__":
     test_user()
-"""
+""".replace("READY", repr(str(ROOT / "flexmb" / "ready" / "kernels")))
 PYTEST = ("python", "-m", "pytest", "-q", "-s", "test_user.py")
 # As the loaders of frozen programs: code objects from an archive, found by a hook on the path, with neither files nor
 # sources; what a package contains is listed by the hook's finder.

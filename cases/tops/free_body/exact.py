@@ -4,6 +4,8 @@ momentum, which is along World z, the third by quadrature."""
 import numpy as np
 from scipy.special import ellipj
 
+from crosscheck.references.tops import primitive, turn
+
 I1, I2, I3 = 2.0, 3.0, 4.2
 MASS = 5.0
 W1, W3 = 3.1, 2.0  # rates at the start, where the second is zero
@@ -17,7 +19,7 @@ MOMENTUM = np.hypot(I1 * W1, I3 * W3)
 def exact(times):
     """Motion of the corner, energy and momentum at `times` (s), World axes, SI."""
     rates = body_rates(times)
-    angles = primitive(precession_rate, times)
+    angles = primitive(precession_rate, times, 8)
     lean = np.arctan2(np.hypot(I1 * rates[0], I2 * rates[1]), I3 * rates[2])
     R = turn(2, angles) @ turn(0, lean) @ turn(2, np.arctan2(I1 * rates[0], I2 * rates[1]))
     omega = np.einsum("tij,jt->ti", R, rates)
@@ -38,24 +40,3 @@ def body_rates(times):
 def precession_rate(times):
     w1, w2, _ = body_rates(times)
     return MOMENTUM * (I1 * w1**2 + I2 * w2**2) / ((I1 * w1) ** 2 + (I2 * w2) ** 2)
-
-
-def primitive(rate, times):
-    """The integral of `rate` from 0 to each of `times`, by Gauss-Legendre between them."""
-    nodes, weights = np.polynomial.legendre.leggauss(12)
-    pieces = 8
-    edges = np.append(np.linspace(times[:-1], times[1:], pieces, endpoint=False).T, times[-1])
-    half, middle = 0.5 * np.diff(edges), 0.5 * (edges[1:] + edges[:-1])
-    parts = half * (rate(middle[:, None] + half[:, None] * nodes) @ weights)
-    return np.concatenate([[0.0], np.cumsum(parts.reshape(-1, pieces).sum(axis=1))])
-
-
-def turn(axis, angles):
-    """Rotations (T, 3, 3) about a coordinate axis."""
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    R = np.zeros((len(angles), 3, 3))
-    R[:, axis, axis] = 1.0
-    R[:, i, i] = R[:, j, j] = np.cos(angles)
-    R[:, j, i] = np.sin(angles)
-    R[:, i, j] = -np.sin(angles)
-    return R

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from crosscheck.references.tops import turn
+
 ACROSS, ALONG = 2.0, 1.2  # carrier
 AXIAL, TRANSVERSE, SPEED = 0.05, 0.03, 120.0  # rotor
 RATE_ACROSS, RATE_ALONG = 0.6, 0.4
@@ -30,14 +32,3 @@ def exact(times):
         "energy.kinetic": np.full_like(times, energy),
         "momentum.angular": np.tile(momentum * up, (len(times), 1)),
     }
-
-
-def turn(axis, angles):
-    """Rotations (T, 3, 3) about a coordinate axis."""
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    R = np.zeros((len(angles), 3, 3))
-    R[:, axis, axis] = 1.0
-    R[:, i, i] = R[:, j, j] = np.cos(angles)
-    R[:, j, i] = np.sin(angles)
-    R[:, i, j] = -np.sin(angles)
-    return R

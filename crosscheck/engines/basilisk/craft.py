@@ -1,6 +1,6 @@
-"""A scene as Basilisk sees spacecraft: a free hub, wheels in it, and chains of parts on it. No Basilisk is needed here.
+"""A scene as a spacecraft of Basilisk: a free hub, wheels in it, and chains of parts on it. It needs no Basilisk.
 
-Welded bodies are one part with what carries them; wheels are balanced, and belong to the hub's mass and inertia.
+Welded bodies form one part with their carrier; wheels are balanced and included in the hub's mass and inertia.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class NoCraft(ValueError):
 
 @dataclass(frozen=True)
 class CraftPart:
-    """What one turn or shift carries: `inboard` is its joint's frame in the part or hub `parent`, `inertia` its own."""
+    """A part on a scalar joint, whose frame in the part or hub `parent` is `inboard`; `inertia` is the part's own."""
 
     parent: int
     inboard: Frame
@@ -41,9 +41,10 @@ class CraftWheel:
 
 @dataclass(frozen=True)
 class Craft:
-    """`base` is the frame in World from which the hub flies off; `where[i]` the part of link i and its frame there.
+    """`base` is the inboard frame of the hub's free hinge in World; `where[i]` is the part of link i and its frame in
+    it.
 
-    `chains` are the numbers of the parts of each chain on the hub, all of them turns or all of them shifts.
+    `chains` are the numbers of the parts of each chain on the hub; a chain has only rotations or only translations.
     """
 
     base: Frame
@@ -57,7 +58,7 @@ class Craft:
 
 
 def craft_of(scene: Scene) -> Craft:
-    """Raises NoCraft where the scene is none."""
+    """Raises NoCraft if the scene cannot be represented."""
     if any(scene.gravity_m_s2):
         raise NoCraft("Basilisk's gravity is that of planets: none that is uniform")
     chain = links(scene)
@@ -106,7 +107,6 @@ def _simple(link: Link, freedom: object) -> Scalar:
 
 
 def _chains(parts: tuple[CraftPart, ...]) -> tuple[tuple[int, ...], ...]:
-    """Every chain from the hub outward."""
     chains: dict[int, list[int]] = {}
     for number, part in enumerate(parts):
         if part.parent == HUB:

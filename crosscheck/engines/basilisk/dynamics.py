@@ -16,6 +16,7 @@ from crosscheck.engines.basilisk.vehicle import Vehicle
 from crosscheck.engines.conventions import cross, quaternion_of, quaternion_rate, rotation_matrix
 from crosscheck.engines.functions_of_time import Profile, profile
 from crosscheck.engines.links import Scalar, attachment
+from crosscheck.engines.rigid_tree import PointLoad
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -56,7 +57,7 @@ class CraftDynamics:
         self.rest = np.array([freedom.rest for freedom in freedoms])
         self._damping = np.array([freedom.damping for freedom in freedoms])
         self._chains = [np.array(chain, dtype=np.intp) for chain in craft.chains]
-        self._loads = [_HubLoad(craft, scene, load) for load in scene.loads]
+        self._loads = [_hub_load(craft, scene, load) for load in scene.loads]
 
     def initial(self) -> Real:
         flight, base = self.craft.flight, self.craft.base
@@ -75,14 +76,14 @@ class CraftDynamics:
             ]
         )
 
-    def state(self, y: Real) -> CraftState:
+    def state(self, t: float, y: Real) -> CraftState:
         wheels, parts = len(self._wheel_motors), len(self._motors)
         quaternion = y[3:7] / np.sqrt(y[3:7] @ y[3:7])
         spins, values, rates = np.split(y[_HUB:-1], [wheels, wheels + parts])
         return CraftState(y[:3], quaternion, y[7:10], y[10:13], spins, values, rates)
 
     def solve(self, t: float, state: CraftState) -> CraftSolution:
-        """Leaves the vehicle in the state."""
+        """The accelerations and the power; the vehicle keeps the state."""
         self.vehicle.put(state.position, state.quaternion, state.velocity, state.turning, state.spins)
         driven = np.array([motor(t).value for motor in self._motors])
         for number, chain in enumerate(self._chains):
@@ -100,7 +101,7 @@ class CraftDynamics:
 
     def rate(self, t: float, y: Real) -> Real:
         """dy/dt."""
-        state = self.state(y)
+        state = self.state(t, y)
         found = self.solve(t, state)
         turning = quaternion_rate(y[3:7], state.turning)
         return np.concatenate(
@@ -108,17 +109,17 @@ class CraftDynamics:
         )
 
     def _push(self, t: float, state: CraftState) -> float:
-        """Put the loads on the hub; their power (W)."""
+        """Apply the loads to the hub; returns their power (W)."""
         R = rotation_matrix(state.quaternion)
         in_world, on_hub, torque = np.zeros(3), np.zeros(3), np.zeros(3)
         for load in self._loads:
             vector = load.vector(t)
-            own = R.T @ vector if load.in_world else vector
+            own = R.T @ vector if load.fixed_in_world else vector
             if not load.is_force:
                 torque += own
             else:
                 torque += cross(load.point, own)
-                if load.in_world:
+                if load.fixed_in_world:
                     in_world += vector
                 else:
                     on_hub += vector
@@ -126,20 +127,9 @@ class CraftDynamics:
         return float((in_world + R @ on_hub) @ state.velocity + torque @ state.turning)
 
 
-class _HubLoad:
-    """A load at a point (3,) of the hub; its vector is in World axes or in those of the hub."""
-
-    def __init__(self, craft: Craft, scene: Scene, load: Load) -> None:
-        at = attachment(scene, craft.links, load)
-        frame = craft.where[at.link][1] @ at.frame
-        self.in_world, self.is_force = load.frame == "world", load.type == "force"
-        self.point = frame.position
-        direction = np.array(load.direction, dtype=float)
-        self._direction = direction if self.in_world else frame.rotation @ direction
-        self._size = profile(load.function)
-
-    def vector(self, t: float) -> Real:
-        return self._size(t).value * self._direction
+def _hub_load(craft: Craft, scene: Scene, load: Load) -> PointLoad:
+    at = attachment(scene, craft.links, load)
+    return PointLoad(load, craft.where[at.link][1] @ at.frame)
 
 
 def _motor(freedom: Scalar):

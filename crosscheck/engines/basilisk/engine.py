@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import TYPE_CHECKING
 
 from crosscheck.engines.basilisk.craft import NoCraft, craft_of
-from crosscheck.engines.contract import Effort, EngineMissing, Support
+from crosscheck.engines.contract import Effort, EngineMissing, Model
 from crosscheck.engines.links import obstacle
+from crosscheck.engines.peer import PeerEngine
+from crosscheck.engines.scipy_loop import RTOL_LADDER
 from flexmb.scene.schema import Scene
 
-if TYPE_CHECKING:
-    from crosscheck.engines.basilisk.model import BasiliskModel
 
-
-class BasiliskEngine:
+class BasiliskEngine(PeerEngine):
     """One free hub with balanced wheels, and serial chains of hinged or of sliding parts on it."""
 
     name = "basilisk"
     summary = "one spacecraft: a free hub, balanced wheels, hinged and sliding parts"
     algorithm = "hub and effectors, back-substitution"
     settings = (
-        "The equations of motion of its Spacecraft with its own effectors, compiled and called from Python, stepped by "
-        "SciPy's DOP853, in Python. Its own integrators hold torques constant over a step of a clock of whole "
-        "nanoseconds, and would be off by that. Outputs are observed after the timed solve."
+        "The equations of motion of its Spacecraft with its own effectors, compiled and called from Python, with "
+        "SciPy's DOP853, also in Python. Basilisk's own integrators hold torques constant in a step and count time in "
+        "whole nanoseconds, which limits their accuracy. Outputs are computed after the timed solve."
     )
 
     def version(self) -> str:
@@ -33,23 +31,19 @@ class BasiliskEngine:
             raise EngineMissing("Basilisk is not installed: pip install flexmb[more-peers]") from error
         return version("bsk")
 
-    def supports(self, scene: Scene) -> Support:
-        reason = obstacle(scene, "Basilisk", ())
+    def obstacle(self, scene: Scene) -> str:
+        if reason := obstacle(scene, "Basilisk", ()):
+            return reason
         try:
-            if not reason:
-                craft_of(scene)
+            craft_of(scene)
         except NoCraft as error:
-            reason = str(error)
-        return Support("no", reason) if reason else Support("exact")
+            return str(error)
+        return ""
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-8, 1e-10, 1e-12))
+        return RTOL_LADDER
 
-    def compile(self, scene: Scene) -> BasiliskModel:
-        self.version()
-        from crosscheck.engines.basilisk.model import BasiliskModel
+    def model(self, scene: Scene) -> Model:
+        from crosscheck.engines.basilisk.model import compiled
 
-        support = self.supports(scene)
-        if support.kind == "no":
-            raise ValueError(f'scene "{scene.name}": {support.reason}')
-        return BasiliskModel(scene)
+        return compiled(scene)

@@ -1,7 +1,7 @@
 """From a state of the vehicle to what engines exchange: World axes, angular first, scalar-first.
 
-Basilisk gives states and their rates, energy and momentum. Where the parts are follows from their coordinates; loads of
-hinges and wheels it does not know.
+Basilisk gives states and their rates, energy and momentum. The motion of the parts follows from their coordinates;
+loads of hinges and wheels are not available.
 """
 
 from __future__ import annotations
@@ -81,7 +81,6 @@ class BasiliskObserver:
         )
 
     def _motions(self, state: CraftState, found: CraftSolution) -> dict[int, PartMotion]:
-        """Of the hub and of all parts."""
         R = rotation_matrix(state.quaternion)
         hub = PartMotion(R, state.position, R @ state.turning, state.velocity, R @ found.angular, found.linear)
         motions = {HUB: hub}

@@ -25,7 +25,7 @@ from crosscheck.engines.links import by_motion
 from flexmb.typing import Real
 
 _STEP = 1.0  # s; equations of motion take a step for noise, of which there is none
-NEXT_TO_NOTHING = 1e-200
+NEGLIGIBLE = 1e-200
 """kg or kg m^2: Basilisk refuses parts without mass or inertia; this is below the round-off of what it is added to."""
 
 
@@ -99,8 +99,6 @@ class Vehicle:
 
 
 class _Chain:
-    """A chain of parts as one effector."""
-
     def __init__(self, parts: list[CraftPart]) -> None:
         turns = by_motion(parts[0].freedom, True, False)
         self.effector, self._names = _turning_chain(parts) if turns else _sliding_chain(parts)
@@ -148,7 +146,7 @@ def _turning_chain(parts: list[CraftPart]) -> tuple[Any, tuple[str, str]]:
     effector = spinningBodyNDOFStateEffector.SpinningBodyNDOFStateEffector()
     for part in parts:
         body = spinningBodyNDOFStateEffector.SpinningBody()
-        body.setMass(max(part.inertia.mass, NEXT_TO_NOTHING))
+        body.setMass(max(part.inertia.mass, NEGLIGIBLE))
         body.setISPntSc_S(_definite(part.inertia.inertia))
         body.setR_ScS_S(_column(part.inertia.com))
         body.setR_SP_P(_column(part.inboard.position))
@@ -164,7 +162,7 @@ def _sliding_chain(parts: list[CraftPart]) -> tuple[Any, tuple[str, str]]:
     effector = linearTranslationNDOFStateEffector.LinearTranslationNDOFStateEffector()
     for part in parts:
         body = linearTranslationNDOFStateEffector.TranslatingBody()
-        body.setMass(max(part.inertia.mass, NEXT_TO_NOTHING))
+        body.setMass(max(part.inertia.mass, NEGLIGIBLE))
         body.setIPntFc_F(_definite(part.inertia.inertia))
         body.setR_FcF_F(_column(part.inertia.com))
         body.setR_F0P_P(_column(part.inboard.position))
@@ -177,12 +175,11 @@ def _sliding_chain(parts: list[CraftPart]) -> tuple[Any, tuple[str, str]]:
 
 
 def _definite(inertia: Real) -> list[list[float]]:
-    found: list[list[float]] = (inertia + NEXT_TO_NOTHING * np.eye(3)).tolist()
+    found: list[list[float]] = (inertia + NEGLIGIBLE * np.eye(3)).tolist()
     return found
 
 
 def _column(vector: Real) -> list[list[float]]:
-    """As Basilisk takes vectors."""
     return [[float(each)] for each in vector]
 
 

@@ -2,8 +2,7 @@
 
 State y = [free coordinates, free speeds, work], speeds of free joints in outboard axes. Quaternions are integrated as
 four numbers: qdot is linear in q, so the norm is an invariant of the exact flow; everything else uses the normalised q.
-Driven coordinates follow their functions of time: DART takes their accelerations as commands, and gives the forces that
-they need.
+Driven coordinates follow their functions of time: DART takes their accelerations as commands and returns their forces.
 """
 
 from __future__ import annotations
@@ -71,7 +70,7 @@ class DartDynamics:
         return DartState(q, v, motion[:, 2])
 
     def solve(self, t: float, state: DartState) -> DartSolution:
-        """Leaves the tree in the state, with its accelerations and the loads across its joints."""
+        """Accelerations and drive loads; the skeleton keeps the state, its accelerations and its joint loads."""
         skeleton, D = self.tree.skeleton, self._driven_v
         skeleton.setPositions(self._positions(state.q))
         skeleton.setVelocities(self._speeds(state))
@@ -93,7 +92,7 @@ class DartDynamics:
         qdot = np.empty(self.tree.nq)
         qdot[self._scalar_q] = state.v[self._scalar_v]
         vdot = solution.acceleration.copy()
-        own = np.empty(self.tree.nq)  # the quaternions' own values, not normalised, enter their rates
+        own = np.empty(self.tree.nq)  # the rates of quaternions depend on their values before normalisation
         own[self._free_q] = y[: len(self._free_q)]
         for slot in self._balls:
             place = slice(slot.q, slot.q + 4)
@@ -128,10 +127,10 @@ class DartDynamics:
 
 
 def _rotation_vector(quaternion: Real) -> Real:
-    """The rotation vector (3,) that DART can turn into the rotation: of small ones it drops the third order.
+    """The rotation vector (3,) from which DART makes the rotation.
 
-    Below 1e-5 rad that is less than round-off. Up to 1e-2 rad, well beyond where its series ends, the vector is that of
-    the long way round, whose angle is not small.
+    For small angles DART truncates a series after the second order. Below 1e-5 rad the error is less than round-off;
+    from there to 1e-2 rad, well beyond the range of the series, the vector of angle - 2 pi is used.
     """
     vector = rotation_vector(quaternion)
     angle = np.sqrt(vector @ vector)

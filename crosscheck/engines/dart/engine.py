@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import TYPE_CHECKING
 
-from crosscheck.engines.contract import Effort, EngineMissing, Support
+from crosscheck.engines.contract import Effort, EngineMissing, Model
 from crosscheck.engines.links import obstacle
+from crosscheck.engines.peer import PeerEngine
+from crosscheck.engines.scipy_loop import RTOL_LADDER
 from flexmb.scene.schema import Scene
 
-if TYPE_CHECKING:
-    from crosscheck.engines.dart.model import DartModel
 
-
-class DartEngine:
+class DartEngine(PeerEngine):
     """Rigid trees, exact: DART's forward dynamics, hybrid where coordinates are prescribed."""
 
     name = "dart"
     summary = "rigid trees in minimal coordinates, hybrid dynamics of its own"
     algorithm = "articulated bodies, O(N)"
     settings = (
-        "The articulated-body dynamics of its Skeleton, compiled and called from Python, stepped by SciPy's DOP853, in "
-        "Python, so that much of its time on small scenes is not its own. Its own World.step is a semi-implicit Euler "
-        "method of first order, with springs and dampers taken implicitly, and would be no rival. No contacts. Outputs "
-        "are observed after the timed solve."
+        "The articulated-body dynamics of its Skeleton, compiled and called from Python, with SciPy's DOP853, also in "
+        "Python: on small scenes much of the time is Python's. DART's own World.step is a semi-implicit Euler method "
+        "of first order with implicit springs and dampers, too inaccurate for a comparison. No contacts. Outputs are "
+        "computed after the timed solve."
     )
 
     def version(self) -> str:
@@ -33,25 +31,20 @@ class DartEngine:
             raise EngineMissing("DART is not installed: pip install flexmb[more-peers]") from error
         return version("dartpy")
 
-    def supports(self, scene: Scene) -> Support:
-        reason = _open_loops_only(scene) or obstacle(scene, "DART", ())
-        return Support("no", reason) if reason else Support("exact")
+    def obstacle(self, scene: Scene) -> str:
+        return _open_loops_only(scene) or obstacle(scene, "DART", ())
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-8, 1e-10, 1e-12))
+        return RTOL_LADDER
 
-    def compile(self, scene: Scene) -> DartModel:
-        self.version()
-        from crosscheck.engines.dart.model import DartModel
+    def model(self, scene: Scene) -> Model:
+        from crosscheck.engines.dart.model import compiled
 
-        support = self.supports(scene)
-        if support.kind == "no":
-            raise ValueError(f'scene "{scene.name}": {support.reason}')
-        return DartModel(scene)
+        return compiled(scene)
 
 
 def _open_loops_only(scene: Scene) -> str:
-    """Why a closed loop is refused: constraints are impulses of a step, and no part of the forward dynamics."""
+    """Why a closed loop is refused: DART's constraints are impulses in a step and not part of the forward dynamics."""
     if not scene.closures:
         return ""
     return f'closure "{scene.closures[0].name}": DART closes loops by impulses of its own steps only, to first order'

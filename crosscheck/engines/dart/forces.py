@@ -9,6 +9,7 @@ from crosscheck.engines.conventions import cross, rotation_vector
 from crosscheck.engines.dart.tree import DartTree
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Scalar, attachment
+from crosscheck.engines.rigid_tree import PointLoad
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -71,19 +72,14 @@ class _DartLoad:
     def __init__(self, tree: DartTree, scene: Scene, load: Load) -> None:
         at = attachment(scene, tree.links, load)
         self._body: dartpy.dynamics.BodyNode = tree.bodies[at.link]
-        self._point = at.frame.position
-        self._in_world = load.frame == "world"
-        direction = np.array(load.direction, dtype=float)
-        self._direction = direction if self._in_world else at.frame.rotation @ direction
-        self._is_force = load.type == "force"
-        self._size = profile(load.function)
+        self._load = PointLoad(load, at.frame)
 
     def apply(self, t: float) -> float:
         R = self._body.getWorldTransform().rotation()
-        vector = self._size(t).value * (self._direction if self._in_world else R @ self._direction)
+        vector, point = self._load.in_world(t, R), self._load.point
         turning = self._body.getAngularVelocity()
-        if not self._is_force:
+        if not self._load.is_force:
             self._body.addExtTorque(vector, False)
             return float(vector @ turning)
-        self._body.addExtForce(vector, self._point, False, True)
-        return float(vector @ (self._body.getLinearVelocity() + cross(turning, R @ self._point)))
+        self._body.addExtForce(vector, point, False, True)
+        return float(vector @ (self._body.getLinearVelocity() + cross(turning, R @ point)))

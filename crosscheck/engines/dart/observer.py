@@ -8,6 +8,7 @@ from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import cross, quaternion_of, rotate_spatial
 from crosscheck.engines.dart.dynamics import DartDynamics, DartState
 from crosscheck.engines.links import Attachment, attachment
+from crosscheck.engines.rigid_tree import by_joint, of_kind
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -31,9 +32,9 @@ class DartObserver:
         mass = sum(link.inertia.mass for link in tree.links)
         return Snapshot(
             markers={name: self._marker(at) for name, at in self._markers.items()},
-            loads={name: load for (kind, name), load in wrench.items() if kind == "body"},
-            wheel_loads={name: load for (kind, name), load in wrench.items() if kind == "wheel"},
-            drives=self._drives(drive),
+            loads=of_kind("body", wrench),
+            wheel_loads=of_kind("wheel", wrench),
+            drives=by_joint(dynamics.driven, drive),
             energy={
                 "kinetic": tree.skeleton.computeKineticEnergy(),
                 "strain": 0.0,
@@ -63,10 +64,3 @@ class DartObserver:
             velocity=np.concatenate([body.getAngularVelocity(), body.getLinearVelocity(point)]),
             acceleration=np.concatenate([body.getAngularAcceleration(), body.getLinearAcceleration(point)]),
         )
-
-    def _drives(self, drive: Real) -> dict[str, Real]:
-        """Loads of the prescribed coordinates by joint name."""
-        named: dict[str, list[float]] = {}
-        for slot, load in zip(self._dynamics.driven, drive, strict=True):
-            named.setdefault(slot.link.joint, []).append(float(load))
-        return {name: np.array(loads) for name, loads in named.items()}

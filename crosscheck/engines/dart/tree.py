@@ -1,9 +1,9 @@
-"""The scene's links as a DART `Skeleton`: every hinge a chain of elementary joints on bodies next to massless.
+"""The scene's links as a DART `Skeleton`: every hinge a chain of elementary joints on nearly massless bodies.
 
 Conventions of DART: spatial vectors [angular; linear]; a ball joint's coordinates are a rotation vector and its speeds
 are in outboard axes; those of a free joint are a rotation vector, then the position, in the joint's inboard frame, and
 its speeds, angular first, are in the axes of the *parent body*, wherever the joint's frame is turned to. Its own
-springs and dampers are part of an implicit step, and are not used.
+springs and dampers belong to its implicit step and are not used.
 """
 
 from __future__ import annotations
@@ -15,63 +15,49 @@ import dartpy
 import numpy as np
 
 from crosscheck.engines.conventions import Frame
-from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar, by_motion
+from crosscheck.engines.rigid_tree import Slot, scalar_start
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
-NEXT_TO_NOTHING = 1e-200
-"""kg or kg m^2: DART warns of zero mass and zero inertia; this is below the round-off of whatever it is added to."""
-
-
-@dataclass(frozen=True)
-class DartSlot:
-    """A freedom, and where its coordinates `q` start in those of the scene and its speeds `v` in those of DART.
-
-    The scene's coordinates are those of the schema: positions before quaternions wxyz.
-    """
-
-    freedom: Freedom
-    link: Link
-    q: int
-    v: int
-
-    @property
-    def driven(self) -> bool:
-        return isinstance(self.freedom, Scalar) and self.freedom.prescribed is not None
+NEGLIGIBLE = 1e-200
+"""kg or kg m^2: DART warns of zero mass and inertia; this is below the round-off of anything to which it is added."""
 
 
 @dataclass(frozen=True)
 class DartTree:
-    """`bodies[i]` is the body whose frame is that of link i; `nq` counts the scene's coordinates."""
+    """`bodies[i]` is the body whose frame is that of link i; `nq` counts the scene's coordinates.
+
+    A slot's `q` counts the scene's coordinates, positions before quaternions wxyz; its `v` counts DART's speeds.
+    """
 
     skeleton: dartpy.dynamics.Skeleton
     links: tuple[Link, ...]
     bodies: tuple[dartpy.dynamics.BodyNode, ...]
-    slots: tuple[DartSlot, ...]
+    slots: tuple[Slot, ...]
     nq: int
 
 
 def build_tree(scene: Scene, chain: tuple[Link, ...]) -> DartTree:
-    """Prescribed joints get accelerations as commands, all others forces."""
+    """The tree; prescribed joints take accelerations as commands, all others forces."""
     skeleton = dartpy.dynamics.Skeleton(scene.name)
     skeleton.setGravity(np.array(scene.gravity_m_s2, dtype=float))
     bodies: list[dartpy.dynamics.BodyNode] = []
-    slots: list[DartSlot] = []
+    slots: list[Slot] = []
     q = 0
     for link in chain:
         body = bodies[link.parent] if link.parent >= 0 else None
         at: Frame | None = link.inboard
         for freedom in link.freedoms:
             joint, body = _joint(skeleton, body, freedom)
-            slot = DartSlot(freedom, link, q, joint.getIndexInSkeleton(0))
+            slot = Slot(freedom, link, q, joint.getIndexInSkeleton(0))
             if slot.driven:
                 joint.setActuatorType(dartpy.dynamics.ActuatorType.ACCELERATION)
             slots.append(slot)
             q += _coordinates(freedom)
             _place(joint, at)
             at = None
-            body.setInertia(_inertia(NEXT_TO_NOTHING, np.zeros(3), np.zeros((3, 3))))
+            body.setInertia(_inertia(NEGLIGIBLE, np.zeros(3), np.zeros((3, 3))))
         if not link.freedoms:
             joint, body = skeleton.createWeldJointAndBodyNodePair(body)
             _place(joint, at)
@@ -85,10 +71,8 @@ def initial_state(tree: DartTree) -> tuple[Real, Real]:
     q, v = np.zeros(tree.nq), np.zeros(tree.skeleton.getNumDofs())
     for slot in tree.slots:
         match slot.freedom:
-            case Scalar(prescribed=None) as freedom:
-                q[slot.q], v[slot.v] = freedom.value, freedom.rate
             case Scalar() as freedom:
-                q[slot.q], v[slot.v], _ = profile(freedom.prescribed)(0.0)
+                q[slot.q], v[slot.v] = scalar_start(freedom)
             case Ball() as freedom:
                 q[slot.q : slot.q + 4] = freedom.quaternion
                 v[slot.v : slot.v + 3] = freedom.angular_velocity
@@ -128,7 +112,7 @@ def _joint(
 
 
 def _place(joint: dartpy.dynamics.Joint, at: Frame | None) -> None:
-    """Where the joint is on its parent; a chain's later joints are where those before them have carried them."""
+    """Set the joint's frame on its parent; the frames of a chain's later joints are those of the bodies before them."""
     if at is not None:
         pose = dartpy.math.Isometry3()
         pose.set_rotation(at.rotation)
@@ -137,5 +121,5 @@ def _place(joint: dartpy.dynamics.Joint, at: Frame | None) -> None:
 
 
 def _inertia(mass: float, com: Real, about_com: Real) -> dartpy.dynamics.Inertia:
-    moment = about_com + NEXT_TO_NOTHING * np.eye(3)
-    return dartpy.dynamics.Inertia(max(mass, NEXT_TO_NOTHING), com, moment)
+    moment = about_com + NEGLIGIBLE * np.eye(3)
+    return dartpy.dynamics.Inertia(max(mass, NEGLIGIBLE), com, moment)

@@ -10,11 +10,12 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from crosscheck.engines.connections import WORLD, Along, Exerted, Moving, along_hinges, connections
+from crosscheck.engines.connections import WORLD, Along, Exerted, Moving
 from crosscheck.engines.conventions import quaternion_of, rotation_vector
 from crosscheck.engines.drake.tree import BALLAST, DrakeSlot, DrakeTree, ball_rotation
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Attachment, Scalar, attachment
+from crosscheck.engines.rigid_tree import PointLoad, TreeConnectors
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -27,10 +28,7 @@ class JointActions:
 
     def __init__(self, tree: DrakeTree, scene: Scene) -> None:
         scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
-        self._held = [
-            (name, [slot for slot in scalars if slot.link.joint == item][number], load)
-            for name, item, number, load in along_hinges(scene)
-        ]
+        self._connectors = TreeConnectors(scene, tree.links, tree.slots)
         self._nv = tree.plant.num_velocities()
         self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
         self._springs = [slot for slot in scalars if slot.freedom.stiffness < 0.0]
@@ -43,11 +41,11 @@ class JointActions:
         self._sprung = [slot for slot in scalars if slot.freedom.stiffness]
 
     def __bool__(self) -> bool:
-        return bool(self._motors or self._springs or self._dampers or self._balls or self._held)
+        return bool(self._motors or self._springs or self._dampers or self._balls or self._connectors.along_hinges)
 
     def held(self, t: float, q: Real, v: Real) -> dict[str, tuple[int, Along]]:
         """By name the speed that a connector along a hinge acts on, and what it does."""
-        return {name: (slot.v, load(t, float(q[slot.q]), float(v[slot.v]))) for name, slot, load in self._held}
+        return self._connectors.along(t, q, v)
 
     def forces(self, t: float, q: Real, v: Real, turned: tuple[Real, ...]) -> Real:
         tau = np.zeros(self._nv)
@@ -75,8 +73,6 @@ class JointActions:
 
 
 class Drives:
-    """The prescribed coordinates of a tree."""
-
     def __init__(self, tree: DrakeTree) -> None:
         self.slots: list[DrakeSlot] = [slot for slot in tree.slots if slot.driven]
         self._motions = [(slot, profile(slot.freedom.prescribed)) for slot in self.slots]
@@ -103,21 +99,18 @@ class DrakeLoads:
 
     def __init__(self, tree: DrakeTree, scene: Scene) -> None:
         self._loads = [_DrakeLoad(tree, scene, load) for load in scene.loads]
-        self._between, self._bodies = connections(scene, tree.links), tree.bodies
+        self._connectors, self._bodies = TreeConnectors(scene, tree.links, tree.slots), tree.bodies
 
     def __bool__(self) -> bool:
-        return bool(self._loads or self._between)
+        return bool(self._loads or self._connectors.between)
 
     def applied(
         self, t: float, poses: list[RigidTransform], speeds: list[SpatialVelocity]
     ) -> list[ExternallyAppliedSpatialForce]:
-        """All of them."""
-        found, exerted = [load.applied(t, poses) for load in self._loads], self.exerted(t, poses, speeds)
-        for each in self._between:
-            for at, load in ((each.a, exerted[each.name].on_a), (each.b, exerted[each.name].on_b)):
-                if at.link >= 0:
-                    body, point = self._bodies[at.link].index(), at.frame.position
-                    found.append(_wrench(body, point, SpatialForce(load[:3], load[3:])))
+        found = [load.applied(t, poses) for load in self._loads]
+        for at, load in self._connectors.loads(self.exerted(t, poses, speeds)):
+            body = self._bodies[at.link].index()
+            found.append(_wrench(body, at.frame.position, SpatialForce(load[:3], load[3:])))
         return found
 
     def exerted(self, t: float, poses: list[RigidTransform], speeds: list[SpatialVelocity]) -> dict[str, Exerted]:
@@ -131,26 +124,21 @@ class DrakeLoads:
             moving = Moving(pose.translation(), pose.rotation().matrix(), V.rotational(), V.translational())
             return moving.carrying(at.frame)
 
-        return {each.name: each.exerted(t, frame(each.a), frame(each.b)) for each in self._between}
+        return self._connectors.exerted(t, frame)
 
 
 class _DrakeLoad:
     def __init__(self, tree: DrakeTree, scene: Scene, load: Load) -> None:
         at = attachment(scene, tree.links, load)
         self._body = tree.bodies[at.link].index()
-        self._point = at.frame.position
-        self._in_world = load.frame == "world"
-        direction = np.array(load.direction, dtype=float)
-        self._direction = direction if self._in_world else at.frame.rotation @ direction
-        self._is_force = load.type == "force"
-        self._size = profile(load.function)
+        self._load = PointLoad(load, at.frame)
 
     def applied(self, t: float, poses: list[RigidTransform]) -> ExternallyAppliedSpatialForce:
         R = poses[int(self._body)].rotation().matrix()
-        vector = self._size(t).value * (self._direction if self._in_world else R @ self._direction)
+        vector = self._load.in_world(t, R)
         nothing = np.zeros(3)
-        load = SpatialForce(nothing, vector) if self._is_force else SpatialForce(vector, nothing)
-        return _wrench(self._body, self._point, load)
+        load = SpatialForce(nothing, vector) if self._load.is_force else SpatialForce(vector, nothing)
+        return _wrench(self._body, self._load.point, load)
 
 
 def _wrench(body: BodyIndex, point: Real, load: SpatialForce) -> ExternallyAppliedSpatialForce:

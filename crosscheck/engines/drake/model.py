@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig, SimulatorStatus
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, EventStatus
 
-from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
+from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.drake.actions import DrakeActions, DrakeLoads, Drives, JointActions
 from crosscheck.engines.drake.observer import DrakeObserver
 from crosscheck.engines.drake.tree import DrakeState, build_tree, initial_state, place, recentred
@@ -19,7 +19,7 @@ from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
-_STEEP = 0.8  # rad of a ball joint's pitch, singular at pi/2: beyond it the joint's angles begin again at zero
+_STEEP = 0.8  # pitch (rad) of a ball joint beyond which its angles restart at zero; they are singular at pi/2
 
 
 class DrakeModel:
@@ -46,10 +46,8 @@ class DrakeModel:
         with np.errstate(over="ignore", invalid="ignore"):  # divergence is a status
             states, evaluations, message = self._integrate(run.times, effort)
         wall = time.perf_counter() - start
-        reached = run.times[: len(states)]
-        status: Status = "finished" if len(states) == len(run.times) else "diverged"
-        samples = self._observed(reached, states)
-        return stack(reached, samples, status=status, message=message, wall_s=wall, evaluations=evaluations)
+        samples = self._observed(run.times[: len(states)], states)
+        return stack(run.times, samples, message=message, wall_s=wall, evaluations=evaluations)
 
     def _connected(self, has_forces: bool, has_loads: bool) -> Diagram:
         """The plant with the actions that this scene needs: without any Drake integrates in C++ alone."""
@@ -68,7 +66,7 @@ class DrakeModel:
         return builder.Build()
 
     def _observed(self, times: Real, states: list[DrakeState]) -> list[Snapshot]:
-        """What is seen in states, with the limit from the right where a function of time jumps."""
+        """Snapshots of states; where a function of time jumps, its limit from the right is used."""
         self._actions.before_end = np.inf
         context = self._diagram.CreateDefaultContext()
         own = self._tree.plant.GetMyContextFromRoot(context)
@@ -80,7 +78,7 @@ class DrakeModel:
         return found
 
     def _put(self, context: Context, t: float, state: DrakeState) -> None:
-        """A state into a context of the diagram; setting the time also drops what is cached of the actions."""
+        """Set the state of a context of the diagram; setting the time also invalidates cached actions."""
         self._actions.turned = state.turned
         context.SetTime(t)
         place(self._tree, self._tree.plant.GetMyMutableContextFromRoot(context), state)
@@ -93,8 +91,8 @@ class DrakeModel:
     def _integrate(self, times: Real, effort: Effort) -> tuple[list[DrakeState], int, str]:
         """States at the sample times reached, evaluations of the right-hand side, and why it stopped early.
 
-        Samples and breaks of the functions of time cut the run into stretches; at the start of each the prescribed
-        coordinates are put on their functions.
+        Sample times and breaks of the functions of time divide the run into intervals; at the start of each the
+        prescribed coordinates are set to their functions.
         """
         simulator = Simulator(self._diagram)
         ApplySimulatorConfig(_settings(effort, times), simulator)
@@ -117,7 +115,7 @@ class DrakeModel:
         return states, integrator.get_num_derivative_evaluations(), ""
 
     def _stretch(self, simulator: Simulator, end: float, turned: tuple[Real, ...]) -> tuple[DrakeState, str]:
-        """Advance to `end`, turning the frames of steep ball joints on the way; the message says why that failed."""
+        """Advance to `end`, restarting the angles of steep ball joints on the way; a message says why that failed."""
         context = simulator.get_mutable_context()
         while True:
             try:

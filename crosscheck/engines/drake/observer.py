@@ -12,6 +12,7 @@ from crosscheck.engines.conventions import cross, quaternion_of
 from crosscheck.engines.drake.actions import DrakeLoads, Drives, JointActions
 from crosscheck.engines.drake.tree import DrakeState, DrakeTree, place
 from crosscheck.engines.links import Attachment, attachment
+from crosscheck.engines.rigid_tree import by_joint, of_kind
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -45,8 +46,8 @@ class DrakeObserver:
         centre = plant.CalcCenterOfMassPositionInWorld(context)
         return Snapshot(
             markers={name: self._marker(at) for name, at in self._markers.items()},
-            loads={name: load for (kind, name), load in loads.items() if kind == "body"},
-            wheel_loads={name: load for (kind, name), load in loads.items() if kind == "wheel"},
+            loads=of_kind("body", loads),
+            wheel_loads=of_kind("wheel", loads),
             drives=drives,
             energy={
                 "kinetic": plant.CalcKineticEnergy(context),
@@ -71,13 +72,11 @@ class DrakeObserver:
             arm = body.EvalPoseInWorld(context).rotation().matrix() @ load.p_BoBq_B
             body.AddInForce(context, arm, load.F_Bq_W, plant.world_frame(), forces)
         needed = plant.CalcInverseDynamics(context, acceleration, forces) - tau
-        named: dict[str, list[float]] = {}
-        for slot in self._drives.slots:
-            named.setdefault(slot.link.joint, []).append(float(needed[slot.v]))
-            tau[slot.v] += needed[slot.v]
+        driven = [slot.v for slot in self._drives.slots]
+        tau[driven] += needed[driven]
         plant.get_applied_generalized_force_input_port().FixValue(context, tau)
         plant.get_applied_spatial_force_input_port().FixValue(context, applied)
-        return {name: np.array(values) for name, values in named.items()}
+        return by_joint(self._drives.slots, needed[driven])
 
     def _motion(self) -> tuple[list[RigidTransform], list[SpatialVelocity]]:
         """X_WB and V_WB of all bodies by their index."""

@@ -4,11 +4,11 @@ Conventions of Drake: quaternions wxyz; spatial vectors [angular; linear]; the v
 are those of the outboard frame in the *inboard* one, in inboard axes; a floating joint's coordinates are quaternion,
 then position. Spatial inertias are taken about the body origin, as multiples of the mass.
 
-Two artifices. (1) A prescribed coordinate has a rotor with inertia `BALLAST`, so that nothing but the applied
+Two workarounds. (1) A prescribed coordinate has a rotor with inertia `BALLAST`, so that only the applied
 BALLAST * acceleration moves it; the error of its acceleration is the load / BALLAST, below round-off. Its load is that
 of a second plant without rotors. (2) Drake's only ball joint has roll, pitch and yaw, which are singular at a pitch of
-a quarter turn. Its inboard frame F is a parameter of the context: it is turned to where the joint is, and the angles
-begin again at zero, whenever the pitch has grown large.
+pi/2. Its inboard frame F is a parameter of the context: when the pitch is large, F is rotated to the joint's present
+orientation and the angles restart at zero.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from crosscheck.engines.conventions import Frame, rotation_matrix
-from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar, by_motion
+from crosscheck.engines.rigid_tree import Slot, scalar_start
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -46,21 +46,13 @@ BALLAST = 1e20
 
 
 @dataclass(frozen=True)
-class DrakeSlot:
-    """A freedom, its Drake joint, and where its coordinates `q` and speeds `v` start.
+class DrakeSlot(Slot):
+    """A freedom with its Drake joint.
 
     Drake's own elements give springs of scalar joints and all dampers, but refuse negative coefficients.
     """
 
-    freedom: Freedom
-    link: Link
     joint: Joint
-    q: int
-    v: int
-
-    @property
-    def driven(self) -> bool:
-        return isinstance(self.freedom, Scalar) and self.freedom.prescribed is not None
 
 
 @dataclass(frozen=True)
@@ -109,7 +101,10 @@ def build_tree(scene: Scene, chain: tuple[Link, ...], *, ballasted: bool) -> Dra
         bodies.append(body)
         last.append(joint)
     plant.Finalize()
-    slots = tuple(DrakeSlot(*each, each[-1].position_start(), each[-1].velocity_start()) for each in joints)
+    slots = tuple(
+        DrakeSlot(freedom, link, joint.position_start(), joint.velocity_start(), joint)
+        for freedom, link, joint in joints
+    )
     return DrakeTree(plant, chain, tuple(bodies), tuple(last), slots)
 
 
@@ -123,10 +118,8 @@ def initial_state(tree: DrakeTree) -> DrakeState:
     turned = []
     for slot in tree.slots:
         match slot.freedom:
-            case Scalar(prescribed=None) as freedom:
-                q[slot.q], v[slot.v] = freedom.value, freedom.rate
             case Scalar() as freedom:
-                q[slot.q], v[slot.v], _ = profile(freedom.prescribed)(0.0)
+                q[slot.q], v[slot.v] = scalar_start(freedom)
             case Ball() as freedom:
                 turned.append(slot.link.inboard.rotation @ rotation_matrix(freedom.quaternion))
                 v[slot.v : slot.v + 3] = freedom.angular_velocity

@@ -1,4 +1,4 @@
-"""A scene as an assembled Exudyn system, with the tables that lead from scene names to Exudyn items."""
+"""A scene as an assembled Exudyn system, with tables from names in the scene to Exudyn items."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ CROSS_ARM = 0.01
 
 @dataclass(frozen=True)
 class Placed:
-    """A scene body in the system: its carrier, its motion at t = 0 and, where it bends, modal state and mesh crosses.
+    """A scene body in the system: its carrier, its motion at t = 0 and, if it is flexible, modal state and mesh
+    crosses.
 
     `reach` (m,): largest displacement of an inertia point for a unit modal coordinate, in units of the body's length.
     """
@@ -82,7 +83,7 @@ class Assembly:
         return [(stage.constraint, stage.prescribed) for stage in stages if stage.constraint is not None]
 
     def deflection_measures(self) -> list[tuple[slice, Real]]:
-        """Where the modal coordinates are among the coordinates, and how far each reaches, for every flexible body."""
+        """The places of the modal coordinates, and their reach, for every flexible body."""
         found = []
         for placed in self.bodies.values():
             if placed.carrier.modes is not None:
@@ -92,7 +93,7 @@ class Assembly:
 
 
 def unconstrained(scene: Scene) -> bool:
-    """Whether the scene is one free-flying body: the case for Exudyn's explicit integrators, which take no joints."""
+    """Whether the scene is one free-flying body, for which Exudyn's explicit integrators can be used."""
     single = len(scene.bodies) == 1 and isinstance(scene.hinges[0], Free)
     return single and not scene.wheels and not scene.point_masses and not scene.connectors
 
@@ -137,12 +138,11 @@ def assemble(scene: Scene) -> Assembly:
 
 
 def _nothing(mbs, t, sensors, factors, configuration) -> list[float]:
-    """What the sampler records until a run gives it something to do."""
     return [0.0]
 
 
 def _held_nodes(scene: Scene) -> dict[str, set[str]]:
-    """Nodes of each flexible body that carry something and deform, or take a load: they need mesh points."""
+    """Nodes of each flexible body that need mesh points: those that carry something and deform, or take a load."""
     held: dict[str, set[str]] = {body.name: set() for body in scene.bodies}
     bodies = {body.name: body for body in scene.bodies}
     users = [(hinge.parent, hinge.parent_node) for hinge in scene.hinges if hinge.parent != GROUND]
@@ -162,7 +162,6 @@ def _held_nodes(scene: Scene) -> dict[str, set[str]]:
 def _attach(
     shop: Workshop, scene: Scene, placed: dict[str, Placed], body: Body, hinge: Hinge, held: set[str]
 ) -> tuple[ExudynLink, Placed]:
-    """A body and the hinge that joins it to its parent."""
     own = frame(hinge.parent_position_m, hinge.parent_quaternion)
     port = _end(shop, placed, hinge.parent, hinge.parent_node, own)
     outboard = frame(*node_frame(body, hinge.child_node)) @ frame(hinge.child_position_m, hinge.child_quaternion)
@@ -256,7 +255,6 @@ def _port(shop: Workshop, parent: Placed, node: str, offset: Frame) -> HingePort
 
 
 def _exudyn_motion(parent: Placed) -> FrameMotion:
-    """Motion of the body's Exudyn axes."""
     return parent.motion.offset(np.zeros(3), parent.carrier.zero.T)
 
 
@@ -300,7 +298,7 @@ def _connect(shop: Workshop, placed: dict[str, Placed], connector: BetweenNodes)
 
 
 def _connect_along(shop: Workshop, scene: Scene, kinds: Sequence[dict[str, ExudynLink]]) -> None:
-    """Connectors along hinges; those on a link's last coordinate are among what acts on its outboard body."""
+    """Connect along hinges; connectors on a link's last coordinate contribute to the load on its outboard body."""
     for _, item, number, load in along_hinges(scene):
         links = next(each for each in kinds if item in each)
         link = links[item]
@@ -336,7 +334,6 @@ def _point_mass(shop: Workshop, parent: Placed, mass: PointMass) -> tuple[Exudyn
 
 
 def _load(shop: Workshop, parent: Placed, load: Load) -> None:
-    """A named load at a node."""
     f, direction = profile(load.function), np.array(load.direction)
     shape = parent.shape(load.node)
     turning = load.frame == "node"

@@ -47,7 +47,7 @@ class PlanarBeam:
     sampler: int
 
     def deflection_measures(self) -> list[tuple[slice, Real]]:
-        """Large deflections are what these elements are for."""
+        """None: large deflections are permitted."""
         return []
 
 
@@ -179,10 +179,10 @@ def _load(shop: Workshop, node: int, load: Load) -> None:
 
 
 def _halved_at_jumps(function: Function) -> Callable[[float], float]:
-    """The function, and where it jumps inside a run the mean of both sides.
+    """The function, with the mean of both sides where it jumps inside a run.
 
-    Fixed steps see only the values at their ends: with the mean, a jump at the end of a step keeps their order.
-    """
+    Fixed steps use only the values at their ends: with the mean, a jump at the end of a step does not reduce their
+    order. """
     f, jumps = profile(function), [t for t in breaks(function) if t > 0.0]
 
     def value(t: float) -> float:

@@ -1,4 +1,4 @@
-"""What connectors do in an Exudyn run, from the recorded motion of their ends and of the joints that they act along."""
+"""Loads of connectors in an Exudyn run, from the recorded motion of their ends and joints."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Paths = dict[int, CarrierPath]
 
 
 class Connected(NamedTuple):
-    """By name, of T samples: wrenches (T,6) of connectors between nodes on B about B, loads (T,1) of those along
+    """By name, at T samples: wrenches (T,6) of connectors between nodes on B about B, loads (T,1) of those along
     hinges; energy (T,) stored in all."""
 
     between: dict[str, Real]
@@ -31,7 +31,6 @@ class Connected(NamedTuple):
 
 
 def connected(assembly: Assembly, states: States, paths: Paths) -> Connected:
-    """What all connectors do at every sample."""
     between, along = _between(assembly, states, paths), _along(assembly, states.times.tolist(), paths)
     energy = np.zeros(len(states.times))
     for each in between.values():
@@ -65,7 +64,6 @@ def _along(assembly: Assembly, times: list[float], paths: Paths) -> dict[str, li
 
 
 def _moving(assembly: Assembly, connector: BetweenNodes, side: str, paths: Paths, count: int) -> list[Moving]:
-    """Motion of an end over all samples."""
     body = getattr(connector, f"body_{side}")
     own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
     if body == GROUND:

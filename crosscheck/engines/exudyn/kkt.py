@@ -1,6 +1,6 @@
-"""Accelerations and multipliers at the initial state, from the constrained equations of motion themselves.
+"""Accelerations and multipliers at the initial state, from the constrained equations of motion.
 
-Exudyn's own initial accelerations are good to 1e-7 for constrained systems; this is good to 1e-11.
+Exudyn's own initial accelerations have errors of 1e-7 in constrained systems; these have errors of 1e-11.
 """
 
 from __future__ import annotations

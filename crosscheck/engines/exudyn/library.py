@@ -1,4 +1,4 @@
-"""Exudyn itself: imported on first use, silenced, and missed with a message that names the remedy."""
+"""The Exudyn library: imported on first use, without its output; EngineMissing names the remedy if it is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loads as functions of time, as Exudyn asks for them in every iteration of every step."""
+"""Loads as functions of time, which Exudyn evaluates in every iteration of every step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scene compiled for Exudyn: pointwise evaluation and runs, in the terms of the engine contract."""
+"""A scene compiled for Exudyn."""
 
 from __future__ import annotations
 
@@ -19,8 +19,6 @@ from flexmb.typing import Real
 
 
 class ExudynModel:
-    """One scene as an Exudyn system."""
-
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.assembly = assemble(scene)

@@ -1,4 +1,4 @@
-"""Where everything is and how it moves at t = 0: redundant coordinates must fit the joints."""
+"""Positions and velocities of all bodies at t = 0: redundant coordinates must satisfy the joints."""
 
 from __future__ import annotations
 

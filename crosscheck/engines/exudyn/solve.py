@@ -1,4 +1,4 @@
-"""Running Exudyn's solvers, sampling their states, and finding out for ourselves whether a run went well."""
+"""Running Exudyn's solvers, sampling their states, and checking whether a run succeeded."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ From a first step that is far too long Exudyn falls to the smallest one and acce
 
 @dataclass(frozen=True)
 class ExudynSolution:
-    """What a run left behind, cut to its good samples."""
+    """The result of a run, cut to its good samples."""
 
     states: States
     status: Status
@@ -49,7 +49,7 @@ class ExudynSolution:
 
 
 class Recorder:
-    """Collects the state at every sample; Exudyn calls its sensors twice at the start, and the later call counts."""
+    """Collects the state at every sample; Exudyn calls its sensors twice at the start, and the later call is used."""
 
     def __init__(self, assembly: Assembly | PlanarBeam) -> None:
         self.data = assembly.shop.mbs.systemData
@@ -90,14 +90,14 @@ def integrate(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> E
 def _starts_accelerated(assembly: Assembly | PlanarBeam) -> bool:
     """Whether a prescribed motion begins with an acceleration.
 
-    Exudyn knows offsets and their rates, so its own initial accelerations lack what the second derivatives add. The
-    trapezoidal rule keeps such an error for ever, with either sign in turn, and loads and drives have it.
+    Exudyn knows offsets and their rates, so its own initial accelerations lack the second derivatives. With the
+    trapezoidal rule this error persists with alternating sign, in loads and drives too.
     """
     return any(profile(0.0).acceleration for _, profile in assembly.prescribed)
 
 
 def _tell_accelerations(assembly: Assembly | PlanarBeam) -> None:
-    """Give Exudyn the accelerations at t = 0."""
+    """Set Exudyn's accelerations at t = 0."""
     found = initial_state(assembly).a
     assert found is not None
     assembly.shop.mbs.systemData.SetODE2Coordinates_tt(found[0], assembly.shop.exu.ConfigurationType.Initial)
@@ -114,7 +114,7 @@ def _settings(assembly: Assembly | PlanarBeam):
 def steps_between_samples(times: Real, step: float) -> int:
     """Number of steps between two samples: the power of two that makes them at most `step`.
 
-    Powers of two keep the ratio of the real steps of two efforts at what their values say. ValueError where the samples
+    With powers of two the actual steps of two efforts have the ratio of their values. ValueError if the samples
     are not uniform.
     """
     gaps = np.diff(times)
@@ -159,7 +159,7 @@ def _fixed_steps(
 
 
 def _run(assembly: Assembly | PlanarBeam, settings, update: bool = False) -> bool:
-    """Run Exudyn's solver; False where it gives up, be it by its return value or by an exception."""
+    """Run Exudyn's solver; False if it fails, by its return value or by an exception."""
     exu = assembly.shop.exu
     try:
         return assembly.shop.mbs.SolveDynamic(
@@ -200,7 +200,7 @@ def _explicit(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> t
 
 
 def _good_samples(assembly: Assembly | PlanarBeam, states: States, times: Real) -> int:
-    """How many samples to keep: in time, finite, and with deflections that still mean something."""
+    """The number of samples to keep: at the requested times, finite, and with valid deflections."""
     count = min(len(states.times), len(times))
     good = np.abs(states.times[:count] - times[:count]) < 1e-6 * times[-1]
     good &= np.all(np.isfinite(states.q[:count]), axis=1) & np.all(np.isfinite(states.v[:count]), axis=1)

@@ -1,9 +1,9 @@
-"""Connectors in Exudyn: its own springs where it has them, with the scene's laws as user functions; else as forces.
+"""Connectors in Exudyn: its own springs with the scene's laws as user functions where possible, else forces.
 
-Exudyn's bushing (`RigidBodySpringDamper`) is not the scene's, whatever its user function returns: it acts with equal
-and opposite forces at two points and leaves out their moment; its intrinsic formulation acts midway, and keeps the
-moment to a thousandth only. And its markers on bending sections are not workless. Bushings, and lines from nodes that
-deform, are therefore generalised forces on the coordinates of what they join.
+Exudyn's bushing (`RigidBodySpringDamper`) differs from the scene's: it acts with equal
+and opposite forces at two points and omits their moment; its intrinsic formulation acts midway and conserves the
+moment only to 1e-3. Its markers on bending sections are not workless. Bushings, and lines from nodes that
+deform, are therefore generalised forces on the coordinates of the joined bodies.
 """
 
 from __future__ import annotations
@@ -34,7 +34,6 @@ class ConnectorEnd:
 
 
 def between(shop: Workshop, connector: BetweenNodes, ends: Sequence[ConnectorEnd]) -> None:
-    """A connector between its frames A and B."""
     if isinstance(connector, SpringDamper) and not any(end.shape.deforms for end in ends):
         _line(shop, connector, ends)
     else:
@@ -89,7 +88,8 @@ def _force(shop: Workshop, connector: BetweenNodes, ends: Sequence[ConnectorEnd]
 
 
 class _Held:
-    """What holds an end of a connector: its motion by the coordinates of its nodes, and what a wrench does to these.
+    """The carrier of a connector's end: its motion from the coordinates of its nodes, and generalised forces of a
+    wrench.
 
     `nodes`: number and count of coordinates of the frame's node, and of the node of modal coordinates where it bends.
     """

@@ -20,7 +20,7 @@ NOT_WORKLESS = (
 
 
 def supports(scene: Scene) -> Support:
-    """"no" with the first reason there is, else "surrogate" with the reasons, else "exact"."""
+    """"no" with the first reason, else "surrogate" with all reasons, else "exact"."""
     for reason in _refusals(scene):
         return Support("no", reason)
     weak = tuple(dict.fromkeys(_approximations(scene)))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import mujoco
 
-from crosscheck.engines.connections import WORLD, Along, Exerted, Moving, along_hinges, connections
+from crosscheck.engines.connections import WORLD, Along, Exerted, Moving
 from crosscheck.engines.conventions import cross
-from crosscheck.engines.links import Attachment, Scalar
+from crosscheck.engines.links import Attachment
 from crosscheck.engines.mujoco.tree import MujocoTree
+from crosscheck.engines.rigid_tree import TreeConnectors
 from flexmb.scene.schema import Scene
 
 
@@ -16,43 +17,29 @@ class MujocoConnections:
 
     def __init__(self, tree: MujocoTree, scene: Scene) -> None:
         self._tree = tree
-        self._between = connections(scene, tree.links)
-        self._along = []
-        for name, item, number, load in along_hinges(scene):
-            slots = [slot for slot in tree.slots if slot.link.joint == item and isinstance(slot.freedom, Scalar)]
-            self._along.append((name, slots[number], load))
+        self._connectors = TreeConnectors(scene, tree.links, tree.slots)
 
     def __bool__(self) -> bool:
-        return bool(self._between or self._along)
+        return bool(self._connectors)
 
     def exerted(self, t: float, data: mujoco.MjData) -> dict[str, Exerted]:
         """What connectors between nodes do, by name."""
-        return {
-            each.name: each.exerted(t, self._frame(each.a, data), self._frame(each.b, data)) for each in self._between
-        }
+        return self._connectors.exerted(t, lambda at: self._frame(at, data))
 
     def along(self, t: float, data: mujoco.MjData) -> dict[str, tuple[int, Along]]:
         """By name the speed that a connector along a hinge acts on, and what it does."""
-        return {
-            name: (slot.v, load(t, float(data.qpos[slot.q]), float(data.qvel[slot.v])))
-            for name, slot, load in self._along
-        }
+        return self._connectors.along(t, data.qpos, data.qvel)
 
     def add(self, t: float, data: mujoco.MjData) -> None:
-        """Add all loads to those that are applied."""
-        found = self.exerted(t, data)
-        for each in self._between:
-            for at, load in ((each.a, found[each.name].on_a), (each.b, found[each.name].on_b)):
-                if at.link >= 0:
-                    body = self._tree.bodies[at.link]
-                    arm = self._frame(at, data).position - data.xipos[body]
-                    data.xfrc_applied[body, :3] += load[3:]
-                    data.xfrc_applied[body, 3:] += load[:3] + cross(arm, load[3:])
+        for at, load in self._connectors.loads(self.exerted(t, data)):
+            body = self._tree.bodies[at.link]
+            arm = self._frame(at, data).position - data.xipos[body]
+            data.xfrc_applied[body, :3] += load[3:]
+            data.xfrc_applied[body, 3:] += load[:3] + cross(arm, load[3:])
         for speed, held in self.along(t, data).values():
             data.qfrc_applied[speed] += held.load
 
     def energy(self, t: float, data: mujoco.MjData) -> float:
-        """Stored in all of them."""
         stored = sum(each.energy for each in self.exerted(t, data).values())
         return stored + sum(held.energy for _, held in self.along(t, data).values())
 

@@ -14,6 +14,7 @@ from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Attachment, Ball, Floating, Scalar, attachment
 from crosscheck.engines.mujoco.connections import MujocoConnections
 from crosscheck.engines.mujoco.tree import ARMATURE, MujocoSlot, MujocoTree
+from crosscheck.engines.rigid_tree import PointLoad
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -27,11 +28,11 @@ class Forces:
 
     def __init__(self, tree: MujocoTree, scene: Scene) -> None:
         scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
-        self.driven: list[MujocoSlot] = [slot for slot in scalars if slot.freedom.prescribed is not None]
+        self.driven: list[MujocoSlot] = [slot for slot in tree.slots if slot.driven]
         self._tree = tree
         self._motions = [(slot.q, slot.v, profile(slot.freedom.prescribed)) for slot in self.driven]
         self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
-        self._pushed: tuple[float, list[tuple[int, float]]] = np.nan, []  # what `_pushes` has found last, and when
+        self._pushed: tuple[float, list[tuple[int, float]]] = np.nan, []  # the last result of `_pushes`, with its time
         self._loads = [_BodyWrench(tree, attachment(scene, tree.links, load), load) for load in scene.loads]
         self.connections = MujocoConnections(tree, scene)
         self._connected = bool(self.connections)
@@ -49,7 +50,7 @@ class Forces:
             mujoco.set_mjcb_control(None)
 
     def follow(self, t: float, data: mujoco.MjData) -> None:
-        """Put the prescribed coordinates where their functions say."""
+        """Set the prescribed coordinates to their functions of time."""
         for q, v, motion in self._motions:
             data.qpos[q], data.qvel[v], _ = motion(t)
 
@@ -82,7 +83,10 @@ class Forces:
             self.connections.add(t, data)
 
     def _pushes(self, t: float) -> list[tuple[int, float]]:
-        """Speeds with what their motors give or what makes them follow; stages of a step share their times."""
+        """Indices of speeds with their motor loads or the loads of their prescribed motion.
+
+        The last result is kept, since stages of a step share their times.
+        """
         if t != self._pushed[0]:
             efforts = [(index, motor(t).value) for index, motor in self._motors]
             following = [(v, ARMATURE * motion(t).acceleration) for _, v, motion in self._motions]
@@ -95,17 +99,13 @@ class _BodyWrench:
 
     def __init__(self, tree: MujocoTree, at: Attachment, load: Load) -> None:
         self._body = int(tree.bodies[at.link])
-        self._arm = at.frame.position - tree.links[at.link].inertia.com
-        self._in_world = load.frame == "world"
-        direction = np.array(load.direction, dtype=float)
-        self._direction = direction if self._in_world else at.frame.rotation @ direction
-        self._is_force = load.type == "force"
-        self._size = profile(load.function)
+        self._load = PointLoad(load, at.frame)
+        self._arm = self._load.point - tree.links[at.link].inertia.com
 
     def add(self, t: float, data: mujoco.MjData) -> None:
         R = data.xmat[self._body].reshape(3, 3)
-        vector = self._size(t).value * (self._direction if self._in_world else R @ self._direction)
-        if self._is_force:
+        vector = self._load.in_world(t, R)
+        if self._load.is_force:
             data.xfrc_applied[self._body, :3] += vector
             data.xfrc_applied[self._body, 3:] += cross(R @ self._arm, vector)
         else:

@@ -11,7 +11,7 @@ from math import ceil
 import mujoco
 import numpy as np
 
-from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
+from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
 from crosscheck.engines.links import closed_frames, links
 from crosscheck.engines.mujoco.forces import Forces
@@ -61,11 +61,7 @@ class MujocoModel:
             for t, (qpos, qvel) in zip(run.times, states, strict=False):
                 data.time, data.qpos[:], data.qvel[:] = t, qpos, qvel
                 samples.append(self._observer.observe(data))
-        status: Status = "finished" if len(states) == len(run.times) else "diverged"
-        reached = run.times[: len(states)]
-        return stack(
-            reached, samples, status=status, message=message, wall_s=wall, evaluations=stages * steps
-        )
+        return stack(run.times, samples, message=message, wall_s=wall, evaluations=stages * steps)
 
     def _initial(self) -> mujoco.MjData:
         data = mujoco.MjData(self._tree.model)
@@ -75,8 +71,8 @@ class MujocoModel:
     def _integrate(self, times: Real, longest: float) -> tuple[list[tuple[Real, Real]], int, str]:
         """(qpos, qvel) at the sample times reached, steps made, and why it stopped early.
 
-        Samples and breaks of the functions of time cut the run into stretches of whole equal steps <= `longest`. At the
-        start of each, prescribed coordinates are put on their functions, so that their round-off cannot pile up.
+        Sample times and breaks of the functions of time divide the run into intervals of equal steps <= `longest`. At
+        the start of each, prescribed coordinates are set to their functions, so that round-off does not accumulate.
         """
         model, data = self._tree.model, self._initial()
         wanted = set(times.tolist())
@@ -85,7 +81,7 @@ class MujocoModel:
         total = 0
         with self._forces.active():
             for begin, end in pairwise(ends):
-                # A ratio that is whole but for round-off must not cost one more step.
+                # Round-off in a whole ratio must not cost another step.
                 steps = max(1, ceil((end - begin) / longest * (1.0 - 1e-9)))
                 model.opt.timestep = (end - begin) / steps
                 data.time = begin
@@ -115,7 +111,7 @@ def _last_warning(data: mujoco.MjData) -> str:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Divergence is a status here: keep MuJoCo from writing its log file into the working directory."""
+    """Keep MuJoCo from writing a log file into the working directory; divergence is reported as a status."""
     mujoco.set_mju_user_warning(lambda message: None)
     try:
         yield

@@ -11,6 +11,7 @@ from crosscheck.engines.conventions import cross, quaternion_of, shift_wrench
 from crosscheck.engines.links import Attachment, attachment, by_motion
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.tree import MujocoClosure, MujocoTree
+from crosscheck.engines.rigid_tree import by_joint, of_kind
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -43,8 +44,8 @@ class MujocoObserver:
         mass, connections = model.body_mass, self._forces.connections
         return Snapshot(
             markers={name: self._marker(at, data) for name, at in self._markers.items()},
-            loads={name: load for (kind, name), load in loads.items() if kind == "body"} | self._closed(data),
-            wheel_loads={name: load for (kind, name), load in loads.items() if kind == "wheel"},
+            loads=of_kind("body", loads) | self._closed(data),
+            wheel_loads=of_kind("wheel", loads),
             drives=self._drives(data, loads),
             energy={
                 "kinetic": kinetic,
@@ -108,7 +109,7 @@ class MujocoObserver:
 
     def _drives(self, data: mujoco.MjData, loads: dict[tuple[str, str], Real]) -> dict[str, Real]:
         """Load across the joint along the prescribed axis, less what spring and damper already give."""
-        named: dict[str, list[float]] = {}
+        found = []
         for slot in self._forces.driven:
             load = loads[slot.link.kind, slot.link.joint]
             about_axis = shift_wrench(load, data.xpos[slot.body] - data.xanchor[slot.joint])
@@ -117,5 +118,5 @@ class MujocoObserver:
             passive = freedom.stiffness * (freedom.rest - data.qpos[slot.q]) - freedom.damping * data.qvel[slot.v]
             along = self._forces.connections.along(data.time, data).values()
             passive += sum(held.load for v, held in along if v == slot.v)
-            named.setdefault(slot.link.joint, []).append(float(half @ data.xaxis[slot.joint] - passive))
-        return {name: np.array(values) for name, values in named.items()}
+            found.append(half @ data.xaxis[slot.joint] - passive)
+        return by_joint(self._forces.driven, found)

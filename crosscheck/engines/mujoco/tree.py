@@ -3,10 +3,10 @@
 Conventions of MuJoCo: quaternions wxyz; a ball's velocity in outboard axes; slides before the ball of a floating link
 are in inboard axes (three slides and a ball serve on any parent, MuJoCo's free joint only on the ground).
 
-Two artifices. (1) A prescribed coordinate has an armature so large that nothing but the applied ARMATURE * acceleration
-moves it; its load is that of the inverse dynamics, where armature has no part. The error of its acceleration is the
-load / ARMATURE. (2) MuJoCo refuses principal moments of inertia below 1e-15 kg m^2: smaller ones (point masses, rods)
-are raised to `LEAST_INERTIA`, an error of that much against the carrier's moment of inertia.
+Two workarounds. (1) A prescribed coordinate has an armature so large that only the applied ARMATURE * acceleration
+moves it; its load is that of the inverse dynamics, which does not contain the armature. The error of its acceleration
+is the load / ARMATURE. (2) MuJoCo refuses principal moments of inertia below 1e-15 kg m^2: smaller ones (point masses,
+rods) are raised to `LEAST_INERTIA`.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import quaternion_of, rotation_matrix
-from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, by_motion
+from crosscheck.engines.rigid_tree import Slot, scalar_start
 from flexmb.typing import Real
 
 ARMATURE = 1e20
@@ -37,15 +37,11 @@ class MujocoClosure:
 
 
 @dataclass(frozen=True)
-class MujocoSlot:
-    """A freedom and where its coordinates `q` and speeds `v` start; `joint` is the id of its first MuJoCo joint."""
+class MujocoSlot(Slot):
+    """A freedom with the ids of its MuJoCo body and of the first of its MuJoCo joints."""
 
-    freedom: Freedom
-    link: Link
     body: int
     joint: int
-    q: int
-    v: int
 
 
 @dataclass(frozen=True)
@@ -91,10 +87,8 @@ def initial_state(tree: MujocoTree) -> tuple[Real, Real]:
     q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
     for slot in tree.slots:
         match slot.freedom:
-            case Scalar(prescribed=None) as freedom:
-                q[slot.q], v[slot.v] = freedom.value, freedom.rate
             case Scalar() as freedom:
-                q[slot.q], v[slot.v], _ = profile(freedom.prescribed)(0.0)
+                q[slot.q], v[slot.v] = scalar_start(freedom)
             case Ball() as freedom:
                 q[slot.q : slot.q + 4] = freedom.quaternion
                 v[slot.v : slot.v + 3] = freedom.angular_velocity
@@ -149,7 +143,7 @@ def _slots(model: mujoco.MjModel, links: tuple[Link, ...], bodies: NDArray[np.in
         joint = int(model.body_jntadr[body])
         for freedom in link.freedoms:
             q, v = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
-            slots.append(MujocoSlot(freedom, link, int(body), joint, q, v))
+            slots.append(MujocoSlot(freedom, link, q, v, int(body), joint))
             joint += _joints_of(freedom)
     return tuple(slots)
 

@@ -1,8 +1,8 @@
 """Forward and hybrid dynamics of a Pinocchio tree as an ordinary differential equation.
 
 State y = [free coordinates, free speeds, work]. Quaternions are integrated as four numbers: qdot is linear in q, so the
-norm is an invariant of the exact flow, and everything else uses the normalised q. Driven coordinates (prescribed, or
-held for a weld) follow their functions of time.
+norm is an invariant of the exact flow, and everything else uses the normalised q. Driven coordinates (prescribed ones,
+and the fixed ones that stand for welds) follow their functions of time.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Dynamics:
         self.loads = PlacedLoads(tree, scene)
         self.closures = PinocchioClosures(tree, scene)
         self.connections = PinocchioConnections(tree, scene)
-        self.driven: list[PinocchioSlot] = [slot for slot in tree.slots if _is_driven(slot)]
+        self.driven: list[PinocchioSlot] = [slot for slot in tree.slots if slot.driven]
         self._motions = [profile(slot.freedom.prescribed) for slot in self.driven]
         driven_q, driven_v = [slot.q for slot in self.driven], [slot.v for slot in self.driven]
         free_q = np.setdiff1d(np.arange(tree.model.nq), driven_q)
@@ -178,10 +178,6 @@ class Dynamics:
         wrenches = self.loads.wrenches(t, self.data)
         self.connections.add(t, self.data, wrenches)
         return wrenches
-
-
-def _is_driven(slot: PinocchioSlot) -> bool:
-    return isinstance(slot.freedom, Scalar) and slot.freedom.prescribed is not None
 
 
 def _quaternion_start(slot: PinocchioSlot) -> int:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from crosscheck.engines.connections import KNOWN
-from crosscheck.engines.contract import Effort, EngineMissing, Support
+from crosscheck.engines.contract import Effort, EngineMissing, Model
 from crosscheck.engines.links import Scalar, links, obstacle
+from crosscheck.engines.peer import PeerEngine
+from crosscheck.engines.scipy_loop import RTOL_LADDER
 from flexmb.scene.schema import Scene
-
-if TYPE_CHECKING:
-    from crosscheck.engines.pinocchio.model import PinocchioModel
 
 MOST_JOINTS = 500
 WHY_NOT_MORE = "Pinocchio's data hold arrays of n x n x n numbers for n speeds, and more than 20 GB for 1000"
 
 
-class PinocchioEngine:
+class PinocchioEngine(PeerEngine):
     """Rigid trees, exact: articulated-body accelerations, hybrid dynamics where coordinates are prescribed."""
 
     name = "pinocchio"
@@ -24,9 +21,9 @@ class PinocchioEngine:
     summary = "rigid trees in minimal coordinates"
     algorithm = "articulated bodies, O(N)"
     settings = (
-        "Its articulated-body algorithm, or its proximal constrained dynamics where loops are closed, compiled and "
-        "called from Python. It has no integrator: SciPy's DOP853 steps it, in Python, so that much of its time on "
-        "small scenes is not its own. It has no contacts here. Outputs are observed after the timed solve."
+        "Its articulated-body algorithm, or its proximal constrained dynamics for closed loops, compiled and called "
+        "from Python. It has no integrator: SciPy's DOP853 steps it, in Python, so that on small scenes much of the "
+        "time is Python's. No contacts. Outputs are computed after the timed solve."
     )
 
     def version(self) -> str:
@@ -36,24 +33,19 @@ class PinocchioEngine:
             raise EngineMissing("Pinocchio is not installed: pip install flexmb[peers]") from error
         return pinocchio.__version__
 
-    def supports(self, scene: Scene) -> Support:
+    def obstacle(self, scene: Scene) -> str:
         if len(scene.hinges) > MOST_JOINTS:
-            return Support("no", f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}")
+            return f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
         reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), KNOWN, screws=True)
-        reason = reason or (scene.closures and _beside_closures(scene))
-        return Support("no", reason) if reason else Support("exact")
+        return reason or (_beside_closures(scene) if scene.closures else "")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-8, 1e-10, 1e-12))
+        return RTOL_LADDER
 
-    def compile(self, scene: Scene) -> PinocchioModel:
-        self.version()
-        from crosscheck.engines.pinocchio.model import PinocchioModel
+    def model(self, scene: Scene) -> Model:
+        from crosscheck.engines.pinocchio.model import compiled
 
-        support = self.supports(scene)
-        if support.kind == "no":
-            raise ValueError(f'scene "{scene.name}": {support.reason}')
-        return PinocchioModel(scene)
+        return compiled(scene)
 
 
 def _beside_closures(scene: Scene) -> str:

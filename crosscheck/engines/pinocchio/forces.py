@@ -9,6 +9,7 @@ from crosscheck.engines.conventions import rotation_vector, scalar_first
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Scalar, attachment
 from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, Places, places
+from crosscheck.engines.rigid_tree import PointLoad
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -83,18 +84,13 @@ class _JointWrench:
     def __init__(self, tree: PinocchioTree, scene: Scene, load: Load) -> None:
         at = attachment(scene, tree.links, load)
         self.joint = tree.joints[at.link]
-        self._point = at.frame.position
-        self._in_world = load.frame == "world"
-        direction = np.array(load.direction, dtype=float)
-        self._direction = direction if self._in_world else at.frame.rotation @ direction
-        self._is_force = load.type == "force"
-        self._size = profile(load.function)
+        self._load = PointLoad(load, at.frame)
 
     def wrench(self, t: float, data: pin.Data) -> pin.Force:
         R = data.oMi[self.joint].rotation
-        vector = self._size(t).value * (R.T @ self._direction if self._in_world else self._direction)
-        if self._is_force:
-            return pin.Force(vector, np.cross(self._point, vector))
+        vector = self._load.in_body(t, R)
+        if self._load.is_force:
+            return pin.Force(vector, np.cross(self._load.point, vector))
         return pin.Force(np.zeros(3), vector)
 
 

@@ -10,6 +10,7 @@ from crosscheck.engines.conventions import angular_first, cross, quaternion_of, 
 from crosscheck.engines.links import attachment
 from crosscheck.engines.pinocchio.dynamics import Dynamics, PinocchioState
 from crosscheck.engines.pinocchio.tree import placement
+from crosscheck.engines.rigid_tree import by_joint, of_kind
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -47,8 +48,8 @@ class PinocchioObserver:
         linear, about_com, com = data.hg.linear, data.hg.angular, data.com[0]
         return Snapshot(
             markers=markers,
-            loads={name: load for (kind, name), load in wrench.items() if kind == "body"} | closed,
-            wheel_loads={name: load for (kind, name), load in wrench.items() if kind == "wheel"},
+            loads=of_kind("body", wrench) | closed,
+            wheel_loads=of_kind("wheel", wrench),
             drives=self._drives(drive),
             energy={
                 "kinetic": pin.computeKineticEnergy(model, data, state.q, state.v),
@@ -74,8 +75,5 @@ class PinocchioObserver:
 
     def _drives(self, drive: Real) -> dict[str, Real]:
         """Loads of the prescribed coordinates by joint name; what holds a weld is no drive."""
-        named: dict[str, list[float]] = {}
-        for slot, load in zip(self._dynamics.driven, drive, strict=True):
-            if not slot.held:
-                named.setdefault(slot.link.joint, []).append(float(load))
-        return {name: np.array(loads) for name, loads in named.items()}
+        own = [(slot, load) for slot, load in zip(self._dynamics.driven, drive, strict=True) if not slot.held]
+        return by_joint([slot for slot, _ in own], [load for _, load in own])

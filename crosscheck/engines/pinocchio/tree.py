@@ -14,8 +14,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.engines.conventions import Frame, scalar_last
-from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
+from crosscheck.engines.rigid_tree import Slot, scalar_start
 from flexmb.scene.functions import Constant
 from flexmb.typing import Real
 
@@ -26,13 +26,9 @@ Places = slice | NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class PinocchioSlot:
-    """A freedom and where its coordinates `q` and speeds `v` start; `held`: it stands for a weld."""
+class PinocchioSlot(Slot):
+    """A freedom; if it is `held` it stands for a weld."""
 
-    freedom: Freedom
-    link: Link
-    q: int
-    v: int
     held: bool
 
 
@@ -47,7 +43,7 @@ class PinocchioTree:
 
 
 def places(numbers: ArrayLike) -> Places:
-    """Entries of an array by their numbers; as a slice, which costs a third, where they follow one another."""
+    """Indices of entries of an array; consecutive ones as a slice, which takes a third of the time."""
     found = np.asarray(numbers, dtype=np.intp)
     if len(found) == 0:
         return slice(0, 0)
@@ -59,7 +55,7 @@ def placement(frame: Frame) -> pin.SE3:
 
 
 def build_tree(links: tuple[Link, ...], gravity: Real) -> PinocchioTree:
-    """Links come depth-first, as Pinocchio needs them: `crba` is silently wrong otherwise, hence the check."""
+    """The model; links are ordered depth-first, since Pinocchio's `crba` is silently wrong in another order."""
     model = pin.Model()
     model.gravity.linear = gravity
     joints: list[int] = []
@@ -85,10 +81,8 @@ def initial_state(tree: PinocchioTree) -> tuple[Real, Real]:
     q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
     for slot in tree.slots:
         match slot.freedom:
-            case Scalar(prescribed=None) as freedom:
-                q[slot.q], v[slot.v] = freedom.value, freedom.rate
             case Scalar() as freedom:
-                q[slot.q], v[slot.v], _ = profile(freedom.prescribed)(0.0)
+                q[slot.q], v[slot.v] = scalar_start(freedom)
             case Ball() as freedom:
                 q[slot.q : slot.q + 4] = scalar_last(freedom.quaternion)
                 v[slot.v : slot.v + 3] = freedom.angular_velocity

@@ -8,7 +8,7 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
-from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, digit_kinds, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, digit_kinds
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
@@ -19,7 +19,7 @@ from flexmb.typing import Real
 
 CRANK, COUPLER, ROCKER, GROUND = 0.3, 0.8, 0.7, 1.0  # m
 SIZE = GROUND
-RATE = 3.8269366540605176  # rad/s of the crank at the start: that of the motion of which the pictures are
+RATE = 3.8269366540605176  # initial rate (rad/s) of the crank in the motion of the published pictures
 SAMPLES = 33
 LEAST = 1e-17
 REAL_RK4 = 2.785293563405282  # |R(z)| = 1 at z = -2.785 on the real axis
@@ -83,7 +83,7 @@ STEPS = 512
 def measure_stability(scene: Scene, step: float, rate: float) -> Measurement:
     """The largest opening in the second half of `STEPS` steps, at each of them.
 
-    An unstable loop swings about, and at a few instants alone it may be closed by chance.
+    The opening of an unstable loop oscillates and may be small at single instants.
     """
     return gap(step, STEPS * step, rate, STEPS + 1)
 
@@ -102,7 +102,6 @@ STABILISATION = StabilityMap(
     x=Axis("step", "s", 1e-4, 2e-3, 6, log=True),
     y=Axis("rate of stabilisation", "1/s", 5e2, 5e4, 8, log=True),
     thresholds=(-3.0,),
-    kinds=growth_kinds(),
     overlay=Overlay(
         "step x rate = 2.785",
         "Baumgarte 1972; real stability interval of RK4: Hairer, Wanner II, IV.2",
@@ -132,7 +131,7 @@ def measure_drift(scene: Scene, step: float, kept: float) -> Measurement:
         case "stabilised 20/s":
             return gap(step, SPAN, SLOW_RATE)
     mujoco = engine("mujoco")
-    mujoco.version()  # says how to install it where it is missing
+    mujoco.version()  # raises EngineMissing
     found = mujoco.compile(scene).simulate(Run(np.linspace(0.0, SPAN, SAMPLES)), Effort("step", step, "RK4"))
     if found.status != "finished":
         return Measurement(status="failed", message=found.message)
@@ -147,7 +146,7 @@ def anchored() -> float:
 
 @cache
 def pulled_apart() -> float:
-    """Largest acceleration (m/s^2) in a run at which the joined points would part if nothing joined them."""
+    """Largest relative acceleration (m/s^2) in a run that the joined points would have without the closure."""
     mechanism, tree = system(), System(system().scene)
     done = simulate(mechanism, SPAN, samples=SAMPLES, rtol=1e-8, atol=1e-10)
     largest = 0.0

@@ -1,4 +1,4 @@
-"""Distance from gimbal lock: digits of the accelerations that gimbals and quaternions keep."""
+"""Distance from gimbal lock: accurate digits of accelerations with gimbals and quaternions."""
 
 from __future__ import annotations
 

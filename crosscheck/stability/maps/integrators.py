@@ -10,7 +10,7 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
-from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap
 from flexmb.integrate.integrator import Method as MethodName
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
@@ -18,7 +18,7 @@ from flexmb.scene.schema import InertiaPoint, ModalNode, Scene
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
-STEPS, PARTS = 4096, 64  # of a run: 1000 periods and more where step x frequency is 1.54 and more
+STEPS, PARTS = 4096, 64  # of a run: at least 1000 periods if step x frequency is at least 1.54
 GROWTH = 2e-5  # of the amplitude's logarithm in a step; beats of a bounded motion stay below a hundredth of it
 SLOW = 1.0  # rad/s
 START = 1e-3  # m
@@ -51,7 +51,7 @@ class Stepper:
             path, finished = done.markers["fast"], done.finished
             return path.position[:, 0], path.velocity[:, 3], "" if finished else why
         other = engine(self.engine)
-        other.version()  # says how to install it where it is missing
+        other.version()  # raises EngineMissing
         found = other.compile(scene).simulate(Run(times), Effort("step", step, self.name))
         path = found.markers["fast"]
         return path.position[:, 0], path.velocity[:, 3], "" if found.status == "finished" else found.message
@@ -121,7 +121,6 @@ def step_map(method: Stepper) -> StabilityMap:
         x=Axis("step", "s", 1e-3, 1e-1, 8, log=True),
         y=Axis("highest modal frequency", "rad/s", 10.0, 1000.0, 8, log=True),
         thresholds=(GROWTH,),
-        kinds=growth_kinds(),
         overlay=Overlay(limit, method.source, excess),
         shows=f"Steps with which {method.name} of {method.engine} keeps an undamped mode bounded.",
         depth=3 if method.limit not in (NEVER, UNLIMITED) else 1,
@@ -149,7 +148,7 @@ METHODS = (
 )
 
 
-# ---- Methods that choose their steps: the tolerance takes the place of the step
+# ---- Methods with error control: the tolerance replaces the step
 
 PERIODS = 1000
 BOUNDED = 2.0  # times the start
@@ -182,7 +181,6 @@ def tolerance_map(name: MethodName, source: str) -> StabilityMap:
         x=Axis("relative tolerance", "", 1e-7, 1e-3, 4, log=True),
         y=Axis("highest modal frequency", "rad/s", 10.0, 1000.0, 4, log=True),
         thresholds=(BOUNDED,),
-        kinds=growth_kinds(),
         overlay=Overlay("every tolerance is stable", source, lambda tolerance, frequency: -np.ones_like(tolerance)),
         shows=f"{name} with error control keeps an undamped mode bounded, however loose the tolerance.",
         depth=1,

@@ -27,7 +27,7 @@ def scene(bodies: float, algorithm: float) -> Scene:
     """A chain of equal bodies on hinges about two axes in turn, moving under gravity."""
     builder = SceneBuilder("chain", gravity=(0.0, 0.0, -9.81))
     if bodies > MOST[ALGORITHMS[round(algorithm)]]:
-        bodies = 1.0  # no run needs it
+        bodies = 1.0  # `measure` does not use the scene then
     rng = np.random.default_rng(3)
     for k in range(count(bodies)):
         builder.rigid_body(f"b{k}", mass=1.0, com=(0.5, 0.02, 0.01), inertia=(0.01, 0.09, 0.09))

@@ -1,4 +1,4 @@
-"""Mass ratio across a hinge, and an outer body with nearly no inertia of its own: digits each algorithm keeps."""
+"""Mass ratio across a hinge, and an outer body with nearly no inertia of its own: accurate digits of each algorithm."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Flexible or rigid on a spring? An appendage with modes against a rigid body on a spring hinge, by (149)-(151)."""
+"""Comparison of an appendage with modes and a rigid body on a spring hinge, by the relations (149)-(151)."""

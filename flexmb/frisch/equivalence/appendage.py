@@ -1,4 +1,4 @@
-"""An elastic appendage at a limb end: modal data of a body that is clamped to its inboard body, taken from a scene."""
+"""An elastic appendage: modal data of a body of a scene that is clamped to its inboard body and carries nothing."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Appendage:
 
     @cached_property
     def moving(self) -> ModeParameters:
-        """Parameters of the points that some mode moves or turns; points in the clamp belong to the base."""
+        """Parameters of the points that some mode moves or turns; points at the clamp move with the base."""
         model = self.model
         size = np.sqrt(np.sum(model.position**2, axis=1).max())
         shapes = np.maximum(np.abs(model.translation), size * np.abs(model.rotation)).max(axis=(1, 2))
@@ -72,8 +72,10 @@ def inertia_about_origin(p: ModeParameters) -> Real:
 
 
 def appendage(model: FlexibleModel, name: str = "appendage") -> Appendage:
-    """The appendage of a flexible model. Raises ValueError, naming it `name`, where the paper's comparison makes no
-    sense: no modes, modes that are not clamped at the origin, or modes without stiffness.
+    """The appendage of a flexible model.
+
+    Raises ValueError, which calls it `name`, if the comparison is not defined: without modes, with modes that are not
+    clamped at the origin, or with modes without stiffness.
     """
     if model.mode_count == 0:
         raise ValueError(f"{name}: a rigid body has no modes to compare with a hinge; choose a flexible body")
@@ -87,7 +89,7 @@ def appendage(model: FlexibleModel, name: str = "appendage") -> Appendage:
     if np.any(squares <= 0.0):
         n = int(np.argmin(squares))
         raise ValueError(f"{name}: mode {n + 1} has no stiffness; a mode of a clamped body needs a frequency")
-    # Frequencies equal to nine digits keep their order: a degenerate pair is no reason to change it.
+    # Frequencies that agree to nine digits keep their order, so that rounding does not exchange a degenerate pair.
     order = np.argsort([float(f"{square:.8e}") for square in squares], kind="stable")
     own = with_modes(own, order)
     return Appendage(name, own, mode_parameters(own), np.sqrt(squares[order]))
@@ -112,10 +114,10 @@ def with_modes(model: FlexibleModel, chosen: NDArray[np.intp]) -> FlexibleModel:
 def appendage_of(scene: Scene, body: str, modes: int | None = None) -> Appendage:
     """The body of that name as an appendage of its inboard body.
 
-    `modes`: how many modes to look at. A beam gets them from its finite elements, whatever the scene says; a modal body
-    has only those it was given. Default: all of a modal body; of a beam the lower half of the finite elements' modes,
-    which are accurate, up to `DEFAULT_MODES`. Raises ValueError, saying why, where the body does not exist, is not
-    flexible, not clamped, or not at a limb end.
+    `modes` is the number of modes to use. Those of a beam are computed from its finite elements, whatever number the
+    scene gives; a modal body has only the modes it was given. Default: all modes of a modal body; of a beam the lower
+    half of the modes of its finite elements, which is accurate, up to `DEFAULT_MODES`. Raises ValueError if the body
+    does not exist, is not flexible or not clamped, or if anything is attached to it.
     """
     found = next((candidate for candidate in scene.bodies if candidate.name == body), None)
     if found is None:
@@ -163,12 +165,12 @@ def _check_limb_end(scene: Scene, body: str) -> None:
     attached += [f'connector "{each.name}"' for each in ends if body in (each.body_a, each.body_b)]
     if attached:
         raise ValueError(
-            f'body "{body}" is not at a limb end ({", ".join(attached)}): a hinge cannot stand for its modes, since '
-            "what they do to the attached frames is lost"
+            f'body "{body}" carries {", ".join(attached)}: a hinge cannot replace its modes, because it does not '
+            "move the attached frames as the modes do"
         )
     for hinge in scene.hinges:
         if hinge.child == body and hinge.child_node not in ("origin", "root"):
             raise ValueError(
-                f'body "{body}" is clamped at its origin but hung up at node "{hinge.child_node}" by hinge '
-                f'"{hinge.name}"; the comparison needs the clamp at the hinge'
+                f'body "{body}" is clamped at its origin, but hinge "{hinge.name}" is at its node '
+                f'"{hinge.child_node}"; the comparison needs the clamp at the hinge'
             )

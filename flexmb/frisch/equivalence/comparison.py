@@ -1,8 +1,8 @@
 """Which model of an appendage is better for which question, with the numbers of the paper's "Interpretation of
 results".
 
-A spring-hinged rigid body has only one vibration for each axis, but moves exactly however far it turns. Modes bring one
-vibration each, but leave out everything of second order in the deflection.
+A rigid body on a spring hinge has only one vibration per axis, but its motion is exact at any angle. Modes have one
+vibration each, but omit all terms of second order in the deflection.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class Preference:
 class Equivalence:
     """An appendage with modes compared with a rigid body on a spring hinge.
 
-    `accuracy` that is asked for, as a fraction; `fits` by name: `AT_CLAMP`, `BEST` and, where a point was given,
-    `GIVEN`; `directions`: how the modes converge about and along the body axes and hinge axes; `verdicts` about the
-    given hinge, or else the best one.
+    `accuracy`: the requested accuracy, a fraction; `fits` by name: `AT_CLAMP`, `BEST` and, if a point was given,
+    `GIVEN`; `directions`: convergence of the modes about and along the body axes and the hinge axes; `verdicts` about
+    the given hinge, or the best one.
     """
 
     appendage: Appendage
@@ -74,7 +74,7 @@ def coupling_error(body: Appendage, fit: Fit) -> float:
     """Largest relative difference of effective mass and effective inertia between a hinge and its modes, along the
     modes.
 
-    Base and hinge exchange momentum as base and modes do if these agree: at resonance they are the pull on the base.
+    These determine the momentum that base and appendage exchange, and the reaction on the base at resonance.
     """
     hinge, modes = fit.effective_inertia, modal_effective_inertia(body, fit.modes)
     errors = []
@@ -117,20 +117,20 @@ def _verdicts(body: Appendage, accuracy: float, fit: Fit) -> tuple[Preference, .
         Preference(
             f"deflections beyond {angle:.2g} rad at the hinge",
             "rigid",
-            f"modes leave out terms of second order, 1 - cos = {percent(accuracy)} there; the hinge turns exactly",
+            f"modes omit terms of second order, 1 - cos = {percent(accuracy)} there; the rotation of a hinge is exact",
         ),
         Preference(
             f"base spinning faster than {np.sqrt(accuracy) * f[first]:.3g} Hz",
             "rigid",
-            f"modes without second-order shapes do not stiffen, an error of (spin / {f[first]:.4g} Hz)^2 in the "
-            "squared frequency; a rigid body that turns outward does",
+            f"modes without second-order shapes have no centrifugal stiffening, an error of (spin / {f[first]:.4g} "
+            "Hz)^2 in the squared frequency; a rigid body on a hinge has it",
         ),
     ]
     return tuple(verdicts)
 
 
 def _beyond(body: Appendage, fit: Fit) -> tuple[float, float]:
-    """Fractions of inertia about the hinge axes, and of mass along the modes' velocity, that other modes move."""
+    """Fractions of the inertia about the hinge axes, and of the mass along the modes' velocity, of all other modes."""
     modal, rigid = modal_effective_inertia(body, fit.modes), inertia_about_origin(body.moving)
     turning = [(q @ modal[:3, :3] @ q) / (q @ rigid[:3, :3] @ q) for q in fit.hinge.axes]
     velocity = [body.parameters.A[mode] for mode in fit.modes]

@@ -1,4 +1,4 @@
-"""One picture of an appendage against spring-hinged rigid models: shape, mismatches, and modes needed."""
+"""Picture of the comparison of an appendage with spring-hinged rigid models: shape, mismatches, number of modes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flexmb.typing import Real
 
 _SIZE = (12.0, 7.0)  # inches
 _RESOLUTION = 120  # dots per inch
-_FLOOR = 1e-6  # mismatches below are drawn here
+_FLOOR = 1e-6  # lower end of the logarithmic axis: smaller mismatches are drawn here
 _COLOURS = ("tab:orange", "tab:blue", "tab:green")
 
 
@@ -35,7 +35,7 @@ def write_equivalence_plot(result: Equivalence, path: Path) -> Path:
 
 
 def _shape(result: Equivalence, axes: Axes) -> None:
-    """Velocity of the points of the first axis's mode, and of the rigid models with their best rates."""
+    """Velocities of the points in the mode of the first axis, and in the rigid models at their best rates."""
     body = result.appendage
     model, mode = body.model, next(iter(result.fits.values())).modes[0]
     moved = model.translation[:, :, mode]
@@ -83,7 +83,7 @@ def _short(value: float) -> str:
 
 
 def _convergence(result: Equivalence, axes: Axes) -> None:
-    """What is missing with N modes, for the motions of the base that some mode takes part in."""
+    """The remainder with N modes, for those motions of the base that excite any mode."""
     count = result.appendage.mode_count
     for direction in result.directions:
         if direction.taking_part(count):

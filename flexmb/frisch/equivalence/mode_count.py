@@ -1,18 +1,18 @@
-"""How many modes an appendage needs: the right sides of (149)-(151) as sums that converge to the left ones.
+"""Number of modes that an appendage needs: the right-hand sides of (149)-(151) as sums that converge to the left ones.
 
-Let the base turn away from the appendage, or the appendage from the base, by omega about the clamp: the left sides of
-(149)-(151) with the body undeformed. In the modes, normalised by (41) and complete once all are taken, that motion has
-the rates adot_n = s_n . [omega; 0] / m, its projections in the norm of kinetic energy, where s_n is a mode's momentum
-[Q_n + m alpha x A_n; m A_n] about the clamp. So
+Let the undeformed appendage turn against the base at omega about the clamp; this gives the left-hand sides of
+(149)-(151). The modes are normalised by (41) and, all together, complete. In them this motion has the rates
+adot_n = s_n . [omega; 0] / m, its projections in the norm of kinetic energy, where s_n is a mode's momentum
+[Q_n + m alpha x A_n; m A_n] about the clamp. Hence
 
     (149)   sum_n adot_n A_n  ->  omega x alpha
     (150)   sum_n adot_n E_n  ->  omega x Phi - Phi x omega
     (151)   sum_n adot_n Q_n  ->  Phi . omega
 
-and the same for a velocity of the clamp, with [0; v] instead. The sum of s_n s_n' / m over the modes is the effective
-inertia (6,6) that follows the base elastically; it tends to the rigid body's about the clamp. The remainder is fixed to
-the base in a model with that many modes, at whatever frequency the base moves. Inertia in the clamp itself, which no
-mode moves, is fixed to the base anyway and is not counted.
+and likewise for a velocity v of the clamp, with [0; v]. The sum of s_n s_n' / m over the modes is the effective inertia
+(6,6) that is coupled to the base elastically; it converges to that of the rigid body about the clamp. A model with that
+many modes treats the remainder as fixed to the base at all frequencies. Inertia at the clamp itself, which no mode
+moves, is not counted.
 """
 
 from __future__ import annotations
@@ -33,10 +33,11 @@ UNIT = np.eye(3)
 class Direction:
     """Convergence for one motion of the base, by number of modes N = 0..n, lowest first.
 
-    `motion` (6,): unit [omega; velocity of the clamp], `name` of it; `inertia`: the rigid body's for it, kg m^2 about
-    the clamp or kg; `mode_shares` (n,): effective inertia of each mode as a part of that; `remainder` (n+1,): what is
-    left over; `relations` (3,n+1): mismatches of (149)-(151) in the norm of `equivalence`, as parts of the energy of
-    the rigid motion; empty (0,n+1) for motion along a direction, about which the relations say nothing.
+    `motion` (6,): unit [omega; velocity of the clamp], called `name`; `inertia`: that of the rigid body for it, kg m^2
+    about the clamp or kg; `mode_shares` (n,): effective inertia of each mode as a fraction of it; `remainder` (n+1,):
+    1 less the shares of the first N modes; `relations` (3,n+1): mismatches of (149)-(151) in the norm of
+    `flexmb.frisch.equivalence.relations`, as fractions of the energy of the rigid motion; empty, (0,n+1), for
+    translations, on which the relations do not depend.
     """
 
     name: str
@@ -52,12 +53,12 @@ class Direction:
         return np.max(np.vstack([self.remainder, self.relations]), axis=0)
 
     def needed(self, accuracy: float) -> int | None:
-        """Fewest modes with which remainder and relations are and stay within `accuracy`; None if all are too few."""
+        """Least N from which on remainder and relations are within `accuracy`; None if they are not with all modes."""
         within = np.logical_and.accumulate((self.worst <= accuracy)[::-1])[::-1]
         return int(np.argmax(within)) if within[-1] else None
 
     def taking_part(self, modes: int) -> int:
-        """How many of the first `modes` modes move this way at all, by more than a millionth of the inertia."""
+        """How many of the first `modes` modes have more than a millionth of the inertia for this motion."""
         return int(np.count_nonzero(self.mode_shares[:modes] > 1e-6))
 
 

@@ -13,8 +13,9 @@ sum_mn adot_m M1_mn adot_n / 2, which is m |adot|^2 / 2 under (41). So the misma
 
     (149)   sqrt(m) |difference|,   (150)   |difference|_F / sqrt(tr Phi),   (151)   |Phi^-1/2 difference|,
 
-each over the square root of twice the modes' energy: parts of the root-mean-square velocity of the appendage. The scale
-of (150) makes it equal to (151) for a slender rod. "The norm" of a hinge is the root of the sum of the three squares.
+each divided by the square root of twice the modes' energy: fractions of the root-mean-square velocity of the appendage.
+The scale of (150) makes it equal to (151) for a slender rod. "The norm" of a hinge is the root of the sum of the three
+squares.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from flexmb.frisch.parameters import ModeParameters
 from flexmb.modal.cross import cross_matrix
 from flexmb.typing import Real
 
-_ROUND_OFF = 1e-12
+_ROUND_OFF = 1e-12  # moments of inertia below this fraction of their scale are taken for rounding errors of zero
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,10 @@ class Relation:
 class Fit:
     """A spring-hinged rigid model of an appendage.
 
-    `hinge`; `modes` (k) that its axes stand for, counted from 0; `rates` (k,k), row i: hinge rates thetadot that go
-    best with unit rate of mode `modes[i]`; `relations`, (149)-(151) for each of those modes; `mismatch`, their norm
+    `hinge`; `modes` (k), those that its axes replace, counted from 0; `rates` (k,k), row i: hinge rates thetadot that
+    fit unit rate of mode `modes[i]` best; `relations`, (149)-(151) for each of those modes; `mismatch`, their norm
     (root mean square over several modes); `frequencies` (k,) rad/s of the hinge with the base fixed;
-    `effective_inertia` (6,6), order [angular about the clamp; linear]: what the hinge can turn away from the base.
+    `effective_inertia` (6,6), order [angular about the clamp; linear], that the hinge couples to the base elastically.
     """
 
     hinge: SpringHinge
@@ -112,9 +113,9 @@ def displacement_relations(
     body: Appendage, hinge: SpringHinge, coordinates: ArrayLike, angles: ArrayLike | None = None
 ) -> tuple[Relation, ...]:
     """(47) and (49): mass centre and inertia of the displaced appendage, for modal coordinates (n,) and hinge angles
-    (k,) rad, by default those that go best with them at small angles.
+    (k,) rad, by default those that fit best at small angles.
 
-    The rigid side turns by the whole rotation; the flexible one is of first order in the coordinates. So the mismatch
+    The rigid side has the finite rotation, the flexible side is of first order in the coordinates. The mismatch thus
     grows with the square of the displacement even where (149)-(151) agree.
     """
     p, a = body.parameters, np.asarray(coordinates, dtype=float)
@@ -128,16 +129,16 @@ def displacement_relations(
 
 
 def best_rates(body: Appendage, point: Real, axes: Real, rates: ArrayLike) -> Real:
-    """Hinge rates (k,) that make the norm of (149)-(151) smallest for modal rates (n,)."""
+    """Hinge rates (k,) that minimise the norm of (149)-(151) for modal rates (n,)."""
     p = body.parameters
     return _least_squares(_hinge_columns(p, point, axes), _modal_side(p, np.asarray(rates, dtype=float)))
 
 
 def turning_axis(body: Appendage, mode: int) -> Real:
-    """Unit vector (3,) about which a mode turns the appendage: the omega that goes best with (150), (151).
+    """Unit vector (3,) about which a mode turns the appendage: the omega that fits (150), (151) best.
 
-    With all mass in one point, which has no turn of its own, the omega about the clamp that goes best with (149).
-    Raises ValueError for a mode that does not turn it, such as an axial one.
+    If all mass is in one point, (150) and (151) are empty, and omega about the clamp is fitted to (149). Raises
+    ValueError for a mode that does not turn the appendage, such as an axial one.
     """
     p = body.parameters
     rates = np.eye(body.mode_count)[mode]
@@ -149,7 +150,7 @@ def turning_axis(body: Appendage, mode: int) -> Real:
         turning = np.sqrt(omega @ p.Phi @ omega)
     if turning <= 1e-6 * np.sqrt(_scale(p, rates)):
         raise ValueError(
-            f"{body.name}: mode {mode + 1} moves the appendage without turning it, so no hinge can stand for it; "
+            f"{body.name}: mode {mode + 1} moves the appendage without turning it, so that no hinge can replace it; "
             "choose another mode"
         )
     largest = omega[np.argmax(np.abs(omega))]
@@ -158,12 +159,13 @@ def turning_axis(body: Appendage, mode: int) -> Real:
 
 
 def best_hinge(body: Appendage, axes: ArrayLike | None = None, modes: tuple[int, ...] | None = None) -> Fit:
-    """The spring hinge that describes the appendage best: at its point the norm of (149)-(151) is smallest.
+    """The spring hinge that approximates the appendage best: its point minimises the norm of (149)-(151).
 
     `axes` (k,3): default one, about which the first of `modes` turns the appendage. `modes`, one for each axis, counted
-    from 0; default: the mode of which a turn about the axis explains most, and without `axes` the lowest. Springs give
-    each axis the frequency of its mode with the base fixed. The point may slide along a single axis; the place nearest
-    to the clamp is taken. Raises ValueError for axes that depend on one another and for modes that no hinge can follow.
+    from 0; default: the mode that rotation about the axis explains best, and without `axes` the lowest. The springs
+    give each axis the frequency of its mode with the base fixed. Along a single axis the position of the point is
+    arbitrary; the one nearest to the clamp is taken. Raises ValueError for linearly dependent axes and for modes that
+    do not turn the appendage.
     """
     axes, modes = _choice(body, axes, modes)
     starts = [_nearest_point(body, axis, mode) for axis, mode in zip(axes, modes, strict=True)]
@@ -237,7 +239,7 @@ def _choice(body: Appendage, axes: ArrayLike | None, modes: tuple[int, ...] | No
         raise ValueError(f"{body.name}: a hinge axis is a vector of three numbers that are not all zero")
     unit = given / sizes[:, None]
     if np.linalg.matrix_rank(unit, tol=1e-6) < len(unit):
-        raise ValueError(f"{body.name}: the hinge axes depend on one another; leave one of them out")
+        raise ValueError(f"{body.name}: the hinge axes are linearly dependent; leave one of them out")
     if modes is None:
         found: list[int] = []
         for axis in unit:
@@ -260,10 +262,10 @@ def _explained(body: Appendage, axis: Real, mode: int) -> float:
 
 
 def _nearest_point(body: Appendage, axis: Real, mode: int) -> Real:
-    """The point, nearest to the clamp, where a hinge about one axis makes the norm smallest.
+    """The point nearest to the clamp at which a hinge about one axis minimises the norm.
 
-    (150) and (151) do not depend on the point and fix the rate thetadot. Then the point satisfies the part of (149)
-    across the axis: thetadot q x (alpha - point) = A_n. If all mass is in one point, it can turn about any point; the
+    (150) and (151) do not depend on the point and determine the rate thetadot. The point then satisfies the components
+    of (149) normal to the axis: thetadot q x (alpha - point) = A_n. If all mass is in one point, any point will do; the
     clamp is taken.
     """
     p = body.parameters
@@ -291,13 +293,13 @@ def _inertia_rate(p: ModeParameters, omega: Real) -> Real:
 
 
 def _hinge_columns(p: ModeParameters, point: Real, axes: Real) -> Real:
-    """Left sides of (149)-(151) per hinge rate, weighted (15,k)."""
+    """Left-hand sides of (149)-(151) at unit hinge rates, weighted (15,k)."""
     arm = p.alpha - point
     return np.column_stack([_weighted(p, np.cross(q, arm), _inertia_rate(p, q), p.Phi @ q) for q in axes])
 
 
 def _modal_side(p: ModeParameters, rates: Real) -> Real:
-    """Right sides of (149)-(151), weighted (15,)."""
+    """Right-hand sides of (149)-(151), weighted (15,)."""
     return _weighted(p, rates @ p.A, np.einsum("n,nab->ab", rates, p.E), rates @ p.Q)
 
 
@@ -307,7 +309,7 @@ def _weighted(p: ModeParameters, velocity: Real, inertia_rate: Real, momentum: R
     size = float(moments.sum())
     if _compact(p):
         return np.concatenate([np.sqrt(p.mass) * velocity, np.zeros(12)])
-    solid = moments > _ROUND_OFF * size  # nothing turns about an axis without inertia
+    solid = moments > _ROUND_OFF * size  # about an axis without inertia there is no angular momentum
     own = np.where(solid, principal.T @ momentum / np.sqrt(np.where(solid, moments, 1.0)), 0.0)
     return np.concatenate([np.sqrt(p.mass) * velocity, inertia_rate.ravel() / np.sqrt(size), own])
 
@@ -330,7 +332,7 @@ def _relative(p: ModeParameters, weighted: Real, rates: Real) -> tuple[float, fl
 
 
 def _compact(p: ModeParameters) -> bool:
-    """Whether all mass is in one point away from the clamp: it has no inertia of its own, (150) and (151) are empty."""
+    """Whether all mass is in one point away from the clamp: without inertia of its own (150) and (151) are empty."""
     return float(np.trace(p.Phi)) <= _ROUND_OFF * p.mass * float(p.alpha @ p.alpha)
 
 

@@ -1,4 +1,4 @@
-"""Standard Input Data of flexible bodies: reading, writing, and what flexmb makes of it."""
+"""Standard Input Data of flexible bodies: reading, writing, and conversion from and to bodies of scenes."""
 
 from flexmb.interchange.sid.blocks import Sid as Sid
 from flexmb.interchange.sid.blocks import SidError as SidError

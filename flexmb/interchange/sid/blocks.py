@@ -14,9 +14,9 @@ w_q = (w_x^2, w_y^2, w_z^2, w_x w_y, w_y w_z, w_z w_x):
     ksigma m x 1   modal force of initial stress, M1 its slope
     Ke, De m x m   stiffness and damping
 
-M1 holds derivatives by the modal coordinates, with geometric stiffness where the file has it: in Ct (unit
-accelerations), Cr (unit angular accelerations), Oe (products of angular velocities), and phi and psi of the nodes (unit
-loads there).
+M1 contains derivatives with respect to the modal coordinates, including geometric stiffness if the file has it: in Ct
+(unit accelerations), Cr (unit angular accelerations), Oe (products of angular velocities), and phi and psi of the nodes
+(unit loads at the nodes).
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from flexmb.typing import Real
 
 
 class SidError(ValueError):
-    """A SID file that cannot be used: file, line or block, what is wrong, and the remedy."""
+    """A SID file that cannot be used: file, line or block, defect and remedy."""
 
 
 @dataclass(frozen=True, eq=False)
 class Taylor:
     """A matrix to first order in the modal coordinates: zero (rows, columns) + sum_k q_k first[:, k, :].
 
-    `first` (rows, m, columns), or None where the file stops at order 0.
+    `first` (rows, m, columns), or None if the file has order 0 only.
     """
 
     zero: Real
@@ -44,7 +44,7 @@ class Taylor:
 
     @property
     def slope(self) -> Real | None:
-        """`first`, or None where it is missing or zero."""
+        """`first`, or None if it is missing or zero."""
         return None if self.first is None or not np.any(self.first) else self.first
 
 
@@ -81,7 +81,7 @@ class Sid:
 
 
 def shapes(m: int) -> dict[str, tuple[int, int]]:
-    """Rows and columns of every block of a body with m modes, in the order of the file."""
+    """Rows and columns of all blocks of a body with m modes, in the order of the file."""
     return {
         "mdCM": (3, 1), "J": (3, 3), "Ct": (m, 3), "Cr": (m, 3), "Me": (m, m), "Gr": (3, 3 * m), "Ge": (m, 3 * m),
         "Oe": (m, 6), "ksigma": (m, 1), "Ke": (m, m), "De": (m, m),
@@ -89,5 +89,5 @@ def shapes(m: int) -> dict[str, tuple[int, int]]:
 
 
 def node_shapes(m: int) -> dict[str, tuple[int, int]]:
-    """The same of a node's blocks."""
+    """Rows and columns of the blocks of a node."""
     return {"origin": (3, 1), "phi": (3, m), "psi": (3, m), "AP": (3, 3), "sigma": (6, 1)}

@@ -1,4 +1,4 @@
-"""Standard Input Data of a flexible body of a scene: its sums over inertia points, to first order in the modes."""
+"""Standard Input Data of a flexible body of a scene, from sums over its inertia points to first order in the modes."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from flexmb.scene.bodies import BeamBody, ModalBody
 from flexmb.typing import Real
 
 ROWS, COLUMNS = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)
-"""Where the six numbers of Oe stand in a symmetric matrix: xx, yy, zz, xy, yz, zx."""
+"""Indices of the six numbers of Oe in a symmetric matrix: xx, yy, zz, xy, yz, zx."""
 
 
 def sid_of(body: BeamBody | ModalBody, folder: str | os.PathLike[str] | None = None) -> Sid:
     """All blocks of a flexible body, of order 1, in its body frame.
 
-    `folder`: where the file of a modal body lies, if it has a relative name. A body of level "stiffened" has its
-    geometric stiffness in Ct, Cr, Oe and the nodes. A free-free body leaves out the node "origin", which is no point of
-    its material. Raises ValueError for data of which no model can be made.
+    `folder`: the folder of a modal body's file, if its name is relative. The geometric stiffness of a body of level
+    "stiffened" is in Ct, Cr, Oe and the nodes. For a free-free body the node "origin" is omitted, because it is not
+    fixed to the material. Raises ValueError for inconsistent data.
     """
     model = flexible_model(body, None if folder is None else Path(folder))
     m = model.mode_count
@@ -55,7 +55,7 @@ def sid_of(body: BeamBody | ModalBody, folder: str | os.PathLike[str] | None = N
 
 
 def _second(model: FlexibleModel) -> FirstOrder:
-    """What a second-order field of the points adds to the first-order sums C1, L1, G and M1."""
+    """Contributions of a second-order field of the points to the first-order sums C1, L1, G and M1."""
     m = model.mode_count
     field = model.second
     if field is None:
@@ -79,7 +79,7 @@ def _second(model: FlexibleModel) -> FirstOrder:
 
 
 def _moments(model: FlexibleModel) -> Real:
-    """Q_nk = sum m phi_n phi_k' (m,m,3,3) of all mass, inertia tensors taken as masses that move with their points."""
+    """Q_nk = sum m phi_n phi_k' (m,m,3,3) of all mass, with inertia tensors as masses that move with their points."""
     psi = np.swapaxes(model.rotation, 1, 2)
     u = np.swapaxes(model.translation, 1, 2) + np.cross(psi, model.com_offset[:, None])
     S = 0.5 * np.trace(model.inertia, axis1=1, axis2=2)[:, None, None] * np.eye(3) - model.inertia
@@ -90,17 +90,17 @@ def _moments(model: FlexibleModel) -> Real:
 
 
 def _spun(A: Real) -> Real:
-    """tr A 1 - sym A: the inertia of a second moment A (...,3,3)."""
+    """tr(A) 1 - sym(A): the inertia that belongs to the second moment A (...,3,3)."""
     return np.trace(A, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - 0.5 * (A + np.swapaxes(A, -1, -2))
 
 
 def _side_by_side(matrices: Real) -> Real:
-    """(m,3,3) as (3,3m)."""
+    """Matrices (m,3,3) side by side, (3,3m)."""
     return np.concatenate(list(matrices), axis=1) if len(matrices) else np.zeros((3, 0))
 
 
 def _six(symmetric: Real) -> Real:
-    """(...,3,3) as the six numbers (...,6) with which w' A w = six . w_q."""
+    """Symmetric matrices A (...,3,3) as six numbers (...,6) with w' A w = six . w_q."""
     return symmetric[..., ROWS, COLUMNS] * np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 

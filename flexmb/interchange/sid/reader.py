@@ -1,4 +1,4 @@
-"""Reading SID files of any writer: Fortran's exponents, any letter case, comments, blank lines, blocks in any order."""
+"""Reader of SID files, with Fortran exponents, any letter case, comments, blank lines, and blocks in any order."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ import numpy as np
 from flexmb.interchange.imported import MAGNITUDE, usable
 from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor, node_shapes, shapes
 from flexmb.scene.reading import MIB, Unreadable, read_text
+from flexmb.typing import Real
 
 LIMIT = 256 * MIB
 LARGEST = 2**26  # numbers in one block
-OPTIONAL = ("ksigma", "De", "sigma", "psi", "AP")  # zero, for AP the unit matrix, where a file leaves them out
+OPTIONAL = ("ksigma", "De", "sigma", "psi", "AP")  # zero (AP: the unit matrix) if a file does not have them
 ZEROS, DIAGONAL, SYMMETRIC, GENERAL, UNIT = range(5)  # "structure"
 STATEMENT = re.compile(r"([A-Za-z_]\w*)\s*(?:\(([^)]*)\))?\s*(?:=\s*(.*))?$")
 
 
 class SidLine(NamedTuple):
-    """A statement: `key`, in small letters, as written in `word`; indices in brackets; what is right of "="."""
+    """A statement: its first word as written and, as `key`, in lower case; indices; text after "="."""
 
     number: int
     word: str
@@ -35,7 +36,7 @@ class SidLine(NamedTuple):
 
 
 def read_sid(path: str | os.PathLike[str]) -> Sid:
-    """Read a SID file. SidError names file, line and remedy, OSError the file that cannot be read."""
+    """Read a SID file. Raises SidError with file, line and remedy, or OSError."""
     try:
         text = read_text(path, LIMIT)
     except Unreadable as error:
@@ -44,7 +45,7 @@ def read_sid(path: str | os.PathLike[str]) -> Sid:
 
 
 class _Reader:
-    """Statements of one file, taken one after the other."""
+    """The statements of one file, read in sequence."""
 
     def __init__(self, file: str, text: str) -> None:
         self.file = file
@@ -67,7 +68,7 @@ class _Reader:
                 blocks[self._new(known[line.key], blocks)] = self._taylor(known[line.key], shapes(self.modes))
             else:
                 self._fail(
-                    f'"{line.word}" is no block of a modal body', f"blocks are frame, {', '.join(known.values())}"
+                    f'"{line.word}" is not a block of a modal body', f"blocks are frame, {', '.join(known.values())}"
                 )
         return Sid(mass=mass, modes=names, nodes=tuple(nodes), **self._complete(blocks, shapes(self.modes), "the body"))
 
@@ -82,7 +83,7 @@ class _Reader:
                 case "ielastq" if len(line.indices) == 1:
                     names[line.indices[0]] = line.value.strip().strip("'\"")
                 case _:
-                    self._fail(f'"{line.word}" does not belong into refmod', "it holds mass, nelastq and ielastq(k)")
+                    self._fail(f'"{line.word}" does not belong to refmod', "it has mass, nelastq and ielastq(k)")
         if not mass > 0.0:
             self._fail("refmod gives no mass above zero", "add mass = ... in kg")
         if not 0 <= count <= LARGEST:
@@ -95,10 +96,10 @@ class _Reader:
         nodes: list[SidNode] = []
         while (line := self._next("end frame")).key != "end":
             if line.key != "new":
-                self._fail(f'"{line.word}" stands where a node begins', "write new node = NAME")
+                self._fail(f'"{line.word}" is not the start of a node', "write new node = NAME")
             name = line.value.strip().strip("'\"")
             if not name or name in [node.name for node in nodes]:
-                self._fail(f'the node name "{name}" is empty or there twice', "give every node a name of its own")
+                self._fail(f'the node name "{name}" is empty or repeated', "give every node a name of its own")
             nodes.append(self._node(name))
         return nodes
 
@@ -109,13 +110,35 @@ class _Reader:
             if line.key == "rframe":
                 continue
             if line.key not in known:
-                self._fail(f'"{line.word}" is no block of a node', f"blocks are {', '.join(known.values())}")
+                self._fail(f'"{line.word}" is not a block of a node', f"blocks are {', '.join(known.values())}")
             blocks[self._new(known[line.key], blocks)] = self._taylor(known[line.key], node_shapes(self.modes))
         return SidNode(name, **self._complete(blocks, node_shapes(self.modes), f"node {name}"))
 
     def _taylor(self, name: str, expected: dict[str, tuple[int, int]]) -> Taylor:
         """A block, with what its structure leaves out."""
-        start, head, elements = self.line.number, {}, []
+        start = self.line.number
+        head, elements = self._block(name)
+        shape = self._shape(name, expected[name], head, start)
+        structure = head.get("structure", GENERAL)
+        zero = np.eye(*shape) if structure == UNIT else np.zeros(shape)
+        first = None
+        if head.get("order", 0) == 1 or any(line.key == "m1" for line, _ in elements):
+            if zero.size * self.modes > LARGEST:
+                self._fail(f"{name} would not fit into memory", "correct nelastq")
+            first = np.zeros((shape[0], self.modes, shape[1]))
+        for line, value in elements:
+            self._put(name, line, value, zero if line.key == "m0" else first)
+        if structure == SYMMETRIC:
+            zero = _mirrored(zero)
+            if first is not None:
+                first = np.stack([_mirrored(each) for each in np.moveaxis(first, 1, 0)], axis=1)
+        return Taylor(
+            zero.reshape(expected[name]), first if first is None else first.reshape(expected[name][0], self.modes, -1)
+        )
+
+    def _block(self, name: str) -> tuple[dict[str, int], list[tuple[SidLine, float]]]:
+        """The whole numbers at the head of a block, and its elements."""
+        head, elements = dict[str, int](), list[tuple[SidLine, float]]()
         while (line := self._next(f"end {name}")).key != "end":
             if line.key in ("m0", "m1"):
                 elements.append((line, self._real(line.value)))
@@ -123,43 +146,34 @@ class _Reader:
                 head[line.key] = self._whole(line.value)
             else:
                 self._fail(
-                    f'"{line.word}" does not belong into {name}', "it holds order, nrow, ..., m0(i,j), m1(i,k,j)"
+                    f'"{line.word}" does not belong to {name}', "it has order, nrow, ..., m0(i,j), m1(i,k,j)"
                 )
-        rows, columns = expected[name]
-        structure, order = head.get("structure", GENERAL), head.get("order", 0)
+        return head, elements
+
+    def _shape(self, name: str, expected: tuple[int, int], head: dict[str, int], start: int) -> tuple[int, int]:
+        """Rows and columns as a block is written that starts in that line: stresses may be a row."""
+        rows, columns = expected
         if name == "ksigma" and head.get("ncol") == self.modes and head.get("nrow") == 1:
             rows, columns = columns, rows
         given = (head.get("nrow", rows), head.get("ncol", columns))
+        structure, order = head.get("structure", GENERAL), head.get("order", 0)
         if structure != ZEROS and given != (rows, columns) or structure not in range(5) or order not in (0, 1):
             self.line = self.line._replace(number=start)
             what = f"{name} is {given[0]} x {given[1]} of structure {structure}, order {order}"
             self._fail(what, f"it has to be {rows} x {columns}, of structure 0 to 4, order 0 or 1")
-        zero = np.eye(rows, columns) if structure == UNIT else np.zeros((rows, columns))
-        has_first = order == 1 or any(line.key == "m1" for line, _ in elements)
-        if has_first and rows * columns * self.modes > LARGEST:
-            self._fail(f"{name} would not fit into memory", "correct nelastq")
-        first = np.zeros((rows, self.modes, columns)) if has_first else None
-        for line, value in elements:
-            target = zero if line.key == "m0" else first
-            assert target is not None
-            if len(line.indices) != target.ndim or not all(
-                1 <= i <= n for i, n in zip(line.indices, target.shape, strict=True)
-            ):
-                self.line = line
-                size = " x ".join(map(str, target.shape))
-                self._fail(f"{line.key}{line.indices} is no element of {name} ({size})", "correct its indices")
-            place = tuple(i - 1 for i in line.indices)
-            target[place] = value
-        if structure == SYMMETRIC:
-            zero = _mirrored(zero)
-            first = (
-                None
-                if first is None
-                else np.moveaxis(np.array([_mirrored(each) for each in np.moveaxis(first, 1, 0)]), 0, 1)
-            )
-        return Taylor(
-            zero.reshape(expected[name]), first if first is None else first.reshape(expected[name][0], self.modes, -1)
+        return rows, columns
+
+    def _put(self, name: str, line: SidLine, value: float, target: Real | None) -> None:
+        """An element into m0, or into m1, which is there where the block has an element of it."""
+        assert target is not None
+        is_inside = len(line.indices) == target.ndim and all(
+            1 <= i <= n for i, n in zip(line.indices, target.shape, strict=True)
         )
+        if not is_inside:
+            self.line = line
+            size = " x ".join(map(str, target.shape))
+            self._fail(f"{line.key}{line.indices} is no element of {name} ({size})", "correct its indices")
+        target[tuple(i - 1 for i in line.indices)] = value
 
     def _complete(self, found: dict[str, Taylor], expected: dict[str, tuple[int, int]], of: str) -> dict[str, Taylor]:
         for name, shape in expected.items():
@@ -171,13 +185,13 @@ class _Reader:
 
     def _new(self, name: str, found: dict[str, Taylor]) -> str:
         if name in found:
-            self._fail(f"{name} is there twice", "keep one of them")
+            self._fail(f"{name} is repeated", "keep one of them")
         return name
 
     # Statements and numbers
 
     def _statements(self, text: str) -> Iterator[SidLine]:
-        """All statements; whatever stands before "part" is a title."""
+        """All statements; lines before "part" are a title."""
         started = False
         for number, raw in enumerate(text.split("\n"), 1):
             stripped = raw.strip()
@@ -197,12 +211,12 @@ class _Reader:
                 yield self.line._replace(indices=tuple(self._whole(i) for i in indices.split(",")) if indices else ())
             else:
                 self.line = SidLine(number, stripped, (), "")
-                self._fail(f'"{stripped[:60]}" is no statement', "write KEY = VALUE, or the name of a block")
+                self._fail(f'"{stripped[:60]}" is not a statement', "write KEY = VALUE, or the name of a block")
 
     def _next(self, until: str) -> SidLine:
         line = next(self.lines, None)
         if line is None:
-            self._fail(f"the file ends before {until}", "the file is cut off, or an end is missing: write it anew")
+            self._fail(f"the file ends before {until}", "the file is cut off, or an end is missing: write it again")
         self.line = line
         return line
 
@@ -219,7 +233,7 @@ class _Reader:
         except ValueError:
             value = math.nan
         if not usable(value):
-            what = f'"{text.strip()[:40]}" is no finite number up to {MAGNITUDE:g}'
+            what = f'"{text.strip()[:40]}" is not a finite number up to {MAGNITUDE:g}'
             self._fail(what, "write it as 1.5, 1.5E-3 or 1.5D-3")
         return value
 
@@ -227,7 +241,7 @@ class _Reader:
         try:
             value = int(text)
         except ValueError:
-            self._fail(f'"{text.strip()[:40]}" is no whole number', "correct it")
+            self._fail(f'"{text.strip()[:40]}" is not a whole number', "correct it")
         return value
 
     def _fail(self, what: str, remedy: str) -> NoReturn:
@@ -235,5 +249,5 @@ class _Reader:
 
 
 def _mirrored(a: np.ndarray) -> np.ndarray:
-    """The symmetric matrix of which one half may be missing."""
+    """A symmetric matrix, one half of which may be missing."""
     return np.where(a == 0.0, a.T, a)

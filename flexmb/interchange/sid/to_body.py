@@ -1,8 +1,8 @@
-"""A body of a scene with the sums of a SID file: a few masses and modes that have all of them.
+"""A body of a scene from a SID file: few point masses and modes with the same modal integrals.
 
-Every sum of masses in a SID file is a sum m a b of two fields a, b on the points: 1, coordinates of r, coordinates of
-phi_n. So the masses of `flexmb.interchange.gram` have the dynamics of the file at every level up to "full". Geometric
-stiffness, which a SID file holds as slopes of Ct, Cr and Oe, is handed over as `gravity_stiffness` and
+Every inertia integral of a SID file is a sum m a b of two fields a, b on the points: 1, coordinates of r, coordinates
+of phi_n. The masses of `flexmb.interchange.gram` therefore have the dynamics of the file at every level up to "full".
+Geometric stiffness, which is in the slopes of Ct, Cr and Oe of a SID file, is passed on as `gravity_stiffness` and
 `gradient_stiffness`, for level "stiffened".
 """
 
@@ -26,23 +26,23 @@ from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 PRINTED = 1e-6
-"""Blocks that follow from each other agree this well in files of single precision."""
+"""Relative difference up to which redundant blocks of a file agree, for files in single precision."""
 
 
 @dataclass(frozen=True)
 class ImportedSid:
-    """The body, and what of the file it does not carry, in words."""
+    """The body, and notes on what it omits or assumes of the file."""
 
     body: ModalBody
     notes: tuple[str, ...]
 
 
 def imported_sid(sid: Sid, name: str, level: Level | None = None) -> ImportedSid:
-    """A raw modal body with the sums of `sid`.
+    """A raw modal body with the modal integrals of `sid`.
 
-    Its level is "full" unless `level` says otherwise; "ruthless" where the file stops at order 0, since all else needs
-    what changes with the modes. A node at the origin that no mode moves makes it "clamped-free". Raises SidError naming
-    the block that contradicts another one, that no distribution of mass can have, or that no body of a scene has.
+    Its default level is "full", or "ruthless" for a file of order 0, which does not describe changes with the modes. A
+    node at the origin that no mode moves makes it "clamped-free". Raises SidError, which names the block, for blocks
+    that contradict each other, that no distribution of mass can have, or that scenes do not support.
     """
     _refuse(sid)
     notes: list[str] = []
@@ -62,14 +62,14 @@ def imported_sid(sid: Sid, name: str, level: Level | None = None) -> ImportedSid
     }
     if sums.at_rest_only and body["level"] not in ("rigid", "ruthless"):
         raise SidError(
-            f'SID body "{name}": Gr and Oe have no M1, so nothing says how inertia changes with the modes, and level '
-            f'"{body["level"]}" needs it: use level "ruthless", or write the file with order 1'
+            f'SID body "{name}": Gr and Oe have no M1, the change of inertia with the modes, which level '
+            f'"{body["level"]}" needs: use level "ruthless", or write the file with order 1'
         )
     return ImportedSid(to_struct(plain(body), ModalBody), tuple(notes))
 
 
 def with_sid_bodies(scene: Scene) -> Scene:
-    """The scene with its SID bodies read from their files, as raw modal bodies. SidError and OSError as of reading."""
+    """The scene with its SID bodies read from their files, as raw modal bodies. Raises SidError or OSError."""
     if not any(isinstance(body, SidBody) for body in scene.bodies):
         return scene
     bodies = (
@@ -82,7 +82,7 @@ def with_sid_bodies(scene: Scene) -> Scene:
 class _Sums:
     """Sums of masses m and fields: P[n] = sum m phi_n r' (m,3,3), Q[n,k] = sum m phi_n phi_k' (m,m,3,3).
 
-    `change` (m,m,3,3), symmetric: sum m r G' of the second-order field, which geometric stiffness is made of.
+    `change` (m,m,3,3), symmetric: sum m r G' of the second-order field, from which geometric stiffness follows.
     """
 
     def __init__(self, sid: Sid, notes: list[str]) -> None:
@@ -117,7 +117,11 @@ class _Sums:
             )
 
     def _separate(self, sid: Sid, second: Real, notes: list[str]) -> None:
-        """Q from Oe and Ge; what the modal masses leave of Oe's trace is geometric stiffness along the longest axis."""
+        """Q from Oe and Ge, if Gr has no M1.
+
+        The trace of Oe that is not explained by the modal masses is taken for geometric stiffness along the longest
+        axis of the body.
+        """
         extra = _trace(second) - sid.Me.zero
         if np.max(np.abs(extra), initial=0.0) > PRINTED * np.max(np.abs(sid.Me.zero), initial=0.0):
             axis = np.linalg.eigh(_second_moment(sid.J.zero))[1][:, -1]
@@ -127,7 +131,10 @@ class _Sums:
         self.Q = second - self.change + half
 
     def _at_rest(self, sid: Sid) -> Real:
-        """Some Q with the right modal masses: what masses that move as 1 and r do, and the rest along x."""
+        """A Q with the correct modal masses, for a file of order 0, in which Q has no further effect.
+
+        It is that of the projections of the modes on 1 and r, and the rest of the modal masses moves along x.
+        """
         rows = np.concatenate([sid.Ct.zero[:, :, None], self.P], axis=2)
         moments = np.block([[np.array([[sid.mass]]), sid.mdCM.zero.T], [sid.mdCM.zero, _second_moment(sid.J.zero)]])
         Q = np.einsum("nab,bc,kdc->nkad", rows, np.linalg.pinv(moments, rcond=PRINTED, hermitian=True), rows)
@@ -135,7 +142,7 @@ class _Sums:
 
 
 def _points(sid: Sid, sums: _Sums) -> EquivalentMasses:
-    """Masses with the sums of the file."""
+    """Point masses with the integrals of the file."""
     m = sums.m
     gram = np.zeros((4 + 3 * m, 4 + 3 * m))
     gram[0, 0] = sid.mass
@@ -154,7 +161,7 @@ def _points(sid: Sid, sums: _Sums) -> EquivalentMasses:
 
 
 def _geometric_stiffness(sid: Sid, sums: _Sums) -> dict[str, Real]:
-    """Of unit accelerations (3,m,m) and of their gradients (3,3,m,m); nothing where the file has none."""
+    """Geometric stiffness under unit accelerations (3,m,m) and gradients (3,3,m,m); empty if the file has none."""
     Ct1 = np.zeros((sums.m, sums.m, 3)) if sid.Ct.first is None else sid.Ct.first
     Cr1 = np.zeros((sums.m, sums.m, 3)) if sid.Cr.first is None else sid.Cr.first
     along, turning = (0.5 * (each + np.swapaxes(each, 0, 1)) for each in (Ct1, Cr1))
@@ -181,13 +188,13 @@ def _node(node: SidNode, with_second: bool) -> dict[str, object]:
 
 
 def _field(shape: Taylor) -> Real:
-    """Second-order field (m,m,3) of a node's shape functions, zero where it has none."""
+    """Second-order field (m,m,3) of a node's shape functions, zero if it has none."""
     m = shape.zero.shape[1]
     return np.zeros((m, m, 3)) if shape.first is None else shape.first.transpose(1, 2, 0)
 
 
 def _held(node: SidNode) -> bool:
-    """Whether the node is the body frame: at the origin, and no mode moves it."""
+    """Whether the node is at the origin and no mode moves it."""
     return not any(np.any(each.zero) for each in (node.origin, node.phi, node.psi))
 
 
@@ -196,14 +203,14 @@ def _is_body_frame(node: SidNode) -> bool:
 
 
 def _stiffness(sid: Sid) -> Real:
-    """Ke with the slope of the forces of initial stress."""
+    """Ke plus the slope of the forces of initial stress."""
     if sid.ksigma.slope is None:
         return sid.Ke.zero
     return sid.Ke.zero + sid.ksigma.slope[:, :, 0]
 
 
 def _refuse(sid: Sid) -> None:
-    """SidError for what no body of a scene has."""
+    """SidError for data that scenes do not support."""
     if np.any(sid.ksigma.zero):
         raise SidError("ksigma has an M0: flexmb has no bodies that are stressed at rest; measure modes from rest")
     for name in ("Ke", "De"):
@@ -211,26 +218,27 @@ def _refuse(sid: Sid) -> None:
             raise SidError(f"{name} has an M1: flexmb has no stiffness or damping that changes with the modes")
     for node in sid.nodes:
         if np.max(np.abs(node.AP.zero @ node.AP.zero.T - np.eye(3))) > PRINTED or np.linalg.det(node.AP.zero) < 0.0:
-            raise SidError(f"AP of node {node.name} is no rotation: correct its M0")
+            raise SidError(f"AP of node {node.name} is not a rotation: correct its M0")
 
 
 def _agree(one: str, other: str, a: Real, b: Real, size: float | None = None) -> None:
     size = float(np.max(np.abs(b), initial=0.0)) if size is None else size
     if np.max(np.abs(a - b), initial=0.0) > PRINTED * size:
-        raise SidError(f"{one} and {other} contradict each other: each follows from the other, so correct one of them")
+        raise SidError(f"{one} and {other} contradict each other: they are redundant, so correct one of them")
 
 
 def _order_of_products(Oe: Real, spin: Real) -> tuple[int, ...]:
-    """Which products of angular velocities the last three columns of Oe belong to: writers have two orders.
+    """The order of the products of angular velocities in the last three columns of Oe.
 
-    Found from Gr, which says the same: xy, yz, zx as in the standard, or xy, xz, yz. SidError where neither fits.
+    The standard has xy, yz, zx; some programs write xy, xz, yz. Gr, which is redundant, decides. SidError if neither
+    order agrees with it.
     """
     wanted = _symmetric(spin)
     size = float(np.max(np.abs(wanted), initial=0.0))
     for order in ((0, 1, 2, 3, 4, 5), (0, 1, 2, 3, 5, 4)):
         if np.max(np.abs(_of_six(Oe, order) - wanted), initial=0.0) <= PRINTED * size:
             return order
-    raise SidError("Oe and Gr contradict each other: each follows from the other, so correct one of them")
+    raise SidError("Oe and Gr contradict each other: they are redundant, so correct one of them")
 
 
 def _of_six(six: Real, order: tuple[int, ...]) -> Real:
@@ -243,17 +251,17 @@ def _of_six(six: Real, order: tuple[int, ...]) -> Real:
 
 
 def _matrices(side_by_side: Real) -> Real:
-    """(3,3m) as (m,3,3)."""
+    """Matrices side by side (3,3m) as an array (m,3,3)."""
     return side_by_side.reshape(3, -1, 3).swapaxes(0, 1)
 
 
 def _second_moment(J: Real) -> Real:
-    """sum m r r' of an inertia."""
+    """The second moment sum m r r' that belongs to an inertia J."""
     return 0.5 * np.trace(J) * np.eye(3) - 0.5 * (J + J.T)
 
 
 def _axial(P: Real) -> Real:
-    """sum m r x phi of P = sum m phi r' (...,3,3)."""
+    """sum m r x phi from P = sum m phi r' (...,3,3)."""
     return np.stack([P[..., 2, 1] - P[..., 1, 2], P[..., 0, 2] - P[..., 2, 0], P[..., 1, 0] - P[..., 0, 1]], axis=-1)
 
 

@@ -1,4 +1,4 @@
-"""Writing SID files: every block, 17 digits, only numbers that are not zero."""
+"""Writer of SID files: all blocks, with 17 digits, without the elements that are zero."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from flexmb.interchange.sid.blocks import Sid, SidNode, Taylor, node_shapes, shapes
 from flexmb.output.whole import write_whole
 
-GENERAL = 3  # "structure": every element may be there
+GENERAL = 3  # "structure" of a full matrix
 
 
 def write_sid(sid: Sid, path: str | os.PathLike[str]) -> None:

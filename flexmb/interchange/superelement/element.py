@@ -1,4 +1,4 @@
-"""A finite-element structure that nothing holds: stiffness, mass and nodes, checked by its rigid-body motions."""
+"""A free finite-element structure: stiffness, mass and nodes, checked by its rigid-body motions."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from flexmb.modal.cross import cross_matrix
 from flexmb.typing import Real
 
 RIGID = 1e-6
-"""Forces of a rigid-body motion, as a share of the forces of the structure's parts, that pass for rounding."""
-ALIKE = 1e-6  # share by which the mass in x, y and z, and two halves of a symmetric matrix, may differ
-LARGEST = 1e60  # as in scenes: no quantity of mechanics is near it, and sums and products of it are finite
+"""Largest force of a rigid-body motion, relative to the sum of the magnitudes of its terms, that counts as rounding."""
+ALIKE = 1e-6  # relative difference allowed between the masses in x, y and z, and the halves of a symmetric matrix
+LARGEST = 1e60  # as in scenes: beyond all mechanical quantities, with finite sums and products
 MOTIONS = ("translation x", "translation y", "translation z", "rotation x", "rotation y", "rotation z")
 
 
 class SuperElementError(ValueError):
-    """Finite-element data that is no free structure: what is wrong, and the remedy."""
+    """Finite-element data that is not a free structure: defect and remedy."""
 
 
 @dataclass(frozen=True, eq=False)
 class SuperElement:
-    """K (N,N) N/m and M (N,N) kg of a free structure with n nodes, in axes that are one for all of it.
+    """K (N,N) N/m and M (N,N) kg of a free structure with n nodes, all in the same axes.
 
     ids (n,); position (n,3) m; place (n,6): the row of each node's displacement along x, y, z and rotation about them,
-    -1 where it has none.
+    -1 if it has none.
     """
 
     K: Real
@@ -37,7 +37,7 @@ class SuperElement:
     place: NDArray[np.int64]
 
     def node(self, number: int) -> int:
-        """Where the node of this number stands; SuperElementError names those that are there."""
+        """The index of the node with this number; SuperElementError, which lists the numbers, if there is none."""
         found = np.flatnonzero(self.ids == number)
         if len(found) == 0:
             some = ", ".join(map(str, self.ids[:8])) + (", ..." if len(self.ids) > 8 else "")
@@ -59,11 +59,11 @@ def super_element(
 ) -> SuperElement:
     """A structure from matrices (N,N) and nodes at `position` (n,3) m.
 
-    `ids` are the numbers of the nodes, 1 to n if not given. `dofs` says which displacements (1, 2, 3) and rotations
-    (4, 5, 6) of each node have a row, in their order, all six if not given: "123" for a node of a solid.
+    `ids` are the numbers of the nodes, by default 1 to n. `dofs` lists the displacements (1, 2, 3) and rotations
+    (4, 5, 6) of each node that have a row, in their order, by default all six: "123" for a node of a solid.
 
-    Raises SuperElementError for matrices that are not symmetric, do not fit the nodes, or are not those of a free
-    structure: six rigid-body motions need no force, and have one mass in all directions.
+    Raises SuperElementError for matrices that are not symmetric, do not fit the nodes, or do not belong to a free
+    structure, whose six rigid-body motions need no force and have the same mass in all directions.
     """
     position = np.asarray(position, dtype=float).reshape(-1, 3)
     if not np.all(np.abs(position) <= LARGEST):
@@ -85,7 +85,7 @@ def super_element(
 def _symmetric(name: str, given: ArrayLike) -> Real:
     matrix = np.asarray(given, dtype=float)
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
-        raise SuperElementError(f"{name} is no square matrix: it has the shape {matrix.shape}")
+        raise SuperElementError(f"{name} is not a square matrix: it has the shape {matrix.shape}")
     if not np.all(np.abs(matrix) <= LARGEST):
         i, j = np.argwhere(~(np.abs(matrix) <= LARGEST))[0] + 1
         raise SuperElementError(
@@ -102,7 +102,7 @@ def _symmetric(name: str, given: ArrayLike) -> Real:
 
 def _places(ids: NDArray[np.int64], dofs: list[str]) -> NDArray[np.int64]:
     if len(set(ids.tolist())) != len(ids) or len(dofs) != len(ids):
-        raise SuperElementError("a node number is there twice, or numbers, positions and dofs differ in length")
+        raise SuperElementError("a node number is repeated, or numbers, positions and dofs differ in length")
     place, row = np.full((len(ids), 6), -1, dtype=np.int64), 0
     for i, digits in enumerate(dofs):
         if not digits or any(digit not in "123456" for digit in digits) or len(set(digits)) != len(digits):

@@ -39,8 +39,8 @@ def read_super_element(
 ) -> SuperElement:
     """A structure from files of its matrices and its nodes; one file may hold both matrices, named K... and M....
 
-    Where matrices name node and displacement of their rows (DMIG), these count, and the table only has to know the
-    nodes. Raises SuperElementError naming the file, the place and the remedy, OSError for a file that cannot be read.
+    DMIG matrices name the node and the displacement of each row; then the table only needs to list the nodes. Raises
+    SuperElementError with the file, the place and the remedy, or OSError.
     """
     table = _nodes(Path(nodes))
     stiffness, mass = _matrix(Path(K), "K"), _matrix(Path(M), "M")
@@ -50,7 +50,7 @@ def read_super_element(
 
 
 def _matrix(path: Path, letter: str) -> NamedMatrix:
-    """The matrix of a file; where there are several, the one whose name begins with `letter`."""
+    """The matrix of a file; if there are several, the one whose name begins with `letter`."""
     ending = path.suffix.lower()
     if ending in OP4 + DMIG:
         found = (op4_matrices if ending in OP4 else dmig_matrices)(str(path), _text(path))
@@ -58,12 +58,12 @@ def _matrix(path: Path, letter: str) -> NamedMatrix:
         if len(chosen) != 1:
             names = ", ".join(each.name for each in found) or "none"
             raise SuperElementError(
-                f"{path}: which matrix is {letter}? it holds {names}: give a file with one that begins so"
+                f"{path}: which matrix is {letter}? it has {names}: give a file with one whose name begins so"
             )
         return chosen[0]
     if ending not in MATRIX_MARKET + HARWELL_BOEING:
         known = ", ".join(MATRIX_MARKET + HARWELL_BOEING + OP4 + DMIG)
-        raise SuperElementError(f'{path}: "{ending}" is no known format: write the matrix as one of {known}')
+        raise SuperElementError(f'{path}: "{ending}" is not a known format: write the matrix as one of {known}')
     market = ending in MATRIX_MARKET
     return NamedMatrix(letter, _whole(market_matrix(str(path), _text(path)) if market else _harwell_boeing(path)), None)
 
@@ -72,11 +72,11 @@ def _harwell_boeing(path: Path) -> Real:
     from scipy.io import hb_read
 
     if regular_size(path) > LIMIT:
-        raise SuperElementError(f"{path} has more than {LIMIT // MIB} MiB: reduce the structure where it was made")
+        raise SuperElementError(f"{path} has more than {LIMIT // MIB} MiB: reduce the structure in its own program")
     try:
         found = hb_read(path)
     except (ValueError, IndexError, OverflowError, MemoryError, TypeError) as error:
-        raise SuperElementError(f"{path} is no Harwell-Boeing file ({error}): write it anew") from None
+        raise SuperElementError(f"{path} is not a Harwell-Boeing file ({error}): write it again") from None
     refuse_large(str(path), *found.shape)
     dense = np.asarray(found.todense() if hasattr(found, "todense") else found)
     if np.iscomplexobj(dense):
@@ -85,7 +85,7 @@ def _harwell_boeing(path: Path) -> Real:
 
 
 def _whole(dense: Real) -> Real:
-    """The matrix of which one half may be left out."""
+    """A symmetric matrix, one half of which may be missing."""
     lower = np.tril(dense, -1)
     return dense + lower.T if np.any(lower) and not np.any(np.triu(dense, 1)) else dense
 
@@ -124,7 +124,7 @@ def _nodes(path: Path) -> Nodes:
 
 
 def _number_of_node(word: str) -> int:
-    """ValueError for what is no whole number of 64 bits."""
+    """A node number; ValueError unless it is an integer of 64 bits."""
     number = int(word)
     if not -(2**63) <= number < 2**63:
         raise ValueError(f"{word:.40} is too large")
@@ -132,7 +132,7 @@ def _number_of_node(word: str) -> int:
 
 
 def _by_labels(K: NamedMatrix, M: NamedMatrix, table: Nodes) -> tuple[NamedMatrix, NamedMatrix, Nodes]:
-    """Both matrices with the rows that either names, node by node, and the table of these nodes."""
+    """Both matrices with the union of their rows, ordered by nodes, and the table of these nodes."""
     if K.rows is None or M.rows is None:
         raise SuperElementError("one matrix names its rows and the other does not: give both from one code and format")
     known = dict(zip(table.ids, table.position, strict=True))

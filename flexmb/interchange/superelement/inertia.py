@@ -1,4 +1,4 @@
-"""How a mass matrix carries inertia: by one kernel for all directions, or by lumps at the nodes."""
+"""The structure of a mass matrix: one kernel for all directions, or lumps at the nodes."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True, eq=False)
 class NodalInertia:
-    """Inertia of a structure with n nodes, and the mass matrix M (N,N) that it amounts to.
+    """Inertia of a structure with n nodes, and the mass matrix M (N,N) that belongs to it.
 
-    kernel (n,n) kg: a field with values f at the nodes and one with values g have the sum f' kernel g, which is exact
-    for solids, whose shape functions are one for all directions. second_moment (n,3,3) kg m²: sum m a a' of masses at
-    arms a from the mass centres, which turn with the nodes; offset (n,3) m: these mass centres. `note` says what was
-    changed, in words.
+    kernel (n,n) kg: sum m f g = f' kernel g for two fields with values f and g at the nodes. This is exact for solids,
+    whose shape functions are the same in all directions. second_moment (n,3,3) kg m²: sum m a a' of masses at arms a
+    from the mass centres, turning with the nodes; offset (n,3) m: these mass centres. `note` describes changes to M.
     """
 
     kernel: Real
@@ -40,10 +39,10 @@ class NodalInertia:
 
 
 def nodal_inertia(element: SuperElement) -> NodalInertia:
-    """The inertia of M: as it is where it has one kernel or lumps at nodes; else lumped, with a note.
+    """The inertia of M: exact if M has one kernel or lumps at nodes; otherwise lumped, with a note.
 
-    Lumps keep the mass and mass centre of the structure. SuperElementError for a node with mass in some directions
-    only.
+    Lumping conserves the mass and the mass centre of the structure. SuperElementError for a node with mass in some
+    directions only.
     """
     full, blocks = _by_nodes(element)
     largest = _max(element.M)
@@ -61,7 +60,7 @@ def nodal_inertia(element: SuperElement) -> NodalInertia:
 
 
 def _by_nodes(element: SuperElement) -> tuple[Real, Real]:
-    """M as (n,6,n,6), with zeros where a node has no row, and its blocks (n,6,6) of single nodes."""
+    """M as (n,6,n,6), with zeros for displacements without a row, and its diagonal blocks (n,6,6)."""
     n = len(element.ids)
     there = element.place >= 0
     full = np.zeros((6 * n, 6 * n))
@@ -73,7 +72,7 @@ def _by_nodes(element: SuperElement) -> tuple[Real, Real]:
 
 
 def _kernel(full: Real, largest: float) -> Real | None:
-    """The one kernel (n,n) of all three directions, or None; rotations have no inertia."""
+    """The common kernel (n,n) of all three directions, or None if there is none or rotations have inertia."""
     if _max(full[:, 3:]) > 0.0:
         return None
     kernel = np.einsum("iaja->ij", full[:, :3, :, :3]) / 3.0
@@ -82,7 +81,10 @@ def _kernel(full: Real, largest: float) -> Real | None:
 
 
 def _lumps(element: SuperElement, blocks: Real, note: str) -> NodalInertia:
-    """Blocks (n,6,6) [m, -m c~; m c~, J] of single nodes; a tensor that no mass has is raised to one that has."""
+    """Lumps from the blocks (n,6,6) [m, -m c~; m c~, J] of single nodes.
+
+    Negative second moments, which no mass has, are set to zero; this increases the inertia.
+    """
     mass = np.einsum("iaa->i", blocks[:, :3, :3]) / 3.0
     slack = ALIKE * float(np.max(mass))
     uneven = np.max(np.abs(blocks[:, :3, :3] - mass[:, None, None] * np.eye(3)), axis=(1, 2))

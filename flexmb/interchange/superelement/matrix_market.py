@@ -1,4 +1,4 @@
-"""Matrix Market files, read here: SciPy's reader ends the process, or never returns, for some that are damaged."""
+"""Reader of Matrix Market files; SciPy's crashes, or never returns, for some damaged files."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from flexmb.typing import Real
 
 BANNER = "%%matrixmarket"
 FORMATS, FIELDS, SYMMETRIES = ("array", "coordinate"), ("real", "double", "integer"), ("general", "symmetric")
-LARGEST = 8_000  # rows: a dense matrix of half a GiB, minutes
+LARGEST = 8_000  # rows: a dense matrix of this size has half a GiB and takes minutes to factorise
 
 
 def market_matrix(file: str, text: str) -> Real:
-    """The matrix (rows, columns) of a file; SuperElementError with file, what is wrong and the remedy."""
+    """The matrix (rows, columns) of a file; SuperElementError with file, defect and remedy."""
     head, _, rest = text.partition("\n")
     words = head.lower().split()
     if words[:2] != [BANNER, "matrix"] or len(words) != 5:
@@ -41,32 +41,32 @@ def market_matrix(file: str, text: str) -> Real:
 
 
 def refuse_large(file: str, rows: int, columns: int) -> None:
-    """SuperElementError for a matrix that no dense one can hold."""
+    """SuperElementError for a matrix that is too large for dense computations."""
     if max(rows, columns) > LARGEST:
         raise SuperElementError(
-            f"{file}: {rows} x {columns} is too large for dense matrices ({LARGEST} rows): reduce it statically where "
-            "it was made, or condense rotations and inner nodes"
+            f"{file}: {rows} x {columns} is too large for dense matrices ({LARGEST} rows): reduce it statically in its "
+            "own program, or condense rotations and inner nodes"
         )
 
 
 def _counts(file: str, line: str, many: int) -> list[int]:
     words = line.split()
     if len(words) != many or not all(word.isascii() and word.isdigit() and len(word) < 19 for word in words):
-        raise _error(file, f'"{line:.60}" stands where {many} sizes belong')
+        raise _error(file, f'"{line:.60}" is in the place of {many} sizes')
     return [int(word) for word in words]
 
 
 def _numbers(file: str, body: str) -> Real:
     with warnings.catch_warnings():
-        warnings.simplefilter("error", DeprecationWarning)  # of what is no number, from there on to the end
+        warnings.simplefilter("error", DeprecationWarning)  # that of text which cannot be parsed as numbers
         try:
             return np.fromstring(body, sep=" ") if body.strip() else np.zeros(0)
         except (DeprecationWarning, ValueError):
-            raise _error(file, "what stands below the sizes are not numbers alone") from None
+            raise _error(file, "the lines below the sizes contain more than numbers") from None
 
 
 def _array(file: str, numbers: Real, rows: int, columns: int, symmetric: bool) -> Real:
-    """Column by column; of a symmetric one the lower half."""
+    """A matrix given by columns; of a symmetric one only the lower half."""
     wanted = rows * (rows + 1) // 2 if symmetric else rows * columns
     if len(numbers) != wanted:
         raise _error(file, f"it holds {len(numbers)} numbers, and {rows} x {columns} needs {wanted}")
@@ -78,7 +78,7 @@ def _array(file: str, numbers: Real, rows: int, columns: int, symmetric: bool) -
 
 
 def _coordinates(file: str, numbers: Real, rows: int, columns: int, count: int, symmetric: bool) -> Real:
-    """Row, column and value of each element; those that are given twice add up."""
+    """A matrix given by row, column and value of each element; repeated elements are added."""
     if len(numbers) != 3 * count:
         raise _error(file, f"it holds {len(numbers)} numbers, and {count} elements need {3 * count}")
     i, j, values = numbers.reshape(-1, 3).T
@@ -91,4 +91,4 @@ def _coordinates(file: str, numbers: Real, rows: int, columns: int, count: int, 
 
 
 def _error(file: str, what: str) -> SuperElementError:
-    return SuperElementError(f"{file} is no Matrix Market file of a real matrix ({what}): write it anew")
+    return SuperElementError(f"{file} is not a Matrix Market file of a real matrix ({what}): write it again")

@@ -1,6 +1,6 @@
-"""Nastran's OP4 files in text form and DMIG cards of punch files.
+"""Readers of Nastran's OP4 files in text form and of DMIG cards of punch files.
 
-Read here because the library that reads them elsewhere, pyNastran, needs a NumPy older than this house does.
+pyNastran, which also reads them, requires an older NumPy than flexmb.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from flexmb.typing import Real
 
 LARGEST = 8_000  # rows
 REAL_TYPES = (1, 2)  # single and double precision
-INTEGER = 8  # characters of a whole number in OP4
+INTEGER = 8  # characters of an integer in OP4
 STRING = 65536  # of a short string header: (words + 1) * STRING + first row
 SYMMETRIC = 6
 FIELDS = {False: (8, 8), True: (8, 16)}  # of a card: characters of the first field, and of the others
 
 
 class NamedMatrix(NamedTuple):
-    """A matrix (N,N), and (node, displacement 1 to 6) of its rows where the file says so."""
+    """A matrix (N,N), and (node, displacement 1 to 6) of its rows, if the file has them."""
 
     name: str
     matrix: Real
@@ -45,9 +45,9 @@ def op4_matrices(file: str, text: str) -> list[NamedMatrix]:
 
 
 def _op4(file: str, lines: list[str], at: int) -> tuple[NamedMatrix, int]:
-    """The matrix whose header stands on line `at`, and the line behind it.
+    """The matrix whose header is line `at`, and the number of the line after it.
 
-    Lines without a decimal point are whole numbers: three begin a column (number, first row or 0, words), one or two
+    Lines without a decimal point contain integers: three begin a column (number, first row or 0, words), one or two
     begin a string of a sparse column.
     """
     header = lines[at]
@@ -56,7 +56,7 @@ def _op4(file: str, lines: list[str], at: int) -> tuple[NamedMatrix, int]:
         name = header[4 * INTEGER : 5 * INTEGER].strip()
         width = int(re.search(r"\d[EeDd](\d+)\.", header[5 * INTEGER :])[1])  # type: ignore[index]
     except (ValueError, TypeError):
-        raise SuperElementError(f"{file}, line {at + 1}: this is no header of an OP4 matrix in text form") from None
+        raise SuperElementError(f"{file}, line {at + 1}: this is not the header of an OP4 text matrix") from None
     rows = abs(rows)
     if kind not in REAL_TYPES or columns != rows or not 0 < rows <= LARGEST:
         what = f"matrix {name} is {rows} x {columns} of type {kind}"
@@ -75,7 +75,7 @@ def _op4(file: str, lines: list[str], at: int) -> tuple[NamedMatrix, int]:
                 continue
             whole = [int(line[i : i + INTEGER]) for i in range(0, len(line.rstrip()), INTEGER)]
         except ValueError as error:
-            raise SuperElementError(f"{file}, line {number + 1}: {error}: the file is damaged, write it anew") from None
+            raise SuperElementError(f"{file}, line {number + 1}: {error}: a damaged file, write it again") from None
         if len(whole) == 3:
             column, row = whole[0] - 1, whole[1] - 1
             if column == columns:
@@ -90,7 +90,7 @@ def _op4(file: str, lines: list[str], at: int) -> tuple[NamedMatrix, int]:
 
 
 def dmig_matrices(file: str, text: str) -> list[NamedMatrix]:
-    """All real square matrices of the DMIG cards of a file, in 8 or 16 characters a field, or with commas."""
+    """All real square matrices of the DMIG cards of a file, with fields of 8 or 16 characters, or with commas."""
     forms: dict[str, int] = {}
     elements: dict[str, dict[tuple[tuple[int, int], tuple[int, int]], float]] = {}
     for number, fields in _cards(text):
@@ -130,9 +130,9 @@ def _assembled(
 
 
 def _cards(text: str) -> Iterator[tuple[int, list[str]]]:
-    """DMIG cards: the line where each begins, and its fields with those of its continuations.
+    """DMIG cards: the number of the first line, and the fields including those of continuation lines.
 
-    Field 0 is the card's name; from field 5 on, elements take four fields each: node, displacement, real, imaginary.
+    Field 0 is the card's name; from field 5 on, each element has four fields: node, displacement, real, imaginary.
     """
     begun = 0
     card: list[str] = []
@@ -155,7 +155,7 @@ def _cards(text: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _fields(line: str) -> list[str]:
-    """The fields of a line: four of 16 characters or eight of 8 behind the first, or as many as there are commas."""
+    """The fields of a line: after the first, four of 16 or eight of 8 characters; or separated by commas."""
     if "," in line:
         return [word.strip() for word in line.split(",")]
     first, width = FIELDS["*" in line[:8]]
@@ -164,7 +164,7 @@ def _fields(line: str) -> list[str]:
 
 
 def _real(word: str) -> float:
-    """A number of Fortran: 1.5, 1.5D+3, 1.5+3. ValueError where it is none, or not finite."""
+    """A Fortran number: 1.5, 1.5D+3, 1.5+3. ValueError if it is not one, or not finite."""
     text = re.sub(r"(?<=[\d.])([+-]\d+)$", r"E\1", word.strip().upper().replace("D", "E"))
     value = float(text)
     if not usable(value):

@@ -1,8 +1,8 @@
-"""Craig and Bampton's reduction: static modes of the interface and modes of the structure held at its interface.
+"""Craig-Bampton reduction: constraint modes of the interface and fixed-interface normal modes.
 
-Either all interface nodes but the first move, the first being the body frame (boundary "clamped-free"), or all do and
-the six rigid-body motions are taken out ("free-free", the body frame at the mass centre). Both describe the same
-motions of the structure. The modes are made orthonormal by the eigenproblem of the reduced matrices.
+With the boundary "clamped-free" the first interface node is the body frame, and all others move; with "free-free" all
+move, the six rigid-body motions are removed, and the body frame is at the mass centre. Both describe the same motions
+of the structure. The eigenproblem of the reduced matrices makes the modes orthonormal.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from flexmb.scene.modal_data import inertia_points
 from flexmb.typing import Real
 
 LOOSE = 1e-12
-"""Share of its own stiffness below which a motion needs no force: a mechanism, or a part that is joined to nothing."""
+"""Pivots of K below this fraction of the diagonal are zero: there is a mechanism, or an unconnected part."""
 DENSE = 1000
-"""Rows of matrices that are solved whole."""
-MASSLESS = 1e-13  # share of the largest 1/omega^2 below which a mode moves no mass
+"""Number of rows up to which the dense eigensolver is used."""
+MASSLESS = 1e-13  # a mode has no mass if 1/omega^2 is below this fraction of the largest
 
 
 @dataclass(frozen=True)
 class ReducedBody:
-    """`body` in axes of the structure, its origin at `origin` (3,) m of them; frequencies (m,) Hz of its modes.
+    """`body` in axes of the structure, with its origin at `origin` (3,) m; frequencies (m,) Hz of its modes.
 
-    mass kg, mass centre (3,) m and inertia (3,3) kg m² about the origin, both in the body frame, by the rigid-body
-    motions of M. shapes (n,6,m): displacements and rotations of all nodes of the structure for unit modes, to recover
-    its motion from modal coordinates. `notes`: what was changed, in words.
+    mass kg, mass centre (3,) m and inertia (3,3) kg m² about the origin, both in the body frame, from the rigid-body
+    motions of M. shapes (n,6,m): displacements and rotations of all nodes of the structure at unit modal coordinates,
+    to recover its motion. `notes` describe changes to the data.
     """
 
     body: ModalBody
@@ -54,9 +54,9 @@ def reduced(
 ) -> ReducedBody:  # fmt: skip
     """A flexible body whose nodes are the `interface` nodes, named by their numbers.
 
-    `modes`: how many modes of the structure held at all interface nodes join the 6 static modes of each of these, but
-    for the six rigid-body motions. `damping_ratio` of every mode. Raises SuperElementError for interface nodes without
-    rotations, no or more modes than there are, mechanisms, and mass that no points can have.
+    `modes`: the number of fixed-interface modes, in addition to the 6 constraint modes of each interface node, less the
+    six rigid-body motions. `damping_ratio` applies to every mode. Raises SuperElementError for interface nodes without
+    rotations, an impossible number of modes, mechanisms, and a mass matrix that is not positive semidefinite.
     """
     if not 0.0 <= damping_ratio < 1.0:
         raise SuperElementError(f"the damping ratio is {damping_ratio:g}: give a number from 0 to 1, such as 0.005")
@@ -64,7 +64,7 @@ def reduced(
     nodes = [element.node(number) for number in dict.fromkeys(interface)]
     held = _interface_rows(element, nodes)
     if len(held) + modes <= 6:
-        raise SuperElementError("one interface node without modes is a rigid body: ask for modes, or for more nodes")
+        raise SuperElementError("one interface node without modes is a rigid body: give modes, or more nodes")
     T = _shapes(element.K, inertia.M, held, modes)
     clamped = boundary == "clamped-free"
     R = element.rigid(np.zeros(3))
@@ -79,7 +79,7 @@ def reduced(
     try:
         points = equivalent_masses(inertia.gram(element.position - origin, translation, rotation))
     except NoMasses as error:
-        raise SuperElementError(f"M is no mass matrix ({error}): its eigenvalues have to be zero or more") from None
+        raise SuperElementError(f"M is not a mass matrix ({error}): its eigenvalues have to be zero or more") from None
     body = {
         "name": name,
         "points": inertia_points(*points),
@@ -117,13 +117,13 @@ def _interface_rows(element: SuperElement, nodes: list[int]) -> NDArray[np.int64
 
 
 def _shapes(K: Real, M: Real, held: NDArray[np.int64], modes: int) -> Real:
-    """Static modes of the interface and the lowest modes of the structure held there: columns (N, held + modes)."""
+    """Constraint modes and the lowest fixed-interface modes: columns (N, held + modes)."""
     from scipy.linalg import cho_solve
 
     inside = np.setdiff1d(np.arange(len(K)), held)
     if not 0 <= modes <= len(inside):
         raise SuperElementError(
-            f"{modes} modes are asked for, and the structure held at its interface has {len(inside)}"
+            f"{modes} modes are requested, and the structure held at its interface has {len(inside)}"
         )
     T = np.zeros((len(K), len(held) + modes))
     T[held, np.arange(len(held))] = 1.0
@@ -168,7 +168,7 @@ def _modes(K: Real, M: Real, T: Real, rigid: Real | None) -> tuple[Real, Real]:
 
 
 def _factor(K: Real, what: str) -> Real:
-    """Cholesky's lower factor; SuperElementError where a pivot of K, scaled to unit diagonal, is rounding."""
+    """Cholesky's lower factor; SuperElementError if a pivot of K, scaled to unit diagonal, is zero to round-off."""
     size = np.sqrt(np.maximum(np.diag(K), np.finfo(float).tiny))
     try:
         L = np.linalg.cholesky(K / np.outer(size, size))
@@ -180,7 +180,10 @@ def _factor(K: Real, what: str) -> Real:
 
 
 def _highest(M: Real, L: Real, count: int) -> tuple[Real, Real]:
-    """The `count` largest values, ascending, and columns of M x = value L L' x; by Lanczos where few of many."""
+    """The `count` largest eigenvalues, ascending, and eigenvectors of M x = value L L' x.
+
+    By the Lanczos method if the matrix is large and `count` small, otherwise by a dense solver.
+    """
     from scipy.linalg import eigh, solve_triangular
     from scipy.sparse.linalg import LinearOperator, eigsh
 
@@ -193,7 +196,7 @@ def _highest(M: Real, L: Real, count: int) -> tuple[Real, Real]:
         def product(x: Real) -> Real:
             return solve_triangular(L, M @ solve_triangular(L, x, lower=True, trans=1), lower=True)
 
-        start = np.random.default_rng(0).normal(size=n)  # the same run after run
+        start = np.random.default_rng(0).normal(size=n)  # fixed, so that results are reproducible
         values, columns = eigsh(LinearOperator((n, n), product), k=count, which="LA", v0=start, tol=1e-13)
         order = np.argsort(values)
         values, columns = values[order], columns[:, order]
@@ -201,8 +204,8 @@ def _highest(M: Real, L: Real, count: int) -> tuple[Real, Real]:
 
 
 def _at_nodes(element: SuperElement, V: Real) -> Real:
-    """Translations and rotations (n,6,m) of the nodes, zero where a node has none."""
-    padded = np.concatenate([V, np.zeros((1, V.shape[1]))])  # row -1
+    """Translations and rotations (n,6,m) of the nodes, zero for those without a row."""
+    padded = np.concatenate([V, np.zeros((1, V.shape[1]))])  # index -1 selects the row of zeros
     return padded[element.place]
 
 

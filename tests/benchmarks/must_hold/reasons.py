@@ -15,13 +15,13 @@ class Reason(NamedTuple):
 REASONS = (
     Reason(
         ("canonical_cold", "canonical"),
-        "nobody has profiled the session since kernels come with the installation. First uses of native compile "
-        "nothing; what is left is the runs of peers and of native, judging, pictures and the report.",
+        "nothing is compiled. Of some 165 s of processor time the runs of peers take about 90 (Exudyn half of it), "
+        "those of Frisch's algorithm 21, of the recursion 17, all inside kernels; judging and the report 13, planning "
+        "and the starts of workers the rest. Two processors are busy for nine tenths of the time.",
     ),
     Reason(
         ("cases_worst",),
-        "a thousand rods write loads, markers and charts of a thousand hinges, and a beam bent by its length runs for "
-        "seconds; no kernel is compiled in any case.",
+        "a beam that is bent by its length is integrated for 8.6 s; no kernel is compiled in any case.",
     ),
     Reason(
         ("batch_flexible",),

@@ -14,9 +14,8 @@ from crosscheck.biting.score import CaseBite
 from crosscheck.biting.subject import subject
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import Case, load_case, resolve, shipped_cases
-from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.bites import print_bites
-from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
+from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, run_here
 
 BLIND = """
 [[variant]]
@@ -32,7 +31,9 @@ goals = { "energy.total" = 1e-6 }
 
 def campaign(case: Case, out: Path, engine: str = "fine") -> CaseBite:
     out.mkdir(exist_ok=True)
-    (bite,) = run_campaign([case], out, engine=engine, provider=PROVIDER, limits=Limits(workers=2))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("crosscheck.biting.campaign.run_planned", run_here)
+        (bite,) = run_campaign([case], out, engine=engine, provider=PROVIDER)
     return bite
 
 

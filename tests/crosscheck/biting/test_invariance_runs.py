@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,15 @@ from rich.console import Console
 
 from crosscheck.biting.invariance_runs import VERDICTS, InvarianceVerdict, run_invariances
 from crosscheck.library.find import load_case
-from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.invariances import print_invariances
-from tests.crosscheck.sessions import CASE, PROVIDER
+from tests.crosscheck.sessions import CASE, PROVIDER, run_here
+
+
+def invariances(out: Path, engine: str) -> Sequence[InvarianceVerdict]:
+    """Those of the small case, run in this process."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("crosscheck.biting.invariance_runs.run_planned", run_here)
+        return run_invariances([load_case(CASE)], out, engine=engine, provider=PROVIDER)
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +30,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def verdicts(out: Path) -> dict[str, InvarianceVerdict]:
     """Of a pendulum in a few lines, which knows neither where its hinge stands nor which way its World is turned."""
-    found = run_invariances([load_case(CASE)], out, engine="fine", provider=PROVIDER, limits=Limits(workers=1))
+    found = invariances(out, "fine")
     return {each.invariance: each for each in found}
 
 
@@ -66,6 +73,6 @@ def test_they_are_printed_and_kept(out: Path, verdicts: dict[str, InvarianceVerd
 
 
 def test_an_absent_engine_is_no_agreement(tmp_path: Path) -> None:
-    found = run_invariances([load_case(CASE)], tmp_path, engine="missing", provider=PROVIDER, limits=Limits(workers=1))
+    found = invariances(tmp_path, "missing")
     assert {each.status for each in found} == {"did not run", "not applicable"}
     assert print_invariances(Console(quiet=True), found) == 1

@@ -12,7 +12,8 @@ import pytest
 from crosscheck.biting.invariances import NotApplicable
 from crosscheck.biting.invariances.counterpart import Channels
 from crosscheck.biting.invariances.later import LATER, START_S
-from crosscheck.engines.answers import checked_run, support_of
+from crosscheck.engines.answers import checked_run
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import Effort, Engine, Run
 from crosscheck.engines.native import NativeEngine
 from crosscheck.engines.pinocchio.engine import PinocchioEngine
@@ -192,9 +193,9 @@ def test_an_engine_that_begins_at_zero_is_not_asked() -> None:
     class AtZero(NativeEngine):
         takes = ("connectors",)
 
-    assert support_of(NativeEngine(), passive(), START_S).kind == "exact"
-    assert support_of(AtZero(), passive()).kind == "exact"
-    refused = support_of(AtZero(), passive(), START_S)
+    assert CheckedEngine(NativeEngine(), START_S).supports(passive()).kind == "exact"
+    assert CheckedEngine(AtZero()).supports(passive()).kind == "exact"
+    refused = CheckedEngine(AtZero(), START_S).supports(passive())
     assert refused.kind == "no" and "begins all runs at t = 0" in refused.reason
 
 

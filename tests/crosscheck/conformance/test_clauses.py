@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crosscheck.conformance import form
 from crosscheck.conformance.catalogue import CLAUSES, SHOWN
 from crosscheck.conformance.form import FORM
 from crosscheck.conformance.samples import SAMPLES
@@ -248,7 +249,8 @@ def at_many_samples(run: Trajectory) -> Trajectory:
 
 
 @pytest.fixture
-def nothing_kept() -> Iterator[None]:
+def nothing_kept(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(form, "PATIENCE_S", 0.1)  # what stays behind here stays for ever
     yield
     while KEPT:
         found = KEPT.pop()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from crosscheck.engines.answers import support_of
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import Effort, Run, Support
 from crosscheck.engines.registry import engine
 from flexmb.scene.build import angular, linear
@@ -41,7 +41,7 @@ def off(ours: dict, theirs: dict) -> float:
 def test_first_instant(name):
     pytest.importorskip(LIBRARY.get(name, name))
     scene = load_scene(CASE)
-    assert support_of(engine(name), scene).kind == "exact"
+    assert CheckedEngine(engine(name)).supports(scene).kind == "exact"
     ours, theirs = (engine(each).compile(scene).evaluate() for each in ("native", name))
     accelerations = [{marker: at.acceleration for marker, at in each.markers.items()} for each in (ours, theirs)]
     assert off(*accelerations) <= WITHIN[name]
@@ -152,7 +152,7 @@ def test_connectors_at_bending_nodes_in_exudyn(kind):
     """At the first instant to rounding; over time of second order."""
     pytest.importorskip("exudyn")
     scene = modal_points(sprung_beam(kind))
-    assert support_of(engine("exudyn"), scene).kind == "exact"
+    assert CheckedEngine(engine("exudyn")).supports(scene).kind == "exact"
     models = [engine(each).compile(scene) for each in ("native", "exudyn")]
     ours, theirs = (model.evaluate() for model in models)
     assert off(ours.connectors, theirs.connectors) <= 1e-12
@@ -166,7 +166,7 @@ def test_connectors_at_bending_nodes_in_exudyn(kind):
 
 
 def test_what_an_adapter_does_not_have_it_refuses():
-    support = support_of(engine("exudyn-beam"), only(load_scene(CASE), AngularFriction))
+    support = CheckedEngine(engine("exudyn-beam")).supports(only(load_scene(CASE), AngularFriction))
     assert support.kind == "no" and "bearing" in support.reason
 
 
@@ -180,6 +180,6 @@ class Unaware:
 
 
 def test_an_engine_that_knows_of_none_is_not_asked_to_leave_them_out():
-    support = support_of(Unaware(), load_scene(CASE))
+    support = CheckedEngine(Unaware()).supports(load_scene(CASE))
     assert support.kind == "no" and support.reason == '"spring a": the adapter of engine unaware knows no connectors'
-    assert support_of(Unaware(), only(load_scene(CASE))).kind == "exact"
+    assert CheckedEngine(Unaware()).supports(only(load_scene(CASE))).kind == "exact"

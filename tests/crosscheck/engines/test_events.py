@@ -3,7 +3,7 @@
 import pytest
 
 import flexmb as fm
-from crosscheck.engines.answers import support_of
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.registry import engine
 from flexmb.run.warm_up import pendulum
 from flexmb.scene.schema import Scene
@@ -19,10 +19,10 @@ def eventful() -> Scene:
 
 @pytest.mark.parametrize("name", ["pinocchio", "mujoco", "exudyn", "exudyn-beam", "drake"])
 def test_peers_refuse_scenes_with_events(name: str) -> None:
-    support = support_of(engine(name), eventful())
+    support = CheckedEngine(engine(name)).supports(eventful())
     assert support.kind == "no" and "caught" in support.reason and "knows no events" in support.reason
 
 
 @pytest.mark.parametrize("name", ["native", "native-composite", "native-frisch", "native-generalised-alpha"])
 def test_our_own_algorithms_run_them(name: str) -> None:
-    assert support_of(engine(name), eventful()).kind == "exact"
+    assert CheckedEngine(engine(name)).supports(eventful()).kind == "exact"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from crosscheck.engines.answers import support_of
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import Run, Support
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.native import NativeEngine, radau5
@@ -28,25 +28,25 @@ class Willing:
 
 
 def test_an_engine_without_controllers_refuses_them() -> None:
-    refused = support_of(Willing(), rotor(LAW))  # type: ignore[arg-type]
+    refused = CheckedEngine(Willing()).supports(rotor(LAW))  # type: ignore[arg-type]
     assert refused.kind == "no"
     assert '"law": the adapter of engine willing knows no controllers' in refused.reason
-    assert support_of(Willing(), rotor()).kind == "exact"  # type: ignore[arg-type]
+    assert CheckedEngine(Willing()).supports(rotor()).kind == "exact"  # type: ignore[arg-type]
 
 
 def test_the_native_engine_runs_them() -> None:
-    assert support_of(NativeEngine(), rotor(LAW)).kind == "exact"
+    assert CheckedEngine(NativeEngine()).supports(rotor(LAW)).kind == "exact"
 
 
 def test_implicit_methods_take_continuous_ones() -> None:
-    assert support_of(radau5(), rotor(LAW)).kind == "exact"
+    assert CheckedEngine(radau5()).supports(rotor(LAW)).kind == "exact"
 
 
 @pytest.mark.parametrize("name", ["native-radau5", "native-exponential", "native-generalised-alpha"])
 def test_and_those_of_closed_chains(name: str) -> None:
     """They run as by the engine without Jacobians."""
     scene, run = controlled(GRASHOF, "drive", LAGGING), Run(np.linspace(0.0, 0.1, 3))
-    assert support_of(engine(name), scene).kind == "exact"
+    assert CheckedEngine(engine(name)).supports(scene).kind == "exact"
     done, exact = (
         engine(each).compile(scene).simulate(run, engine(each).efforts(scene)[-1]) for each in (name, "native")
     )
@@ -64,5 +64,5 @@ def test_laws_whose_changes_no_record_would_see_are_refused() -> None:
     law = fm.UserLaw(
         name="law", inputs=("angle",), function="tests.flexmb.control.laws:proportional", parameters=(1.0,)
     )
-    assert "would not know its changes" in support_of(NativeEngine(), rotor(law)).reason
-    assert support_of(NativeEngine(), craft().scene()).kind == "exact"
+    assert "would not know its changes" in CheckedEngine(NativeEngine()).supports(rotor(law)).reason
+    assert CheckedEngine(NativeEngine()).supports(craft().scene()).kind == "exact"

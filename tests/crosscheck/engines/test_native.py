@@ -54,7 +54,7 @@ def _gap(pairs: list[tuple[np.ndarray, np.ndarray]]) -> float:
 def rounding(scene: Scene) -> float:
     """Of two backward-stable solutions: their common backward error times the condition of the mass matrix."""
     system = flexmb.compile(scene)
-    points = max(len(link.model.mass) for link in system._links)
+    points = max(len(link.model.mass) for link in system.links)
     condition = np.linalg.cond(system.mass_matrix(system.initial_state))
     return algebra(system.nu, len(system.body_names), points) * float(condition)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.engines.answers import efforts_of
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import Effort
 from crosscheck.engines.pace import Pace
 from crosscheck.engines.registry import engine
@@ -41,7 +41,7 @@ def oscillator(hertz: float) -> tuple[Scene, float]:
 @pytest.mark.parametrize("made", [pendulum(), oscillator(1.0), oscillator(1e4)], ids=["pendulum", "1 Hz", "10 kHz"])
 def test_steps_resolve_the_fastest_motion(name: str, duration_s: float, made: tuple[Scene, float]) -> None:
     scene, hertz = made
-    steps = [effort.value for effort in efforts_of(engine(name), scene, duration_s)]
+    steps = [effort.value for effort in CheckedEngine(engine(name), duration_s=duration_s).efforts(scene)]
     assert duration_s / steps[0] >= 200 and duration_s / steps[-1] <= MOST * (1.0 + 1e-12)
     assert np.allclose(np.divide(steps[:-1], steps[1:]), 2.0, rtol=1e-15)
     if hertz * duration_s * PER_PERIOD <= MOST:  # 10 kHz over 1000 s is beyond every default
@@ -79,4 +79,4 @@ class Older:
 
 def test_an_engine_without_durations_is_asked_as_before() -> None:
     scene, _ = pendulum()
-    assert efforts_of(Older(), scene, 1e3)[0].value == 4e-3  # type: ignore[arg-type]
+    assert CheckedEngine(Older(), duration_s=1e3).efforts(scene)[0].value == 4e-3  # type: ignore[arg-type]

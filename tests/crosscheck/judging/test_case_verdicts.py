@@ -10,13 +10,13 @@ import pytest
 
 from crosscheck.judging.case_verdicts import CLOCK
 from crosscheck.judging.results import NEEDED
-from crosscheck.judging.verdict import GRAVITY, STATUSES
+from crosscheck.judging.verdict import SEVERITY, STATUSES
 from crosscheck.records.kinds import RunStatus
 from crosscheck.records.packing import pack
 from crosscheck.report.views import SYMBOLS
 from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, ended, judged, ladder, run_file, single, way
 
-ENDINGS = [status for status in GRAVITY if status not in ("agree", "differ", "unresolved")]
+ENDINGS = [status for status in SEVERITY if status not in ("agree", "differ", "unresolved")]
 CONSERVED = """
 [[variant]]
 name = "rigid"
@@ -193,7 +193,7 @@ def test_a_crash_is_not_hidden_behind_an_expected_refusal() -> None:
 
 
 def test_every_status_is_known_wherever_statuses_are_listed() -> None:
-    assert set(GRAVITY) == set(SYMBOLS) == set(STATUSES)
+    assert set(SEVERITY) == set(SYMBOLS) == set(STATUSES)
     assert set(ENDINGS) | {"finished"} == set(get_args(RunStatus))
 
 

@@ -168,7 +168,7 @@ def values(*given: float, doubt: float = 0.0, sizes: tuple[float, ...] = ()) -> 
             values(-1e308),
             None,
             "failed",
-            "the results are so large that their distance is no number",
+            "the results are so large that their distance is not finite",
         ),
         (values(0.0, doubt=1e-9), values(0.0), None, "unresolved", f"the signal's size is 0{UNSIZED}"),
         (

@@ -130,7 +130,7 @@ def test_judging_warns_of_nothing() -> None:
             apart = [RungSignal(0.1, np.full((3, 1), -1e308)), RungSignal(0.01, np.full((3, 1), level))]
             found = estimate(FORCE, "step", apart, 0.0)
             assert np.array_equal(found.envelope, np.full(3, np.inf))
-            assert found.how == "unknown: the runs are so far apart that their distance is no number"
+            assert found.how == "unknown: the runs are so far apart that their distance is not finite"
         assert observed_order((4.0, 1.0, 1.0), 2.0, 1.0) is None
         assert observed_order((4.0, 4.0, 1.0), 2.0, 1.0) is None
     assert np.all(np.isinf(spatial(FORCE, np.zeros((3, 0)), np.zeros((3, 0)), 2.0, 1.0)))

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from crosscheck.judging.outcome import SessionOutcome
-from crosscheck.judging.verdict import GRAVITY
+from crosscheck.judging.verdict import SEVERITY
 from crosscheck.library.accepted import Figure, key
 from crosscheck.report.ci import write_junit
 from tests.crosscheck.made_records import ONE_PAIR, TIP, ended, judged, ladder, way
@@ -29,7 +29,10 @@ def failures(outcome: SessionOutcome, folder: Path) -> int:
     return stated
 
 
-@pytest.mark.parametrize("status", [None, *(each for each in GRAVITY if each not in ("agree", "differ", "unresolved"))])
+JUDGED = ("agree", "differ", "unresolved")
+
+
+@pytest.mark.parametrize("status", [None, *(each for each in SEVERITY if each not in JUDGED)])
 def test_an_engine_beside_the_comparisons_may_refuse_or_diverge_but_not_fail(
     status: str | None, tmp_path: Path
 ) -> None:

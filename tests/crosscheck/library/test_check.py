@@ -18,10 +18,10 @@ from crosscheck.library.accepted import Figure
 from crosscheck.library.case import CaseError, RunFile
 from crosscheck.library.check import check_accepted, check_run_file
 from crosscheck.library.check.ranges import MOST_SAMPLES
-from crosscheck.library.find import load_case, shipped_cases
+from crosscheck.library.find import load_case
 from crosscheck.library.patterns import fault
 from flexmb.run.channels import channels_of, matches
-from tests.crosscheck.sessions import copy_case
+from tests.crosscheck.sessions import copy_case, shipped
 
 EXAMPLE = textwrap.dedent(case_module.__doc__.split("run.toml::")[1].split("Channels are named")[0])
 NONSENSE = (-math.inf, -1.0, 0.0, 5e-324, 1e308, math.inf, math.nan)
@@ -189,7 +189,7 @@ def test_the_kinds_of_patterns_are_the_kinds_of_channels() -> None:
 
 
 def test_the_library_is_as_strict_as_it_asks_others_to_be() -> None:
-    assert all(faults_of((case.folder / "run.toml").read_text(encoding="utf-8")) == "" for case in shipped_cases())
+    assert all(faults_of((case.folder / "run.toml").read_text(encoding="utf-8")) == "" for case in shipped())
 
 
 PLACE = "load.force | native (rigid) | mujoco (rigid)"

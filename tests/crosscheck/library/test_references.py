@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from crosscheck.library.case import CaseError
-from crosscheck.library.find import load_case, shipped_cases
+from crosscheck.library.find import load_case
 from crosscheck.library.reference import current_reference, parse_values, values_text
-from tests.crosscheck.sessions import copy_case
+from tests.crosscheck.sessions import copy_case, shipped
 
 GOOD = """
 [[variant]]
@@ -150,7 +150,7 @@ def test_a_bad_file_is_refused(old: str, new: str, said: str) -> None:
 
 def test_every_shipped_case_has_a_reference_of_itself() -> None:
     """Cases without a recipe are none: what is stored belongs to the scene, and ends no later than the case."""
-    for case in shipped_cases():
+    for case in shipped():
         assert case.run.reference is not None, case.name
         found = current_reference(case)
         assert all(0.0 < known.uncertainty < np.inf for known in found.knowledge.channels.values())

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import msgspec
@@ -39,8 +40,8 @@ WITHOUT_PART = {
     "crosscheck.running.plan": "makes the scene, which is in the record's own key",
     "crosscheck.running.job": "says what is in the record's own key: scene, sample times, effort",
     "crosscheck.records.machine": "tells the reader of a report about the machine",
-    "crosscheck.running.draw": "draws",
-    "crosscheck.running.film": "makes a scene too",
+    "crosscheck.drawing.draw": "draws",
+    "crosscheck.drawing.film": "makes a scene too",
     "crosscheck.engines.functions_of_time": "says to the drawing how a wheel starts; native evaluates functions itself",
     "crosscheck.records.drawing": "holds what was drawn",
     "crosscheck.records.held": "holds the stored reference, which is made of other runs",
@@ -161,7 +162,8 @@ def test_an_earlier_result_counts_only_where_the_last_session_confirmed_it(edite
 NATIVE_RUN = """
 import sys
 import numpy as np
-import crosscheck.running.execute as execute
+import crosscheck.running.execute
+from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
 from crosscheck.library.find import load_case
@@ -170,9 +172,9 @@ case = load_case(Path(sys.argv[2]))
 scene = case.scene(case.run.variants[0])
 found = engine(sys.argv[1])
 effort = Effort("tolerance", 1e-3, "dop853")
-execute.checked_run(found.compile(scene).simulate(Run(np.linspace(0.0, 1e-4, 3)), effort), np.linspace(0.0, 1e-4, 3), scene)
+CheckedEngine(found).compile(scene).simulate(Run(np.linspace(0.0, 1e-4, 3)), effort)
 print(*(name for name in sys.modules if name.partition(".")[0] in ("flexmb", "crosscheck")))
-"""  # noqa: E501
+"""
 
 
 @pytest.mark.parametrize("name", ["native", "native-frisch"])
@@ -224,6 +226,8 @@ def test_a_key_holds_libraries_platform_and_compiler(monkeypatch: pytest.MonkeyP
     assert {"numpy", "scipy", "numba", "llvmlite"} <= sources(native).libraries
     assert sources(["crosscheck.engines.pinocchio"]).libraries >= {"pinocchio", "numpy"}
     assert "numba" not in sources(["crosscheck.engines.mujoco"]).libraries
+
+    monkeypatch.setattr(keys, "sources", cache(sources))  # to parse them all takes a second, and nobody edits them
 
     def key() -> str:
         keys._key.cache_clear()

@@ -7,9 +7,7 @@ from pathlib import Path
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.library.find import load_case
 from crosscheck.report import write_all
-from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import sweep
-from tests.crosscheck.sessions import PROVIDER, copy_case
+from tests.crosscheck.sessions import copy_case, sweep_here
 
 COMPARISON = """
 [[comparison]]
@@ -46,5 +44,5 @@ engines = ["fine", "stepper"]
 def session(folder: Path, run_file: str) -> tuple[SessionOutcome, Path]:
     """Run the small case with another run file, and write the report into the folder."""
     case = load_case(copy_case(folder, run_file))
-    sweep([case], (), folder / "records.jsonl", provider=PROVIDER, limits=Limits(workers=1))
+    sweep_here([case], (), folder / "records.jsonl")
     return write_all(folder / "records.jsonl", folder)

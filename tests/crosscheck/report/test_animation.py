@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from crosscheck.drawing.film import film
 from crosscheck.engines.native import NativeEngine
 from crosscheck.judging.results import CaseResults, Result, collect
-from crosscheck.library.find import Case, load_case, resolve, shipped_cases
+from crosscheck.library.find import Case, load_case, resolve
 from crosscheck.records.archive import read
 from crosscheck.records.drawing import FILM, Drawing, DrawnWheel
 from crosscheck.records.kinds import RunRecord
@@ -18,18 +19,23 @@ from crosscheck.records.packing import pack
 from crosscheck.report.animation import animations, wheel_angle
 from crosscheck.report.store import Store
 from crosscheck.running.execute import execute
-from crosscheck.running.film import film
 from crosscheck.running.plan import plan, variant_scene
 from crosscheck.running.sweep import PROVIDER
 from flexmb.interchange.sid import sid_of, write_sid
 from flexmb.scene.bodies import SidBody
 from flexmb.scene.connectors import HingeFriction
 from flexmb.typing import Real
-from tests.crosscheck.sessions import CASE
+from tests.crosscheck.sessions import CASE, shipped
 from tests.flexmb.interchange.made_bodies import beam, swinging
 
 
-@pytest.mark.parametrize("case", shipped_cases(), ids=lambda case: case.name)
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, marks=pytest.mark.slow if case.name == "chains/thousand_rods" else [], id=case.name)
+        for case in shipped()
+    ],
+)
 def test_every_body_wheel_mass_and_connector_is_drawn(case: Case) -> None:
     record, _ = plan(case, (), PROVIDER, films=True)
     for variant in record.run.variants:

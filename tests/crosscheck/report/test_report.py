@@ -18,10 +18,8 @@ from crosscheck.report.case_view import transformation
 from crosscheck.report.html import code
 from crosscheck.report.store import SAMPLES, Store
 from crosscheck.running.plan import plan
-from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import sweep
 from tests.crosscheck.report.reading import data_of, series_of
-from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
+from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, sweep_here
 
 MIXED = """
 [[variant]]
@@ -42,7 +40,7 @@ FOREIGN = re.compile(r"""(?:src|href)\s*=\s*["'](?!#)|@import|url\(""")
 
 
 def session(folder: Path, case: Path) -> tuple[SessionOutcome, Path]:
-    sweep([load_case(case)], (), folder / "records.jsonl", provider=PROVIDER, limits=Limits(workers=2))
+    sweep_here([load_case(case)], (), folder / "records.jsonl")
     return write_all(folder / "records.jsonl", folder)
 
 

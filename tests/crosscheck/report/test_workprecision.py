@@ -12,9 +12,7 @@ from crosscheck.library.find import load_case
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import Record, RunRecord
 from crosscheck.report.workprecision import WorkPrecision, work_precision
-from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import sweep
-from tests.crosscheck.sessions import PROVIDER, copy_case
+from tests.crosscheck.sessions import copy_case, sweep_here
 
 RUN_FILE = """
 [[variant]]
@@ -32,7 +30,7 @@ reference = "rigid"
 def records(tmp_path_factory: pytest.TempPathFactory) -> list[Record]:
     folder: Path = tmp_path_factory.mktemp("chart")
     case = load_case(copy_case(folder, RUN_FILE))
-    sweep([case], (), folder / "records.jsonl", provider=PROVIDER, limits=Limits(workers=2))
+    sweep_here([case], (), folder / "records.jsonl")
     return read(folder / "records.jsonl")
 
 

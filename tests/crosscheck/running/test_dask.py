@@ -19,12 +19,13 @@ from distributed import LocalCluster
 
 from crosscheck.running import dask_cluster
 from crosscheck.running.dask_cluster import ClusterError, DaskCluster
-from crosscheck.running.scheduler import Event
+from crosscheck.running.scheduler import Event, Work
 from crosscheck.sampling.run import run_sweep
-from crosscheck.stability.run import run_here, run_map
+from crosscheck.stability.run import run_map
 from tests.crosscheck.running.interrupted import install_plugs, interrupt_and_go_on
 from tests.crosscheck.sampling.test_sweeps import write as write_sweep
 from tests.crosscheck.sessions import PROVIDER as ENGINES
+from tests.crosscheck.sessions import here
 from tests.crosscheck.stability.synthetic import PROVIDER as MAPS
 
 TRIES = 2
@@ -85,7 +86,7 @@ def work(job: tuple[str, str], emit: Callable[[object], None]) -> None:
 def run(address: str, folder: Path, whats: list[str], **options: object) -> dict[str, list[Event]]:
     jobs = [(what, str(folder)) for what in whats]
     found: dict[str, list[Event]] = {what: [] for what in whats}
-    for event in DaskCluster(address)(work, jobs, None, "", **options):
+    for event in DaskCluster(address)(Work(work, jobs, "", **options)):
         found[whats[event.job]].append(event)
     return found
 
@@ -156,12 +157,12 @@ def test_an_interrupted_session_leaves_whole_records_and_goes_on(
 def test_sweeps_and_maps_on_a_cluster_give_what_they_give_here(address: str, tmp_path: Path) -> None:
     cluster = DaskCluster(address)
     file = write_sweep(tmp_path, "fine")
-    for name, scheduler in (("here", run_here), ("there", cluster)):
+    for name, scheduler in (("here", here), ("there", cluster)):
         (tmp_path / name).mkdir()
         run_sweep(file, tmp_path / name, provider=ENGINES, scheduler=scheduler)
     assert (tmp_path / "here" / "samples.csv").read_bytes() == (tmp_path / "there" / "samples.csv").read_bytes()
-    here, there = (
+    near, far = (
         run_map("circle", tmp_path / f"{name}.jsonl", provider=MAPS, scheduler=scheduler, depth=2)
-        for name, scheduler in (("circle_here", run_here), ("circle_there", cluster))
+        for name, scheduler in (("circle_here", here), ("circle_there", cluster))
     )
-    assert here.verdict.cells == there.verdict.cells and here.mesh.labels == there.mesh.labels
+    assert near.verdict.cells == far.verdict.cells and near.mesh.labels == far.mesh.labels

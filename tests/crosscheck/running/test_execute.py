@@ -12,14 +12,15 @@ import msgspec
 import numpy as np
 import pytest
 
-from crosscheck.engines.answers import LONGEST_TEXT, BrokenContract
+from crosscheck.engines.answers import LONGEST_TEXT, BrokenContract, describe
 from crosscheck.engines.contract import Effort, EngineMissing, Run, Support, Trajectory
 from crosscheck.judging.uncertainty import RUNGS
 from crosscheck.library.find import load_case
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.packing import unpack
 from crosscheck.running import execute as module
-from crosscheck.running.execute import describe, execute, find_engine
+from crosscheck.running import rung as of_rungs
+from crosscheck.running.execute import execute, find_engine
 from crosscheck.running.job import Done, Job
 from flexmb.run.channels import channels_of
 from tests.crosscheck.fake_engines import Fake, Pendulum
@@ -104,7 +105,8 @@ def cut(run: Trajectory, status: Any = "diverged", count: int = 2, message: str 
 def on_a_clock(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
     """Every look at the worker's clock is so many seconds after the one before."""
     clock = itertools.count(10.0, seconds)
-    monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    for timed in (module, of_rungs):
+        monkeypatch.setattr(timed, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
 
 
 @pytest.fixture(autouse=True)
@@ -124,7 +126,7 @@ def quick_keys(monkeypatch: pytest.MonkeyPatch) -> list[frozenset[str]]:
 def job(engine: str = "actor", **changes: Any) -> Job:
     given = Job(
         case="made/made", variant="rigid", role="main", engine=engine, scene=SCENE, scene_id="id", times=TIMES,
-        provider="tests.crosscheck.running.test_execute:engines",
+        provider="tests.crosscheck.running.test_execute:engines", maker="",
     )  # fmt: skip
     return replace(given, **changes)
 
@@ -278,10 +280,8 @@ def test_the_key_holds_all_that_the_result_depends_on(
     assert quick_keys == [frozenset({"tests.crosscheck.running.test_execute"})]
     assert len(first) == 16 and int(first, 16) >= 0
     assert key_of(Actor()) == first
-    monkeypatch.setattr(module, "home", {"actor": "somewhere"}.get)
-    assert key_of(Actor()) != first
+    assert key_of(Actor(), maker="somewhere") != first
     assert quick_keys[-1] == frozenset({"tests.crosscheck.running.test_execute", "somewhere"})
-    monkeypatch.undo()
     monkeypatch.setattr(module, "made_by", lambda modules: "tests.crosscheck.running.test_execute")
     assert key_of(Actor()) == first
     assert key_of(Actor(says={"version": "1.1"})) != first
@@ -358,7 +358,7 @@ def test_a_long_run_that_is_another_each_time_is_a_failure(monkeypatch: pytest.M
     noisy = Actor(play=lambda run, count: replace(run, momentum=run.momentum * (1 + 1e-9 * noise(count))))
     found = records(noisy)
     assert [each.status for each in found] == ["failed", *["finished"] * 4]
-    assert "not reproducible: momentum.angular is another when the same effort is run again" in found[0].message
+    assert "not reproducible: momentum.angular differs when the same effort is run again" in found[0].message
 
 
 def test_a_run_is_as_short_as_the_worker_says_whatever_the_engine_claims() -> None:
@@ -366,7 +366,7 @@ def test_a_run_is_as_short_as_the_worker_says_whatever_the_engine_claims() -> No
     noisy = Actor(play=lambda run, count: replace(run, momentum=run.momentum * (1 + 1e-9 * count), wall_s=1.0))
     found = records(noisy)
     assert [each.status for each in found] == ["failed"] * 5
-    assert "not reproducible: momentum.angular is another when the same effort is run again" in found[0].message
+    assert "not reproducible: momentum.angular differs when the same effort is run again" in found[0].message
 
 
 @pytest.mark.parametrize(
@@ -374,10 +374,10 @@ def test_a_run_is_as_short_as_the_worker_says_whatever_the_engine_claims() -> No
     [
         (lambda run: cut(run), "the same effort finished once and diverged the next time"),
         (lambda run: cut(run, "failed"), "the same effort finished once and failed the next time"),
-        (lambda run: replace(run, energy={}), "energy.kinetic is another when the same effort is run again"),
+        (lambda run: replace(run, energy={}), "energy.kinetic differs when the same effort is run again"),
         (
             lambda run: replace(run, momentum=run.momentum * (1 + 1e-15)),
-            "momentum.angular is another when the same effort is run again",
+            "momentum.angular differs when the same effort is run again",
         ),
     ],
 )

@@ -6,8 +6,8 @@ import msgspec
 import pytest
 
 from crosscheck.records.kinds import RunRecord
-from crosscheck.running.execute import solves
 from crosscheck.running.expected import BESIDES_S, Remaining, expected_seconds
+from crosscheck.running.rung import repeats_of
 
 RECORD = RunRecord(
     case="case", variant="rigid", role="main", engine="native", version="1", scene="", status="finished",
@@ -19,7 +19,8 @@ def test_a_job_takes_its_compilation_and_the_latest_run_of_every_effort() -> Non
     older = msgspec.structs.replace(RECORD, wall_s=50.0)
     short = msgspec.structs.replace(RECORD, effort="fine", wall_s=0.01)
     found = expected_seconds([older, "no run", RECORD, short])
-    assert found == {("case", "rigid", "main", "native"): pytest.approx(2.0 + 1.0 + solves(0.01) * 0.01 + BESIDES_S)}
+    seconds = 2.0 + 1.0 + repeats_of(0.01) * 0.01 + BESIDES_S
+    assert found == {("case", "rigid", "main", "native"): pytest.approx(seconds)}
 
 
 def test_the_clock_corrects_what_was_expected() -> None:

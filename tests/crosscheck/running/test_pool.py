@@ -13,7 +13,7 @@ import pytest
 
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.processes import memory_limit
-from crosscheck.running.scheduler import Event
+from crosscheck.running.scheduler import Event, Work
 from crosscheck.running.worker import LOG_LIMIT_BYTES, TICK_S
 
 
@@ -38,7 +38,7 @@ def test_every_job_is_answered_and_a_crash_costs_only_its_own(tmp_path: Path) ->
     jobs = ["good", "die", "better", "die", "best", "print", "threads"]
     log = tmp_path / "log"
     before = os.environ.get("OPENBLAS_NUM_THREADS")
-    events = list(run_jobs(work, jobs, 2, str(log)))
+    events = list(run_jobs(Work(work, jobs, str(log), 2)))
     for number, job in enumerate(jobs):
         last = outcome(events, number)[-1]
         if job == "die":
@@ -96,8 +96,10 @@ def test_a_job_that_does_not_end_well_is_ended_and_the_others_go_on(
     limit = {"hang": 2.0}
     events = list(
         run_jobs(
-            misbehave, [job, "good"], 1, str(tmp_path / "log"),
-            time_limit_s=lambda job: limit.get(job, 60.0), memory_limit_bytes=0.4e9,
+            Work(
+                misbehave, [job, "good"], str(tmp_path / "log"), 1,
+                time_limit_s=lambda job: limit.get(job, 60.0), memory_limit_bytes=0.4e9,
+            )
         )
     )  # fmt: skip
     last = outcome(events, 0)[-1]
@@ -107,14 +109,14 @@ def test_a_job_that_does_not_end_well_is_ended_and_the_others_go_on(
 
 def test_a_log_does_not_grow_without_bound(tmp_path: Path) -> None:
     log = tmp_path / "log"
-    list(run_jobs(misbehave, ["flood"], 1, str(log)))
+    list(run_jobs(Work(misbehave, ["flood"], str(log), 1)))
     assert log.stat().st_size <= LOG_LIMIT_BYTES
 
 
 def test_nothing_that_one_kind_leaves_in_its_process_reaches_another(tmp_path: Path) -> None:
     """The first job of each kind changes the folder, which the second of the same kind finds changed."""
     jobs = [("one", 0), ("one", 1), ("two", 0), ("two", 1)]
-    events = run_jobs(wander, jobs, 1, str(tmp_path / "log"), kind=lambda job: job[0])
+    events = run_jobs(Work(wander, jobs, str(tmp_path / "log"), 1, lambda job: job[0]))
     places = [event.content for event in events if event.kind == "emitted"]
     assert places == [os.getcwd(), "/", os.getcwd(), "/"]
 
@@ -130,7 +132,7 @@ def test_memory_of_the_machine_is_shared_out() -> None:
 
 
 def test_no_jobs_no_workers(tmp_path: Path) -> None:
-    assert list(run_jobs(work, [], 2, str(tmp_path / "log"))) == []
+    assert list(run_jobs(Work(work, [], str(tmp_path / "log"), 2))) == []
 
 
 def whoami(job: tuple[str, int], emit: Callable[[object], None]) -> None:
@@ -140,7 +142,7 @@ def whoami(job: tuple[str, int], emit: Callable[[object], None]) -> None:
 def test_workers_stay_with_their_kind(tmp_path: Path) -> None:
     """Two workers, two kinds in turn: a process leaves its kind only when no job of it is left, so at most once."""
     jobs = [(kind, number) for number in range(4) for kind in ("one", "two")]
-    events = run_jobs(whoami, jobs, 2, str(tmp_path / "log"), kind=lambda job: job[0])
+    events = run_jobs(Work(whoami, jobs, str(tmp_path / "log"), 2, lambda job: job[0]))
     done: dict[object, list[str]] = {}
     for event in events:
         if event.kind == "emitted":
@@ -152,7 +154,7 @@ def test_workers_stay_with_their_kind(tmp_path: Path) -> None:
 
 def test_only_one_worker_is_at_a_kind_until_its_first_job_is_done(tmp_path: Path) -> None:
     jobs = [("one", 0), ("one", 1), ("one", 2)]
-    events = list(run_jobs(whoami, jobs, 2, str(tmp_path / "log"), kind=lambda job: job[0]))
+    events = list(run_jobs(Work(whoami, jobs, str(tmp_path / "log"), 2, lambda job: job[0])))
     order = [(event.kind, event.job) for event in events if event.kind in ("started", "ended")]
     assert order[:2] == [("started", 0), ("ended", 0)]
     assert sorted(order[2:]) == [("ended", 1), ("ended", 2), ("started", 1), ("started", 2)]

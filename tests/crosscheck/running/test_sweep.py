@@ -9,6 +9,8 @@ from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
+from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import Limits
 from tests.crosscheck.sessions import CASE, compare_engines, copy_case, only, run_case
 
 GOALS = '"marker:tip" = 1e-6, "load" = 1e-6, "energy" = 1e-6'
@@ -51,8 +53,9 @@ FAULTY = ("absent", "nonsense", "refuser", "crasher", "raiser", "diverger")
 
 @pytest.fixture(scope="module")
 def faulty(tmp_path_factory: pytest.TempPathFactory) -> SessionOutcome:
-    """Two sound engines, a biased one, and all that give no result, in one session."""
-    return compare_engines(tmp_path_factory.mktemp("faulty"), ("fine", "stepper", "biased", *FAULTY))
+    """Two sound engines, a biased one, and all that give no result, in one session, in worker processes."""
+    engines = ("fine", "stepper", "biased", *FAULTY)
+    return compare_engines(tmp_path_factory.mktemp("faulty"), engines, scheduler=run_jobs, limits=Limits(workers=2))
 
 
 def test_a_biased_engine_differs_from_both_others(faulty: SessionOutcome) -> None:

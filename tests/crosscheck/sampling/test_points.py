@@ -133,5 +133,5 @@ def test_paths_reach_every_station_and_whole_numbers_stay_whole() -> None:
         1.5 * each.EIy_Nm2 for each in scene.bodies[0].stations
     ]
     assert changed.bodies[0].elements == 4 and isinstance(changed.bodies[0].elements, int)
-    with pytest.raises(CaseError, match=r"4.5 is no whole number"):
+    with pytest.raises(CaseError, match=r"4.5 is not a whole number"):
         with_values(scene, both, (1.0, 4.5))

@@ -6,6 +6,7 @@ import csv
 import functools
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -15,7 +16,7 @@ from typer.testing import CliRunner
 from crosscheck import cli
 from crosscheck.library.case import CaseError
 from crosscheck.running.pool import run_jobs
-from crosscheck.running.scheduler import Event, Limits
+from crosscheck.running.scheduler import Event, Limits, Work
 from crosscheck.sampling.run import Sampled, run_sweep
 from crosscheck.sampling.statistics import summarise
 from flexmb.scene.files import dumps
@@ -58,11 +59,11 @@ def write(folder: Path, *engines: str, head: str = HEAD, parameter: str = ANGLE,
     return file
 
 
-def here_and_backwards(function, jobs, *_: object):
+def here_and_backwards(work: Work):
     """A scheduler without processes that begins at the end."""
-    for number in reversed(range(len(jobs))):
+    for number in reversed(range(len(work.jobs))):
         found: list[object] = []
-        function(jobs[number], found.append)
+        work.function(work.jobs[number], found.append)
         yield from (Event(number, "emitted", content) for content in found)
         yield Event(number, "ended")
 
@@ -146,8 +147,8 @@ def test_an_interrupted_sweep_leaves_a_table_of_what_was_done_by_a_name_that_say
     run(file, tmp_path / "out")
     (tmp_path / "out" / "summary.json").write_text("{}", encoding="utf-8")
 
-    def interrupted(function, jobs, *_: object):
-        yield from (event for event in here_and_backwards(function, jobs[:2]))
+    def interrupted(work: Work):
+        yield from (event for event in here_and_backwards(replace(work, jobs=work.jobs[:2])))
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -166,7 +167,7 @@ def test_an_interrupted_sweep_leaves_a_table_of_what_was_done_by_a_name_that_say
         (("angle_rad", "angel_rad"), 'there is no "angel_rad": did you mean "angle_rad"?'),
         (("hinges.pivot", "hinges.pivto"), 'did you mean "pivot"?'),
         (("angle_rad", "angle_rad.x"), "end the path before it"),
-        (("hinges.pivot.rotation.angle_rad", "hinges.pivot.rotation"), "lead the path to a number"),
+        (("hinges.pivot.rotation.angle_rad", "hinges.pivot.rotation"), "give the path of a number"),
         (("marker:tip.position", "marker:tap.position"), 'no marker "tap": did you mean "tip"?'),
         (("marker:tip.position", "speed"), 'no channel "speed"'),
         (("sd = 0.1", "sd = -0.1"), "sd positive"),
@@ -213,7 +214,7 @@ def test_a_count_takes_whole_numbers_in_every_sample(tmp_path: Path) -> None:
     parameter = f'[[parameter]]\npath = "bodies.boom.elements"\n{count}'
     quantity = HEIGHT.replace("marker:tip.position", "energy.total").replace('component = "y"\n', "")
     file = write(tmp_path, "fine", head=head, parameter=parameter, quantity=quantity)
-    with pytest.raises(CaseError, match=r"sweep\.toml: .* counts something: 4\.5 is no whole number"):
+    with pytest.raises(CaseError, match=r"sweep\.toml: .* is a count: 4\.5 is not a whole number"):
         run(file, tmp_path / "out")
 
 

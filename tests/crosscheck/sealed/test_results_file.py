@@ -19,7 +19,7 @@ from crosscheck.sealed.badge import badge_json, badge_svg
 from crosscheck.sealed.document import SealedResults, results_of
 from crosscheck.sealed.seal import ResultsError, read_results, sealed_text
 from tests.crosscheck.sealed.test_compare import made
-from tests.crosscheck.sessions import PROVIDER, copy_case, sweep_here
+from tests.crosscheck.sessions import copy_case, sweep_here
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> tuple[Session, SessionO
     """The small case, run."""
     folder = tmp_path_factory.mktemp("session")
     records = folder / "records.jsonl"
-    sweep_here([load_case(copy_case(folder))], (), records, provider=PROVIDER)
+    sweep_here([load_case(copy_case(folder))], (), records)
     found = collect(last_session(read(records)))
     return found, conclude(found), records
 

@@ -15,14 +15,19 @@ from crosscheck.stability.catalogue import stability_maps
 from crosscheck.stability.flow import flow
 from crosscheck.stability.map import Axis, StabilityMap
 from crosscheck.stability.maps import free_spin, integrators, spinning_beam, vibrating_hinge
-from crosscheck.stability.run import Finished, run_here, run_map
+from crosscheck.stability.run import Finished, run_map
 from flexmb.system.compile import compile
 from flexmb.tables.state import pack
+from tests.crosscheck.sessions import here
 
 PROVIDER = "tests.crosscheck.stability.test_maps:coarse_maps"
 DECADES = {"gimbal_lock": 1.0}  # of a cell, where classes are narrower than two
 LARGEST = {"many_bodies": 150.0}  # largest value of x in these tests, where cells beyond it take long
-COSTLY = {"integrator_flexmb_radau5"}  # runs of a second and more
+COSTLY = {  # a second and more: by default one map of each family
+    "integrator_flexmb_radau5", "integrator_exudyn_expliciteuler", "integrator_exudyn_rk44",
+    "integrator_exudyn_trapezoidalindex2", "integrator_mujoco_rk4", "mass_ratio_frisch", "mass_ratio_composite",
+    "closure_drift", "follower_force",
+}  # fmt: skip
 NAMES = tuple(stability_maps())
 WITHOUT_BOUNDARY = {name for name in NAMES if stability_maps()[name].overlay.name.startswith(("every", "no "))}
 
@@ -56,7 +61,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory):
 
     def run(name: str) -> Finished:
         if name not in known:
-            known[name] = run_map(name, folder / f"{name}.jsonl", provider=PROVIDER, scheduler=run_here)
+            known[name] = run_map(name, folder / f"{name}.jsonl", provider=PROVIDER, scheduler=here)
         if known[name].verdict.status == "did not run":
             pytest.skip(known[name].verdict.worst)
         return known[name]

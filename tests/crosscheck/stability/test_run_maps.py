@@ -13,21 +13,22 @@ from typer.testing import CliRunner
 
 from crosscheck import cli
 from crosscheck.records import made_by
-from crosscheck.running.scheduler import Limits
+from crosscheck.running.scheduler import Limits, Work
 from crosscheck.stability import run
 from crosscheck.stability.boundary import judge
 from crosscheck.stability.catalogue import stability_maps
 from crosscheck.stability.map_records import CellRecord, cells_of, identity, read
 from crosscheck.stability.picture import STATUSES, draw
-from crosscheck.stability.run import Finished, run_here, run_map
+from crosscheck.stability.run import Finished, run_map
 from crosscheck.stability.verdict_file import read_verdicts
 from crosscheck.terminal import map_runs
+from tests.crosscheck.sessions import here
 from tests.crosscheck.stability import synthetic
 from tests.crosscheck.stability.synthetic import CIRCLE, PROVIDER, shifted
 
 
 def run_it(name: str, folder: Path, **options: object) -> Finished:
-    return run_map(name, folder / f"{name}.jsonl", provider=PROVIDER, **{"scheduler": run_here, **options})
+    return run_map(name, folder / f"{name}.jsonl", provider=PROVIDER, **{"scheduler": here, **options})
 
 
 def test_a_true_overlay_is_met_and_a_wrong_one_is_noticed(tmp_path: Path) -> None:
@@ -129,8 +130,8 @@ def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path: Path, monkeypatch:
         seen.append(1)
         run.run_cell(job, emit)
 
-    def scheduler(function, *words):
-        return run_here(counting, *words)
+    def scheduler(work: Work):
+        return here(replace(work, function=counting))
 
     again = run_map("circle", tmp_path / "cut.jsonl", provider=PROVIDER, scheduler=scheduler)
     assert len(seen) == len(whole.records) - known > 0

@@ -46,7 +46,6 @@ def cheap(folder: Path) -> list[list[str]]:
     """Commands that need no kernel and run no session."""
     return [
         ["crosscheck", "list"],
-        ["crosscheck", "engines"],
         ["crosscheck", "stability", "list"],
         ["flexmb", "equivalence", str(spinner(folder)), PANEL, "--picture", str(folder / "equivalence.png")],
     ]
@@ -60,6 +59,7 @@ def dear(folder: Path) -> list[list[str]]:
     sweep = folder / "spread.toml"
     sweep.write_text(SWEEP, encoding="utf-8")
     return [
+        ["crosscheck", "engines"],
         ["flexmb", "mass", scene],
         ["flexmb", "linearize", scene, "--at", "initial"],
         ["flexmb", "campbell", scene, "shaft", "--rates", "0:4:3", "--picture", str(folder / "campbell.png")],

@@ -17,7 +17,7 @@ from crosscheck.terminal.live import LiveProgress
 
 def lasting_line(message: str) -> str:
     """What stays of a job that did not run."""
-    job = Job("case", "rigid", MAIN, "absent", None, "", np.zeros(2), "module:engines")
+    job = Job("case", "rigid", MAIN, "absent", None, "", np.zeros(2), "module:engines", "")
     record = RunRecord(
         case="case", variant="rigid", role=MAIN, engine="absent", version="", scene="", status="did not run",
         message=message,
@@ -31,7 +31,7 @@ def lasting_line(message: str) -> str:
 
 @pytest.mark.parametrize("columns", [40, 100])
 def test_what_runs_is_named_in_full_on_every_terminal(columns: int) -> None:
-    job = Job("a_family_of_cases/a_case", "rigid", MAIN, "absent", None, "", np.zeros(2), "module:engines")
+    job = Job("a_family_of_cases/a_case", "rigid", MAIN, "absent", None, "", np.zeros(2), "module:engines", "")
     screen = io.StringIO()
     with LiveProgress(Console(file=screen, width=columns, force_terminal=True)) as live:
         live.hear([job], Event(0, "started"))

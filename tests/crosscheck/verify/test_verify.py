@@ -17,7 +17,7 @@ from crosscheck.verify.causes import likely_cause
 from crosscheck.verify.columns import VerifyError, read_columns
 from flexmb.typing import Real
 from tests.crosscheck.fake_engines import TOLERANCES, Pendulum
-from tests.crosscheck.sessions import CASE, PROVIDER
+from tests.crosscheck.sessions import CASE, PROVIDER, here
 
 TIMES = np.linspace(0.0, 1.0, 5)
 ALLOWED = 1e-6
@@ -117,7 +117,7 @@ def test_flexmbs_own_trajectory_agrees(tmp_path: Path) -> None:
     case = load_case(CASE)
     run = fm.simulate(case.scene(case.run.variants[0]), 4.0, samples=81)
     run.to_csv(tmp_path / "trajectory.csv")
-    checked = verify_csv(case, tmp_path / "trajectory.csv", engine="fine", provider=PROVIDER)
+    checked = verify_csv(case, tmp_path / "trajectory.csv", engine="fine", provider=PROVIDER, scheduler=here)
     assert {verdict.status for verdict in checked.all} == {"agree"}, [verdict.reason for verdict in checked.all]
     assert {f"marker:tip.{part}" for part in ("position", "orientation", "velocity", "angular_velocity")} | {
         "load:pivot.force", "energy.total", "momentum.linear"
@@ -127,7 +127,7 @@ def test_flexmbs_own_trajectory_agrees(tmp_path: Path) -> None:
     letters = {"x": "y", "y": "x"}
     exchanged = re.sub(r"tip\.velocity\.([xy])", lambda found: f"tip.velocity.{letters[found[1]]}", text)
     wrong = write(tmp_path / "wrong.csv", exchanged)
-    (differing,) = verify_csv(case, wrong, engine="fine", provider=PROVIDER).unexpected
+    (differing,) = verify_csv(case, wrong, engine="fine", provider=PROVIDER, scheduler=here).unexpected
     assert differing.channel == "marker:tip.velocity"
     assert "worst at t = " in differing.reason
     assert "the components are in the order y, x, z?" in differing.reason
@@ -233,7 +233,7 @@ def test_the_command_shows_a_table_with_the_cause(tmp_path: Path) -> None:
     columns = np.column_stack([times, 1e3 * run.markers["tip"].position, run.loads["pivot"][:, 3:]])
     head = ",".join(["t", *(f"tip.p{c}" for c in "xyz"), *(f"pivot.f{c}" for c in "xyz")])
     np.savetxt(tmp_path / "my.csv", columns, "%.17g", ",", header=head, comments="")
-    checked = verify_csv(case, tmp_path / "my.csv", engine="fine", provider=PROVIDER)
+    checked = verify_csv(case, tmp_path / "my.csv", engine="fine", provider=PROVIDER, scheduler=here)
     assert "(mm, say)" in checked.details["marker:tip.position"].cause
     assert checked.details["load:pivot.force"].cause == ""
     assert 0.0 < checked.details["marker:tip.position"].worst_s <= 4.0

@@ -150,7 +150,7 @@ def test_a_made_up_hinge_needs_its_declaration_only(with_drill):
     scene = drilled()
     system, dense = System(scene), DenseSystem(scene)
     q, u = np.zeros(system.nq), np.zeros(system.nu)
-    for link in system._links:
+    for link in system.links:
         q[system.coordinate(link.hinge.name)], u[system.speed(link.hinge.name)] = link.kind.state(link.hinge)
     q, u = dense.on_profile(q, u, 0.0)
     assert sum(body["hinge_kind"] == len(catalogue.KINDS) - 1 for body in system.constants.body) == 3

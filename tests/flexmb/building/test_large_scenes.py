@@ -11,7 +11,7 @@ import pytest
 
 from flexmb.building.assemble import assemble
 from flexmb.building.links import BodyLink, links
-from flexmb.building.numbering import Numbering, wheels_by_body
+from flexmb.building.numbering import Numbering
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.check import SceneError, check_scene
 from flexmb.scene.files import load_scene, save_scene
@@ -27,7 +27,7 @@ PARENTS = {
     "star": lambda k: min(k, 1) - 1,
     "binary tree": lambda k: (k - 1) // 2 if k else -1,
 }
-FEW = 104  # a multiple of what some tables are rounded up to
+FEW = 48  # a multiple of what some tables are rounded up to
 
 
 def tree(shape: str, bodies: int) -> SceneBuilder:
@@ -120,8 +120,8 @@ def _bytes(shape: str, bodies: int) -> int:
 
 @pytest.mark.parametrize("shape", PARENTS)
 def test_no_depth_is_too_deep(shape):
-    """Twenty times Python's limit of recursion."""
-    bodies = 20 * sys.getrecursionlimit()
+    """Four times Python's limit of recursion."""
+    bodies = 4 * sys.getrecursionlimit()
     scene = SceneBuilder(shape)
     for k in range(bodies):
         parent = PARENTS[shape](k)
@@ -152,7 +152,7 @@ def test_rigid_bodies_at_once_are_those_of_their_links(recipe, seed):
     """Frames and inertia in one step of arrays against each link's ports and model by themselves."""
     scene = trees.random_scene(seed, recipe)
     chain = links(scene)
-    constants = assemble(scene, chain, Numbering(chain, wheels_by_body(scene))).constants
+    constants = assemble(scene, chain, Numbering(chain, scene)).constants
     for k, link in enumerate(chain):
         body = constants.body[k]
         rigid = link.level.tables(link.model, link.wheels).rigid

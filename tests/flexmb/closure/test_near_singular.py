@@ -77,13 +77,6 @@ def judged(run: flexmb.Trajectory, found: np.ndarray, expected: np.ndarray, boun
     return "right" if off < bound else f"WRONG by {off:.1e}, drift {np.max(np.abs(run.energy_drift)):.1e}"
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_a_random_row_is_right_or_lost(seed):
-    """A sample of the campaign."""
-    found = outcomes(seed, ("dop853", "looser", "rk4", "coarser rk4"))
-    assert not [each for each in found.values() if each.startswith("WRONG")], found
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_bennetts_reference_closes(seed):
     """All the way round the axis behind the last link is the fourth one, on the ground, and at rest."""
@@ -107,6 +100,7 @@ def test_a_random_bennett_is_right_or_lost(seed):
 def test_random_mechanisms_are_right_or_lost(of, count):
     """The campaign: no run is wrong and says OK, and few are lost, but of those whose gaps and steps are given.
 
+    Rows are tried here only, as their reference takes 13 s to compile.
     In 156 rows (of seeds 0 to 198) with a reference that is trusted, all runs were right but two: one of "looser"
     (CLOSURE_OPEN), one of "stabilised" (CLOSURE_SINGULAR). Of "stabilised rk4" one in thirty said BRANCH_UNKNOWN. In 24
     linkages of Bennett's all were right. Thresholds, by what became of 33 rows when they were moved either way:

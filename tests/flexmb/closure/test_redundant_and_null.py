@@ -18,7 +18,7 @@ from tests.bounds import algebra
 from tests.flexmb.closure import chains, loops
 
 ZERO, MOVING = 1e-10, 1e-6  # singular values of J, of entries of size 1: none lies between
-FEW, ALL = 25, 500
+FEW, ALL = 12, 500
 
 
 def check(seed: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from types import SimpleNamespace
 
 import msgspec
@@ -11,6 +12,7 @@ import pytest
 import flexmb
 from flexmb.closure import branch
 from flexmb.closure.tables import GROUP
+from flexmb.run import segments
 from flexmb.scene import build
 from flexmb.scene import schema as s
 from flexmb.tables.status import Status
@@ -26,9 +28,13 @@ SETTINGS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("settings", SETTINGS)
-@pytest.mark.parametrize("count", [1, 2, 5, 10])
-@pytest.mark.parametrize("speed", [30.0, 1.0])
+@pytest.mark.parametrize(
+    ("speed", "count", "settings"),
+    [  # by default all numbers by one way to integrate, and all ways of one number
+        pytest.param(*each, marks=[] if each[2] == "dop853" or each[:2] == (30.0, 2) else pytest.mark.slow)
+        for each in product((30.0, 1.0), (1, 2, 5, 10), SETTINGS)
+    ],
+)
 def test_windows_stay_parallel_where_all_bars_lie_on_one_line(count, speed, settings):
     """One four-bar, many, even numbers of rows turned over at once: none turns into the branch that folds."""
     loose = {"loose": 1e-5, "looser": 1e-3, "coarse rk4": 1e-5, "radau5": 1e-3, "exponential": 1e-5}
@@ -110,6 +116,22 @@ def test_samples_and_ends_may_lie_at_singular_positions(settings):
     assert np.array_equal(run.undetermined["window 0"], [True, True, False, False, False, True])
 
 
+@pytest.mark.parametrize("t_end", [4.5, 4.5 - 1e-4, 4.5 + 1e-4])
+def test_a_run_that_ends_within_a_leap_is_integrated_once(t_end, monkeypatch):
+    """The leap goes on beyond the end of the run, whose last sample lies within it: such a run cannot be taken up."""
+    calls, whole = [], segments.integrate
+
+    def counted(*given, **settings):
+        calls.append(given)
+        return whole(*given, **settings)
+
+    monkeypatch.setattr(segments, "integrate", counted)
+    run = flexmb.simulate(m.windows(1, np.pi, gravity=0.0), t_end)
+    assert run.finished and len(calls) == 1, run.message
+    assert (run.restart is None) == (t_end >= 4.5)  # before it the position is not reached
+    assert np.max(np.abs(run.q[:, 0] - 0.5 * np.pi + np.pi * run.t)) < 1e-7
+
+
 @pytest.mark.parametrize("settings", ["dop853", "rk4"])
 def test_a_start_where_branches_cross_is_no_motion(settings):
     """All bars on one line at the start: rank and branch are not known there."""
@@ -127,8 +149,13 @@ def test_a_mechanism_that_comes_to_rest_at_a_singular_position_is_not_said_to_go
     assert not run.finished
 
 
-@pytest.mark.parametrize("settings", SETTINGS)
-@pytest.mark.parametrize("longer", [1e-2, 1e-3, 1e-5, 1e-8, 0.0])
+@pytest.mark.parametrize(
+    ("longer", "settings"),
+    [  # by default all distances by two ways to integrate, and all ways at one distance
+        pytest.param(*each, marks=[] if each[1] in ("dop853", "rk4") or each[0] == 1e-3 else pytest.mark.slow)
+        for each in product((1e-2, 1e-3, 1e-5, 1e-8, 0.0), SETTINGS)
+    ],
+)
 def test_passing_near_a_singular_position_is_right_or_stops(longer, settings):
     """A rod hardly longer than the crank: the slider turns back close to the crankshaft, on one side of it.
 

@@ -54,7 +54,7 @@ class Posed(NamedTuple):
 
 
 def posed(scene: fm.Scene) -> Posed:
-    plant = fm.compile(scene)._anew()
+    plant = fm.compile(scene)
     chosen = algorithms.chosen("articulated")
     route = plant.route()
     tables = route.tables()
@@ -155,10 +155,10 @@ def test_a_controller_takes_the_steps_of_the_spring_that_it_stands_for(method: A
 
 def test_without_the_controller_in_the_jacobian_steps_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
     stiff = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((-2e5, -2e3),))
-    complete = fm.simulate(link(stiff, torque=TORQUE), 0.02, "radau5", rtol=1e-6, atol=1e-8)
+    complete = fm.simulate(link(stiff, torque=TORQUE), 5e-3, "radau5", rtol=1e-6, atol=1e-8)
     whole = Feedback._tangent
     monkeypatch.setattr(Feedback, "_tangent", lambda *given: replace(whole(*given), column=np.zeros(0, np.int64)))
-    incomplete = fm.simulate(link(stiff, torque=TORQUE), 0.02, "radau5", rtol=1e-6, atol=1e-8)
+    incomplete = fm.simulate(link(stiff, torque=TORQUE), 5e-3, "radau5", rtol=1e-6, atol=1e-8)
     assert incomplete.statistics.evaluations > 5 * complete.statistics.evaluations
 
 

@@ -23,7 +23,7 @@ RECIPES = {
     "linear": trees.LINEAR, "stiffened": trees.STIFFENED, "every level": trees.EVERY_LEVEL,
     "free-flying": trees.FREE_FLYING, "conservative": trees.CONSERVATIVE, "later kinds": trees.LATER,
 }  # fmt: skip
-SEEDS = range(2)
+CASES = [*((name, 0) for name in RECIPES), *(pytest.param((name, 1), marks=pytest.mark.slow) for name in RECIPES)]
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Pair:
     bias: np.ndarray
 
 
-@pytest.fixture(scope="module", params=[(name, seed) for name in RECIPES for seed in SEEDS], ids=str)
+@pytest.fixture(scope="module", params=CASES, ids=str)
 def pair(request) -> Pair:
     name, seed = request.param
     scene = trees.random_scene(seed, RECIPES[name])

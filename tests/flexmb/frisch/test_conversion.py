@@ -52,7 +52,7 @@ def test_particles_need_no_turning_points():
 
 
 def test_single_turning_points_cannot_be_had_from_their_sums():
-    with pytest.raises(ValueError, match="single points cannot be had from their sums"):
+    with pytest.raises(ValueError, match="points cannot be recovered from the sums"):
         to_integrals(mode_parameters(TURNING))
     with pytest.raises(ValueError, match="not the printed ones"):
         to_integrals(mode_parameters(PARTICLES, as_printed=True))

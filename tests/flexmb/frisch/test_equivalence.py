@@ -264,7 +264,7 @@ def test_axis_of_a_mode():
     ("axes", "modes", "message"),
     [
         ([[0, 0, 0]], None, "three numbers that are not all zero"),
-        ([[0, 0, 1], [0, 0, 2]], None, "depend on one another"),
+        ([[0, 0, 1], [0, 0, 2]], None, "linearly dependent"),
         ([[0, 0, 1]], (0, 1), "1 hinge axes need as many modes, got 2"),
         (None, (9,), "it has modes 1 to 6"),
         ([[1, 0, 0]], None, "does not turn the appendage about that axis"),

@@ -141,7 +141,7 @@ def test_path_of_the_print_counts_its_first_hinge_twice():
     system = flexmb.compile(tree(1))
     nested = system.nested()
     nested.partitions(0.0, packed(system.initial_state))
-    places = nested._w.nest
+    places = nested.own_workspace.nest
     parent = system.constants.body["parent"]
     for k in range(len(parent)):
         path = [k]

@@ -74,7 +74,7 @@ def test_dependent_modes_are_refused():
         rotation=BODY.rotation[:, :, [0, 1, 0]],
         nodes={},
     )
-    with pytest.raises(ValueError, match="boom: its modes depend on one another"):
+    with pytest.raises(ValueError, match="boom: its modes are linearly dependent"):
         normalised(double, "boom")
 
 
@@ -86,14 +86,14 @@ def test_clamped_modes_that_move_the_origin_are_refused(shape):
     still = np.zeros((3, 3))
     clamp = (moved, still) if shape == "translation" else (still, moved)
     body = replace(BODY, nodes={"origin": FlexibleNode(np.zeros(3), np.eye(3), *clamp)})
-    with pytest.raises(ValueError, match='boom: mode 1 moves the body origin, seen at node "origin"'):
+    with pytest.raises(ValueError, match='boom: mode 1 moves the body origin \\(at node "origin"'):
         normalised(body, "boom")
     with pytest.raises(ValueError, match="boom: mode 1 moves the body origin"):
         mode_parameters(body, as_printed=True, name="boom")
     arrays = {key: getattr(BODY, key).copy() for key in ("position", "translation", "rotation")}
     arrays["position"][4] = 0.0
     arrays["translation"][4], arrays["rotation"][4] = clamp
-    with pytest.raises(ValueError, match="seen at inertia point 4.*free-free"):
+    with pytest.raises(ValueError, match="at inertia point 4.*free-free"):
         check_boundary(replace(BODY, **arrays))
     check_boundary(replace(BODY, clamped=False, **arrays))
 

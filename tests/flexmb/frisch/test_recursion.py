@@ -53,7 +53,7 @@ def pair(request) -> Pair:
     M, bias = system.mass_matrix(state), system.bias(state)
     loads = max(np.max(np.abs(load)) for load in system.hinge_loads(state).values())
     size = float(np.max(np.abs(M) @ np.abs(motion.accelerations)) + np.max(np.abs(bias)) + loads)
-    points = max(len(link.model.mass) for link in system._links)
+    points = max(len(link.model.mass) for link in system.links)
     bound = algebra(system.nu, len(system.body_names), points)
     return Pair(system, nested, state, motion, M, system.applied(state) - bias, size, bound)
 

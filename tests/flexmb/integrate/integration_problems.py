@@ -12,11 +12,12 @@ import numpy as np
 from scipy.special import ellipj
 
 from flexmb.integrate.control import ACCEPTED, COUNTS, Interval, copy, derivative
-from flexmb.integrate.dop853 import ExplicitStages, dop853, interpolant, interpolate, stages
+from flexmb.integrate.dop853 import ExplicitStages, dop853, stages, state_at
 from flexmb.integrate.dop853_tableau import STAGES, STAGES_DENSE
 from flexmb.integrate.memory import memory
 from flexmb.integrate.problem import Accuracy, Clock, Problem, problem
 from flexmb.integrate.rk4 import rk4
+from flexmb.integrate.watch import Ends
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
@@ -101,17 +102,17 @@ def run_dop853_fixed(problem, y, t0, h, steps, x, ends, dense, counts):
     ends (steps, n): the state after each; dense (steps, n): the interpolant at the fraction x of each.
     """
     n = y.shape[0]
-    s, trial = ExplicitStages(np.empty((STAGES_DENSE, n)), np.empty(n), np.empty((7, n))), np.empty(n)
+    s, y_new = ExplicitStages(np.empty((STAGES_DENSE, n)), np.empty((7, n)), np.zeros(1, np.int64)), np.empty(n)
     derivative(problem, t0, y, s.k[0], counts)
     for j in range(steps):
         t = t0 + j * h
-        stages(problem, t, math.inf, y, h, s.k, s.y_new, counts)
-        problem.project(t + h, s.y_new, problem.constants)
-        derivative(problem, t + h, s.y_new, s.k[STAGES], counts)
-        interpolant(problem, Interval(t, t + h, math.inf), y, s, trial, counts)
-        interpolate(y, s.f, x, dense[j])
-        copy(s.y_new, y)
-        copy(s.y_new, ends[j])
+        step, s.has_interpolant[0] = Interval(t, t + h, math.inf), 0
+        stages(problem, step, y, s.k, y_new, counts)
+        problem.project(t + h, y_new, problem.constants)
+        derivative(problem, t + h, y_new, s.k[STAGES], counts)
+        state_at(problem, step, Ends(y, s.k[0], y_new, s.k[STAGES]), s, t + x * h, dense[j], (0, counts))
+        copy(y_new, y)
+        copy(y_new, ends[j])
         copy(s.k[STAGES], s.k[0])
         counts[ACCEPTED] += 1
 

@@ -97,7 +97,7 @@ BAD = {
     "no model": ("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "MuJoCo refuses"),
     "no xml": ("hello", "not XML"),
 }
-NAN = r"is no finite number up to 1e+150: give a finite number, or leave the attribute out"
+NAN = r"is not a finite number up to 1e+150: give a finite number, or leave the attribute out"
 UNSOUND = {  # MuJoCo compiles all of the first kind, with a default in place of the number
     "inertial": (
         "<geom ", '<inertial pos="nan 0 0" mass="1" diaginertia="1 1 1"/><geom ', f'inertial, pos: "nan" {NAN}',
@@ -114,7 +114,7 @@ UNSOUND = {  # MuJoCo compiles all of the first kind, with a default in place of
     "copies": (
         "</worldbody>",
         '<replicate count="1000"><replicate count="1000"><body/></replicate></replicate></worldbody>',
-        "it asks for 1000000 copies, and 10000 are allowed",
+        "it requests 1000000 copies, and the limit is 10000",
     ),
     "texture": ("<worldbody>", '<asset><texture width="99999" height="9999"/></asset><worldbody>', "999890001 entries"),
     "room": ("<worldbody>", '<size nuser_body="999999999"/><worldbody>', "999999999 entries"),
@@ -134,7 +134,7 @@ def test_numbers_that_are_none_are_seen_before_mujoco_takes_them_for_defaults(fa
 def test_an_included_file_that_is_none_is_refused(make, tmp_path):
     """MuJoCo would wait for a pipe for ever."""
     make(tmp_path / "more.xml")
-    with pytest.raises(OSError, match="no regular file"):
+    with pytest.raises(OSError, match="name a regular file"):
         read(MJCF.replace("<worldbody>", '<include file="more.xml"/><worldbody>'), tmp_path)
 
 

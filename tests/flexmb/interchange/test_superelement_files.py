@@ -90,28 +90,28 @@ def test_op4_with_long_string_headers():
 SPARSE = (DATA / "pynastran_sparse.op4").read_text()
 BAD = {
     "cut OP4": ("K.op4", SPARSE[:600], "has no end"),
-    "no OP4": ("K.op4", "hello\n", "line 1: this is no header"),
+    "no OP4": ("K.op4", "hello\n", "line 1: this is not the header"),
     "outside": ("K.op4", SPARSE.replace("  327687", "  327700", 1), "an element outside of the matrix"),
     "not finite": ("K.op4", SPARSE.replace(" 2.0000000000000000E+07", " 2.0000000000000E+7777", 1), "not finite"),
     "complex OP4": ("K.op4", SPARSE.replace("       6       2K", "       6       4K"), "real square matrices"),
-    "binary": ("K.op4", "\x00\x00", "no header"),
+    "binary": ("K.op4", "\x00\x00", "not the header"),
     "which": ("K.op4", SPARSE.replace("KAAX", "XAAX"), "which matrix is K"),
-    "no DMIG": ("K.pch", "$ nothing\n", "it holds none"),
+    "no DMIG": ("K.pch", "$ nothing\n", "it has none"),
     "no header": ("K.pch", "DMIG*   KAAX                           1               1\n", "line 1"),
-    "no matrix market": ("K.mtx", "1 2 3", "no Matrix Market file"),
-    "NUL in a number": ("K.mtx", "%%MatrixMarket matrix array real general\n1 1\n1\x000\n", "not numbers alone"),
+    "no matrix market": ("K.mtx", "1 2 3", "not a Matrix Market file"),
+    "NUL in a number": ("K.mtx", "%%MatrixMarket matrix array real general\n1 1\n1\x000\n", "more than numbers"),
     "too few": ("K.mtx", "%%MatrixMarket matrix array real symmetric\n2 2\n1 2\n", "2 numbers, and 2 x 2 needs 3"),
     "outside of it": ("K.mtx", "%%MatrixMarket matrix coordinate real general\n2 2 1\n3 1 1.0\n", "element 1 lies"),
-    "sizes": ("K.mtx", "%%MatrixMarket matrix array real general\n2 -2\n", '"2 -2" stands where 2 sizes belong'),
+    "sizes": ("K.mtx", "%%MatrixMarket matrix array real general\n2 -2\n", '"2 -2" is in the place of 2 sizes'),
     "pattern": ("K.mtx", "%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "known are array or coord"),
     "complex": ("K.mtx", "%%MatrixMarket matrix array complex general\n1 1\n1 1\n", "is complex"),
-    "no HB": ("K.rb", "x", "no Harwell-Boeing file"),
+    "no HB": ("K.rb", "x", "not a Harwell-Boeing file"),
     "large": (
         "K.mtx",
         "%%MatrixMarket matrix coordinate real general\n90000 90000 1\n1 1 1.0\n",
         "too large for dense",
     ),
-    "unknown": ("K.full", "x", "no known format: write the matrix as one of .mtx"),
+    "unknown": ("K.full", "x", "not a known format: write the matrix as one of .mtx"),
 }
 
 
@@ -134,7 +134,7 @@ TABLES = {
     "few": ("id,x,y,z\n1,0,0,0\n", "K has 18 rows"),
     "beyond all numbers": (f"id,x,y,z\n{'9' * 30},0,0,0\n", "line 2: give id,x,y,z as numbers"),
     "endless cell": (f"id,x,y,z\n{'2' * 200_000},0,0,0\n", "field larger than"),
-    "twice": ("id,x,y,z\n1,0,0,0\n1,1,0,0\n", "a node number is there twice"),
+    "twice": ("id,x,y,z\n1,0,0,0\n1,1,0,0\n", "a node number is repeated"),
 }
 
 

@@ -133,12 +133,15 @@ SINGLE = f'<robot name="r">{link("a", 1)}{link("b", 2)}{joint("j", "revolute", "
 BAD = {
     "mimic": (SINGLE.replace("<axis", '<mimic joint="k"/><axis'), 'joint "j": it mimics'),
     "kind": (SINGLE.replace('"revolute"', '"screw"'), 'its type is "screw"'),
-    "loop": (SINGLE.replace("</robot>", joint("k", "fixed", "b", "a", 2) + "</robot>"), "0 links are no joint's child"),
+    "loop": (
+        SINGLE.replace("</robot>", joint("k", "fixed", "b", "a", 2) + "</robot>"),
+        "0 links are not the child of a joint",
+    ),
     "two parents": (
         SINGLE.replace("</robot>", joint("k", "fixed", "a", "b", 2) + "</robot>"),
         'is also the child of "j"',
     ),
-    "two roots": (SINGLE.replace("</robot>", link("c", 3) + "</robot>"), "2 links are no joint's child"),
+    "two roots": (SINGLE.replace("</robot>", link("c", 3) + "</robot>"), "2 links are not the child of a joint"),
     "unknown link": (SINGLE.replace('child link="b"', 'child link="x"'), 'its child is "x"'),
     "no mass": (re.sub(r"<mass[^>]*/>", "", SINGLE), "mass value is missing"),
     "nan": (re.sub(r'ixx="[^"]*"', 'ixx="nan"', SINGLE), "inertia ixx is 'nan'"),
@@ -166,7 +169,7 @@ def test_inertia_that_no_body_has_is_refused_or_repaired(tmp_path):
     with pytest.raises(fm.SceneError, match="triangle|positive"):
         read(text, tmp_path)
     repaired = read(text, tmp_path, repair=True)
-    assert "changed as little as makes them possible: a, b" in repaired.notes[-1]
+    assert "changed by the least amount: a, b" in repaired.notes[-1]
     moments = np.linalg.eigvalsh(repaired.scene.bodies[0].inertia_kg_m2)
     assert moments[0] + moments[1] >= moments[2] * (1.0 - 1e-12)
     assert read(SINGLE, tmp_path, repair=True) == read(SINGLE, tmp_path)  # what is possible stays as it is

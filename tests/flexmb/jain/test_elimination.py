@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from flexmb.scene import schema
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.shapes import beam_section
+from flexmb.tables.features import SEVERAL, contained
 from tests import trees
 from tests.benchmarks.rivals import flexible_chain
 from tests.bounds import UNIT_ROUNDOFF, algebra, backward_error, gamma
@@ -52,17 +55,24 @@ class Found:
         return body["nodes"][body["elimination"] > 0]
 
 
+@cache
+def dense_equations(name: str, seed: int) -> tuple[schema.Scene, flexmb.System, np.ndarray, np.ndarray, float]:
+    """A random scene, its system in explicit form, M and bias at the initial state, and the bound of two routes."""
+    scene = trees.random_scene(seed, RECIPES[name])
+    explicit, dense = flexmb.compile(scene, "explicit"), DenseSystem(scene)
+    state = explicit.initial_state
+    bound = algebra(dense.nu, len(dense.tree.members), max(len(member.model.mass) for member in dense.tree.members))
+    return scene, explicit, dense.mass_matrix(state.q), dense.bias(state.q, state.u), bound
+
+
 @pytest.fixture(
     scope="module", ids=str, params=[(name, seed, form) for name in RECIPES for seed in SEEDS for form in ELIMINATIONS]
 )
 def found(request) -> Found:
     name, seed, elimination = request.param
-    scene = trees.random_scene(seed, RECIPES[name])
-    system, dense = flexmb.compile(scene, elimination), DenseSystem(scene)
-    state = system.initial_state
-    bound = algebra(dense.nu, len(dense.tree.members), max(len(member.model.mass) for member in dense.tree.members))
-    explicit = flexmb.compile(scene, "explicit")
-    return Found(system, explicit, state, dense.mass_matrix(state.q), dense.bias(state.q, state.u), bound)
+    scene, explicit, M, bias, bound = dense_equations(name, seed)
+    system = flexmb.compile(scene, elimination)
+    return Found(system, explicit, system.initial_state, M, bias, bound)
 
 
 def test_accelerations_solve_the_dense_equations(found):
@@ -167,6 +177,7 @@ def arm(masses: np.ndarray, hinge_node: str = "origin", level: str = "ruthless",
 
 
 MASSES = np.array([1.0, 2.0, 3.0])
+TURN = schema.Constant(value=1.0)
 
 
 @pytest.mark.parametrize(
@@ -190,6 +201,24 @@ def test_the_woodbury_form_is_for_constant_tables():
     """(B3) belongs to Appendix B."""
     assert flexmb.compile(arm(MASSES), "woodbury").elimination == {"arm": "woodbury"}
     assert flexmb.compile(arm(MASSES, level="full"), "woodbury").elimination == {"arm": "explicit"}
+
+
+@pytest.mark.parametrize(
+    ("hinge", "node", "general"),
+    [
+        (schema.Revolute, "origin", False),
+        (schema.Prismatic, "origin", False),
+        (schema.Spherical, "origin", True),
+        (schema.Weld, "origin", True),
+        (partial(schema.Revolute, rotation=schema.AngularCoordinate(prescribed_rad=TURN)), "origin", True),
+        (schema.Revolute, "tip", True),
+    ],
+)
+def test_which_hinges_need_a_matrix(hinge, node, general):
+    """The table in `flexmb.jain`: D_R of a single axis is a number, of all other hinges a matrix."""
+    hinges = (hinge(name="root", parent="ground", child="arm", child_node=node),)
+    system = flexmb.compile(msgspec.structs.replace(arm(MASSES), hinges=hinges))
+    assert (SEVERAL in contained(system.constants)) == general
 
 
 def test_an_unknown_form_is_refused():

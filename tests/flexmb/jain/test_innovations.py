@@ -22,7 +22,10 @@ from tests.flexmb.jain.random_states import LEVELS, RandomState, random_state
 CARRIERS = ("rigid", "modal", "floating")
 
 
-@pytest.fixture(scope="module", params=[(level, n) for level in LEVELS for n in (3, 20, 200)], ids=str)
+LONG = [pytest.param((level, 200), marks=[] if level == "every level" else pytest.mark.slow) for level in LEVELS]
+
+
+@pytest.fixture(scope="module", params=[*((level, n) for level in LEVELS for n in (3, 20)), *LONG], ids=str)
 def found(request) -> RandomState:
     """Trees, and at 200 bodies chains; wheels and prescribed speeds among them."""
     level, bodies = request.param

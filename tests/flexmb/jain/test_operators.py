@@ -53,7 +53,7 @@ def case(scene: flexmb.Scene) -> Case:
 
 @pytest.fixture(
     scope="module",
-    params=[(MIXED, "chain", 50), *((MIXED, shape, n) for shape in SHAPES for n in (1, 2, 20))]
+    params=[(MIXED, "chain", 30), *((MIXED, shape, n) for shape in SHAPES for n in (1, 2, 20))]
     + [(level, shape, 5) for level in LEVELS for shape in SHAPES],
     ids=lambda param: "-".join(map(str, param)),
 )
@@ -65,10 +65,10 @@ def found(request) -> Case:
 
 @pytest.fixture(scope="module")
 def longest() -> Case:
-    """A chain of 200 bodies, half of them flexible, all hinges free."""
+    """A chain of 100 bodies, half of them flexible, all hinges free."""
     carriers = ("rigid", "modal", "floating")
-    recipe = replace(trees.MIXED, bodies=200, branching=False, prescribed=False, carriers=carriers)
-    return case(trees.random_scene(200, recipe))
+    recipe = replace(trees.MIXED, bodies=100, branching=False, prescribed=False, carriers=carriers)
+    return case(trees.random_scene(100, recipe))
 
 
 def norm(x: Real) -> float:
@@ -177,7 +177,7 @@ def test_lemmas_on_any_scene(seed, bodies, level, tree):
     check_accelerations(operators, np.random.default_rng(seed))
 
 
-def test_two_hundred_bodies(longest):
+def test_a_hundred_bodies(longest):
     check_operators(longest.operators)
     check_lemmas(longest.operators)
     check_accelerations(longest.operators, np.random.default_rng(1))

@@ -139,6 +139,6 @@ def test_kernels_call_by_address_with_the_tables_of_a_bundle():
     scaling, clearing = (
         direct(each, *given).args[0] for each, given in ((scaled, (STATUS, REAL, VECTOR)), (cleared, (NOTHING, MATRIX)))
     )
-    assert through(scaling, clearing, inner._address) == 3
+    assert through(scaling, clearing, inner.kernel_address) == 3
     assert inner.y.tolist() == [0.0, 2.0, 4.0]
     assert inner.values.tolist() == [[1.0, 1.0, 0.0]] * 2

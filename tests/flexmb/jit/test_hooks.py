@@ -86,11 +86,12 @@ with warnings.catch_warnings(record=True) as warned:
 """
 NUMBERS = """
 import numpy as np
-from flexmb.integrate.rk4 import rk4
 from flexmb.tables.soundness import unsound
-from tests.flexmb.integrate.integration_problems import HARMONIC, solve
 from tests.flexmb.jit.test_bundle import choose, fill_inner, Nested, pair
 print(fill_inner(Nested(pair(), np.array([1.0, 3.0])), 2.0), choose(pair()), unsound(np.ones(2), np.zeros(0, np.int64)))
+"""
+RUN = """
+from tests.flexmb.integrate.integration_problems import HARMONIC, solve
 print(solve(HARMONIC, [0.0, 1.0], step=1e-2).last.tolist())
 """
 HIDDEN = {
@@ -110,13 +111,18 @@ def probe(program: str, hidden: str = "") -> list[str]:
     return done.stdout.splitlines()
 
 
-@pytest.mark.parametrize("hidden", HIDDEN)
+def is_told(line):
+    return line.startswith("plain numba ") and line.count("is not one that flexmb knows from inside") == 1
+
+
+@pytest.mark.parametrize("hidden", [name for name in HIDDEN if name != "another version"])
 def test_one_warning_says_that_the_hooks_are_not_used(hidden):
     [line] = probe(WHICH, HIDDEN[hidden])
-    assert line.startswith("plain numba ") and line.count("is not one that flexmb knows from inside") == 1
+    assert is_told(line)
 
 
-def test_without_the_hooks_results_are_the_same():
-    first, *others = probe(WHICH + NUMBERS)
-    plain, *same = probe(WHICH + NUMBERS, HIDDEN["another version"])
-    assert first == "hooks" and plain.startswith("plain") and same == others
+@pytest.mark.parametrize("numbers", [NUMBERS, pytest.param(RUN, marks=pytest.mark.slow)], ids=["kernels", "a run"])
+def test_without_the_hooks_results_are_the_same(numbers):
+    first, *others = probe(WHICH + numbers)
+    plain, *same = probe(WHICH + numbers, HIDDEN["another version"])
+    assert first == "hooks" and is_told(plain) and same == others

@@ -71,10 +71,10 @@ class Project:
         return found
 
 
-@pytest.fixture
-def project(tmp_path: Path) -> Project:
-    """After a first process, which compiles everything."""
-    made = Project(tmp_path)
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    """After a first process, which compiles everything; each test leaves it like that."""
+    made = Project(tmp_path_factory.mktemp("project"))
     assert made.used() == ("1.5 -0.5", "0 0 0")
     return made
 

@@ -68,7 +68,7 @@ def kinds(folder: Path) -> set[str]:
 
 
 def test_one_of_two_processes_compiles(tmp_path):
-    crew = [start(tmp_path, number, 2, 2.0) for number in range(2)]
+    crew = [start(tmp_path, number, 2, 1.0) for number in range(2)]
     assert sorted(found(each) for each in crew) == [0, 1]
     assert len([*tmp_path.glob("compiled by *")]) == 1
     assert kinds(tmp_path / "kernels") == {".kernel"}
@@ -76,7 +76,7 @@ def test_one_of_two_processes_compiles(tmp_path):
 
 def test_without_the_lock_both_do(tmp_path):
     """The count above sees it."""
-    crew = [start(tmp_path, number, 2, 2.0, "alone") for number in range(2)]
+    crew = [start(tmp_path, number, 2, 1.0, "alone") for number in range(2)]
     assert [found(each) for each in crew] == [0, 0]
     assert len([*tmp_path.glob("compiled by *")]) == 2
 

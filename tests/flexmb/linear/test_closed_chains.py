@@ -34,7 +34,7 @@ class Manifold:
         start = self.model.state
         q, u = start.q.copy(), start.u.copy()
         for _ in range(20):
-            found = self.system._admissible(t, np.r_[q, u, 0.0])
+            found = self.system.admissible(self.system.state(q, u, t))
             short = [start.q[self.chosen] + z - found.q[self.chosen], start.u[self.chosen] + w - found.u[self.chosen]]
             if np.max(np.abs(short)) < 1e-14:
                 break

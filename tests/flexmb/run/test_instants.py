@@ -69,7 +69,7 @@ def check(run: fm.Trajectory, kind: str, start: float, instant: float, shown: li
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_due_at_a_time_happens_once_wherever_in_a_run_it_lies(kind: str, method: Any) -> None:
     options, names = METHODS[method], ["it"]
-    for start in (0.0, -1.25, 3.0):
+    for start in (0.0, -1.25, 3.0) if method == "dop853" else (-1.25,):
         for later in (0.0, 0.5, 1.0):
             instant, end = start + later, start + 1.0
             scene = moving(kind, start, event("time", instant, KINDS[kind][0]))
@@ -114,6 +114,10 @@ def test_what_comes_to_a_level_has_to_come_there(kind: str, watch: str) -> None:
             assert gone.events == () and gone.q[-1, 0] == pytest.approx(1.0, abs=1e-9)
 
 
+# Of the ways to stand on a stop: how it is crossed, what is watched, and whether the cart is in a closed chain.
+BY_DEFAULT = {("falling", WHERE, False), ("either", "height[2]", False), ("falling", "height[2]", True)}
+
+
 def test_events_of_one_instant_happen_in_the_order_of_the_scene() -> None:
     """Wherever it lies; a sampled controller acts after all of them, and an event on what it says comes last."""
     law = fm.StateSpace(name="law", inputs=("speed",), D=((1.0,),), period_s=0.25)
@@ -130,12 +134,17 @@ def test_events_of_one_instant_happen_in_the_order_of_the_scene() -> None:
         assert run.signals["law"][:, 0].tolist() == [float(t < later) for t in run.t]
 
 
-@pytest.mark.parametrize("chain", [False, True], ids=["tree", "chain"])
-@pytest.mark.parametrize("watch", [WHERE, "height[2]"])
-@pytest.mark.parametrize("crossing", ["falling", "either"])
+@pytest.mark.parametrize(
+    ("crossing", "watch", "chain"),
+    [
+        each if each in BY_DEFAULT else pytest.param(*each, marks=pytest.mark.slow)
+        for each in product(("falling", "either"), (WHERE, "height[2]"), (False, True))
+    ],
+)
 def test_what_stands_on_a_stop_does_not_fall_through_it(crossing: str, watch: str, chain: bool) -> None:
     """At rest it rests; what moves into the stop is struck, what leaves it is not; without `rests` it chatters."""
-    for level, off, speed, rests in product((0.0, 0.3), (0.0, -6e-17), (0.0, -1.0, 1.0), (True, False)):
+    levels = (0.3,) if chain else (0.0, 0.3)
+    for level, off, speed, rests in product(levels, (0.0, -6e-17), (0.0, -1.0, 1.0), (True, False)):
         stop = fm.Impact(coordinate=WHERE, restitution=0.5, rests=rests)
         there = {"position": level + off, "rate": speed}
         scene = cart(event(watch, level, stop, crossing=crossing), gravity=G, chain=chain, **there)

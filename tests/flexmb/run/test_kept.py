@@ -7,9 +7,9 @@ import pytest
 
 import flexmb as fm
 import flexmb.run.propagate as propagation
-import flexmb.run.simulate as simulation
 import flexmb.run.switching as switching
 from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.run import segments
 from flexmb.run.observing import observe
 from flexmb.run.propagate import integration
 from flexmb.run.warm_up import pendulum
@@ -164,14 +164,14 @@ def test_single_states_take_over_where_the_compiled_loop_ends(system, sound):
 
 def test_outputs_that_overflow_end_the_samples(monkeypatch):
     """Squares of speeds overflow before the speeds do: the samples before are kept."""
-    whole = simulation.integrate
+    whole = segments.integrate
 
-    def overflowing(*given):
-        raw = whole(*given)
+    def overflowing(*given, **settings):
+        raw = whole(*given, **settings)
         raw.states[2:, 1] = 1e200
         return raw
 
-    monkeypatch.setattr(simulation, "integrate", overflowing)
+    monkeypatch.setattr(segments, "integrate", overflowing)
     run = fm.simulate(pendulum(), 1.0, samples=5)
     assert run.status is Status.NONFINITE and run.stopped_at == 0.5
     assert run.message.startswith("stopped at t = 0.5 s: the result at t = 0.5 s is not finite")

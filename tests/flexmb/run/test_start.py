@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+from flexmb.jit.installed import unfit
+
 LATER = (
     "scipy.linalg", "scipy.spatial", "scipy.interpolate", "scipy.sparse", "scipy.optimize", "matplotlib",
     "rich", "typer", "jinja2", "psutil", "filelock", "flexmb.dense.dense_system", "flexmb.jain.operators",
@@ -34,7 +36,7 @@ LOADED = "\nprint(*[name for name in {later} if name in sys.modules])"
 def loaded(code: str) -> list[str]:
     """Of `LATER`, in a process that finds its kernels compiled."""
     text = code + LOADED.format(later=LATER)
-    for _ in range(2):  # who compiles loads what numba's compiler needs
+    for _ in range(2 if unfit() else 1):  # who compiles loads what numba's compiler needs
         done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
     return done.stdout.split()

@@ -43,7 +43,7 @@ def test_gimbal_lock_is_said_and_the_orientation_kept(sequence: str, side: float
 
 def test_what_is_no_sequence_is_refused() -> None:
     for wrong in ("zz", "zzx", "xyq", "zyx "):
-        with pytest.raises(ValueError, match="no sequence"):
+        with pytest.raises(ValueError, match="not a sequence"):
             angles_of([1.0, 0.0, 0.0, 0.0], wrong)
     with pytest.raises(ValueError, match="length zero"):
         angles_of([0.0, 0.0, 0.0, 0.0])

@@ -2,6 +2,7 @@
 
 import gc
 import re
+from functools import cache
 
 import msgspec
 import numpy as np
@@ -49,12 +50,18 @@ def values_of(node: inspect.Type) -> st.SearchStrategy:
     return SCALARS[type(node)]
 
 
+@cache
+def items_of(kind: type) -> st.SearchStrategy:
+    """One or two items of a kind; made once, as making a strategy takes longer than drawing from it."""
+    return st.lists(values_of(inspect.type_info(kind)), min_size=1, max_size=2).map(tuple)
+
+
 @pytest.mark.parametrize("kind", COLLECTIONS, ids=lambda kind: kind.__name__)
 @settings(max_examples=20, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_round_trip_is_the_identity(kind, data):
     """Every kind of item, nested structs and functions included, with arbitrary text and bit-exact floats."""
-    items = data.draw(st.lists(values_of(inspect.type_info(kind)), min_size=1, max_size=2).map(tuple))
+    items = data.draw(items_of(kind))
     name = data.draw(SCALARS[inspect.StrType])
     scene = s.Scene(**({"name": name, "bodies": (), "hinges": ()} | {COLLECTIONS[kind]: items}))
     assert loads(dumps(scene)) == scene

@@ -132,7 +132,7 @@ def test_damping_is_that_of_the_first_mode():
 def test_refusals():
     with pytest.raises(ValueError, match='no beam "rod"'):
         finite_segments(beam_scene(), "rod", 4)
-    with pytest.raises(ValueError, match='"panel" is no beam .kind "rigid"'):
+    with pytest.raises(ValueError, match='"panel" is not a beam .kind "rigid"'):
         finite_segments(beam_scene(), "panel", 4)
     with pytest.raises(ValueError, match="at least 2"):
         finite_segments(beam_scene(), "boom", 1)

@@ -62,7 +62,7 @@ def calls() -> dict[str, Call]:
         found[called] = Call(function, arguments, kinds)
 
     pointwise = (
-        "mass_matrix", "bias", "applied", "energy", "momentum", "partitions", "digits_left", "precision",
+        "mass_matrix", "bias", "applied", "energy", "momentum", "partitions", "digits_left", "precision", "admissible",
     )  # fmt: skip
     for name in pointwise:
         add(f"System.{name}", getattr(tree, name), {"state": state}, state=states)
@@ -107,6 +107,7 @@ def calls() -> dict[str, Call]:
         t=numbers,
     )
     add("State", fm.State, {"q": state.q.copy(), "u": state.u.copy(), "t": 0.5}, q=rows, u=rows, t=numbers)
+    add("System.scene_state", tree.scene_state, {"t": 0.5}, t=numbers)
     for name in ("coordinate", "speed"):
         add(f"System.{name}", getattr(tree, name), {"name": "elbow"}, name=names)
     asked = {"algorithm": "articulated", "stabilise": 0.0}
@@ -148,8 +149,7 @@ def calls() -> dict[str, Call]:
     start = chain.initial_state
     for name in (
         "mass_matrix", "bias", "energy", "momentum", "determined_loads", "closure_gaps", "hinge_loads", "digits_left",
-        "mass_properties",
-        "precision",
+        "mass_properties", "precision", "admissible",
     ):  # fmt: skip
         add(f"ClosedSystem.{name}", getattr(chain, name), {"state": start}, state=closed_states)
     add(
@@ -315,7 +315,12 @@ def seen(run: fm.Trajectory) -> tuple[Any, ...]:
 
 
 # What takes no numbers, and why. Whatever else is public must be among the calls.
+INSIDE = {  # of the mechanics, for numbers that have been examined
+    "nested_system", "precision_if_doubtful", "observe_recursion", "observe_rates", "observe_motion", "observe_row",
+    "check_status", "check_precision", "all_loads", "referred_loads",
+}  # fmt: skip
 EXEMPT = {
+    *(f"{system}.{name}" for system in ("System", "ClosedSystem") for name in INSIDE),
     "System.workspace", "System.recursion_workspace", "System.composite_workspace", "NestedSystem.workspace",  # nothing
     "System.fault_name", "ClosedSystem.fault_name",  # of the status of a kernel
     "Trajectory.columns", "LinearModel.to_scipy", "LinearModel.to_control",  # nothing
@@ -331,7 +336,7 @@ EXEMPT = {
     "ClosedSystem.consistent_inverse_dynamics", "ClosedSystem.modal_residual", "ClosedSystem.applied",  # the tree's
     "ClosedSystem.factorise",
     "ClosedSystem.operators", "ClosedSystem.partitions", "ClosedSystem.nested",  # always refused
-    "ClosedSystem.coordinate", "ClosedSystem.speed", "ClosedSystem.state",
+    "ClosedSystem.coordinate", "ClosedSystem.speed", "ClosedSystem.state", "ClosedSystem.scene_state",
     "ClosedSystem.evaluator",  # always refused
     "ClosedSystem.workspace", "ClosedSystem.recursion_workspace", "ClosedSystem.composite_workspace",
     "load_scene", "save_scene", "SceneBuilder",  # files and data, checked where they are compiled

@@ -69,7 +69,7 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
     found: dict[str, Question] = {
         name: lambda s, x, name=name: getattr(s, name)(x)
         for name in ("mass_matrix", "bias", "energy", "momentum", "digits_left", "precision", "mass_properties",
-                     "applied", "hinge_loads")
+                     "applied", "hinge_loads", "admissible")
     }  # fmt: skip
     algorithms = ("articulated", "unsplit", "composite", "frisch") if is_tree else ("articulated", "composite")
     for each in algorithms:
@@ -83,6 +83,7 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
         "factorise": lambda s, x: s.factorise(x).solve(rates),
         "accelerations_batch": lambda s, x: s.accelerations_batch(x.q[None], x.u[None], x.t, threads=1),
         "initial_state": lambda s, x: s.initial_state,
+        "scene_state": lambda s, x: s.scene_state(x.t),
         "simulate": lambda s, x: seen(fm.simulate(s, x.t + 2e-3, state=x, t_start=x.t, samples=3)),
         "simulate_batch": lambda s, x: fm.simulate_batch(s, 2e-3, q=x.q[None], u=x.u[None], samples=3, threads=1).q,
     }

@@ -8,7 +8,8 @@ import pytest
 
 import flexmb as fm
 from flexmb.scene.build import SceneBuilder
-from flexmb.system.batch import Batch, compile_batch
+from flexmb.system.batch import Batch
+from flexmb.system.compile import compile_batch
 from tests import trees
 from tests.bounds import backward_error
 

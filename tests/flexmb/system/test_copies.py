@@ -81,7 +81,7 @@ def test_arrays_that_are_parts_of_one_are_not_copied() -> None:
     with pytest.raises(TypeError, match="Halves cannot be copied"):
         copy.deepcopy(Halves(both[:2], both[2:]))
     with pytest.raises(TypeError, match="Outputs cannot be copied"):
-        copy.deepcopy(fm.compile(rigid())._out)
+        copy.deepcopy(fm.compile(rigid()).observation.out)
 
 
 def guarded(bundled: Any, rooms: dict[str, np.ndarray]) -> Any:

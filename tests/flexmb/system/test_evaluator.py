@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.entry.object_access import SWITCH
 from flexmb.run.warm_up import looped
 from flexmb.system import evaluator as evaluator_module
 from flexmb.system.algorithms import ALGORITHMS
@@ -187,7 +188,7 @@ def test_arguments_by_name_and_in_wrong_numbers(system, roads):
 
 
 def test_it_works_where_objects_cannot_be_read(system, roads, monkeypatch):
-    monkeypatch.setattr(evaluator_module, "readable", lambda: False)
+    monkeypatch.setenv(SWITCH, "off")
     evaluator, state = system.evaluator(), moving(system, 0)
     found = evaluator(state.t, state.q, state.u)
     assert np.array_equal(found, system.accelerations(state)) and found is evaluator.accelerations
@@ -342,7 +343,7 @@ def test_copies_have_addresses_of_their_own(system, copied):
     found = other.accelerations(state), other.mass_matrix(state), fm.simulate(other, 1e-3, samples=3).q
     assert all(np.array_equal(a, b) for a, b in zip(found, expected, strict=True))
     assert np.array_equal(evaluator(state.t, state.q, state.u), system.accelerations(state, "composite"))
-    other._w.body["velocity"][:] = np.nan
+    other.own_workspace.body["velocity"][:] = np.nan
     assert np.array_equal(system.mass_matrix(state), expected[1])
     with pytest.raises(TypeError, match="cannot be copied"):
         copied(system._invert)

@@ -64,8 +64,8 @@ def somewhere(system: fm.System, size: float = 3e-3) -> fm.State:
 
 def at_root(system: fm.System, state: fm.State, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The load across the section at x = 0, and that across the hinge, both World about the hinge's point."""
-    system._all_loads(*system.layout.entering(state))
-    root, point = node_pose(system, system._w, "beam", "root"), hinge_frames(system, system._w)["root"].point
+    w = system.all_loads(state).motion
+    root, point = node_pose(system, w, "beam", "root"), hinge_frames(system, w)["root"].point
     torque, force = root.rotation @ load[:3], root.rotation @ load[3:]
     about = torque + np.cross(root.position - point, force)
     return np.concatenate([about, force]), system.hinge_loads(state)["root"]
@@ -224,7 +224,7 @@ def test_loads_of_a_free_vibration_converge() -> None:
         wanted = fm.Modes(count=count, families=("bending_y",))
         beam = fm.SceneBuilder("let go").beam("beam", length=LENGTH, elements=12, section=SECTION, modes=wanted)
         system = fm.compile(beam.weld("clamp", "ground", "beam").scene())
-        link = system._links[0]
+        link = system.links[0]
         eta = force * link.node("tip").translation[1] / np.diag(link.model.stiffness)
         found = system.section_loads(system.state(eta, np.zeros(count)), "beam", [0.0])
         errors.append([abs(found.bending[0, 1] / (force * LENGTH) - 1.0), abs(found.shear[0, 0] / force - 1.0)])
@@ -247,7 +247,7 @@ def test_one_mode_against_its_closed_form() -> None:
         "beam", length=LENGTH, elements=12, section=SECTION, modes=wanted, points="line"
     )
     system = fm.compile(beam.weld("clamp", "ground", "beam").scene())
-    shape = system._links[0].node("tip").translation[1, 0]
+    shape = system.links[0].node("tip").translation[1, 0]
     found = system.section_loads(system.state(np.array([1e-6 / shape]), np.zeros(1)), "beam", x)
     EI = E * IZ
     np.testing.assert_allclose(found.bending[:, 1], EI * second, atol=1e-7 * EI * np.max(np.abs(second)))

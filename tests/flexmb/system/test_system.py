@@ -186,7 +186,7 @@ def records(bundle):
 
 system = flexmb.compile(random_scene(SEED, RECIPE))
 system.constants = system.recursion_constants = records(system.constants)
-system._w = system._recursion_w = records(system._w)
+system.own_workspace = system.own_recursion_workspace = records(system.own_workspace)
 np.save(sys.argv[1], numbers(system))
 """
 

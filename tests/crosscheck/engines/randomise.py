@@ -1,4 +1,4 @@
-"""Random states of one scene: where engines must agree on accelerations, loads, energies and momenta to round-off."""
+"""Random states of a scene, in which engines must agree on accelerations, loads, energies and momenta to round-off."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _DEFLECTION = 0.03  # of a beam's length
 
 
 def randomise(scene: Scene, rng: Generator) -> Scene:
-    """The same scene at random hinge coordinates and speeds, modal states and wheel speeds; prescribed ones stay."""
+    """The scene with random hinge coordinates and speeds, modal states and wheel speeds, except prescribed ones."""
     flexible = [body for body in scene.bodies if isinstance(body, BeamBody | ModalBody) and body.level != "rigid"]
     states = tuple(_modal_state(body, rng) for body in flexible)
     return replace(

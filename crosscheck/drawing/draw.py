@@ -1,10 +1,9 @@
-"""How to draw a scene from its markers: every drawn point is a marker plus a fixed offset in the marker's axes.
+"""The drawing of a scene: every drawn point is a marker plus a fixed offset in the marker's axes.
 
-Rigid bodies become the box with the same mass and inertia, carried by any marker on the body, or a ball where they have
-none; flexible bodies a line through the nodes that carry markers, which bends with them; wheels become discs, point
-masses that are fixed balls, springs coils, bushings and springs of hinges marks. Markers are all that runs record, so
-that drawing needs no mechanics; bodies without a marker are not drawn. `film.py` gives each body the markers it needs.
-"""
+A rigid body is drawn as the box of the same mass and inertia, or as a ball if it has no inertia; a flexible body as a
+line through its nodes with markers; wheels as discs, fixed point masses as balls, springs as coils, bushings and
+springs of hinges as marks. Only markers are recorded, so that drawing needs no mechanics; bodies without a marker are
+not drawn. `film.py` adds the markers that each body needs. """
 
 from __future__ import annotations
 
@@ -24,11 +23,11 @@ from flexmb.typing import Real
 
 LARGEST_ASPECT = 12.0
 DRAWN_AS = {SpringDamper: "spring", Bushing: "mount"}
-THINNEST_WHEEL = 0.1  # width of a wheel over its radius, where its inertias would make it thinner
+THINNEST_WHEEL = 0.1  # least drawn width of a wheel over its radius
 
 
 def draw(scene: Scene, trails: Sequence[str] | None = None) -> Drawing:
-    """Lines of every body and wheel that has a marker to carry it; `trails` are the scene's markers if not given."""
+    """Lines of every body and wheel with a marker; `trails` names markers, by default all."""
     lines: list[Line] = []
     wheels: list[DrawnWheel] = []
     for body in scene.bodies:
@@ -53,7 +52,7 @@ def draw(scene: Scene, trails: Sequence[str] | None = None) -> Drawing:
 
 
 def _rigid(scene: Scene, body: RigidBody, marker: Marker) -> list[Line]:
-    """Box of equal inertia, and arms from the mass centre to where the body is joined to others."""
+    """The box of equal inertia, and arms from the mass centre to the joints of the body."""
     position, rotation = _pose(body, marker)
 
     def carried(point: Real) -> CarriedPoint:
@@ -71,7 +70,7 @@ def _rigid(scene: Scene, body: RigidBody, marker: Marker) -> list[Line]:
 
 
 def _masses(scene: Scene) -> list[Line]:
-    """Point masses that stay where they are; those that move become bodies in a film."""
+    """Fixed point masses; moving ones are bodies in a film."""
     found = []
     for mass in scene.point_masses:
         point = None if mass.directions else _carried(scene, mass.body, mass.node, mass.offset_m)
@@ -81,7 +80,7 @@ def _masses(scene: Scene) -> list[Line]:
 
 
 def _connectors(scene: Scene) -> list[Line]:
-    """Connectors between nodes, and springs along hinges where these are."""
+    """Connectors between nodes, and springs along hinges at the hinge points."""
     found = []
     for each in scene.connectors:
         kind, points = "mount", []
@@ -101,7 +100,7 @@ def _connectors(scene: Scene) -> list[Line]:
 
 
 def _carried(scene: Scene, body: str, node: str, offset: Vector) -> CarriedPoint | None:
-    """A point at a node of a body or of the ground; None where no marker moves with it."""
+    """A point at a node of a body or of the ground; None if no marker moves with it."""
     if body == GROUND:
         return CarriedPoint("", offset)
     own = next(each for each in scene.bodies if each.name == body)
@@ -114,8 +113,8 @@ def _carried(scene: Scene, body: str, node: str, offset: Vector) -> CarriedPoint
 
 
 def _flexible(scene: Scene, body: Body, markers: list[Marker]) -> Line:
-    """Line through the body's nodes with markers, by distance from its origin, from its inboard hinge if that is
-    carried."""
+    """A line through the body's nodes with markers in the order of their distance from its origin; it begins at the
+    inboard hinge if a marker carries that."""
     nodes = {marker.node: marker for marker in reversed(markers)}
     placed = sorted(nodes.values(), key=lambda marker: float(np.linalg.norm(_node_point(body, marker.node, ZERO))))
     rest = np.array([_node_point(body, marker.node, ZERO) for marker in placed])
@@ -131,7 +130,7 @@ def _flexible(scene: Scene, body: Body, markers: list[Marker]) -> Line:
 
 
 def _directions(points: Real) -> Real:
-    """Unit vectors (n,3) along a line through points (n,3), at each from its neighbours; zero for a single point."""
+    """Unit tangents (n,3) of a line through points (n,3), by differences; zero for a single point."""
     if len(points) < 2:
         return np.zeros_like(points)
     ways = np.gradient(points, axis=0)
@@ -151,9 +150,8 @@ def _root_point(scene: Scene, body: Body) -> CarriedPoint | None:
 def _corners(body: RigidBody) -> list[Real]:
     """Corners of the uniform box with the body's mass and principal inertias, in the body frame.
 
-    Sides from I_x = m (b^2 + c^2)/12 and so on: a^2 = 6 (I_y + I_z - I_x)/m. Sides are kept within `LARGEST_ASPECT` so
-    that a body of no width is still seen.
-    """
+    Sides from I_x = m (b^2 + c^2)/12 and so on: a^2 = 6 (I_y + I_z - I_x)/m. Their ratio is limited by
+    `LARGEST_ASPECT`, so that a thin body is visible. """
     moments, axes = np.linalg.eigh(np.array(body.inertia_kg_m2))
     squares = 6.0 * (moments.sum() - 2.0 * moments) / max(body.mass_kg, np.finfo(float).tiny)
     sides = np.sqrt(np.maximum(squares, 0.0))
@@ -179,7 +177,7 @@ def _joints(scene: Scene, body: RigidBody) -> list[Real]:
 
 
 def _turns_with(body: Body, marker: Marker, wheel: Wheel) -> bool:
-    """Whether a marker of the body has the motion that a wheel on the body rides on."""
+    """Whether a marker of the body moves with the node of a wheel on the body."""
     return isinstance(body, RigidBody) or marker.node == wheel.node
 
 

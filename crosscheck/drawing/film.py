@@ -1,8 +1,8 @@
-"""The run that an animation is made from: the scene with markers on every body, and more of them along bent ones.
+"""The run for an animation: the scene with markers on every body, and additional ones along beams.
 
-The markers that a case records are those it judges, and many bodies have none. A film is a run of its own, by the
-library's own engine, so that what is judged stays as the case says; it is drawn and never judged. Where a case has
-efforts of its own, finer ones take long: the coarsest is off by a thousandth of the motion at most.
+The markers of a case are those that it judges, and many bodies have none. So the animation has a run of its own by the
+native engine, which is never judged. If the case prescribes efforts, the coarsest is used, which is off by a thousandth
+of the motion at most.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from crosscheck.drawing.draw import draw
 from crosscheck.engines.contract import Effort
 from crosscheck.records.drawing import Drawing
-from crosscheck.running.draw import draw
 from flexmb.interchange.sid.blocks import SidError
 from flexmb.interchange.sid.to_body import with_sid_bodies
 from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
@@ -24,17 +24,17 @@ from flexmb.scene.tree import coordinates, rest_frames
 
 ENGINE = "native"
 FRAMES = 161
-EFFORT = Effort("tolerance", 1e-10, "dop853")  # unless the case has its own: then their coarsest
-PIECES = 6  # of a beam, between the nodes that are filmed
+EFFORT = Effort("tolerance", 1e-10, "dop853")  # if the case prescribes none
+PIECES = 6  # into which additional nodes divide a beam
 ADDED = "drawn"
 NO_INERTIA = ((0.0,) * 3,) * 3
 
 
 def film(scene: Scene) -> tuple[Scene, Drawing] | None:
-    """The scene to run and how to draw it; None where the scene's own markers show as much, or a SID file is bad."""
+    """The scene to run and its drawing; None if the scene's own markers suffice or a SID file cannot be read."""
     try:
         filmed = _hung(with_sid_bodies(scene))
-    except (SidError, OSError):  # runs tell what is wrong with the file
+    except (SidError, OSError):  # the case's runs report the error
         return None
     carried = {marker.body for marker in scene.markers}
     if filmed is scene and all(isinstance(body, RigidBody) and body.name in carried for body in scene.bodies):
@@ -45,7 +45,6 @@ def film(scene: Scene) -> tuple[Scene, Drawing] | None:
 
 
 def film_channels(drawing: Drawing) -> tuple[str, ...]:
-    """The channels that the drawing needs."""
     carriers = {point.marker for line in drawing.lines for point in line.points if point.marker}
     found = [
         f"marker:{name}.{part}"
@@ -58,8 +57,8 @@ def film_channels(drawing: Drawing) -> tuple[str, ...]:
 
 
 def _hung(scene: Scene) -> Scene:
-    """The scene with point masses that move as bodies on slides, which markers can follow, unless something names
-    them."""
+    """The scene with moving point masses replaced by bodies on slides, to which markers can be fixed, unless a
+    connector, sensor or event refers to them."""
     watching = msgspec.json.encode((scene.connectors, scene.sensors, scene.events)).decode()
     moving = [mass for mass in scene.point_masses if mass.directions and f'"{mass.name}' not in watching]
     if not moving:

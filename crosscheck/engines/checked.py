@@ -1,0 +1,72 @@
+"""An engine whose answers are all held against the contract before anyone uses them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from crosscheck.engines.answers import checked_ladder, checked_model, checked_run, checked_support, checked_version
+from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Support, Trajectory
+from crosscheck.engines.steps import USUAL_S
+from flexmb.scene.schema import Scene, UserLaw
+
+LATER = ("connectors", "controllers", "events")
+"""Collections that scenes did not have when the contract was first written; `takes` names those an adapter handles."""
+NO_START = "begins all runs at t = 0"
+
+
+class CheckedEngine:
+    """Asks an engine about runs that start at `t_start` and last `duration_s` (s).
+
+    An answer that the contract does not allow raises `BrokenContract`; what the engine itself raises passes through.
+    """
+
+    def __init__(self, engine: Engine, t_start: float = 0.0, duration_s: float = USUAL_S) -> None:
+        self.engine, self.name = engine, engine.name
+        self.t_start, self.duration_s = t_start, duration_s
+
+    def version(self) -> str:
+        return checked_version(self.engine.version())
+
+    def supports(self, scene: Scene) -> Support:
+        """What the engine says; "no" where its adapter would silently ignore the start or a collection of the scene.
+
+        User-defined controller laws are refused for every engine: records would not notice when they change.
+        """
+        known = getattr(self.engine, "takes", ())
+        if self.t_start != 0.0 and "t_start" not in known:
+            return Support("no", f"the adapter of engine {self.name} {NO_START}")
+        for collection in LATER:
+            items = getattr(scene, collection)
+            if items and collection not in known:
+                return Support("no", f'"{items[0].name}": the adapter of engine {self.name} knows no {collection}')
+        for law in scene.controllers:
+            if isinstance(law, UserLaw) and not law.function.startswith("flexmb."):
+                reason = f'the function "{law.function}" is not of flexmb: a record would not know its changes'
+                return Support("no", reason)
+        return checked_support(self.engine.supports(scene))
+
+    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
+        """The ladder for the duration from the engine's `efforts_for` if it has one, else its `efforts`."""
+        if (by_duration := getattr(self.engine, "efforts_for", None)) is not None:
+            return checked_ladder(by_duration(scene, self.duration_s))
+        return checked_ladder(self.engine.efforts(scene))
+
+    def compile(self, scene: Scene) -> Model:
+        return CheckedModel(checked_model(self.engine.compile(scene)), scene)
+
+
+@dataclass(frozen=True)
+class CheckedModel:
+    """A compiled scene whose trajectories are checked; each run gets its own copy of the sample times."""
+
+    model: Model
+    scene: Scene
+
+    def warm_up(self) -> None:
+        self.model.warm_up()
+
+    def evaluate(self) -> Snapshot:
+        return self.model.evaluate()
+
+    def simulate(self, run: Run, effort: Effort) -> Trajectory:
+        return checked_run(self.model.simulate(Run(times=run.times.copy()), effort), run.times, self.scene)

@@ -1,0 +1,38 @@
+"""The equations of a system or scene for its linear models: those of a tree, or of a closed chain."""
+
+from __future__ import annotations
+
+from flexmb.linear.variations import Equations
+from flexmb.scene.open_loop import refuse_feedback
+from flexmb.scene.schema import Scene
+from flexmb.system.closed import ClosedSystem
+from flexmb.system.compile import compile
+from flexmb.system.tree_system import System
+from flexmb.tables.state import State
+
+
+def equations_of(system: System) -> Equations:
+    """The equations of a tree or a closed chain; NotImplementedError for closures on bodies of level "ruthless"."""
+    if not isinstance(system, ClosedSystem):
+        return Equations(system)
+    from flexmb.linear.closed_variations import ClosedEquations  # few scenes need it
+
+    return ClosedEquations(system)
+
+
+def entering(system: System | Scene, state: State | None) -> tuple[Equations, State]:
+    """The two parts of a linear model: the equations of a system or scene, and a state of it (default: initial).
+
+    NotImplementedError for scenes with controllers and for closures on bodies of level "ruthless", ValueError or
+    TypeError for a state that is not one of this system.
+    """
+    if not isinstance(system, System | Scene):
+        raise TypeError(f"a System or a Scene is needed, not {type(system).__name__}")
+    refuse_feedback(system if isinstance(system, Scene) else system.scene, "a linear model of the motion alone")
+    equations = equations_of(system if isinstance(system, System) else compile(system))
+    if state is None:
+        return equations, equations.system.initial_state
+    equations.system.layout.entering(state)
+    if isinstance(equations.system, ClosedSystem):
+        return equations, equations.system.admissible(state, "state")
+    return equations, state

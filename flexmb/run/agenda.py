@@ -1,0 +1,106 @@
+"""Which events of a scene can still happen in a run, and when those on time are due."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from msgspec import structs
+
+from flexmb.control.schedule import slack
+from flexmb.integrate.watch import Watch
+from flexmb.run.event_memory import EventMemory
+from flexmb.run.propagate import Raw
+from flexmb.run.sides import Sides
+from flexmb.scene.schema import Scene, SceneEvent
+from flexmb.scene.tree import watchable
+from flexmb.tables.status import Status
+from flexmb.typing import Real
+
+WATCHED_AGAIN = 2.5
+"""Times by which an event happened before its instant: so long it is not watched, twice to its instant and beyond."""
+
+
+class Agenda:
+    """The events of a scene, with what has become of them."""
+
+    def __init__(self, scene: Scene, sides: Sides, times: Real) -> None:
+        """times (T,) s of the output."""
+        self._sides, self._t_end = sides, float(times[-1])
+        self._together = slack(float(times[0]), self._t_end)
+        """Instants this close (s) are one."""
+        self._done = set[str]()
+        """Names of events on time that have happened, or were due before the run."""
+        self._passed, self.until = set[str](), -np.inf
+        """Names of events that happened before their instant, and the time (s) up to which they are not watched."""
+        self.take(scene)
+
+    def take(self, scene: Scene) -> None:
+        """The events of a scene as other events have left it; sensors are replaced by what they measure."""
+        names = watchable(scene) if scene.events else {}
+        self._events = tuple(structs.replace(each, watch=names.get(each.watch, each.watch)) for each in scene.events)
+
+    @property
+    def _armed(self) -> list[SceneEvent]:
+        return [event for event in self._events if event.name not in self._passed]
+
+    @property
+    def watched(self) -> list[SceneEvent]:
+        """Events on what moves, in the order of the scene."""
+        return [event for event in self._armed if event.watch != "time"]
+
+    def due_at_start(self, t: float) -> list[SceneEvent]:
+        """Events on time that are due where the run starts; earlier ones are gone."""
+        timed = [event for event in self._events if event.watch == "time"]
+        self._done |= {event.name for event in timed if event.level < t - self._together}
+        return [event for event in timed if abs(event.level - t) <= self._together]
+
+    def next_stop(self, t: float) -> tuple[float, list[SceneEvent]]:
+        """The time (s) up to which nothing is due after t, and the events on time that are due then."""
+        timed = [event for event in self._armed if event.watch == "time" and event.name not in self._done]
+        first = min((max(event.level, t) for event in timed), default=np.inf)
+        end = first if first < self._t_end - self._together else self._t_end
+        stop = min(end, self.until if t < self.until else np.inf)
+        return stop, [event for event in timed if event.level <= stop + self._together]
+
+    def found(self, raw: Raw, levels: Watch | None, due: Sequence[SceneEvent], stop: float) -> list[SceneEvent]:
+        """What happens where a segment ended, in the order of the scene: what came to its level, and what is due."""
+        if raw.status is not Status.OK or raw.interrupted:
+            return []
+        crossed = [self.watched[i] for i in np.flatnonzero(levels.found)] if levels is not None and raw.paused else []
+        due = due if raw.t >= stop - self._together else ()
+        return [event for event in self._events if event in crossed or event in due]
+
+    def happened(self, event: SceneEvent) -> None:
+        """Events on time happen once."""
+        if event.watch == "time":
+            self._done.add(event.name)
+
+    def pass_over(self, events: Sequence[SceneEvent], t: float, early: float) -> None:
+        """Events that happened so long (s) before their instant are not watched until that is over."""
+        self._passed |= {event.name for event in events}
+        self.until = t + WATCHED_AGAIN * early
+
+    def watch_again(self) -> None:
+        """All events, from now on."""
+        self._passed.clear()
+
+    def remember(self, scene: Scene, anew: bool, given: Scene) -> EventMemory:
+        """As things are; sides of the events that are watched are those of the moment."""
+        sides = self._sides
+        side = [1 if event.name in self._done else sides.side.get(event.name, 0) for event in scene.events]
+        came = [sides.came.get(event.name, 0) for event in scene.events]
+        passed = [int(event.name in self._passed) for event in scene.events]
+        whole = (np.array(each, np.int64) for each in (side, came, passed))
+        return EventMemory(*whole, self.until, anew, 0, given)
+
+    def recall(self, memory: EventMemory) -> None:
+        """What a run knew that is taken up."""
+        self.until = memory.until
+        for i, event in enumerate(self._events):
+            if memory.passed[i]:
+                self._passed.add(event.name)
+            if event.watch != "time":
+                self._sides.side[event.name], self._sides.came[event.name] = int(memory.side[i]), int(memory.came[i])
+            elif memory.side[i]:
+                self._done.add(event.name)

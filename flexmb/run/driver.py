@@ -1,0 +1,272 @@
+"""The driver of a run: one loop over segments, with what happens between them, joined to one trajectory.
+
+A segment is integrated in compiled code (`flexmb.run.segments`). What follows depends on why it ended (`SegmentEnd`):
+at an event the actions of all events at that instant change the scene and the state, and the next segment begins anew;
+at the end of the run's time, or where nothing goes on, the run is over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple, assert_never
+
+import numpy as np
+
+from flexmb.integrate.memory import STRETCH, TIME, Memory
+from flexmb.integrate.settings import Settings
+from flexmb.integrate.watch import UNKNOWN, Watch
+from flexmb.run.agenda import Agenda
+from flexmb.run.chattering import FEW, Chattering
+from flexmb.run.event_memory import EventMemory
+from flexmb.run.event_record import EventRecord
+from flexmb.run.joining import joined
+from flexmb.run.making import Making
+from flexmb.run.origin import Beginning
+from flexmb.run.propagate import Raw, unmoved
+from flexmb.run.restart import Restart
+from flexmb.run.resting import with_stops
+from flexmb.run.segments import Segment, SegmentEnd, Segments
+from flexmb.run.sides import DIRECTIONS, Sides
+from flexmb.run.situation import Situation
+from flexmb.run.solver import Solver
+from flexmb.run.standing import stand
+from flexmb.run.trajectory import Trajectory
+from flexmb.scene.events import EndRun
+from flexmb.scene.schema import SceneEvent
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.compile import assembled
+from flexmb.system.tree_system import System
+from flexmb.tables.features import asking
+from flexmb.tables.status import Status
+from flexmb.typing import Real
+
+CAN_GO_ON = (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED)
+"""How a run ends that can be taken up."""
+
+
+class Instant(NamedTuple):
+    """After all that happens at one time: the state, and whether the run ends there by an event."""
+
+    raw: Raw
+    ends: bool
+
+
+class Driver:
+    """One run of a scene."""
+
+    def __init__(
+        self, system: System, times: Real, settings: Settings, algorithm: Algorithm, stabilise: float,
+        taken_up: EventMemory | None = None, made_by: Making | None = None,
+    ) -> None:  # fmt: skip
+        """times (T,) s of the output; taken_up: what was known of events where the run ended that is taken up."""
+        self._times, self._settings, self._taken_up, self._made_by = times, settings, taken_up, made_by
+        given = None if taken_up is None else taken_up.given
+        self._situation = Situation(_with_stops(system), settings, given)
+        self._solver = Solver(self._situation, settings, algorithm, stabilise)
+        self._sides = Sides(self._situation, settings, self._solver.integration)
+        self._agenda = Agenda(self._situation.system.scene, self._sides, times)
+        self._segments = Segments(self._situation, self._agenda, self._sides, times, self._solver)
+        self._chattering = Chattering(times[0], times[-1], settings.atol)
+        self._happened: list[EventRecord] = []
+        self._whole: Trajectory | None = None
+        self._cut: Restart | None = None
+        """From before the step in which an event was found though the end of the run had cut it short."""
+        self.was_interrupted = False
+        """By Ctrl-C, once the run is over."""
+
+    @property
+    def doubts(self) -> list[str]:
+        """What is to be said about a run that ended well all the same."""
+        return self._solver.doubts
+
+    def __call__(self, begin: Beginning) -> Trajectory:
+        """The trajectory of the run."""
+        if begin.events is not None:
+            self._agenda.recall(begin.events)
+        elif self._situation.system.scene.events:
+            start = unmoved(begin)
+            instant = self._at_instant(start, self._agenda.due_at_start(start.t))
+            if instant.ends:
+                return self._over_after_events(instant)
+            begin = self._situation.going_on(instant.raw)
+        while True:
+            segment = self._after_sample(self._next(begin))
+            match segment.end:
+                case SegmentEnd.TIME | SegmentEnd.FAILURE:
+                    return self._over(segment.raw)
+                case SegmentEnd.LEAP:
+                    self._agenda.watch_again()
+                case SegmentEnd.EVENT | SegmentEnd.SAMPLE:
+                    speeds = begin.state.u, segment.raw.y[self._situation.speeds]
+                    self._chattering.count(begin.state.t, segment.raw.t, speeds)
+                case _:
+                    assert_never(segment.end)
+            instant = self._at_instant(segment.raw, segment.found, segment.levels, segment.early)
+            if instant.ends or instant.raw.t >= self._times[-1]:
+                return self._over_after_events(instant)
+            if self._chattering.is_endless:
+                return self._over_anew(instant.raw, ends=False)
+            begin = self._situation.going_on(instant.raw)
+
+    def _next(self, begin: Beginning) -> Segment:
+        """The next segment; its outputs are joined, and sides are those of its end."""
+        watched = self._agenda.watched
+        segment = self._segments(begin)
+        if segment.early:
+            self._agenda.pass_over(segment.found, segment.raw.t, segment.early)
+        self._join(segment.part)
+        levels = segment.levels
+        if levels is not None and levels.kept[0]:
+            self._sides.take(watched, levels.kept_side.tolist(), levels.kept_came.tolist())
+            if segment.raw.paused:
+                self._keep_cut(segment.raw)
+        if levels is not None and (segment.raw.paused or not levels.kept[0]):
+            self._sides.take(watched, levels.side.tolist(), levels.came.tolist())
+        return segment
+
+    def _after_sample(self, segment: Segment) -> Segment:
+        """Sampled controllers have acted where the run's time is over: what they say may bring events."""
+        jumped = self._jumped(segment.raw) if segment.end is SegmentEnd.TIME else []
+        return segment._replace(end=SegmentEnd.SAMPLE, found=jumped) if jumped else segment
+
+    def _at_instant(
+        self, raw: Raw, found: Sequence[SceneEvent], levels: Watch | None = None, early: float = 0.0
+    ) -> Instant:
+        """All that happens at one time, in its order: events that are found, in that of the scene, then what stands on
+        stops. Controllers that are due act where a run goes on, or is over.
+        """
+        y, _ = self._situation.apart(raw.y)
+        watched = self._agenda.watched
+        arrived = found if early else self._sides.arriving(watched, raw, found, levels, y)
+        for event in arrived:
+            records = self._situation.happen(event, raw.t, y, partial(self._accelerations, raw))
+            self._happened += [replace(record, early=early) for record in records]
+            self._agenda.happened(event)
+        raw = self._situation.with_motion(raw, y)
+        if self._whole is None:  # the run starts
+            self._sides.start(watched, y)
+        else:
+            self._sides.move(watched, raw, found, y)
+        struck = self._stand(raw, found, y)
+        raw = self._situation.with_motion(raw, y)
+        self._agenda.take(self._situation.system.scene)  # rest on a stop adds an event
+        self._sides.make_known(self._agenda.watched)
+        ends = any(isinstance(action, EndRun) for event in (*arrived, *struck) for action in event.actions)
+        return Instant(raw, ends)
+
+    def _stand(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> list[SceneEvent]:
+        """What stands on stops, see `flexmb.run.standing`; returns the events that happened."""
+        struck = []
+        for event in self._agenda.watched:
+            is_new = event not in found and self._sides.came[event.name] == 0
+            if is_new and (self._whole is None or self._sides.side[event.name] in (0, UNKNOWN)):
+                stood = stand(
+                    self._situation, event, raw.t, y, self._sides.near(event), partial(self._sides.probe, raw),
+                    partial(self._accelerations, raw),
+                )  # fmt: skip
+                if stood is not None:
+                    self._happened += stood.records
+                    self._sides.side[event.name], self._sides.came[event.name] = stood.side, stood.came
+                    struck += [event] * any(record.name == event.name for record in stood.records)
+        return struck
+
+    def _accelerations(self, raw: Raw, t: float, motion: Real) -> Real:
+        return self._solver.accelerations(raw, motion)
+
+    def _jumped(self, raw: Raw) -> list[SceneEvent]:
+        """Events on what controllers said only where the run was over already."""
+        found: list[SceneEvent] = []
+        if raw.controllers is None:
+            return found
+        with self._solver.integration() as solve:
+            assert solve.feedback is not None
+            for event in self._agenda.watched:
+                if self._sides.is_signal(event) and solve.feedback.is_sampled(event.watch):
+                    height = raw.controllers.signal[solve.feedback.place_of(event.watch)] - event.level
+                    side, direction = self._sides.side[event.name], DIRECTIONS[event.crossing]
+                    if side in (-1, 1) and side * height < -self._sides.near(event) and side * direction <= 0:
+                        found.append(event)
+        return found
+
+    def _over_after_events(self, instant: Instant) -> Trajectory:
+        """Over at the time of events: controllers that are due act after them, and so do events on what they say."""
+        raw, ends = instant
+        if any(each.period_s for each in self._situation.system.scene.controllers):
+            with self._solver.integration() as solve:
+                assert solve.feedback is not None
+                known = solve.feedback.look(self._situation.going_on(raw), acts=True, anew=True)
+            raw = raw._replace(controllers=known)
+            jumped = self._jumped(raw)
+            if jumped:
+                instant = self._at_instant(raw, jumped)
+                raw, ends = instant.raw, ends or instant.ends
+        return self._over_anew(raw, ends)
+
+    def _over_anew(self, raw: Raw, ends: bool) -> Trajectory:
+        """Over where events happened: the state after them is an output too, and a run that takes it up begins anew."""
+        chatters = not ends and raw.t < self._times[-1]
+        last = raw._replace(states=raw.y[None], status=Status.CHATTERING if chatters else raw.status)
+        with self._solver.integration() as solve:
+            if solve.feedback is not None:
+                solve.feedback.look(self._situation.going_on(raw), acts=False)
+            part = self._solver.observed(last, np.array([raw.t]), solve)
+        message = part.message
+        if ends:
+            message = f'ended by event "{self._happened[-1].name}" at t = {raw.t:g} s'
+        elif chatters:
+            names = dict.fromkeys(f'"{event.name}"' for event in self._happened[-FEW:])
+            message = f"{message}; the last were {' and '.join(names)}"
+        cost = {name: 0 for name in vars(part.statistics)}
+        self._join(replace(part, message=message, statistics=replace(part.statistics, **cost)))
+        return self._over(raw, anew=True, ends=ends, chatters=chatters)
+
+    def _over(self, raw: Raw, anew: bool = False, ends: bool = False, chatters: bool = False) -> Trajectory:
+        """The whole run; anew: events happened at its end."""
+        assert self._whole is not None  # there was a segment
+        self.was_interrupted = raw.interrupted
+        can_go_on = not chatters and raw.status in CAN_GO_ON and raw.memory is not None
+        # Events are counted: found again in a step that is not cut short, their instants differ by the error of its
+        # dense output.
+        shown = 0 if self._taken_up is None else self._taken_up.shown
+        return replace(
+            self._whole,
+            events=tuple(self._happened[shown:]),
+            restart=self._restart_of(raw, raw.memory, ends, anew) if can_go_on else None,
+            made_by=self._made_by,
+        )
+
+    def _restart_of(self, raw: Raw, memory: Memory, ends: bool, anew: bool) -> Restart:
+        """Of a run that is over: from before what its end has cut short, or from where it is."""
+        if self._cut is not None and self._cut.events is not None and not ends:
+            shown = sum(record.t > self._cut.since for record in self._happened)
+            return replace(self._cut, t=raw.t, events=self._cut.events._replace(shown=shown))
+        if anew:
+            memory = self._settings.integrator.memory(len(raw.y))
+            memory.numbers[TIME] = memory.numbers[STRETCH] = raw.t
+            memory.y[:] = raw.y
+        return self._restart(raw, memory, anew)
+
+    def _restart(self, raw: Raw, memory: Memory, anew: bool) -> Restart:
+        scene = self._situation.system.scene
+        events = self._agenda.remember(scene, anew, self._situation.given) if scene.events else None
+        return Restart(self._settings.method, scene, raw.t, memory, raw.controllers, events)
+
+    def _keep_cut(self, raw: Raw) -> None:
+        """Before a step that the end of the run cut short, and in which an event was found all the same: it is found
+        otherwise, in the last bits, by a run that goes on."""
+        if self._cut is None and raw.memory is not None:
+            self._cut = self._restart(raw, raw.memory, anew=False)
+
+    def _join(self, part: Trajectory) -> None:
+        self._whole = part if self._whole is None else joined(self._whole, part)
+
+
+def _with_stops(system: System) -> System:
+    """The same with sensors for the loads of stops on which something may come to rest."""
+    if not system.scene.events:
+        return system
+    scene = with_stops(system.scene)
+    with asking(system.kernels):
+        return system if scene == system.scene else assembled(scene)

@@ -1,0 +1,217 @@
+"""One run as arrays, and whether they belong together: each has a row for each time, and all its components."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.run.event_record import EventRecord
+from flexmb.run.restart import Restart
+from flexmb.scene.angles import Angles, angles_of
+from flexmb.system.observables import undetermined_loads
+from flexmb.tables import arguments
+from flexmb.tables.status import Status
+from flexmb.typing import Real
+
+SPATIAL = {"loads": 6, "wheel_loads": 6, "connectors": 6, "hinge_forces": 1}
+"""Fields by name of a hinge or another, with the number of columns."""
+SOME = "drives", "signals", "power"
+"""The same with any number of columns."""
+PATH = {"position": 3, "quaternion": 4, "velocity": 6, "acceleration": 6}
+
+
+@dataclass(frozen=True)
+class MarkerPath:
+    """Motion of a marker in World axes.
+
+    position (T,3) m; quaternion (T,4) scalar first, marker to World components, without jumps of sign; velocity and
+    acceleration (T,6) [angular; linear], the linear one being the classical acceleration of the marker point.
+    """
+
+    position: Real
+    quaternion: Real
+    velocity: Real
+    acceleration: Real
+
+    def angles(self, sequence: str = "zyx") -> Angles:
+        """Angles (T,3) rad of a gimbal's `sequence` of axes, without whole turns of jumps; (T,) where singular.
+
+        See `flexmb.scene.angles.angles_of`.
+        """
+        refuse_torn_path("path", self)
+        found = angles_of(self.quaternion, sequence)
+        return Angles(np.unwrap(found.values, axis=0), found.singular)
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """The cost of a run: seconds of compiling (or of reading compiled kernels), of integrating, of evaluating outputs.
+
+    `factorisations` counts those of a matrix of the size of the state, or of its exponential.
+    """
+
+    evaluations: int
+    accepted_steps: int
+    rejected_steps: int
+    jacobians: int
+    factorisations: int
+    compile_s: float
+    run_s: float
+    output_s: float
+
+
+@dataclass(frozen=True)
+class RunArrays:
+    """What one run has found at the output times that were reached; `flexmb.Trajectory` describes the fields."""
+
+    scene: str
+    status: Status
+    message: str
+    stopped_at: float
+    t: Real
+    q: Real
+    u: Real
+    q_names: tuple[tuple[str, str], ...]
+    u_names: tuple[tuple[str, str], ...]
+    markers: dict[str, MarkerPath]
+    loads: dict[str, Real]
+    wheel_loads: dict[str, Real]
+    drives: dict[str, Real]
+    energy: dict[str, Real]
+    momentum: Real
+    work: Real
+    statistics: Statistics
+    connectors: dict[str, Real] = field(default_factory=dict)
+    hinge_forces: dict[str, Real] = field(default_factory=dict)
+    restart: Restart | None = None
+    signals: dict[str, Real] = field(default_factory=dict)
+    power: dict[str, Real] = field(default_factory=dict)
+    events: tuple[EventRecord, ...] = ()
+
+    def __post_init__(self) -> None:
+        """TypeError or ValueError for parts that do not belong together; asked once more by what works with them."""
+        refuse_torn(self)
+
+    @property
+    def undetermined(self) -> dict[str, NDArray[np.bool_]]:
+        """What the motion does not determine, where closures suppress what others suppress already (docs/notation.md).
+
+        By name of a hinge or closure, which components (6,) of `loads` are NaN, at one output time or more; by
+        "<name>.drive" which (n,) of `drives`. Empty where all loads are determined.
+        """
+        return undetermined_loads(self.loads, self.drives)
+
+    @property
+    def finished(self) -> bool:
+        return self.status is Status.OK
+
+    @property
+    def total_energy(self) -> Real:
+        """Sum of all kinds of energy (T,) J."""
+        refuse_torn(self)
+        return np.sum(list(self.energy.values()), axis=0)
+
+    @property
+    def energy_drift(self) -> Real:
+        """Energy gained beyond the work done (T,) J: zero but for the error of the integration."""
+        return self.total_energy - self.total_energy[0] - (self.work - self.work[0])
+
+    @property
+    def energy_scale(self) -> float:
+        """The scale of a drift of energy (J): the largest change of work or of any kind of energy."""
+        refuse_torn(self)
+        changes = [float(np.ptp(each)) for each in (self.work, *self.energy.values())]
+        return max(*changes, float(np.max(self.energy["kinetic"])))
+
+    @property
+    def momentum_drift(self) -> Real:
+        """Change of momentum since the start (T,6): zero only for scenes without external forces."""
+        refuse_torn(self)
+        return self.momentum - self.momentum[0]
+
+    def columns(self) -> Iterator[tuple[str, str, Real]]:
+        """(name, unit, values (T,)) of every scalar channel, time first."""
+        refuse_torn(self)
+        yield "t", "s", self.t
+        for i, (name, unit) in enumerate(self.q_names):
+            yield name, unit, self.q[:, i]
+        for i, (name, unit) in enumerate(self.u_names):
+            yield name, unit, self.u[:, i]
+        for name, path in self.markers.items():
+            yield from _vector(f"{name}.position", "m", path.position)
+            for i, axis in enumerate("wxyz"):
+                yield f"{name}.quaternion.{axis}", "1", path.quaternion[:, i]
+            yield from _spatial(name, ("angular_velocity", "velocity"), ("rad/s", "m/s"), path.velocity)
+            yield from _spatial(name, ("angular_acceleration", "acceleration"), ("rad/s^2", "m/s^2"), path.acceleration)
+        for name, load in (self.loads | self.wheel_loads | self.connectors).items():
+            yield from _spatial(name, ("torque", "force"), ("N m", "N"), load)
+        for name, drive in self.drives.items():
+            for i in range(drive.shape[1]):
+                yield f"{name}.drive[{i}]", "N or N m", drive[:, i]
+        for name, force in self.hinge_forces.items():
+            yield f"{name}.hinge_force", "N or N m", force[:, 0]
+        for kind, energy in self.energy.items():
+            yield f"energy.{kind}", "J", energy
+        yield "energy.total", "J", self.total_energy
+        yield "work", "J", self.work
+        yield from _spatial("momentum", ("angular", "linear"), ("N m s", "N s"), self.momentum)
+        for name, signals in self.signals.items():
+            for i in range(signals.shape[1]):
+                yield f"signal.{name}[{i}]", "", signals[:, i]
+        for name, power in self.power.items():
+            for i in range(power.shape[1]):
+                yield f"power.{name}[{i}]", "W", power[:, i]
+
+
+def refuse_torn(run: RunArrays) -> None:
+    """TypeError or ValueError for a trajectory that was put together, or altered, so that its parts do not fit."""
+    arguments.held("t", run.t, (None,))
+    T = len(run.t)
+    if not np.isfinite(run.t).all() or np.any(np.diff(run.t) < 0.0):
+        raise ValueError("t: finite times are needed, each not before the last")
+    for name, names in (("q", run.q_names), ("u", run.u_names)):
+        arguments.held(name, getattr(run, name), (T, len(names)))
+    for name, columns in SPATIAL.items():
+        for part, values in _named(run, name).items():
+            arguments.held(f'{name}["{part}"]', values, (T, columns))
+    for name in SOME:
+        for part, values in _named(run, name).items():
+            arguments.held(f'{name}["{part}"]', values, (T, None))
+    for part, values in _named(run, "energy").items():
+        arguments.held(f'energy["{part}"]', values, (T,))
+    for part, path in _named(run, "markers").items():
+        refuse_torn_path(f'markers["{part}"]', path, T)
+    arguments.held("momentum", run.momentum, (T, 6))
+    arguments.held("work", run.work, (T,))
+
+
+def refuse_torn_path(name: str, path: Any, times: int | None = None) -> None:
+    """The same of the path of a marker, at so many times; None for as many as it has."""
+    for part, columns in PATH.items():
+        if not hasattr(path, part):
+            raise TypeError(f"{name} is a {type(path).__name__}: give a MarkerPath")
+        arguments.held(f"{name}.{part}", getattr(path, part), (times, columns))
+        times = len(getattr(path, part))
+
+
+def _named(run: RunArrays, name: str) -> dict[str, Any]:
+    found = getattr(run, name)
+    if not isinstance(found, dict):
+        raise TypeError(f"{name} is a {type(found).__name__}: give arrays by name")
+    return found
+
+
+def _vector(name: str, unit: str, values: Real) -> Iterator[tuple[str, str, Real]]:
+    for i, axis in enumerate("xyz"):
+        yield f"{name}.{axis}", unit, values[:, i]
+
+
+def _spatial(
+    name: str, parts: tuple[str, str], units: tuple[str, str], values: Real
+) -> Iterator[tuple[str, str, Real]]:
+    yield from _vector(f"{name}.{parts[0]}", units[0], values[:, :3])
+    yield from _vector(f"{name}.{parts[1]}", units[1], values[:, 3:])

@@ -1,0 +1,131 @@
+"""Segments of a run: in compiled code from where one begins to the next place at which something happens."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from enum import Enum, auto
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.integrate.control import ACCEPTED, REJECTED
+from flexmb.integrate.settings import Settings
+from flexmb.integrate.watch import Watch, watch
+from flexmb.run.agenda import Agenda
+from flexmb.run.origin import Beginning
+from flexmb.run.propagate import Raw, integrate
+from flexmb.run.sides import Sides
+from flexmb.run.situation import Situation
+from flexmb.run.solver import Solver
+from flexmb.run.trajectory import Trajectory
+from flexmb.run.within_leaps import placed, too_near
+from flexmb.scene.events import EndRun
+from flexmb.scene.schema import SceneEvent
+from flexmb.tables.status import Status
+from flexmb.typing import Flags, Real
+
+
+class SegmentEnd(Enum):
+    """Why a segment ended."""
+
+    TIME = auto()
+    """The run's time is over, and no event is due there."""
+    EVENT = auto()
+    """Something came to its level, or an event on time is due."""
+    SAMPLE = auto()
+    """The run's time is over, and what a sampled controller says there comes to the level of an event."""
+    LEAP = auto()
+    """Events that happened before their instant, which lies within a leap, are watched again from here."""
+    FAILURE = auto()
+    """Nothing goes on: the status says why, or the run was interrupted."""
+
+
+class Segment(NamedTuple):
+    """From one place at which something happens to the next.
+
+    raw: as the integrator left it. levels: what was watched. part: its outputs. found: events that happen at its end,
+    by `early` (s) before their instant.
+    """
+
+    end: SegmentEnd
+    raw: Raw
+    levels: Watch | None
+    part: Trajectory
+    found: Sequence[SceneEvent]
+    early: float = 0.0
+
+
+class Segments:
+    """Integrates the system of a situation from segment to segment, and observes it at the run's output times."""
+
+    def __init__(self, situation: Situation, agenda: Agenda, sides: Sides, times: Real, solver: Solver) -> None:
+        """times (T,) s of the output."""
+        self._situation, self._agenda, self._sides = situation, agenda, sides
+        self._times, self._solver = times, solver
+        self._steps = 0
+        """Made by the segments before, accepted or rejected."""
+
+    def __call__(self, begin: Beginning) -> Segment:
+        """Run to the next event, or to the next time at which one is due, or to the end.
+
+        Near a singular position of a closed chain a run cannot be taken up. An event on time that is due there happens
+        before its instant: the segment is integrated once more, to a place far enough from the singular position.
+        """
+        stop, due = self._agenda.next_stop(begin.state.t)
+        again = begin._replace(y=begin.y.copy())
+        segment = self._to(stop, begin, due)
+        if due and self._situation.system.scene.closures:
+            early = too_near(self._situation, segment.raw, again.state.t, stop, self._further)
+            if early:
+                segment = self._to(stop - early, again, due)
+                segment = segment._replace(early=early if segment.raw.t == stop - early else segment.early)
+        self._steps += segment.raw.counts[ACCEPTED] + segment.raw.counts[REJECTED]
+        return segment
+
+    def _to(self, stop: float, begin: Beginning, due: Sequence[SceneEvent]) -> Segment:
+        """Run to the next level that is watched, or to `stop` (s), where these events are due."""
+        times, shown = self._output(begin, stop)
+        early, is_last = 0.0, stop == self._times[-1]
+        with self._solver.integration() as solve:
+            levels = self._sides.watching(self._agenda.watched, solve)
+            goes_on = not is_last or bool(due)
+            raw = integrate(solve, begin, times, self._left, levels, breaks=goes_on, goes_on=goes_on)
+            found = self._agenda.found(raw, levels, due, stop)
+            if levels is not None:
+                if not all(isinstance(action, EndRun) for event in found for action in event.actions):
+                    raw, early = placed(self._situation, raw, levels, times, self._further)
+                elif levels.leap[0] < raw.t < levels.leap[1]:
+                    raw = raw._replace(memory=None)  # nothing goes on from there
+            kept = shown[: len(raw.states)]
+            part = self._solver.observed(raw._replace(states=raw.states[kept]), times[: len(kept)][kept], solve)
+        if part.status is not Status.OK or raw.interrupted:
+            return Segment(SegmentEnd.FAILURE, raw, levels, part, [], early)
+        if found:
+            return Segment(SegmentEnd.EVENT, raw, levels, part, found, early)
+        end = SegmentEnd.TIME if raw.t == self._times[-1] else SegmentEnd.LEAP
+        return Segment(end, raw, levels, part, found, early)
+
+    def _output(self, begin: Beginning, stop: float) -> tuple[Real, Flags]:
+        """Times (K,) s from the start of a segment to its stop, and which of them are output times of the run."""
+        start, is_last = begin.state.t, stop == self._times[-1]
+        if begin.memory is not None:
+            start = max(start, self._times[0])
+        if is_last and start == self._times[0]:
+            return self._times, np.ones(len(self._times), bool)
+        wanted = self._times[(self._times >= start) & ((self._times < stop) | is_last)]
+        times = np.unique([start, *wanted, stop])
+        return times, np.isin(times, wanted)
+
+    def _further(self, raw: Raw, t: float) -> Raw:
+        """On to a time (s), whatever comes to its level."""
+        begin = self._situation.going_on(raw._replace(y=raw.y.copy()))
+        with self._solver.integration() as solve:
+            nothing = watch((), (), (), (), (), (), self._sides.size(solve))
+            return integrate(solve, begin, np.array([raw.t, t]), self._left, nothing, goes_on=True)
+
+    @property
+    def _left(self) -> Settings:
+        """The settings with as many steps as the segments before have left."""
+        settings = self._solver.settings
+        return replace(settings, max_steps=max(settings.max_steps - self._steps, 0))

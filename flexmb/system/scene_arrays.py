@@ -1,0 +1,95 @@
+"""A scene turned into arrays: constants of the kernels, and places of coordinates by the names of the scene."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from flexmb.building.assemble import assemble
+from flexmb.building.connector_arrays import between_nodes
+from flexmb.building.links import links
+from flexmb.building.models import wheels_by_body
+from flexmb.building.numbering import Numbering
+from flexmb.jain.elimination import Elimination, with_elimination
+from flexmb.scene import schema as s
+from flexmb.scene.connectors import AlongHinge, HingeSpring
+from flexmb.system.observables import Names
+from flexmb.tables.features import GENERAL
+from flexmb.tables.status import Status
+from flexmb.typing import Index
+
+
+class SceneArrays:
+    """A checked scene as kernels take it; nothing is written into it after it is made.
+
+    links: the bodies, each with the hinge that holds it, base to tip. markers, closure_ports: (body, port) of each
+    marker, by name, and of both sides of each closure. signals: those that controllers drive in a run, by number among
+    the functions of time; zero outside of one.
+    """
+
+    def __init__(self, scene: s.Scene, elimination: Elimination) -> None:
+        self.scene = scene
+        self.links = links(scene)
+        numbering = Numbering(self.links, scene)
+        assembled = assemble(scene, self.links, numbering)
+        self.constants, self.markers, self.closure_ports = assembled.constants, assembled.markers, assembled.closures
+        self.recursion_constants = with_elimination(self.constants, elimination)
+        """The same constants with bodies eliminated as chosen."""
+        self.signals = assembled.signals
+        self.layout = numbering.layout
+        self.nq, self.nu = self.layout.nq, self.layout.nu
+
+    @property
+    def kernels(self) -> Literal["general", "special"]:
+        """Which kernels run it: those that take every scene, or those compiled for its kind; see `flexmb.compile`."""
+        return "general" if GENERAL in self.constants.features() else "special"
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Bodies in the order of the dynamics, point masses last."""
+        return tuple(link.name for link in self.links)
+
+    def coordinate(self, name: str) -> slice:
+        """Place in q of a hinge, "<body>.hinge", "<body>.modes", wheel or point mass."""
+        return _find(self.layout.q, name)
+
+    def speed(self, name: str) -> slice:
+        """Place in u of a hinge, "<body>.hinge", "<body>.modes", wheel or point mass."""
+        return _find(self.layout.u, name)
+
+    @property
+    def observed_names(self) -> Names:
+        """Of everything that is observed at a state, in the order of the arrays."""
+        scene, wheels = self.scene, wheels_by_body(self.scene)
+        hinges = [link.hinge.name for link in self.links]
+        on_bodies = [wheel.name for link in self.links for wheel in wheels.get(link.name, ())]
+        closures = [closure.name for closure in scene.closures]
+        between = [each.name for each in between_nodes(scene)]
+        along_hinges = [each for each in scene.connectors if isinstance(each, AlongHinge)]
+        along_hinges.sort(key=lambda each: not isinstance(each, HingeSpring))  # springs come first, as in the tables
+        along = [each.name for each in along_hinges]
+        return Names(self.markers, hinges, on_bodies, closures, self._driven([*hinges, *on_bodies]), between, along)
+
+    def _driven(self, names: list[str]) -> dict[str, Index]:
+        """Places in u of the prescribed coordinates, by hinge or wheel."""
+        driven = self.constants.speed["prescribed"] >= 0
+        if not np.any(driven):
+            return {}
+        places = ((name, self.speed(name)) for name in names)
+        return {name: at.start + np.flatnonzero(driven[at]) for name, at in places if np.any(driven[at])}
+
+    def fault_name(self, status: int, fault: int) -> str:
+        """Name of the body, connector or closure that the number of a failure stands for."""
+        match status:
+            case Status.CONNECTOR_OVERTURNED:
+                return between_nodes(self.scene)[fault].name
+            case Status.CLOSURE_SINGULAR | Status.CLOSURE_OPEN | Status.BRANCH_UNKNOWN:
+                return self.scene.closures[fault].name
+        return self.links[fault].name
+
+
+def _find(places: dict[str, slice], name: str) -> slice:
+    if name not in places:
+        raise KeyError(f"no coordinates of that name: {name!r}; there are {', '.join(sorted(places))}")
+    return places[name]
