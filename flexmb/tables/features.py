@@ -69,7 +69,7 @@ class SceneTables(Protocol):
     connector: Record
     bushing: Record
     hinge_spring: Record
-    friction: Record
+    coordinate_law: Record
     function: Record
     damping: Real
 

@@ -10,9 +10,9 @@ from typing import get_args
 
 import pytest
 
+from crosscheck.drawing.draw import DRAWN_AS
 from crosscheck.engines.links import Freedom as Joint
 from crosscheck.library import time_functions
-from crosscheck.running.draw import DRAWN_AS
 from flexmb.control.wiring import _LAWS
 from flexmb.scene import schema as s
 from flexmb.scene.connectors import BetweenNodes
