@@ -15,7 +15,7 @@ from crosscheck.engines.connections import Connection
 from crosscheck.engines.conventions import Frame, axis_rotation, cross, cross_matrix, frame
 from crosscheck.engines.functions_of_time import fastest_change, fastest_rate, profile, scene_functions
 from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, links
-from flexmb.scene.connectors import BetweenNodes, Bushing, Connector, HingeSpring, by_stem
+from flexmb.scene.connectors import AlongHinge, Bushing, Connector, SpringDamper, by_stem
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import coordinate_of
 from flexmb.typing import Real
@@ -114,26 +114,32 @@ class _Columns:
         return max(_fastest(K[np.ix_(free, free)], M), _fastest(C[np.ix_(free, free)], M) ** 2)
 
     def _resisted(self, scene: Scene, connector: Connector) -> tuple[Real, Real, Real]:
-        """What a connector resists: k rates of n speeds (k,n), and stiffness and damping (k,k) of them."""
+        """What a connector resists: k rates of n speeds (k,n), and stiffness and damping (k,k) of them.
+
+        Friction, which has neither, resists none of them in this sense.
+        """
         stems = by_stem(connector)
-        if isinstance(connector, HingeSpring):
+        if isinstance(connector, AlongHinge):
             item, number = coordinate_of(scene, connector)
             column = np.eye(len(self._freedoms))[[self._first[item.name] + number]]
-            return column, (_steepest(stems) + stems["stop_stiffness"]) * np.eye(1), stems["damping"] * np.eye(1)
-        if not isinstance(connector, BetweenNodes):  # friction along a hinge
-            return np.zeros((0, len(self._freedoms))), np.zeros((0, 0)), np.zeros((0, 0))
+            stiffness = _steepest(stems) + stems["stop_stiffness"] if "stiffness" in stems else 0.0
+            return column, stiffness * np.eye(1), stems.get("damping", 0.0) * np.eye(1)
         ends = Connection(scene, self._chain, connector)
         a, b = self._frame(ends.a), self._frame(ends.b)
         turning, moving = (
             a.rotation.T @ (beyond - before)
             for beyond, before in zip(self._motion_of(ends.b, b), self._motion_of(ends.a, b), strict=True)
         )
-        if isinstance(connector, Bushing):
-            return np.concatenate([turning, moving]), np.array(connector.stiffness), np.array(connector.damping)
-        line = a.rotation.T @ (b.position - a.position)
-        length = np.linalg.norm(line)
-        along = (line / length @ moving)[None] if length > 0.0 else moving
-        return along, _steepest(stems) * np.eye(len(along)), stems["damping"] * np.eye(len(along))
+        match connector:
+            case Bushing():
+                return np.concatenate([turning, moving]), np.array(connector.stiffness), np.array(connector.damping)
+            case SpringDamper():
+                line = a.rotation.T @ (b.position - a.position)
+                length = np.linalg.norm(line)
+                along = (line / length @ moving)[None] if length > 0.0 else moving
+                return along, _steepest(stems) * np.eye(len(along)), stems["damping"] * np.eye(len(along))
+            case _:
+                assert_never(connector)
 
     def _frame(self, at: Attachment) -> Frame:
         return at.frame if at.link < 0 else self._frames[at.link] @ at.frame
