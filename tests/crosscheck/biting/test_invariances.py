@@ -4,6 +4,7 @@ changed by half is noticed."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import msgspec
@@ -20,8 +21,9 @@ from flexmb.run.channels import channels_of, distance, family, magnitude
 from flexmb.scene.build import SceneBuilder, linear
 from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Pulse, Sine
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Scene, Screw
 from flexmb.surrogate import modal_points
+from tests.crosscheck.engines.random_scenes import LATER_KINDS
 from tests.crosscheck.engines.random_scenes import random_scene as random_rigid
 from tests.repo.project import ROOT
 from tests.trees import random_scene as random_flexible
@@ -79,6 +81,31 @@ def test_nothing_changes_in_a_scene_with_flexible_bodies(name: str) -> None:
     counterpart = BY_NAME[name].of(flexible())
     assert counterpart.scene != flexible()
     assert strangers(flexible(), counterpart) == []
+
+
+@cache
+def later_kinds() -> Scene:
+    """Kinds of hinges that the random scenes above do not draw, free and driven, with springs."""
+    return random_rigid(np.random.default_rng(9), ("free", *LATER_KINDS, "revolute", *LATER_KINDS), driven=True)
+
+
+@pytest.mark.parametrize("name", ["turned", "moved", "reordered", "rescaled", "mirrored"])
+def test_nothing_changes_in_a_scene_of_later_kinds(name: str) -> None:
+    counterpart = BY_NAME[name].of(later_kinds())
+    assert counterpart.scene != later_kinds()
+    assert strangers(later_kinds(), counterpart) == []
+
+
+def test_a_screw_that_keeps_its_hand_in_a_mirror_is_noticed() -> None:
+    counterpart = BY_NAME["mirrored"].of(later_kinds())
+    kept = {each.name: each.pitch_m_rad for each in later_kinds().hinges if isinstance(each, Screw)}
+    hinges = tuple(
+        msgspec.structs.replace(each, pitch_m_rad=kept[each.name]) if isinstance(each, Screw) else each
+        for each in counterpart.scene.hinges
+    )
+    wrong = msgspec.structs.replace(counterpart.scene, hinges=hinges)
+    assert kept
+    assert strangers(later_kinds(), replace(counterpart, scene=wrong))
 
 
 @cache
