@@ -75,8 +75,10 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.scene import schema as schema
     from flexmb.scene.build import SceneBuilder as SceneBuilder
     from flexmb.scene.check import check_scene as check_scene
+    from flexmb.scene.connectors import *  # noqa: F403  (the schema's names, those of connectors and hinges among them)
     from flexmb.scene.files import load_scene as load_scene
     from flexmb.scene.files import save_scene as save_scene
+    from flexmb.scene.hinges import *  # noqa: F403
     from flexmb.scene.open_loop import open_loop as open_loop
     from flexmb.scene.problems import SceneError as SceneError
     from flexmb.scene.problems import SceneWarning as SceneWarning

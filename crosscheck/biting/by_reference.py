@@ -33,7 +33,6 @@ class ByReference:
 
     @cached_property
     def trusted(self) -> frozenset[str]:
-        """The channels in which the true run agrees with the reference."""
         found = hold(self.true, self.reference, self.asked)
         return frozenset(name for name, _, finding in found if finding.status == "agree")
 

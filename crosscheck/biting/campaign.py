@@ -91,7 +91,6 @@ def _plan(case: Case, provider: str, limits: Limits) -> tuple[CaseRecord, list[J
 
 
 def scored(what: JudgedVariant, mutants: Litter, results: CaseResults) -> CaseBite:
-    """The scores of one case from the results of its mutants."""
     verdicts: dict[str, list[Verdict]] = {name: [] for name in mutants.mutants}
     for verdict in judge(results):
         verdicts[verdict.comparison].append(verdict)

@@ -71,7 +71,6 @@ class CaseBite(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def counted(self) -> tuple[Mutant, ...]:
-        """The mutants over which the score is taken."""
         return tuple(each for each in self.mutants if each.outcome in ("noticed", "missed"))
 
     @property
@@ -111,7 +110,6 @@ def bite(
     passed_over: Iterable[PassedOver],
     no_reference: str = "",
 ) -> CaseBite:
-    """The scores of a case from its mutants."""
     counted = [each for each in mutants if each.outcome in ("noticed", "missed")]
     channels: dict[str, ChannelScore] = {}
     for mutant in counted:

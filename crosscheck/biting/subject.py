@@ -51,16 +51,7 @@ def subject(case: Case, engine: str) -> JudgedVariant:
 
 def reduced(what: JudgedVariant) -> Case:
     """The case with nothing but the subject's run: no comparison, no control, no chart."""
-    run = msgspec.structs.replace(
-        what.case.run,
-        variants=(what.variant,),
-        comparisons=(),
-        controls=(),
-        conservations=(),
-        charts=(),
-        reference=None,
-    )
-    return replace(what.case, run=run, accepted={})
+    return replace(what.case, run=what.case.run.alone(what.variant), accepted={})
 
 
 def _agreeing(case: Case) -> list[Comparison]:

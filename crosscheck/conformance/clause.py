@@ -105,14 +105,12 @@ def simplest(engine: Engine, rate: float = 0.4) -> Scene:
 
 
 def snapshot(engine: Engine, scene: Scene) -> Snapshot:
-    """The engine's snapshot at the initial state of a scene."""
     found = offered(engine, scene).evaluate()
     require(isinstance(found, Snapshot), f"evaluate() returned a {type(found).__name__}, not a Snapshot")
     return found
 
 
 def ladder(engine: Engine, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
-    """The checked efforts of the engine for a run of the scene."""
     return CheckedEngine(engine, duration_s=duration_s).efforts(scene)
 
 

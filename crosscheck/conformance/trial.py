@@ -87,7 +87,6 @@ def try_engine(
 
 
 def attempt(trial: ClauseTrial, emit: Callable[[ClauseOutcome], None]) -> None:
-    """The function of a worker."""
     clause = CLAUSES[trial.clause]
     try:
         engine = find_engine(trial.provider, trial.engine)

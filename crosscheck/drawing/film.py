@@ -45,7 +45,6 @@ def film(scene: Scene) -> tuple[Scene, Drawing] | None:
 
 
 def film_channels(drawing: Drawing) -> tuple[str, ...]:
-    """The channels that the drawing needs."""
     carriers = {point.marker for line in drawing.lines for point in line.points if point.marker}
     found = [
         f"marker:{name}.{part}"

@@ -51,7 +51,6 @@ def clean(text: str) -> str:
 
 
 def describe(error: BaseException) -> str:
-    """The error and where it was raised."""
     frames = traceback.extract_tb(error.__traceback__)
     place = f" ({frames[-1].name}, {Path(frames[-1].filename).name} line {frames[-1].lineno})" if frames else ""
     try:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable
 from math import hypot, inf, sqrt
-from typing import Any, NamedTuple, assert_never
+from typing import Any, NamedTuple, assert_never, get_args
 
 import numpy as np
 
@@ -17,10 +17,8 @@ from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Attachment, Link, attachment
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.connectors import (
-    AlongHinge,
     AngularFriction,
     AngularSpring,
-    BetweenNodes,
     Bushing,
     HingeSpring,
     LinearFriction,
@@ -32,6 +30,11 @@ from flexmb.scene.connectors import (
 from flexmb.scene.schema import Marker, Scene
 from flexmb.scene.tree import GROUND, coordinate_of
 from flexmb.typing import Real
+
+PeerLine = SpringDamper | Bushing
+PeerAlong = AngularSpring | LinearSpring | AngularFriction | LinearFriction
+KNOWN = (*get_args(PeerLine), *get_args(PeerAlong))
+"""The connectors that adapters know; a scene with another is refused by `crosscheck.engines.links.obstacle`."""
 
 Law = Callable[[float], tuple[float, float]]
 """The resisting load and the stored energy as functions of the displacement."""
@@ -76,13 +79,13 @@ class Along(NamedTuple):
 class Connection:
     """A connector between two frames on links, -1 being the ground; `exerted(t, a, b)` is what it does."""
 
-    def __init__(self, scene: Scene, chain: tuple[Link, ...], connector: BetweenNodes) -> None:
+    def __init__(self, scene: Scene, chain: tuple[Link, ...], connector: PeerLine) -> None:
         self.name = connector.name
         self.a, self.b = (_attached(scene, chain, connector, side) for side in "ab")
         self.exerted = exerts(connector)
 
 
-def exerts(connector: BetweenNodes) -> Callable[[float, Moving, Moving], Exerted]:
+def exerts(connector: PeerLine) -> Callable[[float, Moving, Moving], Exerted]:
     """The function of time and of the motion of frames A and B that gives the connector's loads."""
     on = _law(connector)
 
@@ -95,7 +98,7 @@ def exerts(connector: BetweenNodes) -> Callable[[float, Moving, Moving], Exerted
     return exerted
 
 
-def _law(connector: BetweenNodes) -> Callable[[float, Moving, Moving], tuple[Real, float, float]]:
+def _law(connector: PeerLine) -> Callable[[float, Moving, Moving], tuple[Real, float, float]]:
     match connector:
         case SpringDamper():
             return _line(connector)
@@ -106,8 +109,7 @@ def _law(connector: BetweenNodes) -> Callable[[float, Moving, Moving], tuple[Rea
 
 
 def connections(scene: Scene, chain: tuple[Link, ...]) -> tuple[Connection, ...]:
-    """Connectors between nodes."""
-    return tuple(Connection(scene, chain, each) for each in scene.connectors if isinstance(each, BetweenNodes))
+    return tuple(Connection(scene, chain, each) for each in scene.connectors if isinstance(each, PeerLine))
 
 
 def along_hinges(scene: Scene) -> list[tuple[str, str, int, Callable[[float, float, float], Along]]]:
@@ -115,13 +117,13 @@ def along_hinges(scene: Scene) -> list[tuple[str, str, int, Callable[[float, flo
     load as a function of time, value and rate."""
     found = []
     for connector in scene.connectors:
-        if isinstance(connector, AlongHinge):
+        if isinstance(connector, PeerAlong):
             item, number = coordinate_of(scene, connector)
             found.append((connector.name, item.name, number, _along(connector)))
     return found
 
 
-def _attached(scene: Scene, chain: tuple[Link, ...], connector: BetweenNodes, side: str) -> Attachment:
+def _attached(scene: Scene, chain: tuple[Link, ...], connector: PeerLine, side: str) -> Attachment:
     body, node = getattr(connector, f"body_{side}"), getattr(connector, f"node_{side}")
     own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
     if body == GROUND:
@@ -230,7 +232,7 @@ def _inverse_jacobian(theta: Real) -> Real:
     return np.asarray(np.eye(3) - 0.5 * turn + b * turn @ turn)
 
 
-def _along(connector: AlongHinge) -> Callable[[float, float, float], Along]:
+def _along(connector: PeerAlong) -> Callable[[float, float, float], Along]:
     match connector:
         case AngularFriction() | LinearFriction():
             stems = by_stem(connector)

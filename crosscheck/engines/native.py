@@ -11,6 +11,7 @@ the same kinematics. They are of first order in the deformation, which is level 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
@@ -123,39 +124,21 @@ class NativeEngine:
         return NativeModel(system, self._algorithm, self._method)
 
 
-def composite() -> NativeEngine:
-    """The mass matrix and its Cholesky factors."""
-    return NativeEngine("native-composite", "composite", "flexmb: mass matrix by composite bodies, Cholesky")
-
-
-def frisch() -> NativeEngine:
-    """The corrected equations of 1975."""
-    return NativeEngine("native-frisch", "frisch", "flexmb: Frisch's equations of 1975, first order")
-
-
-def frisch_as_printed() -> NativeEngine:
-    """The same to the letter."""
-    summary = "flexmb: the same as printed, errors included"
-    return NativeEngine("native-frisch-as-printed", "frisch_as_printed", summary)
-
-
-def radau5() -> NativeEngine:
-    """Stiff modes die out where steps are longer than their periods."""
-    return NativeEngine("native-radau5", "articulated", "flexmb, integrated by Radau IIA of order 5", "radau5")
-
-
-def exponential() -> NativeEngine:
-    """Stiff modes are followed exactly as far as they are linear."""
-    return NativeEngine(
-        "native-exponential", "articulated", "flexmb, integrated by exponential collocation", "exponential"
-    )
-
-
-def generalised_alpha() -> NativeEngine:
-    """Fixed steps, spectral radius 0.8."""
-    return NativeEngine(
-        "native-generalised-alpha", "articulated", "flexmb, integrated by generalised-alpha", "generalised_alpha"
-    )
+composite = partial(NativeEngine, "native-composite", "composite", "flexmb: mass matrix by composite bodies, Cholesky")
+frisch = partial(NativeEngine, "native-frisch", "frisch", "flexmb: Frisch's equations of 1975, first order")
+frisch_as_printed = partial(
+    NativeEngine, "native-frisch-as-printed", "frisch_as_printed", "flexmb: the same as printed, errors included"
+)
+radau5 = partial(
+    NativeEngine, "native-radau5", "articulated", "flexmb, integrated by Radau IIA of order 5", "radau5"
+)
+exponential = partial(
+    NativeEngine, "native-exponential", "articulated", "flexmb, integrated by exponential collocation", "exponential"
+)
+generalised_alpha = partial(  # spectral radius 0.8
+    NativeEngine, "native-generalised-alpha", "articulated", "flexmb, integrated by generalised-alpha",
+    "generalised_alpha",
+)  # fmt: skip
 
 
 class NativeModel:
@@ -225,7 +208,6 @@ class NativeModel:
 
 
 def _undetermined(done: NativeTrajectory) -> Iterator[str]:
-    """Channels with an undetermined component."""
     for name, is_open in done.undetermined.items():
         if name.endswith(".drive") and name not in done.loads:
             yield f"drive:{name.removesuffix('.drive')}"

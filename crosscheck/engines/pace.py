@@ -136,7 +136,6 @@ class _Columns:
         return along, _steepest(stems) * np.eye(len(along)), stems["damping"] * np.eye(len(along))
 
     def _frame(self, at: Attachment) -> Frame:
-        """In World."""
         return at.frame if at.link < 0 else self._frames[at.link] @ at.frame
 
     def _motion_of(self, at: Attachment, place: Frame) -> tuple[Real, Real]:

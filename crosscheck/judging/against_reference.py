@@ -56,7 +56,6 @@ def of_stored(reference: StoredReference) -> ReferenceSignals:
 
 
 def of_record(reference: RecordedReference) -> ReferenceSignals:
-    """The signals of a reference in a record."""
     times = np.zeros(0) if reference.times is None else unpack(reference.times)
     channels = {name: unpack(packed) for name, packed in reference.channels.items()}
     return ReferenceSignals(times, channels, reference.uncertainties)

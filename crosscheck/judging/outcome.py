@@ -50,12 +50,10 @@ class SessionOutcome:
 
     @property
     def all(self) -> list[Verdict]:
-        """Every verdict."""
         return [verdict for group in self.verdicts.values() for verdict in group]
 
     @property
     def unexpected(self) -> list[Verdict]:
-        """Verdicts that are not what their case expects."""
         return [verdict for verdict in self.all if not verdict.ok]
 
     @property
@@ -185,7 +183,6 @@ class SessionOutcome:
 
 
 def conclude(session: Session, strict: bool = False) -> SessionOutcome:
-    """Judge every case of a session."""
     verdicts: dict[str, list[Verdict]] = {}
     inapplicable: tuple[Inapplicable, ...] = ()
     for case in session.cases:

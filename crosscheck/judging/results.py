@@ -41,17 +41,14 @@ class Result:
 
     @cached_property
     def _sizes(self) -> Sizes:
-        """Sizes of the finest run's channels."""
         return Sizes(tuple(self.finest.channels), self.values)
 
     @property
     def finest(self) -> RunRecord:
-        """The run at the finest effort."""
         return self.runs[-1]
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the channels that the finest run has."""
         return tuple(self.finest.channels) if self.status == "finished" else ()
 
     @property
@@ -97,7 +94,6 @@ class Result:
         return estimate(channel, finest.effort_kind, rungs, self._sizes.magnitude(channel, finest.evaluations))
 
     def _ladder(self) -> list[RunRecord]:
-        """The last efforts of the finest run's method."""
         method = (self.finest.effort_kind, self.finest.effort_method)
         return [run for run in self.runs if (run.effort_kind, run.effort_method) == method][-RUNGS:]
 

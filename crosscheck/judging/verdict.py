@@ -97,7 +97,6 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def pair(self) -> str:
-        """The two sides in words."""
         if self.variant_a == self.variant_b:
             return f"{self.engine_a} – {self.engine_b}"
         return f"{self.engine_a} ({self.variant_a}) – {self.engine_b} ({self.variant_b})"

@@ -1,6 +1,6 @@
-"""Accepted figures: the E and U that each comparison of a case once reached, in `accepted.toml` beside its run file.
+"""Accepted figures: the E and U that each comparison of a case has reached, in `accepted.toml` beside its run file.
 
-Goals say what is good enough; these figures say what was reached. `crosscheck run --accept` writes them, and they are
+Goals are requirements; these figures are what was reached. `crosscheck run --accept` writes them, and they are
 reviewed like code. `crosscheck.judging.figures` says when a later figure counts as *worse than recorded*.
 
 The file::
@@ -8,9 +8,9 @@ The file::
     ["rigid, all engines"]            # the comparison, or for conserved quantities e.g. "energy conserved"
     "energy.total | native (rigid) | mujoco (rigid)" = { E = 1.2e-13, U = 4.5e-12, of = "0a17c5.c9d3e0.11bb40.9e8f12" }
 
-`of` is what the figure was reached with, see `crosscheck.judging.basis`; a file of an older version has none.
+`of` is the basis of the figure, see `crosscheck.judging.basis`; files of older versions have none.
 
-Only the library's own engines have accepted figures: a user's engine is no part of a shipped case.
+Only the library's own engines have accepted figures.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ HEADER = "# The figures this case has reached. Written by `crosscheck run --acce
 
 
 class Figure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a comparison reached on one channel, relative to its range, and with what; a drift has no U."""
+    """E and U of a comparison in one channel, relative to its range, with their basis; a drift has no U."""
 
     E: float
     U: float = 0.0
@@ -36,17 +36,17 @@ Accepted = dict[str, dict[str, Figure]]  # comparison -> channel and sides -> fi
 
 
 def key(channel: str, a: tuple[str, str], b: tuple[str, str]) -> str:
-    """How the file names a channel of two sides, each (engine, variant)."""
+    """The key of a channel and two sides, each (engine, variant)."""
     return " | ".join([channel, *(f"{engine} ({variant})" for engine, variant in (a, b))])
 
 
 def merged(before: Accepted, now: Accepted) -> Accepted:
-    """The figures `now` of a run of some engines only, together with the figures `before` of the other engines."""
+    """The figures `now` of a run of some engines, with the figures `before` of the others."""
     return {name: before.get(name, {}) | now.get(name, {}) for name in (*before, *now)}
 
 
 def dumps(accepted: Mapping[str, Mapping[str, Figure]]) -> str:
-    """The text of the file: sorted, a line a figure."""
+    """The text of the file: sorted, one line for each figure."""
     lines = [HEADER]
     for name, table in sorted(accepted.items()):
         lines.append(f"[{_quoted(name)}]")
@@ -59,5 +59,5 @@ def dumps(accepted: Mapping[str, Mapping[str, Figure]]) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A basic TOML string on one line: JSON's escapes are TOML's, but for DEL."""
+    """A basic TOML string on one line: its escapes are those of JSON, except for DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

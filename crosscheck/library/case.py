@@ -1,4 +1,4 @@
-"""What a case folder says: the structs behind run.toml and provenance.toml, and the rules they must satisfy.
+"""The files of a case folder: the structs of run.toml and provenance.toml.
 
 A case is a folder ``cases/<family>/<case>/`` with ``scene.toml`` (and further scenes), ``run.toml``,
 ``provenance.toml`` and ``README.md``. Unknown keys are refused with their place. A complete run.toml::
@@ -74,13 +74,13 @@ Channels are named ``marker:<name>.position | orientation | velocity | angular_v
 counts. A goal is the largest uncertainty, relative to the channel's range, with which a comparison still counts as
 resolved.
 
-An expectation other than *agree* needs its reason in words, and bounds, outside of which it is not as expected:
-``band`` for the size of E (*differ*) or of U (*unresolved*), for each pattern of channels ``[low, high]`` with high at
+An expectation other than *agree* needs its reason in words, and bounds within which it is as expected:
+``band`` for E (*differ*) or U (*unresolved*), for each pattern of channels ``[low, high]`` with high at
 most 100 times low; ``diverged_s`` for the last sample time that a *diverged* run reached, at most a quarter of the run
 wide; ``because`` for a text that the engine's own reason must contain (*failed*, *refused*). What crashed, did not
 finish or did not run is never as expected. Statuses are explained in `crosscheck.judging.verdict`.
 
-Every key, those with a default in brackets with it; the structs below say more of each:
+All keys, with defaults in brackets; the structs below explain them:
 
 - at the top: ``title``; ``tags`` [none]; ``duration_s`` (s); ``samples`` (from 0 to the end, both counted);
   ``time_limit_s`` [1800] (s), for one engine on one variant with all its efforts; ``--time-limit`` comes before it;
@@ -100,7 +100,7 @@ Every key, those with a default in brackets with it; the structs below say more 
 - ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``;
 - ``reference``: what ``reference.csv`` holds and how it is made, explained in `crosscheck.library.recipe`.
 
-``library/check`` holds the rules: all numbers finite and in their ranges, names unique, patterns of kinds of channels
+``library/check`` has the rules: all numbers finite and in their ranges, names unique, patterns of kinds of channels
 that exist. Every problem found is reported with its place and the remedy. Beside the run file, ``accepted.toml`` holds
 the E and U that each comparison has reached; `crosscheck run --accept` writes it (see `crosscheck.library.accepted`).
 """
@@ -116,7 +116,7 @@ from crosscheck.library.recipe import EffortLadder, ReferenceRecipe
 from flexmb.scene.schema import Level
 
 Expectation = Literal["agree", "differ", "unresolved", "refused", "diverged", "failed"]
-Band = tuple[float, float]  # lowest and highest that is as expected
+Band = tuple[float, float]  # the lowest and the highest expected value
 Transform = Literal["none", "rigidify", "modal_points", "segments", "substructures"]
 TAKES_APART: tuple[Transform, ...] = ("segments", "substructures")
 MutationKind = Literal[
@@ -146,7 +146,7 @@ Quantity = Literal["energy", "linear_momentum", "angular_momentum"]
 
 
 class _CasePart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Refuses unknown keys; frozen."""
+    """Base of the parts of a run file, which refuses unknown keys."""
 
 
 class ComparisonSide(_CasePart, frozen=True, kw_only=True):
@@ -197,7 +197,7 @@ class Variant(_CasePart, frozen=True, kw_only=True):
 
 
 class Comparison(_CasePart, frozen=True, kw_only=True):
-    """Two results held against each other: `a` and `b`, or every pair of `engines` of one `variant`.
+    """A comparison of two results: `a` and `b`, or every pair of `engines` of one `variant`.
 
     `goals` maps channel patterns to the resolution goal, relative to the channel's range. `scales` replaces the range
     by an absolute size (SI) for channels whose range is no measure, such as a momentum that stays zero. `band`,
@@ -219,15 +219,15 @@ class Comparison(_CasePart, frozen=True, kw_only=True):
 
     @property
     def sides(self) -> tuple[ComparisonSide, ComparisonSide]:
-        """Both sides of a comparison that is one pair, as `selection.select` leaves them."""
+        """Both sides of a comparison of one pair, as `selection.select` returns it."""
         assert self.a is not None and self.b is not None
         return self.a, self.b
 
 
 class Control(_CasePart, frozen=True, kw_only=True):
-    """A negative control: `a` runs the scene with a deliberate fault, `b` the true one; they must come out *differ*.
+    """A negative control: `a` runs the scene with a deliberate fault, `b` the true one; the verdict must be *differ*.
 
-    Mutations, what they do and which slip each stands for: `crosscheck.library.mutations` and docs/mutations.md. For
+    The mutations are in `crosscheck.library.mutations` and docs/mutations.md. For
     example "mass" (+1 % of body `target`), "hinge_axis" (sign of hinge `target`), "node_rotation" (conjugated
     quaternion of "body.node" `target`), "gravity_sign" of the scene.
     """
@@ -289,8 +289,14 @@ class RunFile(_CasePart, frozen=True, kw_only=True):
     charts: tuple[Chart, ...] = msgspec.field(name="chart", default=())
     reference: ReferenceRecipe | None = None
 
+    def alone(self, *variants: Variant) -> RunFile:
+        """The run file with these variants only, and with nothing that is judged or drawn."""
+        return msgspec.structs.replace(
+            self, variants=variants, comparisons=(), controls=(), conservations=(), charts=(), reference=None
+        )
+
     def variant(self, name: str) -> Variant:
-        """The variant called `name`; CaseError names those there are."""
+        """The variant called `name`; CaseError lists the names."""
         for variant in self.variants:
             if variant.name == name:
                 return variant
@@ -299,7 +305,7 @@ class RunFile(_CasePart, frozen=True, kw_only=True):
 
 
 class PublishedNumber(_CasePart, frozen=True, kw_only=True):
-    """A number from outside: `value` (SI) of a component of a channel at time `t_s`, known to `uncertainty` (SI).
+    """A published number: `value` (SI) of a component of a channel at time `t_s`, with its `uncertainty` (SI).
 
     `component` is "x", "y", "z", for orientations also "w", "" where the channel has only one.
     """
@@ -313,11 +319,11 @@ class PublishedNumber(_CasePart, frozen=True, kw_only=True):
 
 
 class Provenance(_CasePart, frozen=True, kw_only=True):
-    """provenance.toml: where the case's data and its expected outcome come from.
+    """provenance.toml: the origin of the case's data and of its expected outcome.
 
-    `reference` says what anchors the case: a published number; a closed form; runs to high precision, which converge by
+    `reference` is the kind of the case's reference: a published number; a closed form; runs of high precision, by
     two algorithms and two integrators of this library; or the agreement of independent codes. `uncertainty` states, in
-    words and numbers, how well that anchor is known. `anchors` are numbers from outside, which the reference must meet.
+    words and numbers, how well it is known. `anchors` are published numbers that the reference must meet.
     """
 
     reference: Literal["published", "closed form", "high precision", "independent codes"]
@@ -328,5 +334,5 @@ class Provenance(_CasePart, frozen=True, kw_only=True):
 
     @property
     def family(self) -> Family:
-        """The family of cases that it belongs to."""
+        """The family of references to which it belongs."""
         return FAMILIES[self.reference]

@@ -1,8 +1,8 @@
-"""The kinds of channels in one table: patterns, records, reports and `crosscheck verify` take what they need from it.
+"""A table of the kinds of channels, for patterns, records, reports and `crosscheck verify`.
 
-A channel is named `<kind>:<item>.<part>` where an item of the scene has it (`load:elbow.torque`, `drive:elbow`), else
-`<kind>.<part>` (`energy.total`) or just `<kind>` (`work`). `flexmb.run.channels` takes the channels out of a
-trajectory; a test holds this table against it.
+A channel of an item of the scene is named `<kind>:<item>.<part>` (`load:elbow.torque`, `drive:elbow`), any other
+`<kind>.<part>` (`energy.total`) or `<kind>` (`work`). `flexmb.run.channels` extracts the channels of a
+trajectory; a test compares this table with it.
 """
 
 from __future__ import annotations
@@ -86,11 +86,11 @@ def kind_named(name: str) -> ChannelKind:
 
 
 def part_of(channel: str) -> Part | None:
-    """What a channel is, by its name; None where there is no such kind of channels."""
+    """The part to which a channel belongs, by its name; None if there is no such kind of channels."""
     head, of_item, rest = channel.partition(":")
     name, _, last = (head, "", rest.rpartition(".")[2]) if of_item else channel.partition(".")
     for kind in KINDS:
         if kind.name == name and kind.of_items == bool(of_item):
             parts = {part.name: part for part in kind.parts}
-            return parts.get("") or parts.get(last)  # the name of an item may hold dots
+            return parts.get("") or parts.get(last)  # the name of an item may contain dots
     return None

@@ -1,4 +1,4 @@
-"""By what files are recognised: SHA-256 of a file, and of the files that make a case."""
+"""Digests of files: SHA-256 of one file, and of all files of a case."""
 
 from __future__ import annotations
 
@@ -15,6 +15,6 @@ def file_digest(file: Path) -> str:
 
 
 def case_digests(folder: Path) -> dict[str, str]:
-    """Digests of the files in a case's folder that decide what is run and judged: scenes, rules, references."""
+    """Digests of the files in a case's folder that determine what is run and judged: scenes, rules, references."""
     files = sorted(file for file in folder.iterdir() if file.suffix in OF_A_CASE and file.is_file())
     return {file.name: file_digest(file) for file in files}

@@ -1,4 +1,4 @@
-"""The case library: finding case folders, shipped or the user's own, and reading them."""
+"""Finding and reading case folders, shipped ones and the user's."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ T = TypeVar("T")
 class Case:
     """A case folder that was read and checked. `name` is "<family>/<case>".
 
-    `alone`: engines are held against the stored reference only, and no partners run.
+    `alone`: engines are compared with the stored reference only, and no partners run.
     """
 
     name: str
@@ -77,10 +77,10 @@ def resolve(words: tuple[str, ...]) -> tuple[Case, ...]:
 
 def _resolve_one(word: str) -> tuple[Case, ...]:
     folder = Path(word)
-    if os.path.isfile(folder / "run.toml"):  # False for whatever cannot even be a path
+    if os.path.isfile(folder / "run.toml"):  # False also for words that cannot be a path
         return (load_case(folder),)
     named = [name for name in shipped_names() if word in (name, name.partition("/")[2])]
-    if named:  # no other case is read for it
+    if named:  # only these cases are read
         return tuple(load_case(shipped_folder() / name) for name in named)
     cases = shipped_cases()
     chosen = tuple(case for case in cases if word == "all" or word in case.run.tags)
@@ -131,14 +131,14 @@ def load_case(folder: Path) -> Case:
 
 
 def _present(file: Path) -> bool:
-    """Whether there is a file, even one that cannot be read: then reading it says so, and it is not passed over."""
+    """Whether the file exists, even if it cannot be read, so that reading reports the error."""
     return os.path.lexists(file)
 
 
 def _read(file: Path, kind: type[T]) -> T:
     try:
         return to_struct(parse_toml(_text(file)), kind, str(file))
-    except SceneError as error:  # the file of a case is no scene, whose message would call it one
+    except SceneError as error:  # its message would call the file a scene
         raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
     except (Unreadable, RecursionError, OverflowError) as error:
         raise CaseError(f"{file}: {error}") from None

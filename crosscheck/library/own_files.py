@@ -1,7 +1,7 @@
 """The source files of flexmb and crosscheck, which crosscheck reads: the key of a record is a digest of them.
 
-Imported from a zip file, by the loader of a frozen program or without sources, flexmb computes as ever. But crosscheck
-could not tell the records of one state of the code from those of another, nor find its cases: it refuses to begin.
+Imported from a zip file, in a frozen program or without sources, flexmb works. But crosscheck
+could not distinguish the records of different states of the code, nor find its cases: it refuses to run.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ OURS = ("flexmb", "crosscheck")
 
 
 def source_folder(package: str) -> Path:
-    """Folder of the source files of `flexmb` or `crosscheck`; CaseError where they are no files."""
+    """Folder of the source files of `flexmb` or `crosscheck`; CaseError if they are no files."""
     spec = find_spec(package)
     folder = Path(spec.origin).parent if spec is not None and spec.origin is not None else None
     if folder is None or not (folder / "__init__.py").is_file():

@@ -1,4 +1,4 @@
-"""Patterns of channels in a run file: which of several patterns a channel belongs to, and which can name none."""
+"""Patterns of channels in a run file: the most specific pattern of a channel, and errors in patterns."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ WHOLE = {kind.name: tuple(part.name for part in kind.parts if part.name) for kin
 
 
 def most_specific(patterns: Iterable[str], channel: str) -> str | None:
-    """The longest of the patterns that name the channel, the first of several; None where none does."""
+    """The first of the longest patterns that match the channel; None if none does."""
     return max((pattern for pattern in patterns if matches(pattern, channel)), key=len, default=None)
 
 
 def fault(pattern: str) -> str:
-    """Why no channel can have such a name; "" if one can.
+    """Why no channel can match the pattern; "" if one can.
 
     A pattern is a kind (`load`), a kind and a name (`load:elbow`), or these and a part (`load:elbow.torque`). A name
     with a dot needs its part, or `.*`.

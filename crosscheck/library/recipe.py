@@ -1,4 +1,4 @@
-"""How the reference of a case is made: the table `[reference]` of run.toml, by which `crosscheck regenerate` goes.
+"""The recipe of a case's reference for `crosscheck regenerate`: the table `[reference]` of run.toml.
 
 For example::
 
@@ -21,7 +21,7 @@ For example::
     [[reference.route]]
     engine = "native-frisch"
 
-Every channel comes by two routes at least, which must agree within their uncertainties and be independent: a closed
+Every channel needs at least two routes, which must agree within their uncertainties and be independent: a closed
 form and any other, two codes, or two of this library's engines with two integrators. The samples are some of the
 variant's: with 251 of these, 126 or 51 can be kept. `docs/references.md` has all rules.
 """
@@ -58,7 +58,7 @@ class ReferenceRoute(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 
 
 class ReferenceRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What `reference.csv` holds, by which routes it is made, and who is held against it in which channels."""
+    """The contents of `reference.csv`, its routes, and the engines and channels that are compared with it."""
 
     variant: str
     samples: int | None = None

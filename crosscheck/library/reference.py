@@ -1,11 +1,11 @@
-"""A case's stored reference: `reference.csv` with the numbers, `reference.toml` with what is known of each channel.
+"""A case's stored reference: `reference.csv` with the numbers, `reference.toml` with the uncertainty of each channel.
 
 `reference.csv` is in SI and World axes, time first, one quoted header line, 17 digits::
 
     "t [s]","marker:tip.position.x [m]","marker:tip.position.y [m]",...
 
-`reference.toml` gives every channel its uncertainty, and says which routes made the numbers, of which scene, until when
-they hold, and which csv and which provenance it belongs to. `crosscheck regenerate` writes both; nobody edits them.
+`reference.toml` gives the uncertainty of every channel, the routes that made the numbers, the scene, the horizon,
+and the digests of the csv and the provenance to which it belongs. `crosscheck regenerate` writes both files.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ TIME = "t [s]"
 
 
 class Known(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What is known of one channel: `uncertainty` (its SI unit, rad for orientations) of every sample up to the
-    horizon, the channel's range `scale`, and in `how` the routes and the estimate that say so."""
+    """The uncertainty of one channel (its SI unit, rad for orientations) at every sample up to the
+    horizon, the channel's range `scale`, and in `how` the routes and the estimate."""
 
     uncertainty: float
     scale: float
@@ -45,8 +45,8 @@ class Known(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class Knowledge(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """reference.toml. `values`, `provenance` and `scene` are digests of reference.csv, of provenance.toml and of what
-    the variant is (see `scene_digest`); `routes` say in words how the numbers were made, `made_with` by what."""
+    """reference.toml. `values`, `provenance` and `scene` are digests of reference.csv, of provenance.toml and of
+    the variant (see `scene_digest`); `routes` describe how the numbers were made, `made_with` by which versions."""
 
     variant: str
     horizon_s: float
@@ -68,7 +68,7 @@ class StoredReference:
 
 
 def load_reference(folder: Path) -> StoredReference:
-    """The reference of the case in `folder`; CaseError where there is none, or where its files belie each other."""
+    """The reference of the case in `folder`; CaseError if there is none, or its files are inconsistent."""
     values, knowledge = _text(folder / VALUES), _knowledge(folder / KNOWLEDGE)
     if digest(values) != knowledge.values:
         raise CaseError(f"{folder / VALUES} was changed after {KNOWLEDGE} was written: {ANEW}")
@@ -84,14 +84,13 @@ def has_reference(folder: Path) -> bool:
 
 
 def digest(text: str) -> str:
-    """What a text is recognised by."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def scene_digest(case: Case, variant: Variant) -> str:
-    """What a variant is recognised by: its scene file without comments, the files it names, and its transformation.
+    """A digest of a variant: its scene file without comments, the files it names, and its transformation.
 
-    It is the scene before the transformation, whose numbers depend in their last digits on the machine.
+    The scene is taken before the transformation, whose results depend in their last digits on the machine.
     """
     try:
         scene = json.dumps(parse_toml(_text(case.folder / variant.scene)), sort_keys=True, default=str)
@@ -109,10 +108,10 @@ def scene_digest(case: Case, variant: Variant) -> str:
 
 
 def current_reference(case: Case) -> StoredReference:
-    """The stored reference of a case, if it is one of the case as it is now.
+    """The stored reference of a case, which must belong to the present case.
 
-    CaseError where there is none, where its files belie each other, where it is of another variant than the run file
-    asks for, or where the scene was changed after it was made.
+    CaseError if there is none, if its files are inconsistent, if it is of another variant than the run file
+    asks for, or if the scene was changed after it was made.
     """
     found = load_reference(case.folder)
     place = f"{case.folder / KNOWLEDGE}:"
@@ -134,7 +133,6 @@ def column_names(channel: str, width: int) -> list[str]:
 
 
 def values_text(times: Real, channels: dict[str, Real]) -> str:
-    """The text of reference.csv."""
     header = [TIME, *(name for channel, rows in channels.items() for name in column_names(channel, rows.shape[1]))]
     text = io.StringIO()
     csv.writer(text, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(header)
@@ -168,9 +166,9 @@ def parse_values(text: str, file: str) -> tuple[Real, dict[str, Real]]:
 
 
 def channels_by_column(names: list[str]) -> dict[str, list[int]]:
-    """The places of the columns of each channel, by names such as "marker:tip.position.x [m]".
+    """The indices of the columns of each channel, by names such as "marker:tip.position.x [m]".
 
-    CaseError names the first column that is not what, or not where, it should be.
+    CaseError names the first column with a wrong name or in a wrong place.
     """
     places: dict[str, list[int]] = {}
     for place, name in enumerate(names):
@@ -190,7 +188,7 @@ def channels_by_column(names: list[str]) -> dict[str, list[int]]:
 
 
 def _channel_of(column: str) -> str:
-    """The channel of a column: what stands before the component, if it has one, and the unit."""
+    """The channel of a column: its name without the component, if it has one, and the unit."""
     name = column.rpartition(" [")[0]
     head, _, last = name.rpartition(".")
     return head if last in ("w", "x", "y", "z") or last.isdigit() else name

@@ -1,12 +1,12 @@
-"""The part of a case that is run: its run file, reduced to the engines that were asked for.
+"""The run file of a case, reduced to the engines that were asked for.
 
 In the reduced run file every comparison is an explicit pair, and `engines` of a variant include those of `also`.
 
-No engine asked for: everything. One: every comparison it takes part in, its partners included. Several: what involves
-only these. An engine that the case names in no variant (one of ours, a user's own, or a misspelt one) joins every
-variant that is compared engine by engine, and the variant of the stored reference; if it does not exist, that shows as
-*did not run*. What it cannot represent there is *not applicable*, see `crosscheck.judging.applicable`. One that the
-case names stays where the case has put it.
+Without engines: everything. With one: every comparison of it, including its partners. With several: the comparisons
+among these. An engine that the case names in no variant (ours, a user's own, or a misspelt one) joins every
+variant that is compared engine by engine, and the variant of the stored reference; if it does not exist, it is
+*did not run*. What it cannot represent there is *not applicable*, see `crosscheck.judging.applicable`. An engine that
+the case names runs only its variants.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from flexmb.scene.problems import closest
 
 
 def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
-    """The reduced run file; variants keep the engines that something needs, and go where nothing does."""
+    """The reduced run file; variants keep the engines that are needed, and are removed if none is."""
     run = _joined(run, asked)
     comparisons = [pair for comparison in run.comparisons for pair in _pairs(run, comparison)]
     kept = tuple(pair for pair in comparisons if _wanted(asked, pair.sides))
@@ -45,7 +45,7 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
 def alone(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     """The run file reduced to the variant of the stored reference, and there to the engines that were asked for.
 
-    Without any these are all that are held against it. Nothing is compared engine against engine.
+    Without any these are all that are compared with it. There are no comparisons of engines with each other.
     """
     of = run.reference.variant if run.reference is not None else ""
     run = _joined(run, asked)
@@ -64,16 +64,16 @@ def alone(run: RunFile, asked: tuple[str, ...]) -> RunFile:
 
 
 def joining(run: RunFile, asked: Iterable[str]) -> tuple[str, ...]:
-    """Those of the engines asked for that the run file does not know: none of its variants has them."""
+    """Those of the engines asked for that no variant of the run file names."""
     known = {engine for variant in run.variants for engine in _all(variant)}
     return tuple(engine for engine in asked if engine not in known)
 
 
 def held(run: RunFile, engines: Iterable[str]) -> dict[str, tuple[dict[str, float], dict[str, float]]]:
-    """Goals and scales, by engine, of those of `engines` that are held against the stored reference.
+    """Goals and scales, by engine, of those of `engines` that are compared with the stored reference.
 
-    They are those that a comparison of its variant expects to agree, or those that the table `[reference]` names; where
-    this gives goals, also those of which no comparison there expects anything; and engines that the case does not know.
+    These are engines that a comparison of its variant expects to agree, or those that the table `[reference]` names; if
+    the table gives goals, also engines without a comparison there; and engines that the case does not name.
     Goals are the table's, or those of the engine's comparisons, the first before later ones.
     """
     recipe = run.reference
@@ -104,7 +104,7 @@ def held(run: RunFile, engines: Iterable[str]) -> dict[str, tuple[dict[str, floa
 
 
 def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
-    """A message that names the engines that were asked for and have no part in any of the run files; "" if all have."""
+    """A message about engines that were asked for and take part in none of the run files; "" if there are none."""
     runs = tuple(runs)
     busy = {engine for run in runs for variant in select(run, asked).variants for engine in variant.engines}
     idle = [engine for engine in asked if engine not in busy]
@@ -115,7 +115,7 @@ def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
 
 
 def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
-    """The run file with engines that it does not know added to the variants that are compared engine by engine."""
+    """The run file with unknown engines added to the variants that are compared engine by engine."""
     foreign = joining(run, asked)
     open_to_all = {each.variant for each in run.comparisons if each.variant and not each.engines}
     open_to_all |= {run.reference.variant} if run.reference is not None else set()
@@ -127,7 +127,6 @@ def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
 
 
 def _pairs(run: RunFile, comparison: Comparison) -> list[Comparison]:
-    """A comparison as explicit pairs."""
     if comparison.variant is None:
         return [comparison]
     engines = comparison.engines or run.variant(comparison.variant).engines
@@ -144,7 +143,7 @@ def _pairs(run: RunFile, comparison: Comparison) -> list[Comparison]:
 
 
 def _wanted(asked: tuple[str, ...], sides: tuple[ComparisonSide, ComparisonSide]) -> bool:
-    """Whether two sides are compared when these engines are asked for."""
+    """Whether two sides are compared if these engines are asked for."""
     involved = {side.engine for side in sides}
     if not asked:
         return True

@@ -1,4 +1,4 @@
-"""Functions of time changed: their values scaled, their clock scaled or moved."""
+"""Changes of functions of time: scaled values, a scaled or shifted clock."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ def scaled(function: Function, factor: float) -> Function:
 
 
 def slowed(function: Function, factor: float) -> Function:
-    """The function f(t / factor): the same course on a clock that shows `factor` times as much."""
+    """The function f(t / factor)."""
     return _multiplied(_multiplied(function, TIMES, factor), FREQUENCIES, 1.0 / factor)
 
 
 def delayed(function: Function, delay: float) -> Function:
-    """The function f(t - delay), `delay` in seconds; a spin-up, which always begins at zero, as it is."""
+    """The function f(t - delay), `delay` in seconds; a spin-up, which always begins at zero, is unchanged."""
     match function:
         case Ramp() | SmoothStep() | Pulse():
             return msgspec.structs.replace(function, start_s=function.start_s + delay)
@@ -80,7 +80,6 @@ def _times(value: float | tuple[float, ...], factor: float) -> float | tuple[flo
 
 
 def in_functions(item: Any, change: Callable[[Function], Function]) -> Any:
-    """A struct with every function of time inside it changed."""
     if isinstance(item, Function):
         return change(item)
     if isinstance(item, tuple):

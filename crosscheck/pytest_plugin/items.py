@@ -96,7 +96,6 @@ class _EngineItem(pytest.Item):
         self.tell("engine", engine)
 
     def tell(self, name: str, value: Any) -> None:
-        """A property of the item."""
         self.user_properties.append((name, value))
 
     def missing(self, reason: str) -> None:
@@ -113,8 +112,6 @@ class _EngineItem(pytest.Item):
 
 
 class _CaseItem(_EngineItem):
-    """An item of a case."""
-
     def __init__(self, case: Case, engine: str, **others: Any) -> None:
         super().__init__(engine=engine, **others)
         self.case = case
@@ -199,8 +196,6 @@ class CannotBeHeld(_CaseItem):
 
 
 class ClauseItem(_EngineItem):
-    """A clause of the contract."""
-
     def __init__(self, clause: str, **others: Any) -> None:
         super().__init__(**others)
         self.clause = clause

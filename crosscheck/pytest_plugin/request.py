@@ -38,7 +38,6 @@ class Request:
 
     @property
     def headline(self) -> str:
-        """The request in a line."""
         count = f"{len(self.cases)} case{'' if len(self.cases) == 1 else 's'}"
         parts = [*([count] if self.cases else []), *(["the contract"] if self.contract else [])]
         return f"crosscheck: {' and '.join(parts)} on {', '.join(self.engines)}, records in {self.runs.folder}"

@@ -45,13 +45,11 @@ class Archive:
         self._encoder = msgspec.json.Encoder()
 
     def write(self, record: msgspec.Struct) -> None:
-        """Append one line."""
         with writing(self._file):
             self._stream.write(self._encoder.encode(record) + b"\n")
             self._stream.flush()
 
     def close(self) -> None:
-        """Close the file."""
         with writing(self._file):
             self._stream.close()
 

@@ -28,5 +28,4 @@ class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
 
     @property
     def arrays(self) -> tuple[Packed, ...]:
-        """All of its arrays."""
         return (*self.channels.values(), *([] if self.times is None else [self.times]))

@@ -17,7 +17,7 @@ import numpy as np
 
 from crosscheck.judging.results import Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
-from crosscheck.library.case import CaseError, RunFile, Variant
+from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
 from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
 from crosscheck.records.archive import read
@@ -84,7 +84,6 @@ def run_routes(
 
 
 def _name(place: int) -> str:
-    """The name of the variant as which a route is run."""
     return f"route {place + 1}"
 
 
@@ -105,16 +104,9 @@ def _engine_results(
     )
     if not variants:
         return {}
-    run = RunFile(
-        title=case.run.title,
-        duration_s=case.run.duration_s,
-        samples=case.run.samples,
-        time_limit_s=case.run.time_limit_s,
-        variants=variants,
-    )
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
-        planned = plan(replace(case, run=run), (), provider, limits.time_s)
+        planned = plan(replace(case, run=case.run.alone(*variants)), (), provider, limits.time_s)
         run_planned([planned], (), records, limits=limits, scheduler=scheduler, listener=listener)
         (results,) = collect(read(records)).cases
     return {each.name: results.get(each.name, each.engines[0], MAIN) for each in variants}

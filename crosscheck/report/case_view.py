@@ -23,8 +23,6 @@ from crosscheck.report.views import (
 
 @dataclass(frozen=True)
 class CaseView:
-    """A case's page."""
-
     place: CasePlace
     name: str
     title: str
@@ -91,7 +89,6 @@ def transformation(variant: Any) -> str:
 
 
 def _timings(case: CaseResults) -> list[dict[str, Any]]:
-    """Compile and solve time of each finest run."""
     return [
         {
             "engine": engine,

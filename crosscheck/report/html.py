@@ -30,7 +30,6 @@ def templates() -> Environment:
 
 
 def source(name: str) -> Markup:
-    """The text of a file in the templates folder."""
     loader = templates().loader
     assert loader is not None
     return Markup(loader.get_source(templates(), name)[0])

@@ -20,7 +20,6 @@ class ScoredMutation(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def by(self) -> str:
-        """The number of channels that noticed it."""
         return f"{sum(self.channels.values())} of {len(self.channels)}" if self.channels else ""
 
 
@@ -36,8 +35,6 @@ class CaseScore(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Scores(msgspec.Struct, frozen=True, kw_only=True):
-    """The scores of the cases by name."""
-
     cases: dict[str, CaseScore] = {}
     error: str = ""
 

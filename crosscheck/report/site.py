@@ -36,8 +36,6 @@ LIBRARIES = ("plotly/plotly-basic.min.js", "three/three.iife.min.js")  # of the 
 
 @dataclass(frozen=True)
 class Material:
-    """The data of all pages."""
-
     session: Session
     outcome: SessionOutcome
     scores: Scores
@@ -105,12 +103,10 @@ def _encoded(text: str) -> bytes:
 
 
 def _page(name: str, material: Material, **more: Any) -> str:
-    """A page by its template."""
     return templates().get_template(name).render(outcome=material.outcome, scripts_of_site=SCRIPTS, **more)
 
 
 def _overview(material: Material, where: dict[str, CasePlace]) -> dict[str, Any]:
-    """The data of the index."""
     session, outcome = material.session, material.outcome
     return {
         "counts": outcome.counts(),
@@ -153,7 +149,6 @@ def _clear(site: Path) -> bool:
 
 
 def _engines(session: Session) -> list[tuple[str, str]]:
-    """Engines with the versions that ran."""
     found: dict[str, set[str]] = {}
     for case in session.cases:
         for (_, engine, _), result in case.results.items():

@@ -30,7 +30,6 @@ class Store:
         self._numbers: dict[bytes, int] = {}
 
     def times(self, times: Real) -> int:
-        """Number of the thinned sample times."""
         return self._add(times[_chosen(len(times))])
 
     def signal(self, result: Result, channel: str) -> int:

@@ -50,8 +50,6 @@ class Row:
 
 @dataclass(frozen=True)
 class VerdictTable:
-    """A table of summaries of verdicts."""
-
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
 
@@ -91,7 +89,6 @@ Numbered = tuple[int, Verdict]  # a verdict with its number among those of its c
 
 
 def anchor(number: int) -> str:
-    """The anchor of a verdict on its page."""
     return f"verdict-{number}"
 
 

@@ -141,31 +141,15 @@ def _attempt(
 
 
 def _job(
-    case: Case,
-    run: RunFile,
-    variant: Variant,
-    role: str,
-    engine: str,
-    scene: Scene | None,
-    error: str,
-    provider: str,
+    case: Case, run: RunFile, variant: Variant, role: str, engine: str, scene: Scene | None, error: str, provider: str
 ) -> Job:
     times = sample_times(run, variant)
+    scene_id = "" if scene is None else scene_identity(scene, times)
     return Job(
-        case=case.name,
-        variant=variant.name,
-        role=role,
-        engine=engine,
-        scene=scene,
-        scene_id="" if scene is None else scene_identity(scene, times),
-        times=times,
-        provider=provider,
-        maker=home(engine),
-        efforts=prescribed(variant, engine),
-        finest_only=role != MAIN,
-        kept=tuple(chart.observable for chart in run.charts),
-        error=error,
-    )
+        case.name, variant.name, role, engine, scene, scene_id, times, provider, home(engine),
+        efforts=prescribed(variant, engine), finest_only=role != MAIN,
+        kept=tuple(chart.observable for chart in run.charts), error=error,
+    )  # fmt: skip
 
 
 def _film(case: Case, run: RunFile, variant: Variant, provider: str) -> tuple[Job, Drawing] | None:
@@ -179,22 +163,10 @@ def _film(case: Case, run: RunFile, variant: Variant, provider: str) -> tuple[Jo
     if made is None:
         return None
     filmed, drawing = made
-    times = np.linspace(0.0, variant.duration_s or run.duration_s, FRAMES)
-    return Job(
-        case=case.name,
-        variant=variant.name,
-        role=FILM,
-        engine=ENGINE,
-        scene=filmed,
-        scene_id=scene_identity(filmed, times),
-        times=times,
-        provider=provider,
-        maker=home(ENGINE),
-        efforts=prescribed(variant, ENGINE)[:1] or (FILM_EFFORT,),
-        finest_only=True,
-        kept=film_channels(drawing),
-        lean=True,
-    ), drawing
+    filmed_as = msgspec.structs.replace(variant, samples=FRAMES)
+    job = _job(case, run, filmed_as, FILM, ENGINE, filmed, "", provider)
+    efforts = job.efforts[:1] or (FILM_EFFORT,)
+    return replace(job, efforts=efforts, kept=film_channels(drawing), lean=True), drawing
 
 
 def prescribed(variant: Variant, engine: str) -> tuple[Effort, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import msgspec
@@ -82,6 +82,11 @@ class Kind:
     colour: str
 
 
+def growth_kinds() -> tuple[Kind, Kind]:
+    """Classes of a map of growth rates."""
+    return Kind("stable", STABLE), Kind("unstable", UNSTABLE)
+
+
 @dataclass(frozen=True)
 class Overlay:
     """The theoretical or published boundary: where `predict(x, y)` (arrays of one shape) crosses `levels`.
@@ -107,11 +112,11 @@ class Overlay:
 class StabilityMap:
     """One case, one quantity, two axes.
 
-    `scene(x, y)` is the family, `measure(scene, x, y)` finds the quantity in one member; the classes `kinds` lie
-    between the `thresholds` (increasing, one fewer). `depth` halvings are made where class or status changes. A cell
-    that `failed` counts as class number `failure` in the comparison with the overlay; if `failure` is not given, every
-    failed cell is wrong. With `skips`, cells that did not finish are no evidence. `shows` is the text of the gallery.
-    """
+    `scene(x, y)` is the family, `measure(scene, x, y)` finds the quantity in one member; the classes `kinds`, by
+    default stable and unstable, lie between the `thresholds` (increasing, one fewer). `depth` halvings are made where
+    class or status changes. A cell that `failed` counts as class number `failure` in the comparison with the overlay;
+    if `failure` is not given, every failed cell is wrong. With `skips`, cells that did not finish are no evidence.
+    `shows` is the text of the gallery. """
 
     name: str
     title: str
@@ -121,9 +126,9 @@ class StabilityMap:
     x: Axis
     y: Axis
     thresholds: tuple[float, ...]
-    kinds: tuple[Kind, ...]
     overlay: Overlay
     shows: str
+    kinds: tuple[Kind, ...] = field(default_factory=growth_kinds)
     depth: int = 3
     failure: int | None = None
     skips: bool = False
@@ -139,11 +144,6 @@ class StabilityMap:
     def outcome(self, x: float, y: float) -> Measurement:
         """The quantity at one place."""
         return self.measure(self.scene(x, y), x, y)
-
-
-def growth_kinds() -> tuple[Kind, Kind]:
-    """Classes of a map of growth rates."""
-    return Kind("stable", STABLE), Kind("unstable", UNSTABLE)
 
 
 def digit_kinds(*names: str) -> tuple[Kind, ...]:

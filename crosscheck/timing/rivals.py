@@ -19,7 +19,7 @@ from crosscheck.engines.contract import Effort
 from crosscheck.judging.against_reference import ReferenceSignals, hold, of_record, shared_times
 from crosscheck.judging.results import Result, collect
 from crosscheck.judging.verdict import Finding
-from crosscheck.library.case import CaseError, RunFile, Variant
+from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
 from crosscheck.records.archive import read
 from crosscheck.records.held import Asked, RecordedReference
@@ -114,14 +114,7 @@ def find_rivals(
     if not chosen:
         raise CaseError(f"{case.name}: none of {', '.join(engines)} runs {', '.join(variants or (held.variant,))}")
     reference = of_record(held)
-    run = RunFile(
-        title=case.run.title,
-        duration_s=case.run.duration_s,
-        samples=case.run.samples,
-        time_limit_s=case.run.time_limit_s,
-        variants=tuple(chosen),
-    )
-    record, jobs = plan(replace(case, run=run), (), provider, limits.time_s)
+    record, jobs = plan(replace(case, run=case.run.alone(*chosen)), (), provider, limits.time_s)
     jobs = [replace(job, kept=tuple(reference.channels)) for job in jobs]
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"

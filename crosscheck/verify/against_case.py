@@ -217,15 +217,7 @@ def _target(case: Case, variant: Variant, engine: str | None, provider: str, sch
 
 def _run(case: Case, variant: Variant, engine: str, provider: str, scheduler: Scheduler) -> Result:
     """The engine's result on the variant, run now in a worker process."""
-    run = msgspec.structs.replace(
-        case.run,
-        variants=(msgspec.structs.replace(variant, engines=(engine,), also=(), refined=None),),
-        comparisons=(),
-        controls=(),
-        conservations=(),
-        charts=(),
-        reference=None,
-    )
+    run = case.run.alone(msgspec.structs.replace(variant, engines=(engine,), also=(), refined=None))
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
         planned = plan(replace(case, run=run), (), provider)

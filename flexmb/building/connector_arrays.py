@@ -1,17 +1,18 @@
-"""From connectors to the arrays of flexmb.tables.arrays: ends, laws, bushings, springs and friction along hinges."""
+"""From connectors to the arrays of flexmb.tables.arrays: ends, laws, bushings, springs and laws along hinges."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, assert_never
 
 import numpy as np
 
 from flexmb.building.links import BodyLink, Port, port
 from flexmb.building.numbering import Numbering
+from flexmb.connectors.catalogue import law_of
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
-from flexmb.scene.connectors import BetweenNodes, HingeFriction, HingeSpring, actuator, by_stem
+from flexmb.scene.connectors import AlongHinge, BetweenNodes, HingeSpring, actuator, by_stem
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.tree import GROUND, coordinate_of
 from flexmb.tables import arrays as a
@@ -89,13 +90,14 @@ def connector_arrays(
             case _:
                 assert_never(connector)
     springs = [each for each in scene.connectors if isinstance(each, HingeSpring)]
-    frictions = [each for each in scene.connectors if isinstance(each, HingeFriction)]
+    along = [each for each in scene.connectors if isinstance(each, AlongHinge)]
+    others = [each for each in along if not isinstance(each, HingeSpring)]
     return {
         "connector": records,
         "end": sides,
         "bushing": matrices,
         "hinge_spring": _hinge_springs(scene, springs, numbering, laws, number),
-        "friction": _frictions(scene, frictions, numbering),
+        "coordinate_law": _coordinate_laws(scene, others, numbering),
         "law": np.array(laws, float).reshape(-1, 8),
     }
 
@@ -105,7 +107,7 @@ def _offset(connector: BetweenNodes, side: str) -> tuple[s.Vector, s.Quaternion]
     return getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY)
 
 
-def _speed(scene: s.Scene, connector: HingeSpring | HingeFriction, numbering: Numbering) -> int:
+def _speed(scene: s.Scene, connector: AlongHinge, numbering: Numbering) -> int:
     item, place = coordinate_of(scene, connector)
     return numbering.u[item.name].start + place
 
@@ -129,15 +131,11 @@ def _hinge_springs(
     return out
 
 
-def _frictions(scene: s.Scene, frictions: list[HingeFriction], numbering: Numbering) -> a.Record:
-    out = np.zeros(len(frictions), a.FRICTION)
-    for row, friction in zip(out, frictions, strict=True):
-        law = by_stem(friction)
-        row["speed"], row["sliding"], row["smoothing"] = (
-            _speed(scene, friction, numbering), law["sliding"], law["smoothing"],
-        )  # fmt: skip
-        row["static"] = law["sliding"] if law["static"] is None else law["static"]
-        row["stribeck"] = 1.0 if law["stribeck"] is None else law["stribeck"]
+def _coordinate_laws(scene: s.Scene, connectors: Sequence[AlongHinge], numbering: Numbering) -> a.Record:
+    out = np.zeros(len(connectors), a.COORDINATE_LAW)
+    for row, connector in zip(out, connectors, strict=True):
+        row["speed"], (row["kind"], numbers) = _speed(scene, connector, numbering), law_of(connector)
+        row["parameters"][: len(numbers)] = numbers
     return out
 
 

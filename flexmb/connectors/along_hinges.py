@@ -1,39 +1,36 @@
-"""Connectors along scalar coordinates: nonlinear springs with stops and actuators, and dry friction.
+"""Connectors along scalar coordinates: nonlinear springs with stops and actuators, and the laws of `catalogue`.
 
-A stop at the depth d, increasing at the rate d', exerts k d (1 + e d'), Hunt and Crossley (1975), and never pulls. The
-load is continuous at any speed of contact, because it is proportional to d. Friction, Hess and Soom (1990), is smooth
-at zero speed:
-
-    [Fc + (Fs - Fc) / (1 + (v/vs)^2)] v / sqrt(v^2 + vr^2)
+A stop at depth d, pressed in at the rate d', pushes back by k d (1 + e d'), Hunt and Crossley (1975), and never pulls:
+the load starts from zero however fast it is met.
 """
 
+from flexmb.connectors import catalogue
 from flexmb.connectors.laws import resistance
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import select
-from flexmb.spatial.scalar import sqrt
-from flexmb.tables.features import FRICTION, HINGE_ACTUATORS, HINGE_SPRINGS
+from flexmb.tables.features import COORDINATE_LAWS, HINGE_ACTUATORS, HINGE_SPRINGS
 
 
 @helper
 def add_loads_along_hinges(c, w):
-    """Add the loads of all springs and friction along coordinates to w.speed.applied."""
+    """Add the loads of all springs and laws along coordinates to w.speed.applied."""
     evaluate_along_hinges(c, w)
     for i in range(c.hinge_spring.shape[0]):
         w.speed[c.hinge_spring[i].speed].applied += w.hinge_spring[i].load
-    for i in range(c.friction.shape[0]):
-        w.speed[c.friction[i].speed].applied += w.friction[i].load
+    for i in range(c.coordinate_law.shape[0]):
+        w.speed[c.coordinate_law[i].speed].applied += w.coordinate_law[i].load
 
 
 @helper
 def evaluate_along_hinges(c, w):
-    """Write loads, energies and powers of all springs and friction to w.hinge_spring and w.friction."""
+    """Write loads, energies and powers of all springs and laws to w.hinge_spring and w.coordinate_law."""
     if has(c, HINGE_SPRINGS):
         for i in range(c.hinge_spring.shape[0]):
             _spring(c, w, i)
-    if has(c, FRICTION):
-        for i in range(c.friction.shape[0]):
-            _friction(c, w, i)
+    if has(c, COORDINATE_LAWS):
+        for i in range(c.coordinate_law.shape[0]):
+            _law(c, w, i)
 
 
 @helper
@@ -57,14 +54,12 @@ def _spring(c, w, i):
 
 
 @helper
-def _friction(c, w, i):
-    v, smoothing = w.u[c.friction[i].speed], c.friction[i].smoothing
-    sliding, ratio = c.friction[i].sliding, v / c.friction[i].stribeck
-    level = sliding + (c.friction[i].static - sliding) / (1.0 + ratio * ratio)
-    load = level * v / sqrt(v * v + smoothing * smoothing)
-    w.friction[i].load = -load
-    w.friction[i].energy = 0.0
-    w.friction[i].power = -load * v
+def _law(c, w, i):
+    j, kind = c.coordinate_law[i].speed, c.coordinate_law[i].kind
+    found = catalogue.load(c, kind, c.coordinate_law[i].parameters, w.q[c.speed[j].coordinate], w.u[j])
+    w.coordinate_law[i].load = found[0]
+    w.coordinate_law[i].energy = found[1]
+    w.coordinate_law[i].power = found[2]
 
 
 @helper
@@ -73,15 +68,18 @@ def stored_along_hinges(c, w):
     total = 0.0
     for i in range(c.hinge_spring.shape[0]):
         total += w.hinge_spring[i].energy
+    if has(c, COORDINATE_LAWS):
+        for i in range(c.coordinate_law.shape[0]):
+            total += w.coordinate_law[i].energy
     return total
 
 
 @helper
 def power_along_hinges(c, w):
-    """Power in W of dampers, stops, actuators and friction at the last evaluation."""
+    """Power in W of dampers, stops, actuators and laws at the last evaluation."""
     total = 0.0
     for i in range(c.hinge_spring.shape[0]):
         total += w.hinge_spring[i].power
-    for i in range(c.friction.shape[0]):
-        total += w.friction[i].power
+    for i in range(c.coordinate_law.shape[0]):
+        total += w.coordinate_law[i].power
     return total

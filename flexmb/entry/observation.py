@@ -24,7 +24,7 @@ from flexmb.levels.body import AT_REST
 from flexmb.motion.coordinates import load_state
 from flexmb.spatial.spatial_vector import store6, times6, vec6
 from flexmb.spatial.vector import add, mat3, matmul, store3, store9, times, vec3
-from flexmb.tables.features import CONNECTORS, FRICTION, HINGE_SPRINGS, WHEELS
+from flexmb.tables.features import CONNECTORS, COORDINATE_LAWS, HINGE_SPRINGS, WHEELS
 from flexmb.typing import Index, Real
 
 Places = dict[str, tuple[slice, tuple[int, ...]]]
@@ -45,7 +45,7 @@ class Outputs:
     energy: Real  # (4,) as in flexmb.jain.balance
     momentum: Real  # (6,) likewise
     connectors: Real  # (C,6) [torque; force] of connectors between nodes, on B about B
-    hinge_forces: Real  # (S,) loads of springs, then of friction, along coordinates
+    hinge_forces: Real  # (S,) loads of springs, then of other laws, along coordinates
 
 
 def shapes(
@@ -160,7 +160,7 @@ def _observe_motion(c, w, out):
     if has(c, CONNECTORS):
         for i in range(c.connector.shape[0]):
             store6(out.connectors[i], 0, vec6(w.connector[i].load, 0))
-    if has(c, HINGE_SPRINGS) or has(c, FRICTION):
+    if has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS):
         _observe_along_hinges(c, w, out.hinge_forces)
     observe_markers(c, w, out)
 
@@ -177,12 +177,12 @@ def observe_markers(c, w, out):
 
 @helper
 def _observe_along_hinges(c, w, loads):
-    """Write the loads of springs, then of friction, along coordinates to loads (S,)."""
+    """Write the loads of springs, then of other laws, along coordinates to loads (S,)."""
     springs = c.hinge_spring.shape[0]
     for i in range(springs):
         loads[i] = w.hinge_spring[i].load
-    for i in range(c.friction.shape[0]):
-        loads[springs + i] = w.friction[i].load
+    for i in range(c.coordinate_law.shape[0]):
+        loads[springs + i] = w.coordinate_law[i].load
 
 
 @helper

@@ -118,7 +118,7 @@ class NestedWorkspace:
     speed: Record  # (nu,) SPEED_STATE
     connector: Record  # (C,) CONNECTOR_STATE
     hinge_spring: Record  # ALONG_HINGE_STATE
-    friction: Record  # ALONG_HINGE_STATE
+    coordinate_law: Record  # ALONG_HINGE_STATE
     nest: Record  # (N,) NEST
     modal: Real  # (N,m) modal coordinates as the level sees them
     modal_rate: Real  # (N,m)

@@ -17,7 +17,7 @@ from flexmb.spatial.vector import add, axpy, dot, mat3, scale, times, vec3
 from flexmb.tables.features import (
     BALL_SPRINGS,
     CONNECTORS,
-    FRICTION,
+    COORDINATE_LAWS,
     HINGE_SPRINGS,
     LOADS,
     MODAL_DAMPING,
@@ -54,7 +54,7 @@ def energy_and_momentum(c, w, energy, momentum):
                 i = c.body[k].q_index
                 theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
                 energy[SPRING] += 0.5 * c.body[k].ball_spring * dot(theta, theta)
-    if has(c, HINGE_SPRINGS) or has(c, FRICTION):
+    if has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS):
         evaluate_along_hinges(c, w)
         energy[SPRING] += stored_along_hinges(c, w)
     if has(c, CONNECTORS):

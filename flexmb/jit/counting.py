@@ -66,7 +66,7 @@ def count(kernel: Callable[..., Any], *arguments: Any) -> Counted:
     tally = Counter[str]()
     scalar = _scalars(tally)
     copies = tuple(_counting(argument, scalar) for argument in arguments)
-    result = _Interpreter(scalar)(kernel)(*copies)
+    result = Interpreter(scalar)(kernel)(*copies)
     return Counted(Operations(**tally), result, copies)
 
 
@@ -144,8 +144,11 @@ def _counting(value: Any, scalar: Any) -> Any:
     return scalar(value) if isinstance(value, float) else value
 
 
-class _Interpreter:
-    """Twins of compiled functions: the same code, with twins of what their modules hold."""
+class Interpreter:
+    """Twins of compiled functions: the same code, with twins of what their modules hold, on numbers of a class.
+
+    `scalar` is the class, with what its `square_root` and `elementary` functions are.
+    """
 
     def __init__(self, scalar: Any) -> None:
         self._scalar = scalar

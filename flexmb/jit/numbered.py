@@ -50,6 +50,7 @@ def numbered(name: str, feature: str, functions: Sequence[Callable[..., Any]]) -
 
     @overload(choose, jit_options=AS_PART, strict=False)  # the written one names the arguments
     def _typed(bundle, number, *arguments):
-        return written(numbers_of(bundle.features, feature, len(functions)))
+        # a bundle without any calls none: where its branches are not cut, the first stands there
+        return written(numbers_of(bundle.features, feature, len(functions)) or (0,))
 
     return choose

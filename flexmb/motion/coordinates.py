@@ -12,8 +12,8 @@ from flexmb.spatial.rotation import rotation_vector
 from flexmb.spatial.scalar import sqrt
 from flexmb.tables.features import (
     BALL_SPRINGS,
+    COORDINATE_LAWS,
     DAMPERS,
-    FRICTION,
     FUNCTIONS,
     HINGE_SPRINGS,
     MODES,
@@ -133,7 +133,7 @@ def hinge_forces(c, w):
     """Write the forces of springs, dampers, friction and motors of hinges and wheels to w.speed.applied."""
     if not (
         has(c, DAMPERS) or has(c, SPRINGS) or has(c, MOTORS) or has(c, BALL_SPRINGS)
-        or has(c, HINGE_SPRINGS) or has(c, FRICTION)
+        or has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS)
     ):  # fmt: skip
         return  # the workspace was made with zeros
     for j in range(w.u.shape[0]):
@@ -151,7 +151,7 @@ def hinge_forces(c, w):
         w.speed[j].applied = force
     if has(c, BALL_SPRINGS):
         _ball_springs(c, w)
-    if has(c, HINGE_SPRINGS) or has(c, FRICTION):
+    if has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS):
         add_loads_along_hinges(c, w)
 
 
@@ -180,6 +180,6 @@ def speed_power(c, w):
                 total += w.function[f, 0] * rate
         if has(c, PRESCRIBED) and c.speed[j].prescribed >= 0:
             total += w.speed[j].drive * rate
-    if has(c, HINGE_SPRINGS) or has(c, FRICTION):
+    if has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS):
         total += power_along_hinges(c, w)
     return total

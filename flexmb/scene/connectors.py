@@ -14,6 +14,11 @@ from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, SceneStruct, Vector
 from flexmb.scene.functions import Function
 from flexmb.scene.units import split_unit
 
+__all__ = [
+    "AngularFriction", "AngularSpring", "Bushing", "Connector", "LinearFriction", "LinearSpring", "SpringDamper",
+]  # fmt: skip
+"""What the schema exports."""
+
 Six = tuple[float, float, float, float, float, float]
 Matrix6 = tuple[Six, Six, Six, Six, Six, Six]
 NONE6: Matrix6 = ((0.0,) * 6,) * 6

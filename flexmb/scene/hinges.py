@@ -15,6 +15,12 @@ from typing import Literal, get_args
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, SceneStruct, Vector
 from flexmb.scene.freedoms import AngularCoordinate, Ball, Floating, Freedom, LinearCoordinate, ScalarFreedom
 
+__all__ = [
+    "AngularCoordinate", "Closure", "Cylindrical", "Free", "Gimbal", "Hinge", "LinearCoordinate", "Planar", "Prismatic",
+    "Revolute", "Screw", "Spherical", "Universal", "Weld",
+]  # fmt: skip
+"""What the schema exports."""
+
 X_AXIS: Vector = (1.0, 0.0, 0.0)
 Y_AXIS: Vector = (0.0, 1.0, 0.0)
 Z_AXIS: Vector = (0.0, 0.0, 1.0)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
+from flexmb.scene import connectors, hinges
 from flexmb.scene.bodies import (
     ZERO,
     BeamBody,
@@ -29,15 +30,8 @@ from flexmb.scene.bodies import (
     TipMass,
     Vector,
 )
-from flexmb.scene.connectors import (
-    AngularFriction,
-    AngularSpring,
-    Bushing,
-    Connector,
-    LinearFriction,
-    LinearSpring,
-    SpringDamper,
-)
+from flexmb.scene.connectors import *  # noqa: F403  (exported as that file says)
+from flexmb.scene.connectors import Connector
 from flexmb.scene.control import (
     Controller,
     CoordinateSensor,
@@ -57,20 +51,8 @@ from flexmb.scene.control import (
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
 from flexmb.scene.freedoms import AngularCoordinate, Freedom, LinearCoordinate, MotionKeys, ScalarFreedom
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
-from flexmb.scene.hinges import (
-    Closure,
-    Cylindrical,
-    Free,
-    Gimbal,
-    Hinge,
-    Planar,
-    Prismatic,
-    Revolute,
-    Screw,
-    Spherical,
-    Universal,
-    Weld,
-)
+from flexmb.scene.hinges import *  # noqa: F403
+from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.values import with_values
 
 
@@ -210,13 +192,12 @@ class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
 
 
 __all__ = [
-    "Action", "AngularCoordinate", "AngularFriction", "AngularSpring", "BeamBody", "BeamNode", "BeamStation", "Body",
-    "Bushing", "Change", "Closure", "Connector", "Constant", "ControlSignal", "Controller", "CoordinateSensor",
-    "Cylindrical", "DistanceSensor", "DriveSensor", "EndRun", "Free", "Function", "GainTable", "Gimbal", "Hinge",
-    "Impact", "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load",
-    "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid",
-    "Planar", "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute",
-    "RigidBody", "Saturation", "Scene", "SceneEvent", "Screw", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical",
-    "SpinUp", "SpringDamper", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector",
-    "Waiver", "Weld", "Wheel",
+    "Action", "BeamBody", "BeamNode", "BeamStation", "Body", "Change", "Constant", "ControlSignal", "Controller",
+    "CoordinateSensor", "DistanceSensor", "DriveSensor", "EndRun", "Function", "GainTable", "Impact",
+    "InertiaPoint", "Latch", "Level", "Load", "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody",
+    "ModalNode", "ModalState", "Modes", "Node", "Pid", "PointMass", "ProfileSensor", "Pulse", "Quaternion", "Ramp",
+    "Release", "RigidBody", "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep",
+    "SpinUp", "StateSpace", "Table", "TimeSensor", "TipMass", "UserLaw", "Vector", "Waiver", "Wheel",
 ]  # fmt: skip
+__all__ += hinges.__all__
+__all__ += connectors.__all__

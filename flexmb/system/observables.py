@@ -75,7 +75,7 @@ def undetermined_loads(loads: Mapping[str, Real], drives: Mapping[str, Real]) ->
 class Names:
     """Of what is observed: (body, port) of markers; hinges, wheels, closures in order; places in u of the driven.
 
-    connectors: between nodes; hinge_forces: springs along hinges, then friction.
+    connectors: between nodes; hinge_forces: springs along hinges, then other laws.
     """
 
     markers: dict[str, tuple[int, int]]

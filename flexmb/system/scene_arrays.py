@@ -13,7 +13,7 @@ from flexmb.building.models import wheels_by_body
 from flexmb.building.numbering import Numbering
 from flexmb.jain.elimination import Elimination, with_elimination
 from flexmb.scene import schema as s
-from flexmb.scene.connectors import HingeFriction, HingeSpring
+from flexmb.scene.connectors import AlongHinge, HingeSpring
 from flexmb.system.observables import Names
 from flexmb.tables.features import GENERAL
 from flexmb.tables.status import Status
@@ -66,8 +66,9 @@ class SceneArrays:
         on_bodies = [wheel.name for link in self.links for wheel in wheels.get(link.name, ())]
         closures = [closure.name for closure in scene.closures]
         between = [each.name for each in between_nodes(scene)]
-        kinds = HingeSpring, HingeFriction  # one after the other, as the tables have them
-        along = [each.name for kind in kinds for each in scene.connectors if isinstance(each, kind)]
+        along_hinges = [each for each in scene.connectors if isinstance(each, AlongHinge)]
+        along_hinges.sort(key=lambda each: not isinstance(each, HingeSpring))  # springs come first, as in the tables
+        along = [each.name for each in along_hinges]
         return Names(self.markers, hinges, on_bodies, closures, self._driven([*hinges, *on_bodies]), between, along)
 
     def _driven(self, names: list[str]) -> dict[str, Index]:

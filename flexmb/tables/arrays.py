@@ -143,12 +143,10 @@ HINGE_SPRING = _record(
     ("stop_dissipation", _F),
     ("function", _I),  # of the actuator, -1 for none
 )
-FRICTION = _record(
-    ("speed", _I),  # place in u
-    ("sliding", _F),
-    ("static", _F),
-    ("stribeck", _F),
-    ("smoothing", _F),
+COORDINATE_LAW = _record(
+    ("kind", _I),  # numbers of flexmb.connectors.catalogue
+    ("speed", _I),  # of the coordinate, place in u
+    ("parameters", _F, (6,)),  # the law's own numbers
 )
 SPEED = _record(
     ("coordinate", _I),  # its scalar coordinate's place in q; -1 for speeds of a quaternion or of a mode
@@ -193,7 +191,7 @@ class Constants:
     end: Record  # (C,2) END, A then B
     bushing: Record  # (connectors that are bushings,) BUSHING_MATRIX
     hinge_spring: Record  # (springs along coordinates,) HINGE_SPRING
-    friction: Record  # (speeds with friction,) FRICTION
+    coordinate_law: Record  # (laws along coordinates that are no springs,) COORDINATE_LAW
     # (pieces,8) of load laws: left end, energy there, then coefficients, highest power first; the first piece of a law
     # also applies below its left end
     law: Real
@@ -312,7 +310,7 @@ class Workspace:
     speed: Record  # (nu,) SPEED_STATE
     connector: Record  # (C,) CONNECTOR_STATE
     hinge_spring: Record  # ALONG_HINGE_STATE
-    friction: Record  # ALONG_HINGE_STATE
+    coordinate_law: Record  # ALONG_HINGE_STATE
     function: Real  # (F,3) value, rate, acceleration
     fault: Index  # (1,) body at which an evaluation failed
     doubt: Index  # (1,) whether an evaluation met a pivot that may consist of rounding errors

@@ -46,7 +46,8 @@ ACTUATORS = "actuators"
 BUSHINGS = "bushings"
 HINGE_SPRINGS = "hinge springs"
 HINGE_ACTUATORS = "hinge actuators"
-FRICTION = "friction"
+COORDINATE_LAWS = "laws along coordinates"  # that are no springs
+LAW = "law along coordinates"  # "law along coordinates 0": the number of a law in flexmb.connectors.catalogue
 FUNCTIONS = "functions"
 MOTORS = "motors"
 PRESCRIBED = "prescribed"
@@ -135,7 +136,7 @@ def contained(c: SceneTables) -> frozenset[str]:
         BUSHINGS: len(c.bushing) > 0,
         HINGE_SPRINGS: len(c.hinge_spring) > 0,
         HINGE_ACTUATORS: np.any(c.hinge_spring["function"] >= 0),
-        FRICTION: len(c.friction) > 0,
+        COORDINATE_LAWS: len(c.coordinate_law) > 0,
         FUNCTIONS: len(c.function) > 0,
         MOTORS: np.any(speed["motor"] >= 0),
         PRESCRIBED: np.any(speed["prescribed"] >= 0),
@@ -147,6 +148,7 @@ def contained(c: SceneTables) -> frozenset[str]:
     numbered = {f"{HINGE} {n}" for n in set(body["hinge_kind"].tolist())}
     numbered |= {f"{AXIS} {n}" for n in set(body["axis"].tolist())}
     numbered |= {f"{LEVEL} {n}" for n in set(body["level"].tolist())}
+    numbered |= {f"{LAW} {n}" for n in set(c.coordinate_law["kind"].tolist())}
     return frozenset(name for name, there in found.items() if there) | numbered
 
 

@@ -48,7 +48,7 @@ def connector_states(c: a.Constants) -> dict[str, Record]:
     return {
         "connector": np.zeros(len(c.connector), a.CONNECTOR_STATE),
         "hinge_spring": np.zeros(len(c.hinge_spring), a.ALONG_HINGE_STATE),
-        "friction": np.zeros(len(c.friction), a.ALONG_HINGE_STATE),
+        "coordinate_law": np.zeros(len(c.coordinate_law), a.ALONG_HINGE_STATE),
     }
 
 

@@ -139,6 +139,8 @@ def test_the_type_checker_finds_every_place_that_does_not_know_a_new_kind(union:
     (tmp_path / "pyproject.toml").write_bytes((ROOT / "pyproject.toml").read_bytes())
     names = {kind.__name__ for kind in get_args(KINDS[union])}
     knowing = [name for name in _by_match(tmp_path, names) if name != MADE_UP[union][0]]
+    if union == "connectors":  # adapters have a union of those that they know, and refuse others
+        knowing = [name for name in knowing if not name.startswith("crosscheck/engines/")]
     assert _unfinished(tmp_path, knowing) == set()
     name, alias, base = MADE_UP[union]
     text = (tmp_path / name).read_text(encoding="utf-8")

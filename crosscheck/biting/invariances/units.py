@@ -18,11 +18,10 @@ from crosscheck.library.time_functions import scaled, slowed
 from flexmb.scene.bodies import ModalBody, SidBody
 from flexmb.scene.connectors import (
     AlongHinge,
-    AngularFriction,
     AngularSpring,
     Bushing,
     Connector,
-    LinearFriction,
+    HingeSpring,
     LinearSpring,
     SpringDamper,
 )
@@ -74,6 +73,7 @@ OF_UNIT = {
     "kg m²": Dimension(2, 1), "N/m": Dimension(0, 1, -2), "N s/m": Dimension(0, 1, -1), "N m/rad": ENERGY,
     "N m s/rad": Dimension(2, 1, -1), "m/rad": Dimension(1), "s/rad": Dimension(time=1), "s/m": Dimension(-1, 0, 1),
 }  # fmt: skip
+QUATERNIONS = ("quaternion_a", "quaternion_b")
 # Of bushings: the first three rows and columns are of turns, the others of displacements.
 OF_BUSHING = {
     "stiffness": _blocks(ENERGY, FORCE, Dimension(0, 1, -2)),
@@ -161,16 +161,14 @@ def _dimension(item: msgspec.Struct, key: str) -> Dimension | Each:
 
 
 def _without_unit(connector: Connector, key: str) -> Dimension | Each:
-    """Of what a connector has under a key that says no unit."""
-    match connector:
-        case Bushing():
-            return OF_BUSHING.get(key, NUMBER)
-        case SpringDamper() | AngularSpring() | LinearSpring():
-            return _stiffening(connector) if key == "stiffening" else NUMBER
-        case AngularFriction() | LinearFriction():
-            return NUMBER
-        case _:
-            assert_never(connector)
+    """Of what a connector has under a key that says no unit: matrices of bushings, stiffening, quaternions, words."""
+    if isinstance(connector, Bushing) and key in OF_BUSHING:
+        return OF_BUSHING[key]
+    if isinstance(connector, SpringDamper | HingeSpring) and key == "stiffening":
+        return _stiffening(connector)
+    if key in QUATERNIONS or isinstance(getattr(connector, key), str):
+        return NUMBER
+    raise NotApplicable(f'connector "{connector.name}": nobody says the unit of "{key}"')
 
 
 def _stiffening(spring: SpringDamper | AngularSpring | LinearSpring) -> Each:

@@ -107,7 +107,6 @@ def _simple(link: Link, freedom: object) -> Scalar:
 
 
 def _chains(parts: tuple[CraftPart, ...]) -> tuple[tuple[int, ...], ...]:
-    """Every chain from the hub outward."""
     chains: dict[int, list[int]] = {}
     for number, part in enumerate(parts):
         if part.parent == HUB:

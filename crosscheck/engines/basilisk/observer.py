@@ -81,7 +81,6 @@ class BasiliskObserver:
         )
 
     def _motions(self, state: CraftState, found: CraftSolution) -> dict[int, PartMotion]:
-        """Of the hub and of all parts."""
         R = rotation_matrix(state.quaternion)
         hub = PartMotion(R, state.position, R @ state.turning, state.velocity, R @ found.angular, found.linear)
         motions = {HUB: hub}

@@ -99,8 +99,6 @@ class Vehicle:
 
 
 class _Chain:
-    """A chain of parts as one effector."""
-
     def __init__(self, parts: list[CraftPart]) -> None:
         turns = by_motion(parts[0].freedom, True, False)
         self.effector, self._names = _turning_chain(parts) if turns else _sliding_chain(parts)
@@ -182,7 +180,6 @@ def _definite(inertia: Real) -> list[list[float]]:
 
 
 def _column(vector: Real) -> list[list[float]]:
-    """As Basilisk takes vectors."""
     return [[float(each)] for each in vector]
 
 

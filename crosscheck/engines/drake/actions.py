@@ -73,8 +73,6 @@ class JointActions:
 
 
 class Drives:
-    """The prescribed coordinates of a tree."""
-
     def __init__(self, tree: DrakeTree) -> None:
         self.slots: list[DrakeSlot] = [slot for slot in tree.slots if slot.driven]
         self._motions = [(slot, profile(slot.freedom.prescribed)) for slot in self.slots]
@@ -109,7 +107,6 @@ class DrakeLoads:
     def applied(
         self, t: float, poses: list[RigidTransform], speeds: list[SpatialVelocity]
     ) -> list[ExternallyAppliedSpatialForce]:
-        """All of them."""
         found = [load.applied(t, poses) for load in self._loads]
         for at, load in self._connectors.loads(self.exerted(t, poses, speeds)):
             body = self._bodies[at.link].index()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import get_args
 
+from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, EngineMissing, Model
 from crosscheck.engines.links import links, obstacle
 from crosscheck.engines.peer import PeerEngine, inertia_obstacle
-from flexmb.scene.schema import Connector, Scene
+from flexmb.scene.schema import Scene
 
 
 class DrakeEngine(PeerEngine):
@@ -26,7 +26,7 @@ class DrakeEngine(PeerEngine):
         return version("drake")
 
     def obstacle(self, scene: Scene) -> str:
-        reason = _open_loops_only(scene) or obstacle(scene, "Drake", (), get_args(Connector))
+        reason = _open_loops_only(scene) or obstacle(scene, "Drake", (), KNOWN)
         return reason or inertia_obstacle(links(scene), "Drake")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:

@@ -138,7 +138,6 @@ def assemble(scene: Scene) -> Assembly:
 
 
 def _nothing(mbs, t, sensors, factors, configuration) -> list[float]:
-    """The sampler's function outside of runs."""
     return [0.0]
 
 
@@ -163,7 +162,6 @@ def _held_nodes(scene: Scene) -> dict[str, set[str]]:
 def _attach(
     shop: Workshop, scene: Scene, placed: dict[str, Placed], body: Body, hinge: Hinge, held: set[str]
 ) -> tuple[ExudynLink, Placed]:
-    """A body and the hinge that joins it to its parent."""
     own = frame(hinge.parent_position_m, hinge.parent_quaternion)
     port = _end(shop, placed, hinge.parent, hinge.parent_node, own)
     outboard = frame(*node_frame(body, hinge.child_node)) @ frame(hinge.child_position_m, hinge.child_quaternion)
@@ -257,7 +255,6 @@ def _port(shop: Workshop, parent: Placed, node: str, offset: Frame) -> HingePort
 
 
 def _exudyn_motion(parent: Placed) -> FrameMotion:
-    """Motion of the body's Exudyn axes."""
     return parent.motion.offset(np.zeros(3), parent.carrier.zero.T)
 
 
@@ -337,7 +334,6 @@ def _point_mass(shop: Workshop, parent: Placed, mass: PointMass) -> tuple[Exudyn
 
 
 def _load(shop: Workshop, parent: Placed, load: Load) -> None:
-    """A named load at a node."""
     f, direction = profile(load.function), np.array(load.direction)
     shape = parent.shape(load.node)
     turning = load.frame == "node"

@@ -122,8 +122,6 @@ def _bare(coordinate: AngularCoordinate | LinearCoordinate, *given: str) -> bool
 
 
 class BeamModel:
-    """One planar beam."""
-
     def __init__(self, beam: PlanarBeam) -> None:
         self.beam = beam
 

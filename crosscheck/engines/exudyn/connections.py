@@ -31,7 +31,6 @@ class Connected(NamedTuple):
 
 
 def connected(assembly: Assembly, states: States, paths: Paths) -> Connected:
-    """The loads of all connectors at every sample."""
     between, along = _between(assembly, states, paths), _along(assembly, states.times.tolist(), paths)
     energy = np.zeros(len(states.times))
     for each in between.values():
@@ -65,7 +64,6 @@ def _along(assembly: Assembly, times: list[float], paths: Paths) -> dict[str, li
 
 
 def _moving(assembly: Assembly, connector: BetweenNodes, side: str, paths: Paths, count: int) -> list[Moving]:
-    """Motion of an end over all samples."""
     body = getattr(connector, f"body_{side}")
     own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
     if body == GROUND:

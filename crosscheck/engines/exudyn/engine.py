@@ -16,8 +16,6 @@ RUNGS = 3
 
 
 class ExudynEngine:
-    """Exudyn behind the engine contract."""
-
     name = "exudyn"
     takes = ("connectors",)
     summary = "rigid bodies and floating frames in redundant coordinates"
@@ -51,7 +49,6 @@ class ExudynEngine:
         return ladder("TrapezoidalIndex2", pace(scene, duration_s, _fastest_mode(scene)), duration_s, RUNGS)
 
     def compile(self, scene: Scene) -> Model:
-        """Convert the scene."""
         from crosscheck.engines.exudyn.model import ExudynModel
 
         return ExudynModel(scene)

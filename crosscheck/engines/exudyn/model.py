@@ -19,8 +19,6 @@ from flexmb.typing import Real
 
 
 class ExudynModel:
-    """One scene as an Exudyn system."""
-
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.assembly = assemble(scene)

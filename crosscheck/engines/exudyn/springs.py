@@ -34,7 +34,6 @@ class ConnectorEnd:
 
 
 def between(shop: Workshop, connector: BetweenNodes, ends: Sequence[ConnectorEnd]) -> None:
-    """A connector between its frames A and B."""
     if isinstance(connector, SpringDamper) and not any(end.shape.deforms for end in ends):
         _line(shop, connector, ends)
     else:

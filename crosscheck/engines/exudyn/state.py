@@ -62,7 +62,6 @@ class CarrierPath:
 
 
 def carrier_path(assembly: Assembly, carrier: Carrier, states: States) -> CarrierPath:
-    """Decode a carrier's coordinates."""
     T = len(states.times)
     if carrier.key < 0:
         still = np.zeros((T, 3))

@@ -31,7 +31,6 @@ class MujocoConnections:
         return self._connectors.along(t, data.qpos, data.qvel)
 
     def add(self, t: float, data: mujoco.MjData) -> None:
-        """Add all loads to those that are applied."""
         for at, load in self._connectors.loads(self.exerted(t, data)):
             body = self._tree.bodies[at.link]
             arm = self._frame(at, data).position - data.xipos[body]
@@ -41,7 +40,6 @@ class MujocoConnections:
             data.qfrc_applied[speed] += held.load
 
     def energy(self, t: float, data: mujoco.MjData) -> float:
-        """Stored in all of them."""
         stored = sum(each.energy for each in self.exerted(t, data).values())
         return stored + sum(held.energy for _, held in self.along(t, data).values())
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import get_args
-
+from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, EngineMissing, Model, Support
 from crosscheck.engines.links import links, obstacle
 from crosscheck.engines.pace import pace
 from crosscheck.engines.peer import PeerEngine, inertia_obstacle
 from crosscheck.engines.steps import USUAL_S, ladder
-from flexmb.scene.schema import Connector, Scene
+from flexmb.scene.schema import Scene
 
 _RUNGS = 4
 _SOFT = "closures are springs and dampers (its defaults): loops open by 1e-4 to 1e-3 of their size under load"
@@ -36,7 +35,7 @@ class MujocoEngine(PeerEngine):
         return mujoco.__version__
 
     def obstacle(self, scene: Scene) -> str:
-        reason = obstacle(scene, "MuJoCo", ("spherical",), get_args(Connector))
+        reason = obstacle(scene, "MuJoCo", ("spherical",), KNOWN)
         return reason or inertia_obstacle(links(scene), "MuJoCo")
 
     def supports(self, scene: Scene) -> Support:

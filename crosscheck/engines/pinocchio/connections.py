@@ -36,7 +36,6 @@ class PinocchioConnections:
             total[joint] = total[joint] + pin.Force(force, back @ load[:3] + np.cross(arm, force))
 
     def power(self, t: float, data: pin.Data) -> float:
-        """Of what is not elastic in them."""
         return sum(each.power for each in self.exerted(t, data).values())
 
     def along(self, t: float, q: Real, v: Real) -> dict[str, tuple[int, Along]]:

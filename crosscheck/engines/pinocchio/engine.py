@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import get_args
-
+from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, EngineMissing, Model
 from crosscheck.engines.links import Scalar, links, obstacle
 from crosscheck.engines.peer import PeerEngine
 from crosscheck.engines.scipy_loop import RTOL_LADDER
-from flexmb.scene.schema import Connector, Scene
+from flexmb.scene.schema import Scene
 
 MOST_JOINTS = 500
 WHY_NOT_MORE = "Pinocchio's data hold arrays of n x n x n numbers for n speeds, and more than 20 GB for 1000"
@@ -37,7 +36,7 @@ class PinocchioEngine(PeerEngine):
     def obstacle(self, scene: Scene) -> str:
         if len(scene.hinges) > MOST_JOINTS:
             return f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
-        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), get_args(Connector), screws=True)
+        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), KNOWN, screws=True)
         return reason or (_beside_closures(scene) if scene.closures else "")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:

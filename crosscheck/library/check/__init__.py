@@ -34,19 +34,19 @@ def check_run_file(run: RunFile) -> None:
 
 
 def check_accepted(accepted: Accepted, run: RunFile) -> None:
-    """Refuse accepted figures that are none, or that belong to no comparison of the run file."""
+    """Refuse accepted figures that are invalid or belong to no comparison of the run file."""
     _refuse(check_figures(accepted, run))
 
 
 def check_provenance(provenance: Provenance) -> None:
-    """Refuse published numbers that nothing can be held against."""
+    """Refuse published numbers that cannot be compared."""
     _refuse(check_anchors(provenance))
 
 
 def check_recorded(run: RunFile) -> None:
-    """Refuse a run file as records hold it, every comparison a pair, that names a variant or engine it does not have.
+    """Refuse a run file from records, with every comparison a pair, that names a variant or engine it does not have.
 
-    Its numbers are judged as they are: judging is total, and archives outlive the rules that have been added since.
+    Its numbers are not checked: judging handles all of them, and archives may be older than some rules.
     """
     _refuse(_recorded(run))
 

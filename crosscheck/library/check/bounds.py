@@ -1,4 +1,4 @@
-"""Expectations other than agreement: each has its reason in words, and the bounds that belong to it and no other."""
+"""Rules of expectations other than agreement: each has its reason in words and just the bounds of its kind."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from crosscheck.library.check.ranges import problem
 from crosscheck.library.check.runs import find_variant
 from flexmb.scene.problems import Defect, Place
 
-WIDEST = 100.0  # a band that lets a difference grow more is none
-WIDEST_PART = 0.25  # of a run's duration, as a bound of the time at which it diverges
+WIDEST = 100.0  # largest ratio of a band's limits
+WIDEST_PART = 0.25  # of a run's duration: largest width of the bounds of a time of divergence
 BOUNDS = {"differ": "band", "unresolved": "band", "diverged": "diverged_s", "failed": "because", "refused": "because"}
 FIGURE_OF = {"differ": "E", "unresolved": "U"}
 
 
 def check_expectation(run: RunFile, item: Comparison | Conservation, place: Place) -> Iterator[Defect]:
-    """An expectation other than agreement has a reason, and the bounds that belong to it and no other."""
+    """An expectation other than agreement must have a reason and just the bounds of its kind."""
     if item.expect != "agree" and not item.reason.strip():
         yield problem(place.key("reason"), "an expected status needs a reason", "say why it is so")
     needed = BOUNDS.get(item.expect)
@@ -43,7 +43,7 @@ def check_expectation(run: RunFile, item: Comparison | Conservation, place: Plac
 
 
 def _longest(run: RunFile, item: Comparison | Conservation) -> float:
-    """Duration (s) of what is compared, the longer one of two."""
+    """The longer duration (s) of the compared variants."""
     sides = (item.a, item.b) if isinstance(item, Comparison) else ()
     names = {item.variant, *(side.variant for side in sides if side is not None)}
     found = [find_variant(run, name) for name in names if name is not None]
@@ -60,7 +60,7 @@ def _remedy(item: Comparison | Conservation, key: str) -> str:
 
 
 def _covered(item: Comparison, place: Place) -> Iterator[Defect]:
-    """Every goal's pattern has its band: the same pattern, or one that names it or a part of it."""
+    """Every pattern with a goal must have a band: of the same pattern, or of one that includes it or a part of it."""
     for pattern in item.goals:
         if not any(_related(pattern, each) for each in item.band):
             yield problem(place, f'no band for "{pattern}"', f'add "{pattern}" = [low, high]')
@@ -72,7 +72,7 @@ def _related(goal: str, band: str) -> bool:
 
 
 def check_band(band: Band, place: Place) -> Iterator[Defect]:
-    """A band is two positive numbers that are not too far apart."""
+    """A band must be two positive numbers within a limited ratio."""
     low, high = band
     if not 0.0 < low < high < math.inf:
         yield problem(place, f"[{low:g}, {high:g}] is no band", "give two positive numbers, the lower first")

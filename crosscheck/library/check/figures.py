@@ -1,4 +1,4 @@
-"""Accepted figures: each is a number, and belongs to something that the run file judges."""
+"""Rules of accepted figures: each is a valid number and belongs to something that the run file judges."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from flexmb.scene.problems import Defect
 
 
 def check_figures(accepted: Accepted, run: RunFile) -> Iterator[Defect]:
-    """The problems of the figures that were accepted for a case."""
     names = [item.name for item in run.comparisons]
     names += [f"{item.quantity.replace('_', ' ')} conserved" for item in run.conservations]
     stale = "take it out; `crosscheck run --accept` writes what is there now"

@@ -1,4 +1,4 @@
-"""What is judged and drawn: comparisons, controls, conserved quantities and charts."""
+"""Rules of comparisons, controls, conserved quantities and charts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from flexmb.scene.problems import Defect, Place
 
 
 def check_comparison(run: RunFile, item: Comparison, place: Place) -> Iterator[Defect]:
-    """The problems of a comparison."""
     yield from check_patterns(item.goals, item.scales, place)
     yield from check_expectation(run, item, place)
     for pattern, band in item.band.items():
@@ -48,7 +47,6 @@ def check_comparison(run: RunFile, item: Comparison, place: Place) -> Iterator[D
 
 
 def check_control(run: RunFile, item: Control, place: Place) -> Iterator[Defect]:
-    """The problems of a negative control."""
     yield from check_patterns(item.goals, item.scales, place)
     for key, side in (("a", item.a), ("b", item.b)):
         yield from check_sides_run(run, side.variant, (side.engine,), place.key(key))
@@ -75,7 +73,6 @@ def check_conservation(
 
 
 def check_chart(run: RunFile, chart: Chart, place: Place) -> Iterator[Defect]:
-    """The problems of a chart."""
     yield from check_pattern(chart.observable, place.key("observable"))
     names = [variant.name for variant in run.variants]
     for key, name in (*(("variants", each) for each in chart.variants), ("reference", chart.reference)):
@@ -84,7 +81,6 @@ def check_chart(run: RunFile, chart: Chart, place: Place) -> Iterator[Defect]:
 
 
 def check_patterns(goals: dict[str, float], scales: dict[str, float], place: Place) -> Iterator[Defect]:
-    """The problems of goals and of scales."""
     if not goals:
         yield problem(place.key("goals"), "name at least one channel and its goal", '{ "marker" = 1e-6 }')
     for pattern, goal in goals.items():
@@ -96,7 +92,7 @@ def check_patterns(goals: dict[str, float], scales: dict[str, float], place: Pla
 
 
 def check_pattern(pattern: str, place: Place) -> Iterator[Defect]:
-    """A pattern must be able to name a channel."""
+    """A pattern must be able to match a channel."""
     why = fault(pattern)
     if why:
         remedy = "write a kind of channel, or kind:name, or kind:name.part"

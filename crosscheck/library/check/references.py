@@ -1,4 +1,4 @@
-"""How a reference is made: the table `[reference]` with its routes, and the published numbers it must meet."""
+"""Rules of the table `[reference]` with its routes, and of published numbers."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from crosscheck.library.patterns import fault
 from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
 from flexmb.scene.problems import Defect, Place
 
-RELATIVE = (1e-16, 1e-2)  # below, no closed form can be evaluated; above, it is none
+RELATIVE = (1e-16, 1e-2)  # range of the accuracy of a closed form
 
 
 def check_reference(run: RunFile, recipe: ReferenceRecipe, place: Place) -> Iterator[Defect]:
-    """The problems of a recipe."""
     names = [variant.name for variant in run.variants]
     variant = find_variant(run, recipe.variant)
     if variant is None:
@@ -42,7 +41,6 @@ def check_reference(run: RunFile, recipe: ReferenceRecipe, place: Place) -> Iter
 
 
 def check_anchors(provenance: Provenance) -> Iterator[Defect]:
-    """The problems of published numbers."""
     for i, anchor in enumerate(provenance.anchors):
         place = ROOT.key("anchor", i)
         why = fault(anchor.channel)
@@ -60,9 +58,9 @@ def check_anchors(provenance: Provenance) -> Iterator[Defect]:
 
 
 def _times(run: RunFile, recipe: ReferenceRecipe, variant: Variant, place: Place) -> Iterator[Defect]:
-    """The reference's samples must be some of the variant's: what is compared is then interpolated nowhere."""
+    """The reference's samples must be some of the variant's, so that no comparison needs interpolation."""
     samples = variant.samples or run.samples
-    if not 2 <= samples <= MOST_SAMPLES:  # `check_samples` says so
+    if not 2 <= samples <= MOST_SAMPLES:  # reported by `check_samples`
         return
     duration = variant.duration_s or run.duration_s
     if recipe.samples is not None and (recipe.samples < 2 or (samples - 1) % (recipe.samples - 1)):

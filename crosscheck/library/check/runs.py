@@ -1,4 +1,4 @@
-"""Who runs what: variants and engines that a part of the run file names must be there, and run it."""
+"""Rules of references to variants and engines: they must exist, and the engine must run the variant."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flexmb.scene.problems import Defect, Place, closest
 
 
 def check_sides_run(run: RunFile, name: str, engines: Iterable[str], place: Place) -> Iterator[Defect]:
-    """The variant must be there, and must be run by the engines."""
+    """The variant must exist and be run by the engines."""
     variant = find_variant(run, name)
     if variant is None:
         yield no_variant(name, [each.name for each in run.variants], place)
@@ -27,7 +27,7 @@ def check_engines_run(variant: Variant, engines: Iterable[str], place: Place) ->
 
 
 def check_engines_once(engines: Sequence[str], place: Place) -> Iterator[Defect]:
-    """Each engine is named once."""
+    """Each engine must be named once."""
     for engine in dict.fromkeys(engine for engine in engines if engines.count(engine) > 1):
         yield problem(place, f'engine "{engine}" is listed twice', "name it once")
 

@@ -1,4 +1,4 @@
-"""Variants: their engines, transformations, refinements and ladders of efforts."""
+"""Rules of variants: their engines, transformations, refinements and ladders of efforts."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ from crosscheck.library.check.runs import check_engines_once, check_engines_run
 from crosscheck.library.recipe import EffortLadder
 from flexmb.scene.problems import Defect, Place
 
-MOST_STEPS = 1e8  # of one run with fixed steps: hours
+MOST_STEPS = 1e8  # of one run with fixed steps, which would take hours
 MOST_EFFORTS = 20
-TOLERANCES = (1e-15, 0.5)  # below, rounding decides; above, nothing is solved
+TOLERANCES = (1e-15, 0.5)  # range of useful relative tolerances
 ORDERS = (0.1, 16.0)
 
 
 def check_variant(run: RunFile, variant: Variant, place: Place) -> Iterator[Defect]:
-    """The problems of a variant."""
     if not variant.engines:
         yield problem(place.key("engines"), "name at least one engine", 'for example ["native"]')
     yield from check_engines_once(variant.engines, place.key("engines"))

@@ -1,5 +1,5 @@
 // Charts of the report: overlays with distances and uncertainties, drifts, work-precision. Data: see charts.py.
-// Curves have colours of middle lightness, which stand out from a white and from a dark page.
+// Curves have colours of medium lightness, which are visible on a white and on a dark page.
 "use strict";
 const COLOURS = { native: "#1d69b1", "native-frisch": "#2c9adb", "native-frisch-as-printed": "#6b7785",
   pinocchio: "#d1495b", mujoco: "#2a9d6f", exudyn: "#c38600", "exudyn-beam": "#7c52b6" };
@@ -16,7 +16,7 @@ function colour(name) {
   return COLOURS[name];
 }
 
-// Plotly takes text for markup and for a template: names are written in character references.
+// Plotly interprets text as markup and as a template, so names are written with character references.
 const plain = text => String(text).replace(/[&<>%${}]/g, c => "&#" + c.charCodeAt(0) + ";");
 
 const column = (series, j) => Array.from(series[j]);

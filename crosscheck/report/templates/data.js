@@ -1,11 +1,11 @@
-// What all scripts share: cases register their data here; series are unpacked, libraries loaded, when first needed.
+// Shared by all scripts: cases register their data here; series are unpacked and libraries loaded when first needed.
 "use strict";
 const crosscheck = {
   cases: new Map(),
   register(id, data) { this.cases.set(id, data); },
 };
 
-// The inverse of store.py: base64, inflate, bytes of equal weight apart, differences of bit patterns; columns of float32.
+// The inverse of store.py: base64, inflate, planes of bytes, differences of bit patterns, columns of float32.
 async function unpack({ shapes, data }) {
   if (!shapes.length) return [];
   const packed = Uint8Array.from(atob(data), c => c.charCodeAt(0));
@@ -35,7 +35,7 @@ function seriesOf(id) {
   return unpacked.get(id);
 }
 
-// A library of the folder of assets, as the global that it defines; in the single file it is there already.
+// Load a library from the assets folder and return the global that it defines; the single file contains it.
 const loading = new Map();
 function library(name, file) {
   if (!loading.has(name)) loading.set(name, name in globalThis ? Promise.resolve() : new Promise((done, failed) => {
@@ -48,6 +48,6 @@ function library(name, file) {
   return loading.get(name);
 }
 
-// What a reader's scheme of colours says now, as style.css defines it.
+// The colours of the reader's present colour scheme, as defined in style.css.
 const tone = name => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 const dark = matchMedia("(prefers-color-scheme: dark)"), calm = matchMedia("(prefers-reduced-motion: reduce)");

@@ -1,4 +1,4 @@
-// The index: cases by what they are called and by how they came out.
+// The index: filters cases by name and by outcome.
 "use strict";
 document.addEventListener("DOMContentLoaded", () => {
   const search = document.getElementById("search"), filter = document.getElementById("filter"), shown = document.getElementById("shown");

@@ -1,4 +1,4 @@
-// A case's page: charts and animation are made when they come into view, what an address names is opened.
+// A case's page: charts and animation are made when they come into view; the target of a link is opened.
 "use strict";
 const pending = new Map();
 const seen = new IntersectionObserver(entries => entries.forEach(entry => {
@@ -10,7 +10,7 @@ const seen = new IntersectionObserver(entries => entries.forEach(entry => {
 
 function later(node, make) { pending.set(node, make); seen.observe(node); }
 
-// A chart in a box, with a choice of what it shows where there are several; `words` describe a choice.
+// A chart in a box, with a menu if there are several; `words` describe an entry.
 function chart(host, id, title, choices, draw, words, first = 0) {
   const box = document.createElement("div"); box.className = "chart";
   box.innerHTML = '<div class="head"><span></span></div><div class="plot" role="img"></div>';
@@ -68,7 +68,7 @@ function fill(section) {
   });
 }
 
-// What stands in closed details is opened for whoever is sent there.
+// Open the closed details that contain the target of a link.
 function reveal() {
   const target = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
   if (!target) return;

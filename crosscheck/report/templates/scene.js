@@ -1,4 +1,4 @@
-// Animation of a scene by three.js: solids, arms, wheels and bent beams that markers carry. Data: see animation.py.
+// Animation of a scene by three.js: solids, arms, wheels and bent beams that move with markers. Data: see animation.py.
 "use strict";
 const TRAIL = 60, RING = 8, FINER = 8; // frames of a trail; sides of a tube; pieces between two nodes of a beam
 const SHORTEST_LOOP_S = 4, LONGEST_LOOP_S = 12, FAR = 4; // a motion this many bodies wide is followed by the camera
@@ -9,7 +9,7 @@ const CONNECTORS = { spring: ["#2b2b2b", "#e0e0e0"], mount: ["#d97500", "#ffa940
 const TURNS = 7, PER_TURN = 8; // of the coil that a spring is drawn as
 const AXES = ["#d43c3c", "#3a8f3e", "#2f74c9"], TRAIL_TONE = "#d1495b";
 
-// One WebGL context draws for all views, whose canvases get copies: browsers allow few contexts on a page.
+// One WebGL context draws for all views, whose canvases are copies: browsers allow few contexts on a page.
 let stage = null;
 function render(scene, camera, canvas) {
   stage = stage || new THREE.WebGLRenderer({ alpha: true, antialias: true });
@@ -46,7 +46,7 @@ class SceneView {
     this.sign(); this.load(first);
     new ResizeObserver(() => { this.fitCanvas(); this.draw(); }).observe(this.canvas);
     dark.addEventListener("change", () => this.load(this.number));
-    // It plays while it is seen, unless the reader stopped it or asks for less motion.
+    // It plays while visible, unless the reader stopped it or prefers reduced motion.
     this.wanted = !calm.matches;
     new IntersectionObserver(([entry]) => this.play(this.wanted && entry.isIntersecting)).observe(this.canvas);
   }
@@ -59,14 +59,14 @@ class SceneView {
     if (on) requestAnimationFrame(t => this.tick(t));
   }
 
-  // The button offers what it would do.
+  // The button shows the action that it performs.
   sign() {
     const offer = this.playing ? "pause" : "play";
     this.button.setAttribute("aria-label", offer);
     this.button.querySelector("path").setAttribute("d", SIGNS[offer]);
   }
 
-  // Wheel and finger belong to the page until the picture is selected.
+  // Mouse wheel and touch scroll the page until the picture is selected.
   hold(on) {
     this.controls.enableZoom = on;
     this.canvas.style.touchAction = on ? "none" : "pan-y";
@@ -122,13 +122,13 @@ class SceneView {
     return [at.map((v, k) => v + p[k]), rotated(q, tx, ty, tz)];
   }
 
-  // The points that the scene covers at a frame.
+  // All drawn points of the scene at a frame.
   *points(s) {
     for (const line of this.shown.lines) for (const point of line.points) yield this.place(point, s)[0];
     for (const wheel of this.shown.wheels) yield this.place([wheel.marker, ...wheel.centre], s)[0];
   }
 
-  // Middle and reach of the whole motion, or of the bodies alone where they go far.
+  // Centre and radius of the whole motion, or of the bodies alone if they travel far.
   measure() {
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity], step = Math.max(1, Math.floor(this.frames / 60));
     this.size = 1e-9;
@@ -169,7 +169,7 @@ class SceneView {
     this.hold(document.activeElement === this.canvas);
   }
 
-  // How far the camera must stand in a direction to have every point of the motion in the picture.
+  // The distance of the camera in a direction at which every point of the motion is visible.
   distance(direction) {
     const right = this.camera.up.clone().cross(direction).normalize(), above = direction.clone().cross(right);
     const slope = Math.tan(this.camera.fov / 2 * Math.PI / 180), step = Math.max(1, Math.floor(this.frames / 60)), offset = new THREE.Vector3();
@@ -222,7 +222,7 @@ class SceneView {
     }));
   }
 
-  // What one marker carries without bending; -1 is the World.
+  // The rigid parts that move with one marker; -1 is the World.
   carrier(m) {
     if (!this.carriers.has(m)) { const group = new THREE.Group(); this.carriers.set(m, group); this.world.add(group); }
     return this.carriers.get(m);
@@ -277,7 +277,7 @@ function lineGeometry(points) {
   return geometry;
 }
 
-// A box by its corners, translucent so that wheels inside are seen, with its edges.
+// A box by its corners, with its edges, translucent so that wheels inside are visible.
 function solid(corners, material) {
   const geometry = lineGeometry(corners);
   geometry.setIndex([0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3]);
@@ -296,7 +296,7 @@ function dot(kind, [, x, y, z], size, material) {
 
 function connectorTone(kind) { return CONNECTORS[kind][dark.matches ? 1 : 0]; }
 
-// A disc about its axis with a spoke on either face, so that its turning is seen.
+// A disc about its axis, with a spoke on either face so that its rotation is visible.
 function wheelMesh(wheel, thin) {
   const outer = new THREE.Group(), turning = new THREE.Group(), radius = Math.max(wheel.radius, 3 * thin), width = Math.max(wheel.width, thin);
   turning.add(new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, width, 32), new THREE.MeshLambertMaterial({ color: WHEEL })));
@@ -307,7 +307,7 @@ function wheelMesh(wheel, thin) {
   return outer;
 }
 
-// A tube through points whose tangents bend it (cubic Hermite; where a tangent is not known, as straight as may be).
+// A tube through points with tangents (cubic Hermite; unknown tangents are estimated as straight as possible).
 class Tube {
   constructor(world, line, radius, material) {
     this.line = line; this.radius = radius;

@@ -8,7 +8,7 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
-from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, digit_kinds, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, digit_kinds
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
@@ -102,7 +102,6 @@ STABILISATION = StabilityMap(
     x=Axis("step", "s", 1e-4, 2e-3, 6, log=True),
     y=Axis("rate of stabilisation", "1/s", 5e2, 5e4, 8, log=True),
     thresholds=(-3.0,),
-    kinds=growth_kinds(),
     overlay=Overlay(
         "step x rate = 2.785",
         "Baumgarte 1972; real stability interval of RK4: Hairer, Wanner II, IV.2",

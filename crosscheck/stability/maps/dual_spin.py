@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap
 from crosscheck.stability.spectrum import growth_rate
 from flexmb.scene.build import SceneBuilder, linear
 from flexmb.scene.schema import Scene
@@ -69,7 +69,6 @@ MAPS = (
         x=Axis("axial inertia of the damped body over the transverse one", "", 0.4, 1.6, 9),
         y=Axis("wheel momentum over transverse inertia x spin", "", -0.35, 0.95, 9),
         thresholds=(NEUTRAL,),
-        kinds=growth_kinds(),
         overlay=Overlay(
             "energy sink on one body: inertia ratio + wheel momentum = 1",
             "Landon, Stewart 1964; Iorillo 1965; Likins 1967",

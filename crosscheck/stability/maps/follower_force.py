@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from scipy.linalg import eigvals
 
-from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap
 from crosscheck.stability.spectrum import growth_rate, states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant
@@ -134,7 +134,6 @@ MAPS = (
         x=LOAD,
         y=TIP_MASS,
         thresholds=(NEUTRAL,),
-        kinds=growth_kinds(),
         overlay=Overlay(
             "flutter of the undamped column, 20.05 without tip mass",
             "Beck 1952, Pflueger 1955; computed with beam elements",
@@ -152,7 +151,6 @@ MAPS = (
         x=LOAD,
         y=DAMPING,
         thresholds=(NEUTRAL,),
-        kinds=growth_kinds(),
         overlay=Overlay(
             "flutter of the damped column, 10.94 for vanishing damping",
             "Bolotin, Zhinzher 1969; Herrmann, Jong 1965; computed with beam elements",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap
 from crosscheck.stability.spectrum import growth_rate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
@@ -45,7 +45,6 @@ MAPS = (
         x=Axis("first moment of inertia over the third", "", 0.55, 1.45, 9),
         y=Axis("second moment of inertia over the third", "", 0.55, 1.45, 9),
         thresholds=(NEUTRAL,),
-        kinds=growth_kinds(),
         overlay=Overlay(
             "the third axis is the intermediate one", "Euler 1758: (I3 - I1)(I3 - I2) changes sign", intermediate
         ),

@@ -10,7 +10,7 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
-from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap
 from flexmb.integrate.integrator import Method as MethodName
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
@@ -121,7 +121,6 @@ def step_map(method: Stepper) -> StabilityMap:
         x=Axis("step", "s", 1e-3, 1e-1, 8, log=True),
         y=Axis("highest modal frequency", "rad/s", 10.0, 1000.0, 8, log=True),
         thresholds=(GROWTH,),
-        kinds=growth_kinds(),
         overlay=Overlay(limit, method.source, excess),
         shows=f"Steps with which {method.name} of {method.engine} keeps an undamped mode bounded.",
         depth=3 if method.limit not in (NEVER, UNLIMITED) else 1,
@@ -182,7 +181,6 @@ def tolerance_map(name: MethodName, source: str) -> StabilityMap:
         x=Axis("relative tolerance", "", 1e-7, 1e-3, 4, log=True),
         y=Axis("highest modal frequency", "rad/s", 10.0, 1000.0, 4, log=True),
         thresholds=(BOUNDED,),
-        kinds=growth_kinds(),
         overlay=Overlay("every tolerance is stable", source, lambda tolerance, frequency: -np.ones_like(tolerance)),
         shows=f"{name} with error control keeps an undamped mode bounded, however loose the tolerance.",
         depth=1,

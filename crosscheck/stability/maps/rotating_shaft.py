@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.stability.flow import growth_rate
-from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap
 from flexmb.scene.build import SceneBuilder, angular, linear
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import Scene
@@ -65,7 +65,6 @@ MAPS = (
         x=Axis("speed over critical speed", "", 0.2, 4.0, 10),
         y=Axis("external over internal damping", "", 0.0, 2.6, 9),
         thresholds=(NEUTRAL,),
-        kinds=growth_kinds(),
         overlay=Overlay(
             "speed = critical x (1 + external/internal damping)",
             "Kimball 1924; Smith 1933; Genta, Dynamics of Rotating Systems, 2.3",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap
 from crosscheck.stability.spectrum import growth_rate, states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Ramp
@@ -56,7 +56,6 @@ MAPS = (
         x=Axis("spin rate over first clamped frequency", "", 0.0, 2.5, 21),
         y=Axis.of("level", *LEVELS),
         thresholds=(NEUTRAL,),
-        kinds=growth_kinds(),
         overlay=Overlay(
             "spin rate = omega_1 without stiffening", "Kane, Ryan, Banerjee 1987; Wu, Haug 1988", softening
         ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
@@ -80,7 +80,6 @@ MAPS = (
         x=Axis("step", "s", 1e-4, 1e-1, 9, log=True),
         y=Axis("stiffness of the hinge spring", "N m/rad", 1e2, 1e8, 9, log=True),
         thresholds=(GROWTH,),
-        kinds=growth_kinds(),
         overlay=Overlay(
             "|R(h lambda)| = 1",
             "Hairer, Wanner, Solving Ordinary Differential Equations II, IV.2, at the chain's own eigenvalues",

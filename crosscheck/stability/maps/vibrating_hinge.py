@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import mathieu_a, mathieu_b
 
 from crosscheck.stability.flow import growth_rate
-from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap
 from crosscheck.stability.spectrum import states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Sine
@@ -59,7 +59,6 @@ MAPS = (
         x=Axis("drive frequency over the pendulum's", "", 3.0, 60.0, 18, log=True),
         y=Axis("amplitude over length", "", 0.01, 1.0, 14, log=True),
         thresholds=(NEUTRAL,),
-        kinds=growth_kinds(),
         overlay=Overlay(
             "Mathieu's a_0 and b_1",
             "Stephenson 1908, Kapitza 1951: amplitude x frequency > sqrt(2 g l); exactly by Mathieu's functions",

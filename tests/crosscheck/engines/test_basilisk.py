@@ -8,12 +8,12 @@ from msgspec.structs import replace
 
 from crosscheck.engines.contract import Effort, EngineMissing, Run, Snapshot
 from crosscheck.engines.conventions import quaternion_of
-from crosscheck.engines.randomise import randomise
 from crosscheck.engines.registry import engine
 from flexmb.scene.build import SceneBuilder, angular, linear
 from flexmb.scene.functions import Sine
 from flexmb.scene.schema import Scene
 from tests.crosscheck.engines.random_scenes import inertia, rotation, unit
+from tests.crosscheck.engines.randomise import randomise
 
 BASILISK = engine("basilisk")
 WAVE = Sine(amplitude=0.7, angular_frequency_rad_s=2.0, phase_rad=0.5)

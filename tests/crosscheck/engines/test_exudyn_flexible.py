@@ -12,11 +12,11 @@ from crosscheck.engines.conventions import cross_matrix
 from crosscheck.engines.exudyn import ExudynEngine
 from crosscheck.engines.exudyn.model import ExudynModel
 from crosscheck.engines.native import NativeEngine
-from crosscheck.engines.randomise import randomise
 from flexmb.scene import schema as s
 from flexmb.scene.functions import Constant, Sine, SpinUp
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.surrogate import modal_points
+from tests.crosscheck.engines.randomise import randomise
 
 EVERY_FAMILY = ("axial", "torsion", "bending_y", "bending_z")
 

@@ -2,13 +2,14 @@
 
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
 from crosscheck.biting.invariances.counterpart import NotApplicable
 from crosscheck.biting.invariances.mirrored import MIRRORED
 from crosscheck.biting.invariances.units import _without_unit
-from crosscheck.engines.connections import _along, exerts
+from crosscheck.engines.connections import KNOWN, _along, exerts
 from crosscheck.engines.links import freedoms, obstacle
 from crosscheck.library.mutations.mirror import _hinge as is_own_image
 from crosscheck.library.mutations.turning import _own as axis_of
@@ -44,6 +45,7 @@ class MadeUp(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="made
     """A connector of no kind."""
 
     name: str = "odd"
+    strength: float = 1.0
 
 
 BORING = Boring(**ENDS, rotation=s.AngularCoordinate(angle_rad=0.5), x=s.LinearCoordinate(position_m=2.0))
@@ -86,12 +88,23 @@ STILL = MovingFrame(constant(np.zeros(3)), constant(np.eye(3)))
 
 @pytest.mark.parametrize(
     "use",
-    [exerts, _along, lambda odd: grip(odd, STILL, STILL, 0.0), lambda odd: _without_unit(odd, "stiffness")],
-    ids=["peers, between nodes", "peers, along a hinge", "dense route", "other units"],
+    [exerts, _along, lambda odd: grip(odd, STILL, STILL, 0.0)],
+    ids=["peers, between nodes", "peers, along a hinge", "dense route"],
 )
 def test_a_made_up_connector_is_refused_by_name(use: Any) -> None:
-    with pytest.raises(AssertionError, match=r"MadeUp\(name='odd'\)"):
+    with pytest.raises(AssertionError, match=r"MadeUp\(name='odd', strength=1.0\)"):
         use(MadeUp())
+
+
+def test_adapters_refuse_a_made_up_connector() -> None:
+    odd = msgspec.structs.replace(s.Scene(name="odd", bodies=(), hinges=()), connectors=(MadeUp(),))
+    assert obstacle(odd, "Anything", (), KNOWN) == 'connector "odd": the adapter of Anything has none of its kind'
+    assert not isinstance(MadeUp(), KNOWN)
+
+
+def test_a_number_whose_unit_nobody_says_is_not_put_in_other_units() -> None:
+    with pytest.raises(NotApplicable, match='connector "odd": nobody says the unit of "strength"'):
+        _without_unit(MadeUp(), "strength")
 
 
 def test_a_hand_that_no_key_changes_has_no_counterpart_in_the_mirror() -> None:

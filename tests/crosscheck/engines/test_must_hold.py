@@ -15,11 +15,11 @@ from msgspec.structs import replace
 
 import flexmb
 from crosscheck.engines.contract import Effort, Engine, EngineMissing, MarkerSnapshot, Run, Snapshot
-from crosscheck.engines.randomise import randomise
 from crosscheck.engines.registry import engine
 from flexmb.scene import schema as s
 from flexmb.surrogate import finite_segments, modal_points, rigidify
 from tests import trees
+from tests.crosscheck.engines.randomise import randomise
 
 # Trees: a random state of a closed chain leaves its closures open. Those are held at a state that closes them, in
 # tests/cases/test_closed_chains.py.

@@ -45,7 +45,8 @@ def test_the_example_in_the_documentation_runs():
 
 METHODS = {
     "rigid_body": s.RigidBody, "beam": s.BeamBody, "modal_body": s.ModalBody, "sid_body": s.SidBody, "weld": s.Weld,
-    "revolute": s.Revolute, "prismatic": s.Prismatic, "cylindrical": s.Cylindrical, "universal": s.Universal,
+    "revolute": s.Revolute, "screw": s.Screw, "prismatic": s.Prismatic, "cylindrical": s.Cylindrical,
+    "universal": s.Universal,
     "gimbal": s.Gimbal, "spherical": s.Spherical, "planar": s.Planar, "free": s.Free, "closure": s.Closure,
     "wheel": s.Wheel, "point_mass": s.PointMass, "force": s.Load, "torque": s.Load, "marker": s.Marker,
     "modal_state": s.ModalState, "spring_damper": s.SpringDamper, "bushing": s.Bushing,
@@ -58,7 +59,7 @@ METHODS = {
     "user_law": s.UserLaw,
 }  # fmt: skip
 # Keys that a method says in its own way: the section of a beam, the one coordinate of a hinge, the type of a load.
-REPLACED = {"beam": {"stations"}, "revolute": {"rotation"}, "prismatic": {"translation"},
+REPLACED = {"beam": {"stations"}, "revolute": {"rotation"}, "screw": {"rotation"}, "prismatic": {"translation"},
             "force": {"type"}, "torque": {"type"}}  # fmt: skip
 
 
