@@ -1,4 +1,4 @@
-"""The generalised-alpha method with a fixed step, on Lie groups too, whole runs in one compiled loop.
+"""The generalised-alpha method with a fixed step, on Lie groups too.
 
 Chung, Hulbert, J. Appl. Mech. 60 (1993), 371; on Lie groups Bruels, Cardona, J. Comput. Nonlinear Dyn. 5 (2010),
 031002, here for explicit equations of motion, udot = f(t, q, u):
@@ -16,24 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.control import (
-    ACCEPTED,
-    FACTORISATIONS,
-    SAMPLES,
-    Interval,
-    all_finite,
-    copy,
-    derivative,
-    permitted,
-    scaled_norm,
-    stretch,
-)
+from flexmb.integrate.control import FACTORISATIONS, Interval, all_finite, copy, derivative, scaled_norm
+from flexmb.integrate.equal_steps import FixedMethod, equal_steps
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
-from flexmb.integrate.memory import DONE, FACTORED, FRESH, STRETCH, TAKEN_UP, begin, keep_place
-from flexmb.integrate.watch import Ends, pause
-from flexmb.jit.kernel import handed_on, helper, kernel, sweep
+from flexmb.integrate.memory import FACTORED, FRESH, TAKEN_UP
+from flexmb.integrate.watch import Ends
+from flexmb.jit.kernel import handed_in, handed_on, helper, kernel, sweep
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
 _ITERATIONS = 12  # of Newton's method, at most
@@ -169,31 +159,65 @@ def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
 
 
 @helper
-def finish(problem, step, y, s, result, controlled):
-    """The state at the end of a step that was made, with its quadratures, projected."""
-    h = step.end - step.start
+def finish(problem, step, h, ends, s, result, controlled):
+    """The state at the end of a step that was made, with its quadratures by the trapezoidal rule, projected."""
     for i in range(controlled):
         result[i] = s.y_new[i]
-    for i in range(controlled, y.shape[0]):
-        result[i] = y[i] + 0.5 * h * (s.f[i] + s.f_new[i])
+    for i in range(controlled, result.shape[0]):
+        result[i] = ends.y[i] + 0.5 * h * (s.f[i] + s.f_new[i])
     problem.project(step.end, result, problem.constants)
+
+
+@handed_in
+def attempt(problem, step, h, ends, s, known, accuracy, counts):
+    """See `FixedMethod`; known[FRESH]: slopes are to be found at the start, and a starts as udot there."""
+    if known[FRESH] != 0.0:
+        status = derivative(problem, step.start, ends.y, s.f, counts)
+        if status != OK:
+            return status
+        for j in range(s.a.shape[0]):
+            s.rate[j] = s.a[j] = s.f[accuracy.coordinates + j]
+        known[FRESH] = 0.0
+    status, known[FACTORED] = step_once(problem, step, ends.y, h, known[FACTORED], s, accuracy, counts)
+    if status == OK:
+        finish(problem, step, h, ends, s, ends.y_new, accuracy.controlled)
+    return status
 
 
 @handed_on
 def inside(problem, step, ends, s, t, result, run):
     """The state within a step, by a shorter one from the same start with a Jacobian of its own."""
     accuracy, counts = run
-    shorter = Interval(step.start, t, step.last)
-    status, _ = step_once(problem, shorter, ends.y, t - step.start, 0.0, s, accuracy, counts)
-    finish(problem, shorter, ends.y, s, result, accuracy.controlled)
+    shorter, h = Interval(step.start, t, step.last), t - step.start
+    status, _ = step_once(problem, shorter, ends.y, h, 0.0, s, accuracy, counts)
+    finish(problem, shorter, h, ends, s, result, accuracy.controlled)
     return status
 
 
-@helper
-def keep_slopes(memory, s, at_start, h_factored):
-    """What only this method knows before a step: Jacobian, slopes, a."""
+@handed_in
+def no_detour(problem, watch, status, step, ends, s, samples, run):
+    """See `FixedMethod`: the run ends before a singular position."""
+    return status, step.start
+
+
+@handed_in
+def accept(s):
+    """See `FixedMethod`."""
+    copy(s.rate_new, s.rate)
+    copy(s.a_new, s.a)
+    copy(s.f_new, s.f)
+
+
+@handed_in
+def enter(known):
+    """udot may jump where a segment ends."""
+    known[FRESH] = 1.0
+
+
+@handed_in
+def keep(memory, s):
+    """Jacobian, slopes and a."""
     n, nu = s.f.shape[0], s.a.shape[0]
-    memory.numbers[FACTORED], memory.numbers[FRESH] = h_factored, 1.0 if at_start else 0.0
     for i in range(n):
         copy(s.J[i], memory.rows[i])
     copy(s.f, memory.rows[n])
@@ -201,92 +225,45 @@ def keep_slopes(memory, s, at_start, h_factored):
         memory.rows[n + 1, j], memory.rows[n + 2, j] = s.rate[j], s.a[j]
 
 
-@helper
-def recall(memory, s, accuracy, counts):
-    """The same of a run that is taken up, with factors made again; of another one that there is nothing.
-
-    Returns (whether slopes are to be found at the start, step of the factors).
-    """
-    numbers, n, nu = memory.numbers, s.f.shape[0], s.a.shape[0]
-    if numbers[TAKEN_UP] == 0.0:
-        return True, 0.0
+@handed_in
+def recall(memory, s, known, accuracy, counts):
+    """The same of a run that is taken up, with factors made again; of another one that there is nothing."""
+    n, nu = s.f.shape[0], s.a.shape[0]
+    if known[TAKEN_UP] == 0.0:
+        known[FRESH] = 1.0
+        return
     for i in range(n):
         copy(memory.rows[i], s.J[i])
     copy(memory.rows[n], s.f)
     for j in range(nu):
         s.rate[j], s.a[j] = memory.rows[n + 1, j], memory.rows[n + 2, j]
-    h_factored = numbers[FACTORED]
-    if h_factored > 0.0:
-        factorise(s, h_factored, accuracy, counts)
-    return numbers[FRESH] != 0.0, h_factored
+    if known[FACTORED] > 0.0:
+        factorise(s, known[FACTORED], accuracy, counts)
+
+
+@helper
+def arrays(n, a, rate, f):
+    """For n components, from a, udot and slope at the start of a step."""
+    nu = a.shape[0]
+    return NewmarkArrays(
+        np.empty((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), a, np.empty(nu), rate, np.empty(nu),
+        np.empty(nu), np.empty(nu), f, np.empty(n), np.zeros(n), np.empty(n),
+    )  # fmt: skip
 
 
 @kernel
 def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y = [q, u, quadratures] as told by `Integrator`; problem: a `StiffProblem`.
 
-    Steps are those of `rk4`. Newton's method stops where its correction is below rtol |y| + atol over the controlled
-    components. Quadratures follow the trapezoidal rule. a starts as udot, at the start and after every segment end,
-    where udot may jump.
+    Newton's method stops where its correction is below rtol |y| + atol over the controlled components. a starts as
+    udot, at the start and after every segment end, where udot may jump.
     """
-    times, segment_ends, _ = clock
-    nq, controlled = accuracy.coordinates, accuracy.controlled
-    n, nu = y.shape[0], controlled - nq
-    s = NewmarkArrays(
-        np.empty((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), np.empty(nu), np.empty(nu), np.empty(nu),
-        np.empty(nu), np.empty(nu), np.empty(nu), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
-    )  # fmt: skip
-    t = begin(problem, times, y, s.y_new, memory, out, counts)
-    copy(y, s.y_new)
-    at_start, h_factored = recall(memory, s, accuracy, counts)
-    start, done, segment = memory.numbers[STRETCH], int(memory.numbers[DONE]), 0
-    for sample in range(counts[SAMPLES], times.shape[0]):
-        while t < times[sample]:
-            end, steps, h, last = stretch(start, times[sample], segment_ends[segment], accuracy.step)
-            for k in range(done, steps):
-                status = permitted(accuracy.max_steps, counts)
-                if status != OK:
-                    keep_place(memory, t, y, start, k)
-                    keep_slopes(memory, s, at_start, h_factored)
-                    return status, t
-                if at_start:
-                    status = derivative(problem, t, y, s.f, counts)
-                    if status != OK:
-                        return status, t
-                    for j in range(nu):
-                        s.rate[j] = s.a[j] = s.f[nq + j]
-                    at_start = False
-                t_new = end if k == steps - 1 else start + (k + 1) * h
-                step = Interval(t, t_new, last)
-                status, h_factored = step_once(problem, step, y, h, h_factored, s, accuracy, counts)
-                if status != OK:
-                    return status, t
-                if watch is not None:
-                    whole = np.empty(n)
-                    finish(problem, step, y, s, whole, controlled)
-                    ends, samples, run = Ends(y, s.f.copy(), whole, s.f_new.copy()), (times, out), (accuracy, counts)
-                    status, t_at = pause(problem, watch, step, ends, inside, s, samples, run)
-                    if status == OK and t_at == t_new:  # it was looked into: what it left is made again
-                        status, h_factored = step_once(problem, step, y, h, 0.0, s, accuracy, counts)
-                    if status != OK:
-                        return status, t_at
-                for i in range(controlled, n):
-                    s.y_new[i] = y[i] + 0.5 * h * (s.f[i] + s.f_new[i])
-                t = t_new
-                copy(s.y_new, y)
-                problem.project(t, y, problem.constants)
-                copy(s.rate_new, s.rate)
-                copy(s.a_new, s.a)
-                copy(s.f_new, s.f)
-                counts[ACCEPTED] += 1
-            start, done = t, 0
-            if t == segment_ends[segment]:
-                segment, at_start = segment + 1, True
-        copy(y, out[sample])
-        counts[SAMPLES] = sample + 1
-    keep_place(memory, t, y, t, 0)
-    keep_slopes(memory, s, at_start, h_factored)
-    return OK, t
+    n, nu = y.shape[0], accuracy.controlled - accuracy.coordinates
+    s = arrays(n, np.empty(nu), np.empty(nu), np.empty(n))
+    ends = Ends(y, s.f, np.empty(n), s.f_new)
+    looking = arrays(n, s.a, s.rate, s.f)
+    method = FixedMethod(attempt, no_detour, accept, enter, recall, keep, inside, looking)
+    return equal_steps(method, problem, s, ends, clock, accuracy, out, counts, memory, watch)
 
 
 INTEGRATOR = Integrator(

@@ -71,8 +71,9 @@ def keep(memory, t, y, known, counts):
 
 
 @helper
-def keep_place(memory, t, y, stretch, done):
-    """Before a step of a method that takes equal ones."""
+def keep_place(memory, t, y, stretch, done, known):
+    """Before a step of a method that takes equal ones, `known` (NUMBERS,) being its numbers."""
     numbers = memory.numbers
+    copy(known, numbers)
     numbers[TIME], numbers[STRETCH], numbers[DONE] = t, stretch, done
     copy(y, memory.y)

@@ -1,4 +1,4 @@
-"""The classical Runge-Kutta method of order 4 with a fixed step, whole runs in one compiled loop."""
+"""The classical Runge-Kutta method of order 4 with a fixed step."""
 
 from __future__ import annotations
 
@@ -10,28 +10,26 @@ from flexmb.integrate.control import (
     ACCEPTED,
     REJECTED,
     RETREAT,
-    SAMPLES,
     Interval,
     all_finite,
     copy,
     derivative,
     permitted,
     step_end,
-    stretch,
 )
+from flexmb.integrate.equal_steps import FixedMethod, equal_steps
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.leap import leap_over, may_leap
-from flexmb.integrate.memory import DONE, STRETCH, begin, keep_place
+from flexmb.integrate.rk4_formulas import advance, weigh
 from flexmb.integrate.watch import Ends, pause
-from flexmb.jit.kernel import handed_on, helper, kernel, written_out
+from flexmb.jit.kernel import handed_in, handed_on, kernel, written_out
 from flexmb.tables.status import NONFINITE, OK
 
 
 @written_out
 def _stage(problem, t, y, slope, h, trial, dy, counts):
     """dy = f(t, y + h slope)."""
-    for i in range(y.shape[0]):
-        trial[i] = y[i] + h * slope[i]
+    advance(y, h, slope, trial)
     return derivative(problem, t, trial, dy, counts)
 
 
@@ -47,9 +45,17 @@ def rk4_step(problem, t, last, y, h, k, trial, counts):
         status = _stage(problem, min(t + h, last), y, k[2], h, trial, k[3], counts)
     if status != OK:
         return status
-    for i in range(y.shape[0]):
-        trial[i] = y[i] + h / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
+    weigh(y, h, k, trial)
     return OK if all_finite(trial) else NONFINITE
+
+
+@handed_in
+def attempt(problem, step, h, ends, k, known, accuracy, counts):
+    """See `FixedMethod`. The slope of the last stage is nearly that at the end."""
+    status = rk4_step(problem, step.start, step.last, ends.y, h, k, ends.y_new, counts)
+    if status == OK:
+        problem.project(step.end, ends.y_new, problem.constants)
+    return status
 
 
 @handed_on
@@ -61,14 +67,10 @@ def inside(problem, step, ends, k, t, result, run):
     return status
 
 
-@helper
-def _detour(problem, watch, trouble, step, y, scratch, output, run):
-    """From the last good state to `step.end` or further, by shorter steps and leaps, where a step there met `trouble`.
-
-    Returns a status code and the time of y, which is again the last good state. scratch: slopes (4,n) and a state (n,);
-    output: times of samples, and samples; run: accuracy and counts. CROSSED, and the time, where it comes to a level.
-    """
-    (k, trial), target, last, (accuracy, counts) = scratch, step.end, step.last, run
+@handed_in
+def detour(problem, watch, trouble, step, ends, k, samples, run):
+    """See `FixedMethod`: by shorter steps and leaps from the last good state, where a step met `trouble`."""
+    y, target, last, (accuracy, counts) = ends.y, step.end, step.last, run
     t = problem.back(y, problem.constants)
     if not t > -math.inf:
         return trouble, target
@@ -78,7 +80,7 @@ def _detour(problem, watch, trouble, step, y, scratch, output, run):
         if status != OK:
             return status, t
         if failed:
-            status, t_at, length = leap_over(problem, watch, t, last, Ends(y, k[0], trial, k[1]), output, run)
+            status, t_at, length = leap_over(problem, watch, t, last, ends, samples, run)
             if status != OK:
                 return status, t_at
             if length > 0.0:
@@ -87,10 +89,10 @@ def _detour(problem, watch, trouble, step, y, scratch, output, run):
         status, t_new = step_end(t, h, target, trouble, accuracy.max_steps, counts)
         if status != OK:
             return status, t
-        status = rk4_step(problem, t, last, y, t_new - t, k, trial, counts)
+        status = rk4_step(problem, t, last, y, t_new - t, k, ends.y_new, counts)
         if status == OK:
-            problem.project(t_new, trial, problem.constants)
-            status = derivative(problem, min(t_new, last), trial, k[3], counts)
+            problem.project(t_new, ends.y_new, problem.constants)
+            status = derivative(problem, min(t_new, last), ends.y_new, ends.dy_new, counts)
         if status != OK and not may_leap(status):
             return status, t
         failed = status != OK
@@ -99,61 +101,42 @@ def _detour(problem, watch, trouble, step, y, scratch, output, run):
             counts[REJECTED] += 1
             continue
         if watch is not None:
-            ends = Ends(y, k[0], trial, k[3])
-            status, t_at = pause(problem, watch, Interval(t, t_new, last), ends, inside, k, output, run)
+            status, t_at = pause(problem, watch, Interval(t, t_new, last), ends, inside, k, samples, run)
             if status != OK:
                 return status, t_at
         t, h = t_new, 2.0 * h
-        copy(trial, y)
+        copy(ends.y_new, y)
         counts[ACCEPTED] += 1
     return OK, t
 
 
+@handed_in
+def accept(k):
+    """Nothing is known of the step before."""
+
+
+@handed_in
+def enter(known):
+    """Likewise."""
+
+
+@handed_in
+def recall(memory, k, known, accuracy, counts):
+    """Likewise."""
+
+
+@handed_in
+def keep(memory, k):
+    """Likewise."""
+
+
 @kernel
 def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
-    """Integrate y' = f(t, y) as told by `Integrator`.
-
-    Every stretch between samples and segment ends is divided into equal steps not exceeding `accuracy.step`, and y is
-    put back on its manifold after each.
-    """
-    times, segment_ends, _ = clock
-    k, trial = np.empty((4, y.shape[0])), np.empty(y.shape[0])
-    t = begin(problem, times, y, trial, memory, out, counts)
-    start, done, segment = memory.numbers[STRETCH], int(memory.numbers[DONE]), 0
-    for sample in range(counts[SAMPLES], times.shape[0]):
-        while t < times[sample]:
-            end, steps, h, last = stretch(start, times[sample], segment_ends[segment], accuracy.step)
-            for j in range(done, steps):
-                status = permitted(accuracy.max_steps, counts)
-                if status != OK:
-                    keep_place(memory, t, y, start, j)
-                    return status, t
-                status = rk4_step(problem, t, last, y, h, k, trial, counts)
-                if may_leap(status):
-                    failed = Interval(t, min(t + h, end), last)
-                    scratch, output = (k, trial), (times, out)
-                    status, t = _detour(problem, watch, status, failed, y, scratch, output, (accuracy, counts))
-                    if status == OK:
-                        break
-                if status != OK:
-                    return status, t
-                if watch is not None:  # the last stage's slope is nearly that at the end
-                    step, ends = Interval(t, t + h, last), Ends(y, k[0], trial, k[3])
-                    status, t_at = pause(problem, watch, step, ends, inside, k, (times, out), (accuracy, counts))
-                    if status != OK:
-                        return status, t_at
-                t = end if j == steps - 1 else start + (j + 1) * h
-                copy(trial, y)
-                problem.project(t, y, problem.constants)
-                counts[ACCEPTED] += 1
-            start, done = t, 0
-            if t == segment_ends[segment]:
-                segment += 1
-        if counts[SAMPLES] == sample:  # not met within a leap
-            copy(y, out[sample])
-            counts[SAMPLES] = sample + 1
-    keep_place(memory, t, y, t, 0)
-    return OK, t
+    """Integrate y' = f(t, y) as told by `Integrator`, y being put back on its manifold after each step."""
+    k = np.empty((4, y.shape[0]))
+    ends = Ends(y, k[0], np.empty(y.shape[0]), k[3])
+    method = FixedMethod(attempt, detour, accept, enter, recall, keep, inside, k)
+    return equal_steps(method, problem, k, ends, clock, accuracy, out, counts, memory, watch)
 
 
 INTEGRATOR = Integrator(

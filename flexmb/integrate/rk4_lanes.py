@@ -4,16 +4,10 @@ from __future__ import annotations
 
 from flexmb.integrate.control import ACCEPTED, SAMPLES, permitted, stretch
 from flexmb.integrate.lane_problem import any_chosen, lane_copy, lane_derivative, mark_finite, set_all, store_lane
+from flexmb.integrate.rk4_formulas import advance, weigh
 from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.jit.lanes import LANES
 from flexmb.tables.status import NONFINITE, OK
-
-
-@helper
-def _advance(s, slope, h):
-    """s.trial = y + h slope."""
-    for i in range(s.y.shape[0]):
-        s.trial[i] = s.y[i] + h * slope[i]
 
 
 @written_out
@@ -25,14 +19,13 @@ def _step(problem, s, entries, t, last, h, counts):
     set_all(entries.time, t + 0.5 * h)
     for stage in range(1, 3):
         if status == OK:
-            _advance(s, s.k[stage - 1], 0.5 * h)
+            advance(s.y, 0.5 * h, s.k[stage - 1], s.trial)
             status = lane_derivative(problem, s, stage, counts)
     set_all(entries.time, min(t + h, last))
     if status == OK:
-        _advance(s, s.k[2], h)
+        advance(s.y, h, s.k[2], s.trial)
         status = lane_derivative(problem, s, 3, counts)
-    for i in range(s.y.shape[0]):
-        s.trial[i] = s.y[i] + h / 6.0 * (s.k[0, i] + 2.0 * (s.k[1, i] + s.k[2, i]) + s.k[3, i])
+    weigh(s.y, h, s.k, s.trial)
     return status
 
 
