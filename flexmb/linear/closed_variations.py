@@ -158,7 +158,7 @@ class ClosedEquations(Equations):
         J = np.empty((n + 2 * rows, n + 1))
         own = self._closures.constants[1]
         status = closed_jacobian(state.t, y, load, J, self.constants, self._w, own, self._rows_w)
-        self._check(status, self._w.fault[0])
+        self.system.check_status(status, int(self._w.fault[0]))
         motion = J[:nq, nq + free]
 
         def of(values: Real) -> _Derivatives:

@@ -27,7 +27,6 @@ from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.functions import pack as pack_functions
 from flexmb.tables.state import DynamicsError, State, pack
-from flexmb.tables.status import OK, Status
 from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real, Record
 
@@ -89,7 +88,7 @@ class Equations:
 
     def check(self, status: int) -> None:
         """DynamicsError unless a status of these kernels is OK."""
-        self._check(status, int(self._w.fault[0]))
+        self.system.check_status(status, int(self._w.fault[0]))
 
     def held(self, t: float) -> Equations:
         """The same equations with every function of time held at its value at time t (s)."""
@@ -118,7 +117,7 @@ class Equations:
     def rates(self, state: State) -> Real:
         """udot (n,) of the free speeds; DynamicsError where it does not exist."""
         status = articulated.accelerations(state.t, pack(state), self.constants, self._real_w)
-        self._check(status, self._real_w.fault[0])
+        self.system.check_status(status, int(self._real_w.fault[0]))
         return self._real_w.speed["acceleration"][self.free]
 
     def mass(self, state: State) -> Real:
@@ -138,11 +137,11 @@ class Equations:
         nq, n, y = self.system.nq, len(self.free), pack(state)
         everything = np.arange(n)
         J, drift = np.empty((len(y), len(y))), np.empty(len(y))
-        self._check(jacobian(state.t, y, J, self.constants, self._w), self._w.fault[0])
+        self.system.check_status(jacobian(state.t, y, J, self.constants, self._w), int(self._w.fault[0]))
         if self._w.doubt[0]:
             self.system.digits_left(state)  # raises if pivots are only rounding
         rates = self._w.slope[nq + self.free, 0]  # the numbers themselves, before their derivatives
-        self._check(time_derivative(state.t, y, drift, self.constants, self._w), self._w.fault[0])
+        self.system.check_status(time_derivative(state.t, y, drift, self.constants, self._w), int(self._w.fault[0]))
         rows, motion = J[nq + self.free], J[:nq, nq + self.free]
         return Variations(
             state, rates, rows[:, :nq] @ motion, rows[:, nq + self.free], drift[nq + self.free],
@@ -174,11 +173,6 @@ class Equations:
                     moving = slice(j + 3, j + 6)
                     out[moving, turning], out[moving, moving] = -_cross(u[moving]), -_cross(u[turning])
         return out[np.ix_(self.free, self.free)]
-
-    def _check(self, status: int, fault: int) -> None:
-        if status != OK:
-            place = self.system.fault_name(status, int(fault))
-            raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
 
 
 def _cross(v: Real) -> Real:
