@@ -1,6 +1,6 @@
-"""Seen in a mirror: z against -z, everywhere. Positions and forces are reflected, rotations and torques the other way.
+"""Reflection of z: polar vectors such as positions and forces are reflected, axial ones with the opposite sign.
 
-Every frame of the scene is reflected and made right-handed again by the opposite z axis: what a mirror S shows of a
+Every frame of the scene is reflected and made right-handed again by the opposite z axis: the mirror image by S of a
 rotation R is S R S. A vector's components become S v where it is polar, -S v where it is axial.
 """
 
@@ -80,7 +80,7 @@ def _mirrored(scene: Scene) -> Counterpart:
 
 
 def _reflected(item: Any) -> Any:
-    """A struct and all structs in it as the mirror shows them."""
+    """The mirror image of a struct with all structs in it."""
     changes = {key: _value(key, getattr(item, key)) for key in item.__struct_fields__}
     item = msgspec.structs.replace(item, **changes)
     match item:
