@@ -50,7 +50,7 @@ def flexible() -> Scene:
 def seen(scene: Scene) -> Channels:
     """All channels (1, k) at the scene's initial state."""
     snapshot = NativeEngine().compile(scene).evaluate()
-    return channels_of(stack(AT, [snapshot], status="finished", message="", wall_s=0.0, evaluations=1))
+    return channels_of(stack(AT, [snapshot], message="", wall_s=0.0, evaluations=1))
 
 
 def strangers(scene: Scene, counterpart: Counterpart) -> list[str]:
