@@ -69,7 +69,7 @@ def run_campaign(
     subjects = [subject(case, engine) for case in cases]
     litters = [litter(each, all_targets) for each in subjects]
     plans = [_plan(each.case, provider, limits) for each in litters]
-    take_away(out / SCORES)  # of an earlier campaign, should this one be killed
+    take_away(out / SCORES)  # so that a killed campaign leaves none of an earlier one
     run_planned(plans, (engine,), out / RECORDS, fresh=fresh, limits=limits, listener=listener)
     found = {each.case.case: each for each in collect(last_session(read(out / RECORDS))).cases}
     bites = tuple(scored(one, mutants, found[one.case.name]) for one, mutants in zip(subjects, litters, strict=True))

@@ -98,7 +98,7 @@ def run_invariances(
     """
     sets = [_planned(subject(case, engine), provider, limits) for case in cases]
     plans = [(each.record, each.jobs) for each in sets]
-    take_away(out / VERDICTS)  # of an earlier session, should this one be killed
+    take_away(out / VERDICTS)  # so that a killed session leaves none of an earlier one
     run_planned(plans, (engine,), out / RECORDS, fresh=fresh, limits=limits, listener=listener)
     found = {each.case.case: each for each in collect(last_session(read(out / RECORDS))).cases}
     verdicts = tuple(verdict for each in sets for verdict in _judged(each, found[each.what.case.name]))
@@ -123,7 +123,8 @@ def _planned(what: JudgedVariant, provider: str, limits: Limits) -> _Set:
             continue
         counterparts[invariance.name] = counterpart
         jobs.append(_job(true, invariance.name, counterpart))
-    bare = msgspec.structs.replace(what.variant, efforts=())  # its jobs have them, those on another clock other steps
+    # The efforts stand in the jobs: a counterpart with another unit of time has other steps.
+    bare = msgspec.structs.replace(what.variant, efforts=())
     record = msgspec.structs.replace(record, run=msgspec.structs.replace(record.run, variants=(bare,)))
     return _Set(what, counterparts, without, record, jobs)
 
@@ -227,7 +228,7 @@ def _with_rounding(name: str, told: Result, other: Result, bodies: int) -> Signa
 
     A vanishing load is a vanishing sum of moments of forces and of gyroscopic torques, which are of the size of the
     kinetic energy; likewise the work of large forces. In other axes and units such a sum rounds differently, as do
-    positions along a chain of bodies. """
+    positions along a chain of bodies."""
     signal = told.signal(name, across=False)
     sizes = signal.sizes
     is_sum = name == "work" or name.endswith(".torque")

@@ -46,7 +46,7 @@ def litter(what: JudgedVariant, all_targets: bool = False) -> Litter:
     """Every applicable mutation at one target of each kind, or at all targets.
 
     Passed over are mutations that physically change nothing, that the variant's transformation does not model, or that
-    make no valid scene. """
+    make no valid scene."""
     scene = at_level(what.case.scene(what.variant), what.variant)
     true = variant_scene(scene, what.variant)
     mutants: dict[str, Control] = {}

@@ -169,7 +169,7 @@ def a_violent_run_has_a_status(engine: Engine) -> None:
     scene = simplest(engine, rate=1e6)
     times = np.linspace(0.0, 1e-3, 3)
     model = CheckedEngine(engine).compile(scene)
-    run = simulated(model, times, ladder(engine, scene, times[-1])[0])  # where it raises, that is told
+    run = simulated(model, times, ladder(engine, scene, times[-1])[0])  # an exception fails the check
     require(run.status == "finished" or bool(run.message.strip()), f"it {run.status} without saying why")
 
 
@@ -231,4 +231,3 @@ def _left(known: set[threading.Thread], before: dict[str, int]) -> str:
 def _same_side(found: Real, like: Real) -> Real:
     """The quaternion or its negative, whichever is nearer to the other."""
     return found if float(np.dot(found, like)) >= 0.0 else -found
-

@@ -3,7 +3,7 @@
 A rigid body is drawn as the box of the same mass and inertia, or as a ball if it has no inertia; a flexible body as a
 line through its nodes with markers; wheels as discs, fixed point masses as balls, springs as coils, bushings and
 springs of hinges as marks. Only markers are recorded, so that drawing needs no mechanics; bodies without a marker are
-not drawn. `film.py` adds the markers that each body needs. """
+not drawn. `film.py` adds the markers that each body needs."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def _corners(body: RigidBody) -> list[Real]:
     """Corners of the uniform box with the body's mass and principal inertias, in the body frame.
 
     Sides from I_x = m (b^2 + c^2)/12 and so on: a^2 = 6 (I_y + I_z - I_x)/m. Their ratio is limited by
-    `LARGEST_ASPECT`, so that a thin body is visible. """
+    `LARGEST_ASPECT`, so that a thin body is visible."""
     moments, axes = np.linalg.eigh(np.array(body.inertia_kg_m2))
     squares = 6.0 * (moments.sum() - 2.0 * moments) / max(body.mass_kg, np.finfo(float).tiny)
     sides = np.sqrt(np.maximum(squares, 0.0))
@@ -218,5 +218,3 @@ def _rotation(quaternion: tuple[float, float, float, float]) -> Rotation:
 
 def _vector(values: Real) -> Vector:
     return (float(values[0]), float(values[1]), float(values[2]))
-
-

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from crosscheck.engines.answers import checked_ladder, checked_model, checked_run, checked_support, checked_version
 from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Support, Trajectory
@@ -14,15 +14,20 @@ LATER = ("connectors", "controllers", "events")
 NO_START = "begins all runs at t = 0"
 
 
+@dataclass
 class CheckedEngine:
     """Asks an engine about runs that start at `t_start` and last `duration_s` (s).
 
     An answer that the contract does not allow raises `BrokenContract`; what the engine itself raises passes through.
     """
 
-    def __init__(self, engine: Engine, t_start: float = 0.0, duration_s: float = USUAL_S) -> None:
-        self.engine, self.name = engine, engine.name
-        self.t_start, self.duration_s = t_start, duration_s
+    engine: Engine
+    t_start: float = 0.0
+    duration_s: float = USUAL_S
+    name: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.name = self.engine.name
 
     def version(self) -> str:
         return checked_version(self.engine.version())

@@ -148,7 +148,7 @@ def law_of(stems: dict[str, Any]) -> Law:
 def _by_table(places: tuple[float, ...], given: tuple[float, ...]) -> Law:
     """Cubics between the knots, straight lines beyond; evaluated in plain Python, which is faster than a SciPy
     spline."""
-    from scipy.interpolate import PchipInterpolator  # few springs have a table, and it takes a fifth of a second
+    from scipy.interpolate import PchipInterpolator  # slow to import, and few springs have a table
 
     spline = PchipInterpolator(places, given)
     knots, pieces = spline.x.tolist(), spline.c.T.tolist()

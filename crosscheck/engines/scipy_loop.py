@@ -26,7 +26,7 @@ _LEAST_ATOL = 1e-13
 RTOL_LADDER = tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-8, 1e-10, 1e-12))
 
 
-class Dynamics(Protocol):
+class EquationsOfMotion(Protocol):
     """Equations of motion dy/dt = rate(t, y) of a state y whose last number is the work done so far."""
 
     def initial(self) -> Real: ...
@@ -42,7 +42,7 @@ class Observer(Protocol):
 class ScipyModel:
     """A scene compiled for a peer that SciPy's DOP853 steps."""
 
-    def __init__(self, scene: Scene, dynamics: Dynamics, observer: Observer) -> None:
+    def __init__(self, scene: Scene, dynamics: EquationsOfMotion, observer: Observer) -> None:
         self._dynamics, self._observer = dynamics, observer
         self._functions = scene_functions(scene)
 

@@ -158,5 +158,3 @@ def _ended(file: Path) -> bool:
     with file.open("rb") as stream:
         stream.seek(max(0, stream.seek(0, os.SEEK_END) - 1))
         return stream.read() in (b"", b"\n")
-
-

@@ -75,7 +75,7 @@ def imported(module: str, file: Path) -> Iterator[str]:
         return
     try:
         tree = ast.parse(file.read_bytes())
-    except (SyntaxError, ValueError):  # it cannot be imported either
+    except (SyntaxError, ValueError):  # its import would fail as well
         return
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
     for node in ast.walk(tree):

@@ -80,7 +80,7 @@ def regenerate(
     knowledge = _knowledge(case, recipe, routes, agreed, values)
     remark = "" if before is None else _permitted(case, before, agreed, knowledge)
     if before is not None and not remark and _describes_the_same(before, agreed, knowledge):
-        if before.knowledge.provenance != knowledge.provenance:  # the next change needs its own reason
+        if before.knowledge.provenance != knowledge.provenance:  # keeps the values, states the new provenance
             values = values_text(before.times, before.channels)
             knowledge = msgspec.structs.replace(before.knowledge, provenance=knowledge.provenance)
             return _put(case, values, knowledge, check, f"reproduced; {PROVENANCE} was changed since")

@@ -22,7 +22,7 @@ class HeavyTop:
     """
 
     def __init__(self, spin: float, lean: float) -> None:
-        self._spin, self._lean = spin, lean
+        self.spin, self.lean = spin, lean
         self._u0, self._a = np.cos(lean), ALONG * spin / ACROSS
         beta = 2.0 * MASS * GRAVITY * HEIGHT / ACROSS
         over = self._a**2 / (2.0 * beta) - self._u0
@@ -36,11 +36,11 @@ class HeavyTop:
         below, change = self._height(times)
         u, sine = self._u0 - below, np.sqrt(self._sine_squared(below))
         precession = primitive(self._precession_rate, times, 24)
-        spin = self._spin * times - primitive(self._along_axis, times, 24)
+        spin = self.spin * times - primitive(self._along_axis, times, 24)
         R = turn(2, precession) @ turn(0, np.arctan2(sine, u)) @ turn(2, spin)
         nodes = np.stack([np.cos(precession), np.sin(precession), 0.0 * times], axis=1)
         omega = self._precession_rate(times)[:, None] * np.array([0.0, 0.0, 1.0]) + (change / sine)[:, None] * nodes
-        omega = omega + (self._spin - self._along_axis(times))[:, None] * R[:, :, 2]
+        omega = omega + (self.spin - self._along_axis(times))[:, None] * R[:, :, 2]
         channels = {}
         for name, point in MARKERS.items():
             channels[f"marker:{name}.position"] = R @ point
@@ -56,7 +56,7 @@ class HeavyTop:
 
     def _sine_squared(self, below: Real) -> Real:
         """1 - u^2."""
-        return np.sin(self._lean) ** 2 + below * (2.0 * self._u0 - below)
+        return np.sin(self.lean) ** 2 + below * (2.0 * self._u0 - below)
 
     def _precession_rate(self, times: Real) -> Real:
         below, _ = self._height(times)

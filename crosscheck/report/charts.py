@@ -122,7 +122,7 @@ def _shown_range(signals: list[Real]) -> list[float] | None:
     """Limits of the drawing if the automatic ones would be misleading, else None.
 
     If one signal is much larger: twice the smallest signal. If all are constant: a band about them, not their
-    round-off. """
+    round-off."""
     sizes = [float(np.max(np.abs(values))) for values in signals]
     smallest, largest = min(sizes), max(sizes)
     if 0.0 < smallest < largest / RUNAWAY:

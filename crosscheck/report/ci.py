@@ -81,32 +81,36 @@ def write_junit(outcome: SessionOutcome, file: Path) -> None:
         tests = [_test(suite, each, _complaint(outcome, each), bool(gone & set(each.sides))) for each in verdicts]
         for each in missing:
             name = f"{each.variant} by {each.engine}{_role(each.role)} ran"
-            test = ElementTree.SubElement(suite, "testcase", classname=case, name=name)
-            ElementTree.SubElement(test, "failure", type=each.status, message=each.reason)
+            _failed(suite, case, name, each.status, each.reason)
         tests += ["failure"] * len(missing) + _not_judged(suite, case, outcome)
         suite.set("tests", str(len(tests)))
         suite.set("failures", str(tests.count("failure")))
         suite.set("skipped", str(tests.count("skipped")))
     if outcome.broken:
-        count = str(len(outcome.broken))
-        suite = ElementTree.SubElement(suites, "testsuite", name="records", tests=count, failures=count)
+        suite = _failing(suites, "records", len(outcome.broken))
         for line in outcome.broken:
-            test = ElementTree.SubElement(suite, "testcase", classname="records", name="the line is a record")
-            ElementTree.SubElement(test, "failure", type="broken", message=line)
+            _failed(suite, "records", "the line is a record", "broken", line)
     for engine in outcome.uncompared if outcome.all else ():
-        suite = ElementTree.SubElement(suites, "testsuite", name=engine, tests="1", failures="1")
-        test = ElementTree.SubElement(suite, "testcase", classname=engine, name="it was compared in something")
-        ElementTree.SubElement(test, "failure", type="nothing", message="it was asked for and compared in nothing")
+        text = "it was asked for and compared in nothing"
+        _failed(_failing(suites, engine), engine, "it was compared in something", "nothing", text)
     if not outcome.all:
-        suite = ElementTree.SubElement(suites, "testsuite", name="crosscheck", tests="1", failures="1")
         unfinished, nothing = ("unfinished", "the session came to its end"), ("nothing", "something was compared")
         kind, name = unfinished if outcome.unfinished else nothing
-        test = ElementTree.SubElement(suite, "testcase", classname="crosscheck", name=name)
-        ElementTree.SubElement(test, "failure", type=kind, message=outcome.headline)
+        _failed(_failing(suites, "crosscheck"), "crosscheck", name, kind, outcome.headline)
     for element in suites.iter():  # XML cannot contain most control characters: they are spelled out
         element.attrib.update({key: printable(value) for key, value in element.attrib.items()})
     with whole_file(file) as beside:
         ElementTree.ElementTree(suites).write(beside, encoding="utf-8", xml_declaration=True)
+
+
+def _failing(suites: ElementTree.Element, name: str, count: int = 1) -> ElementTree.Element:
+    """A suite whose tests all fail."""
+    return ElementTree.SubElement(suites, "testsuite", name=name, tests=str(count), failures=str(count))
+
+
+def _failed(suite: ElementTree.Element, classname: str, name: str, kind: str, message: str) -> None:
+    test = ElementTree.SubElement(suite, "testcase", classname=classname, name=name)
+    ElementTree.SubElement(test, "failure", type=kind, message=message)
 
 
 def _not_judged(suite: ElementTree.Element, case: str, outcome: SessionOutcome) -> list[str]:
@@ -159,24 +163,19 @@ def _table(title: str, verdicts: list[Verdict], say: Callable[[Verdict], str]) -
         return []
     lines = ["", f"## {title}", "", "| case | comparison | channel | pair | what |", "|---|---|---|---|---|"]
     for verdict in verdicts[:SHOWN]:
-        cells = (_flat(verdict.case), _flat(verdict.comparison), _code(verdict.channel), _flat(verdict.pair))
-        lines.append(f"| {' | '.join(cells)} | {_flat(say(verdict))} |")
+        lines.append(f"| {' | '.join(_where(verdict))} | {_flat(say(verdict))} |")
     if len(verdicts) > SHOWN:
         lines += ["", f"... and {len(verdicts) - SHOWN} more, in verdicts.json."]
     return lines
 
 
 def _row(verdict: Verdict) -> str:
-    cells = (
-        _flat(verdict.case),
-        _flat(verdict.comparison),
-        _code(verdict.channel),
-        _flat(verdict.pair),
-        f"**{verdict.status}**",
-        verdict.expected,
-        _flat(verdict.reason),
-    )
-    return "| " + " | ".join(cells) + " |"
+    cells = *_where(verdict), f"**{verdict.status}**", verdict.expected, _flat(verdict.reason)
+    return f"| {' | '.join(cells)} |"
+
+
+def _where(verdict: Verdict) -> tuple[str, str, str, str]:
+    return _flat(verdict.case), _flat(verdict.comparison), _code(verdict.channel), _flat(verdict.pair)
 
 
 def _role(role: str) -> str:

@@ -4,7 +4,7 @@ No library has such a pool. The standard pools and loky fail as a whole when a p
 crash in C++, and have no time limits. Pebble (5.2) has time limits and survives dead workers, but it gives a job to any
 free worker (kernels would be compiled by every worker, and engines would share processes), returns one result a job
 (here every effort is recorded as it ends, so that a killed session loses nothing), limits no memory, and leaves the
-descendants of a worker alive. psutil measures and ends processes. """
+descendants of a worker alive. psutil measures and ends processes."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The interface of schedulers: they take jobs and yield events; the death of a worker costs only its job.
 
 `pool` runs jobs in processes of this machine, `dask_cluster` on those of a Dask cluster; `schedulers` selects one by
-its address. Cases, refinements, controls, stability maps and sweeps all run through this interface. """
+its address. Cases, refinements, controls, stability maps and sweeps all run through this interface."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 Each chosen coordinate or speed is disturbed by `SIZE` and integrated for some time. The disturbances at the end give
 the transition matrix of the linearised motion, up to SIZE^2 and to rounding over SIZE. Its eigenvalues are Floquet's
-multipliers if that time is a period. """
+multipliers if that time is a period."""
 
 from __future__ import annotations
 
@@ -63,4 +63,3 @@ def growth_rate(system: System, places: Sequence[int], time: float) -> float:
     """Largest real part (1/s) of the exponents of disturbances over `time` (s)."""
     multipliers = np.linalg.eigvals(transition_matrix(system, places, time))
     return float(np.log(np.max(np.abs(multipliers))) / time)
-

@@ -116,7 +116,7 @@ class StabilityMap:
     default stable and unstable, lie between the `thresholds` (increasing, one fewer). `depth` halvings are made where
     class or status changes. A cell that `failed` counts as class number `failure` in the comparison with the overlay;
     if `failure` is not given, every failed cell is wrong. With `skips`, cells that did not finish are no evidence.
-    `shows` is the text of the gallery. """
+    `shows` is the text of the gallery."""
 
     name: str
     title: str

@@ -122,5 +122,3 @@ def _groups(verdicts: Iterable[Verdict]) -> dict[tuple[str, ...], list[Verdict]]
     for verdict in verdicts:
         groups.setdefault((verdict.case, verdict.comparison, verdict.pair, verdict.status), []).append(verdict)
     return groups
-
-

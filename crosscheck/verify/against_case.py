@@ -54,7 +54,7 @@ class CsvOutcome(SessionOutcome):
     """The outcome of a CSV, with details by channel; `left_out` are columns that were not compared.
 
     `against` describes the reference, `interpolated` the interpolation of a CSV with its own times ("" if there is
-    none). """
+    none)."""
 
     details: dict[str, Detail] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()

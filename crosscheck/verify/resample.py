@@ -18,7 +18,7 @@ from flexmb.run.channels import distance
 from flexmb.typing import Real
 
 DEGREES = (5, 3)
-FEWEST = 8  # samples from which anything is interpolated
+FEWEST = 8  # fewest samples to interpolate from
 
 
 def resample(channels: Mapping[str, Real], given: Real, wanted: Real) -> tuple[dict[str, Real], dict[str, float]]:

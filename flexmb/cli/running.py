@@ -69,9 +69,7 @@ def simulate(
     """
     with no_traceback(strict):
         check_folder(out)
-        strange = [word for word in also or () if word not in FORMATS]
-        if strange:
-            raise ValueError(f"--also is one of {', '.join(FORMATS)}; got {strange[0]!r}")
+        _check_formats(also or ())
         wanted = _sections(scene, sections or ())
         settings = {
             "method": method, "t_start": from_time, "rtol": rtol, "atol": atol, "step": step, "samples": samples,
@@ -86,6 +84,12 @@ def simulate(
         raise typer.Exit(EXIT_INTERRUPTED)
     if not trajectory.finished:
         raise typer.Exit(EXIT_STOPPED)
+
+
+def _check_formats(words: Sequence[str]) -> None:
+    for word in words:
+        if word not in FORMATS:
+            raise ValueError(f"--also is one of {', '.join(FORMATS)}; got {word!r}")
 
 
 def _run(

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.library.find import load_case
 from crosscheck.library.reference import load_reference
+from crosscheck.references.tops import ACROSS, ALONG, HEIGHT, MARKERS, MASS
 from flexmb.typing import Real
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -120,14 +121,13 @@ def turning(inertia: Real, rotor: Real, weight: Real, start: Rotation, omega: Re
     [("lagrange", WITHIN), ("sleeping", WITHIN), ("falling_top", 12 * WITHIN)],
 )
 def test_heavy_tops(case: str, within: float) -> None:
-    m = closed_form(f"tops/{case}")
-    times = np.linspace(0.0, 0.5, 6)
-    inertia, start = np.array([m.ACROSS, m.ACROSS, m.ALONG]), Rotation.from_rotvec([m.LEAN, 0.0, 0.0])
+    top, times = closed_form(f"tops/{case}").TOP, np.linspace(0.0, 0.5, 6)
+    inertia, start = np.array([ACROSS, ACROSS, ALONG]), Rotation.from_rotvec([top.lean, 0.0, 0.0])
     attitudes = turning(
-        inertia, np.zeros(3), np.array([0.0, 0.0, m.MASS * m.HEIGHT]), start, np.array([0.0, 0.0, m.SPIN]), times
+        inertia, np.zeros(3), np.array([0.0, 0.0, MASS * HEIGHT]), start, np.array([0.0, 0.0, top.spin]), times
     )
-    found = m.exact(times)
-    for name, point in m.MARKERS.items():
+    found = top.exact(times)
+    for name, point in MARKERS.items():
         assert off(found[f"marker:{name}.position"], attitudes.apply(point)) < within
 
 

@@ -2,4 +2,5 @@
 
 from crosscheck.references.tops import HeavyTop
 
-exact = HeavyTop(spin=60.0, lean=0.8).exact
+TOP = HeavyTop(spin=60.0, lean=0.8)
+exact = TOP.exact

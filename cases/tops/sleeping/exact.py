@@ -2,4 +2,5 @@
 
 from crosscheck.references.tops import HeavyTop
 
-exact = HeavyTop(spin=140.0, lean=0.01).exact
+TOP = HeavyTop(spin=140.0, lean=0.01)
+exact = TOP.exact

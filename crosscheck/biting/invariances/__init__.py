@@ -1,4 +1,4 @@
-"""Changes of a scene that mean nothing: every result must come out the same, told in the other frame or unit."""
+"""Invariances: changes of a scene, such as of frames or units, under which all results must stay the same."""
 
 from crosscheck.biting.invariances.boosted import BOOSTED
 from crosscheck.biting.invariances.clock import CLOCK

@@ -1,4 +1,4 @@
-"""Seen from a frame in uniform motion: Galileo's invariance, of what flies freely."""
+"""Galilean invariance: free scenes in a uniformly moving frame."""
 
 from __future__ import annotations
 

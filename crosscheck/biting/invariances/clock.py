@@ -1,4 +1,4 @@
-"""The zero of the clock that functions of time are written on.
+"""A shift of the clock of functions of time.
 
 For any engine, as runs begin at t = 0 here: only what can be written on another clock all the same, a sine by whole
 turns of its phase, a ramp by its start. Runs that begin at another time are `later`.

@@ -1,4 +1,4 @@
-"""What an invariance is: another scene of the same motion, and how its channels are told as those of the first."""
+"""An invariance: another scene with the same motion, and the transformation of its channels to those of the first."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ AXIAL = (".angular_velocity", ".torque", ".angular")
 
 
 class NotApplicable(ValueError):
-    """The invariance says nothing about this scene; the message says why."""
+    """The invariance does not hold for this scene, for the reason in the message."""
 
 
 @dataclass(frozen=True)
 class Counterpart:
-    """A scene that moves like another. `back(times, channels)` tells its channels (T, k) as those of the other at the
-    other's `times` (T,); what it leaves out is not compared. Its clock shows `clock` times as much, and `starts_s` (s)
-    where the other's shows 0."""
+    """A scene that moves like another. `back(times, channels)` transforms its channels (T, k) to those of the other at
+    the other's `times` (T,); channels that it omits are not compared. Its clock is `clock` times as fast, and shows
+    `starts_s` (s) where the other's shows 0."""
 
     scene: Scene
     back: Callable[[Real, Channels], Channels]
@@ -35,7 +35,7 @@ class Counterpart:
 
 @dataclass(frozen=True)
 class Invariance:
-    """A change that means nothing. `of` makes a scene's counterpart, or raises `NotApplicable`."""
+    """An invariance. `of` makes a scene's counterpart, or raises `NotApplicable`."""
 
     name: str
     what: str
@@ -43,13 +43,13 @@ class Invariance:
 
 
 def without_feedback(scene: Scene) -> None:
-    """`NotApplicable` for a scene with controllers, which the invariance would have to tell in its own terms."""
+    """`NotApplicable` for a scene with controllers, which the invariance does not transform."""
     if scene.controllers:
         raise NotApplicable("the scene has controllers, which would have to be told in the other frame too")
 
 
 def without_events(scene: Scene) -> None:
-    """`NotApplicable` for a scene with events, whose levels the invariance would have to tell in its own terms."""
+    """`NotApplicable` for a scene with events, whose levels the invariance does not transform."""
     if scene.events:
         raise NotApplicable(f'event "{scene.events[0].name}" has a level, which is not told in other terms')
 
@@ -60,7 +60,7 @@ def by_kind(
     axial: Callable[[Real], Real],
     orientation: Callable[[Real], Real],
 ) -> Channels:
-    """Channels with their vectors and quaternions mapped, each after its kind; numbers as they are."""
+    """Channels with their vectors and quaternions mapped by kind, and scalars unchanged."""
 
     def mapped(name: str, values: Real) -> Real:
         if name.startswith(("drive:", "hinge_force:")):  # whatever it is called
@@ -103,7 +103,7 @@ def quaternion(values: Real) -> Quaternion:
 
 
 def total_mass(scene: Scene) -> float:
-    """Mass of everything (kg); `NotApplicable` where a body keeps it in a file."""
+    """The total mass (kg); `NotApplicable` if that of a body is in a file."""
     found = sum(wheel.mass_kg for wheel in scene.wheels) + sum(point.mass_kg for point in scene.point_masses)
     for body in scene.bodies:
         match body:

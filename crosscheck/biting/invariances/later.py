@@ -1,4 +1,4 @@
-"""Begun at another time: what depends on the time is shifted as far, and everything goes as it did.
+"""A run that begins at another time, with everything that depends on the time shifted equally.
 
 Functions of time, the instants of sampled controllers and events on time are shifted; what does not depend on the time
 must not notice. Laws of users are told the time: those of flexmb, which alone a case may name, make no use of it.

@@ -1,6 +1,6 @@
-"""Seen in a mirror: z against -z, everywhere. Positions and forces are reflected, rotations and torques the other way.
+"""Reflection of z: polar vectors such as positions and forces are reflected, axial ones with the opposite sign.
 
-Every frame of the scene is reflected and made right-handed again by the opposite z axis: what a mirror S shows of a
+Every frame of the scene is reflected and made right-handed again by the opposite z axis: the mirror image by S of a
 rotation R is S R S. A vector's components become S v where it is polar, -S v where it is axial.
 """
 
@@ -73,7 +73,7 @@ def _mirrored(scene: Scene) -> Counterpart:
 
 
 def _reflected(item: Any) -> Any:
-    """A struct and all structs in it as the mirror shows them."""
+    """The mirror image of a struct with all structs in it."""
     if isinstance(item, Hinge | PointMass):
         counted = zip(coordinates(item), _signs(item), strict=True)
         changed = [each if sign > 0.0 else _opposite(each) for (_, each), sign in counted]

@@ -1,4 +1,4 @@
-"""Everything declared in the opposite order: names, not places, say what belongs to what."""
+"""Everything declared in the opposite order, since references are by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The World turned, and the World moved: what stands on the ground with it, gravity and loads in World axes too."""
+"""Rotation and translation of the World, with everything on the ground, gravity and loads in World axes."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _moved(scene: Scene) -> Counterpart:
 
 
 def on_ground(scene: Scene, placed: Placed) -> Scene:
-    """The scene with the ends of hinges, closures and connectors on the ground placed elsewhere."""
+    """The scene with the ends of hinges, closures and connectors on the ground moved."""
     hinges = []
     for hinge in scene.hinges:
         if hinge.parent == GROUND:

@@ -1,4 +1,4 @@
-"""Other units of length, mass and time, by powers of two, which round nothing."""
+"""Other units of length, mass and time, by powers of two, which cause no rounding."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Dimension(NamedTuple):
 
     @property
     def factor(self) -> float:
-        """By which a number in the other units is larger."""
+        """The ratio of a number in the other units to that in SI."""
         return LENGTH**self.length * MASS**self.mass * TIME**self.time
 
 
@@ -58,7 +58,7 @@ Each = tuple[Any, ...]
 
 
 def _blocks(turning: Dimension, mixed: Dimension, moving: Dimension) -> Each:
-    """Of a (6,6) matrix by [rotation; translation]."""
+    """The dimensions of a (6,6) matrix by [rotation; translation]."""
     above, below = (turning,) * 3 + (mixed,) * 3, (mixed,) * 3 + (moving,) * 3
     return (above,) * 3 + (below,) * 3
 
@@ -143,7 +143,7 @@ def _drives(scene: Scene) -> dict[str, Any]:
 
 
 def _in_units(item: Any) -> Any:
-    """A struct with all its numbers in the other units, each by the unit in its key."""
+    """A struct with all numbers converted by the units in their keys."""
     return msgspec.structs.replace(
         item, **{key: _converted(getattr(item, key), _dimension(item, key)) for key in item.__struct_fields__}
     )

@@ -182,7 +182,7 @@ def _halved_at_jumps(function: Function) -> Callable[[float], float]:
     """The function, with the mean of both sides where it jumps inside a run.
 
     Fixed steps use only the values at their ends: with the mean, a jump at the end of a step does not reduce their
-    order. """
+    order."""
     f, jumps = profile(function), [t for t in breaks(function) if t > 0.0]
 
     def value(t: float) -> float:

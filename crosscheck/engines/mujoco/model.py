@@ -21,7 +21,7 @@ from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
-_INTEGRATORS = {  # by an effort's method: MuJoCo's number, and evaluations a step
+_INTEGRATORS = {  # method of an effort: MuJoCo's constant, evaluations per step
     "RK4": (mujoco.mjtIntegrator.mjINT_RK4, 4),
     "Euler": (mujoco.mjtIntegrator.mjINT_EULER, 1),
     "implicit": (mujoco.mjtIntegrator.mjINT_IMPLICIT, 1),

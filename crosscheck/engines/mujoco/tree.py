@@ -164,7 +164,7 @@ def _principal(inertia: Real) -> tuple[Real, Real]:
     moments, axes = np.linalg.eigh(inertia)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     moments = np.maximum(moments, LEAST_INERTIA)
-    # A disc's moments miss the triangle inequality by round-off, which the compiler does not forgive.
+    # A disc's moments miss the triangle inequality by round-off, and the compiler refuses it.
     moments[2] = min(moments[2], moments[0] + moments[1])
     return moments, axes
 

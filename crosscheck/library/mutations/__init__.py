@@ -1,7 +1,7 @@
 """The catalogue of mutations: deliberate faults of a scene that a comparison must notice.
 
-Each is what a convention error or a slip in the data would do; they stand in files by what they change. A mutation that
-leaves the scene as it was is refused, since a control that changes nothing cannot be noticed.
+Each represents an error of convention or a slip in the data; files group them by what they change. A mutation that
+does not change the scene is refused, since it cannot be noticed.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ CATALOGUE: dict[MutationKind, Mutation] = {
 
 
 def mutate(scene: Scene, mutation: MutationKind, target: str) -> Scene:
-    """The scene with one deliberate fault; CaseError where there is no such target or nothing would change."""
+    """The scene with one deliberate fault; CaseError if there is no such target or nothing would change."""
     changed = CATALOGUE[mutation].change(scene, target)
     if changed == scene:
         raise CaseError(f'control "{mutation}" of "{target}" changes nothing in scene "{scene.name}": choose another')
@@ -39,7 +39,7 @@ def mutate(scene: Scene, mutation: MutationKind, target: str) -> Scene:
 
 
 def applicable(scene: Scene, mutation: Mutation) -> list[MutationTarget]:
-    """The targets of a scene that the mutation can change, those among them that physics says nothing would show."""
+    """The targets of a scene that the mutation can change, including those without physical effect."""
     found = []
     for target in mutation.targets(scene):
         try:

@@ -1,4 +1,4 @@
-"""Mutations of connectors: of what springs, dampers and friction exert, and of where they are fixed."""
+"""Mutations of connectors: of the laws of springs, dampers and friction, and of their points of attachment."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PLACES = ("position_a", "position_b")
 
 
 def connectors(scene: Scene) -> Iterator[MutationTarget]:
-    """All of them; those that only pull or only push are kinds of their own."""
+    """All connectors; those that only pull or only push are separate kinds."""
     for each in scene.connectors:
         acts = getattr(each, "acts", "both")
         kind = str(each.__struct_config__.tag)
@@ -30,7 +30,7 @@ def connectors(scene: Scene) -> Iterator[MutationTarget]:
 
 
 def _scaled(stems: tuple[str, ...], factor: float) -> Callable[[Scene, str], Scene]:
-    """The numbers of a connector under keys that begin so, times a factor."""
+    """The numbers of a connector under keys with these stems, times a factor."""
 
     def changed(connector: Connector) -> Connector:
         keys = [key for key in connector.__struct_fields__ if split_unit(key)[0] in stems]

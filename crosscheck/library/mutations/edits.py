@@ -1,4 +1,4 @@
-"""How mutations reach into a scene: one named item replaced, and the targets that a scene offers."""
+"""Changes of scenes by mutations: replacing one named item, and listing the targets of a scene."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def on_event(scene: Scene, target: str, change: Callable[[SceneEvent], SceneEven
 
 
 def on_node(scene: Scene, target: str, change: Callable[[AnyNode], AnyNode]) -> Scene:
-    """Node "body.node" replaced (body names may hold dots, node names may not here)."""
+    """The scene with node "body.node" changed (only body names may contain dots here)."""
     body_name, _, node_name = target.rpartition(".")
 
     def with_node(body: Body) -> Body:
@@ -74,7 +74,7 @@ def on_node(scene: Scene, target: str, change: Callable[[AnyNode], AnyNode]) -> 
 
 
 def replaced(items: tuple[Named, ...], target: str, change: Callable[[Named], Named]) -> tuple[Named, ...]:
-    """The items with the one called `target` changed; CaseError names those there are."""
+    """The items with the one called `target` changed; CaseError lists the names."""
     if all(item.name != target for item in items):
         known = ", ".join(item.name for item in items) or "none"
         raise CaseError(f'control names "{target}", but there are only {known}')
@@ -126,12 +126,12 @@ def nodes(scene: Scene) -> Iterator[MutationTarget]:
 
 
 def scaled(values: tuple, factor: float = FACTOR) -> tuple:
-    """Numbers, in tuples however deep, multiplied."""
+    """Numbers in nested tuples, multiplied."""
     return tuple(scaled(value, factor) if isinstance(value, tuple) else factor * value for value in values)
 
 
 def multiplied(item: Struct, keys: Iterable[str], factor: float) -> Struct:
-    """A struct with its numbers under some keys multiplied, alone or in tuples; None stays."""
+    """A struct with its numbers under some keys, alone or in tuples, multiplied."""
 
     def times(value: Any) -> Any:
         if value is None:

@@ -1,4 +1,4 @@
-"""Mutations of events: of where they happen, and of what happens there."""
+"""Mutations of events: of their levels and directions, and of their actions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ OTHER_WAY = {"rising": "falling", "falling": "rising"}
 
 
 def events(scene: Scene) -> Iterator[MutationTarget]:
-    """All of them; one kind for each list of actions."""
+    """All events; one kind for each list of actions."""
     for each in scene.events:
         yield MutationTarget(each.name, "event: " + ", ".join(str(act.__struct_config__.tag) for act in each.actions))
 
@@ -31,7 +31,7 @@ def _of_actions(change: Callable[[Action], Action]) -> Callable[[Scene, str], Sc
 
 
 def _begins(scene: Scene, event: SceneEvent) -> float:
-    """What the event watches, at the start (m, rad, or a rate of these; s)."""
+    """The initial value of the event's quantity (m, rad, or a rate of these; s)."""
     name = watchable(scene)[event.watch]
     for wheel in scene.wheels:
         if name.removesuffix(".angle").removesuffix(".speed") == wheel.name:
@@ -53,7 +53,7 @@ def _level(scene: Scene, target: str) -> Scene:
 
 
 def _crossing(scene: Scene, target: str) -> Scene:
-    """The other way; of an event that happens either way, never on the way from where it begins."""
+    """The opposite direction; for an event of both directions the one opposite to its first crossing."""
 
     def changed(event: SceneEvent) -> SceneEvent:
         against = "falling" if _begins(scene, event) < event.level else "rising"

@@ -1,4 +1,4 @@
-"""Mutations of feedback: of controllers, of when they act, and of the sensors that they read."""
+"""Mutations of feedback: of controllers, of their sample times, and of sensors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from flexmb.scene.schema import Scene
 
 Keys = dict[type[Controller], tuple[str, ...]]
 GAINS: Keys = {Pid: ("kp", "ki", "kd"), StateSpace: ("C", "D"), GainTable: ("values",)}
-NUMBERS: Keys = {**GAINS, UserLaw: ("parameters",)}  # a law of one's own has no gains that others know of
+NUMBERS: Keys = {**GAINS, UserLaw: ("parameters",)}  # which parameters of a user's law are gains is unknown
 DYNAMICS: Keys = {Pid: ("filter_s", "tracking_s"), StateSpace: ("A",)}
 LIMITS: Keys = {Pid: ("lower", "upper"), Saturation: ("lower", "upper")}
 SETPOINT: Keys = {Pid: ("setpoint",)}
@@ -53,7 +53,7 @@ def _scaled(keys: Keys, factor: float) -> Callable[[Scene, str], Scene]:
 
 
 def _in_time(change: Callable[[Controller, float], dict[str, float]]) -> Callable[[Scene, str], Scene]:
-    """Other instants of a sampled controller, by its period (s)."""
+    """A change of a sampled controller's timing by a function of its period (s)."""
 
     def changed(controller: Controller) -> Controller:
         if controller.period_s is None:
@@ -64,7 +64,7 @@ def _in_time(change: Callable[[Controller, float], dict[str, float]]) -> Callabl
 
 
 def _sensor(scene: Scene, target: str) -> tuple[Sensor, int]:
-    """The sensor, and how many numbers it has."""
+    """The sensor and its number of outputs."""
     sensor = next((each for each in scene.sensors if each.name == target), None)
     width = None if sensor is None else sensor_width(scene, sensor)
     if sensor is None or width is None:
@@ -73,7 +73,7 @@ def _sensor(scene: Scene, target: str) -> tuple[Sensor, int]:
 
 
 def _reading(scene: Scene, target: str, instead: Callable[[int | None], tuple[str, ...]]) -> tuple[Controller, ...]:
-    """The controllers, with other signals in place of those of a sensor: of one of its numbers, or (None) of all."""
+    """The controllers with the signals of a sensor replaced: of one of its outputs, or (None) of all."""
 
     def signals(reference: str) -> tuple[str, ...]:
         found = named(reference)
@@ -95,7 +95,7 @@ def _sensor_frame(scene: Scene, target: str) -> Scene:
 
 
 def _sensor_sign(scene: Scene, target: str) -> Scene:
-    """By a state space without states behind the sensor, which acts when the first that reads it does."""
+    """Insert a state space without states behind the sensor, with the timing of the first controller that reads it."""
     sensor, width = _sensor(scene, target)
     orientation = isinstance(sensor, MarkerSensor) and sensor.quantity == "orientation"
     signs = CONJUGATE if orientation else (OPPOSITE,) * width

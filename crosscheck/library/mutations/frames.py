@@ -75,7 +75,7 @@ def _node_rotation(scene: Scene, target: str) -> Scene:
 def _node_position(scene: Scene, target: str) -> Scene:
     def moved(node: AnyNode) -> AnyNode:
         if isinstance(node, BeamNode):
-            return msgspec.structs.replace(node, x_m=LESS * node.x_m)  # inwards, where there is beam
+            return msgspec.structs.replace(node, x_m=LESS * node.x_m)  # inwards, where the beam is
         return msgspec.structs.replace(node, position_m=scaled(node.position_m))
 
     return on_node(scene, target, moved)

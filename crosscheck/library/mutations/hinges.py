@@ -1,4 +1,4 @@
-"""Mutations of hinges: their axes, springs and dampers, and the state in which they start."""
+"""Mutations of hinges: of their axes, springs and dampers, and of initial states."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _hinge_axis(scene: Scene, target: str) -> Scene:
 
 
 def _reversal_is_a_name(scene: Scene, target: str) -> str:
-    """Without anything that has a sign of its own, the sign of a coordinate is a name."""
+    """Reversing the sign of a coordinate has no effect if nothing depends on the sign."""
     hinge = next(hinge for hinge in scene.hinges if hinge.name == target)
     if any(getattr(each, "hinge", "") == target for each in scene.connectors):
         return ""

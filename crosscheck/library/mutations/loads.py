@@ -1,4 +1,4 @@
-"""Mutations of the loads that act from outside."""
+"""Mutations of external loads."""
 
 from __future__ import annotations
 

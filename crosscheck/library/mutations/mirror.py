@@ -1,4 +1,4 @@
-"""Scenes that are their own image in a mirror: what starts in the mirror's plane stays in it.
+"""Scenes that are symmetric under reflection: motion that starts in the plane of symmetry stays in it.
 
 The plane is normal to an axis that World and all frames of the scene share. Bodies move in the plane, turn about its
 normal only, and bend within it: of their inertia the part about the normal matters, and a torque along it is the same
@@ -22,14 +22,15 @@ KNOWN = frozenset(
 
 
 def mirrors(scene: Scene) -> tuple[int, ...]:
-    """The axes (0, 1, 2 for x, y, z) along which mirroring changes nothing; none where the rules cannot tell."""
+    """The axes (0, 1, 2 for x, y, z) of reflections under which the scene is symmetric, as far as the rules can
+    tell."""
     if not only_known(scene):
         return ()
     return tuple(axis for axis in AXES if _is_own_image(scene, axis))
 
 
 def only_known(scene: Scene) -> bool:
-    """Whether nothing acts in the scene but what rules of symmetry and rest know of."""
+    """Whether the scene contains only items that the rules of symmetry and rest cover."""
     return not any(getattr(scene, key) for key in scene.__struct_fields__ if key not in KNOWN)
 
 
@@ -39,7 +40,7 @@ def within(vector: Vector, axis: int) -> bool:
 
 
 def along(vector: Vector, axis: int) -> bool:
-    """Whether the vector has no other component."""
+    """Whether the vector has only a component along the axis."""
     return all(abs(vector[other]) <= EPS * max(map(abs, vector)) for other in AXES if other != axis)
 
 
@@ -138,5 +139,5 @@ def _turned(quaternion: Quaternion, axis: int) -> bool:
 
 
 def _inertia(matrix: Matrix3, axis: int) -> bool:
-    """Whether the axis is a principal one."""
+    """Whether the axis is a principal axis of inertia."""
     return along(matrix[axis], axis)

@@ -117,7 +117,7 @@ def _equally_stiff(scene: Scene, target: str) -> str:
 
 
 def _no_rotation(body: ModalBody) -> ModalBody:
-    """Slopes of the modes left out at the nodes."""
+    """The body without slopes of modes at its nodes."""
 
     def flat(node: ModalNode) -> ModalNode:
         return msgspec.structs.replace(node, rotation_modes=tuple((0.0, 0.0, 0.0) for _ in node.rotation_modes))

@@ -1,4 +1,4 @@
-"""What a mutation is: a deliberate fault of a scene, where it applies, and which slip it stands for."""
+"""A mutation: a deliberate fault of a scene, its targets, and the slip that it represents."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from crosscheck.library.case import MutationKind
 from flexmb.scene.schema import Scene
 
 FACTOR = 1.01
-LESS = 2.0 - FACTOR  # where more is not possible
+LESS = 2.0 - FACTOR  # for numbers that cannot be increased
 HUNDREDTH = 0.01
 DROPPED, OPPOSITE = 0.0, -1.0
 
 
 class MutationTarget(NamedTuple):
-    """Something of a scene that a mutation may change: its name, "" for the scene, and what kind of thing it is.
+    """An item that a mutation may change: its name, "" for the scene, and its kind.
 
-    Two targets of one kind are changed by the same lines of a code: a campaign tries one of each kind.
+    Codes treat targets of one kind alike: a campaign tries one of each kind.
     """
 
     name: str
@@ -33,9 +33,9 @@ def _never(scene: Scene, target: str) -> str:
 class Mutation:
     """One deliberate fault.
 
-    `what` it does and the `slip` that it stands for are shown to readers. `targets` are the candidates of a scene, of
-    which `change` refuses by CaseError those that cannot have the fault. `idle` says by which physics a change of the
-    data is no change of the motion, loads and energies, "" where it is one: such a mutant is none.
+    `what` it does and the `slip` that it represents are shown to readers. `targets` are the candidates of a scene, of
+    which `change` refuses by CaseError those that cannot have the fault. `idle` says why a change of the
+    data does not change motion, loads and energies, "" if it does: such a mutant does not count.
     """
 
     name: MutationKind

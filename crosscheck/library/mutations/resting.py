@@ -1,4 +1,4 @@
-"""Bodies whose mass centre stays where it is: without gravity their mass has no part in motion, loads or energies."""
+"""Bodies whose mass centre stays at rest: without gravity their mass does not affect motion, loads or energies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bodies that turn about one axis only, because all hinges that carry them are parallel, or by a mirror's symmetry.
+"""Bodies that turn about one axis only, because all hinges that carry them are parallel, or by symmetry.
 
 Of the inertia of such a body only J e matters, e its axis: moments are J e alpha + e x J e w^2. A torque along e is the
 same in World and in body axes.

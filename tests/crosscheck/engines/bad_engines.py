@@ -233,7 +233,7 @@ def _gallery() -> tuple[dict[str, Bad], dict[str, Bad]]:
         "raises": ("ZeroDivisionError", does(lambda: 1 / 0), {}),
         "exits": ("SystemExit: 0", throws(SystemExit(0)), {}),
         "raises_beyond_exceptions": ("Unusual", throws(Unusual()), {}),
-        "raises_what_cannot_be_told": ("Unspeakable: its text cannot be had", throws(Unspeakable()), {}),
+        "raises_what_cannot_be_told": ("Unspeakable: its message cannot be read", throws(Unspeakable()), {}),
         "raises_half_a_letter": ("\\udfff", throws(ValueError("\udfff")), {}),
         "recurses": ("RecursionError", does(recurse), {}),
         "has_no_memory": ("MemoryError", throws(MemoryError()), {}),

@@ -84,4 +84,3 @@ def test_numbers_that_are_none_must_be_named(run):
         checked_run(replace(found, undetermined=()), times, scene)
     with pytest.raises(BrokenContract, match="channels of loads and drives"):
         checked_run(replace(found, undetermined=("energy.kinetic",)), times, scene)
-

@@ -229,7 +229,7 @@ def test_accepted_figures_are_read_as_strictly(accepted: dict, said: str) -> Non
     ],
 )
 def test_the_reference_of_the_run_file_has_every_key(kind: type, heading: str) -> None:
-    reference = case_module.__doc__.split("Every key,")[1].split("``case_check.py``")[0]
+    reference = case_module.__doc__.split("All keys,")[1].split("``library/check``")[0]
     (item,) = [part for part in reference.split("\n- ") if part.startswith(heading)]
     tables = {"variant", "comparison", "control", "conservation", "chart", "reference"} if kind is RunFile else set()
     keys = {each.encode_name for each in msgspec.structs.fields(kind)} - tables

@@ -208,7 +208,7 @@ def test_errors_are_described_with_their_place_and_without_their_faults() -> Non
             raise ValueError
 
     assert describe(ValueError("why")) == "ValueError: why"
-    assert describe(Mute()) == "Mute: its text cannot be had"
+    assert describe(Mute()) == "Mute: its message cannot be read"
     assert describe(BrokenContract("so")) == "broke the contract: so"
     assert describe(BrokenContract("x" * LONGEST_TEXT)).endswith("(20 characters more)")
     assert describe(ValueError("x" * LONGEST_TEXT)).endswith("(12 characters more)")
