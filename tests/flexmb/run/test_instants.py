@@ -65,8 +65,15 @@ def check(run: fm.Trajectory, kind: str, start: float, instant: float, shown: li
     assert run.u[after, 0] == pytest.approx(speed[after], abs=1e-9)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("kind", KINDS)
+def pairs(kinds: Any, usual: str) -> list[Any]:
+    """Kinds and methods: by default all kinds by `dop853` and all methods with one kind, the others marked slow."""
+    return [
+        pytest.param(kind, method, marks=[] if method == "dop853" or kind == usual else pytest.mark.slow)
+        for kind, method in product(kinds, METHODS)
+    ]
+
+
+@pytest.mark.parametrize(("kind", "method"), pairs(KINDS, "rests"))
 def test_what_is_due_at_a_time_happens_once_wherever_in_a_run_it_lies(kind: str, method: Any) -> None:
     options, names = METHODS[method], ["it"]
     for start in (0.0, -1.25, 3.0) if method == "dop853" else (-1.25,):
@@ -214,8 +221,7 @@ def hopping(watch: str, kind: str) -> fm.Scene:
     return cart(floor, *items, gravity=G, position=1.0, force=force)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("kind", ["bounce", "change", "latch and release", "sampled"])
+@pytest.mark.parametrize(("kind", "method"), pairs(["bounce", "change", "latch and release", "sampled"], "change"))
 def test_a_run_that_is_taken_up_at_an_event_is_one_that_had_never_ended(kind: str, method: Any) -> None:
     """To the last bit: at each event, soon before and after it, at an instant of a controller, and twice."""
     watch, options = ("height[2]" if kind == "change" else WHERE), METHODS[method]

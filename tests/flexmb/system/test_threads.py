@@ -83,7 +83,7 @@ def test_ten_million_shared_calls():
     assert "in all 0 wrong of 10000000" in printed, printed
 
 
-@pytest.mark.parametrize("kernels", ["exact", "general"])
+@pytest.mark.parametrize("kernels", [pytest.param("exact", marks=pytest.mark.slow), "general"])  # 14 s to compile
 def test_the_first_calls_of_a_process_may_be_those_of_threads(kernels):
     assert first_word(program("first_calls", "shared", FLEXMB_KERNELS=kernels)) == "right"
 
