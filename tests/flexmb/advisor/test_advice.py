@@ -131,7 +131,8 @@ def test_a_tolerance_beyond_the_finest_models_is_refused() -> None:
     assert advise(bent, 2e-2, t_end=0.7).accepted
     advice = advise(bent, 1e-4, t_end=0.7)
     assert not advice.accepted
-    assert "not known to 0.0001" in advice.refusal and "second-order deflection, which none of its models has" in advice.refusal
+    assert "not known to 0.0001" in advice.refusal
+    assert "second-order deflection, which none of its models has" in advice.refusal
 
 
 def test_rigid_scenes_get_their_method() -> None:

@@ -35,7 +35,7 @@ WRONG = {
     "ending": (("import", "robot.step"), "is not a known kind of model"),
     "missing": (("import", "robot.urdf"), "No such file"),
     "mjcf and base": (("import", "robot.xml", "--free-base"), "are for URDF"),
-    "rigid": (("export", "scene.toml", "load", "--out", "b.sid"), "is not a flexible body of the scene; these are: rod"),
+    "rigid": (("export", "scene.toml", "load", "--out", "b.sid"), "not a flexible body of the scene; these are: rod"),
     "interface": (("reduce", "K.mtx", "M.mtx", "n.csv", "--interface", "a", "--out", "b.sid"), "numbers of nodes"),
     "out": (("reduce", "K.mtx", "M.mtx", "n.csv", "--interface", "1", "--out", "b.txt"), "neither a SID file"),
     "no matrix": (

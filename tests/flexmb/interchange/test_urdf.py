@@ -133,7 +133,10 @@ SINGLE = f'<robot name="r">{link("a", 1)}{link("b", 2)}{joint("j", "revolute", "
 BAD = {
     "mimic": (SINGLE.replace("<axis", '<mimic joint="k"/><axis'), 'joint "j": it mimics'),
     "kind": (SINGLE.replace('"revolute"', '"screw"'), 'its type is "screw"'),
-    "loop": (SINGLE.replace("</robot>", joint("k", "fixed", "b", "a", 2) + "</robot>"), "0 links are not the child of a joint"),
+    "loop": (
+        SINGLE.replace("</robot>", joint("k", "fixed", "b", "a", 2) + "</robot>"),
+        "0 links are not the child of a joint",
+    ),
     "two parents": (
         SINGLE.replace("</robot>", joint("k", "fixed", "a", "b", 2) + "</robot>"),
         'is also the child of "j"',
