@@ -25,7 +25,7 @@ from flexmb.spatial.spatial_vector import dot6, scale6, store6, sum6, times6
 from flexmb.spatial.vector import cross, dot, matmul, store3, sub, times_t, transpose
 from flexmb.tables.arrays import BUSHING
 
-LEAST_UPRIGHT = cos(0.5 * radians(170.0)) ** 2
+LEAST_UPRIGHT = cos(0.5 * radians(170.0)) ** 2  # the quaternion's scalar part is the cosine of half the angle
 
 
 @helper
@@ -47,6 +47,7 @@ def load_of_bushing(c, w, i, A, B):
     upright = q[0] * q[0]
     w.connector[i].upright = upright
     torque = inverse_right_jacobian_times(theta, b, g[0])
+    # Lanes cannot stop one copy alone: a copy beyond the limit goes on with a load of NaN.
     load = (kept(upright.real > LEAST_UPRIGHT, torque[0]), torque[1], torque[2]), g[1]
     store6(w.connector[i].load, 0, scale6(-1.0, times6(R_A, load)))
     store3(w.connector[i].arm, 0, arm)

@@ -44,6 +44,7 @@ def load_along_line(c, w, i, A, B):
 @helper
 def _while_loaded(acts, elastic, tension):
     """The tension of a one-sided connector: zero while it is slack, and where damping would reverse its sign."""
+    # `select` in place of `if`: in lanes each copy decides for itself. `.real` is the value of a dual number.
     if acts == TENSION:
         return select((elastic.real > 0.0) & (tension.real > 0.0), tension, 0.0)
     if acts == COMPRESSION:

@@ -285,7 +285,7 @@ class DenseSystem:
 
     def _seen(self, q: Real, u: Real, rates: Real) -> Instant:
         """The motion in the inertia forces: eta = etadot = 0 for ruthless bodies."""
-        u = u.copy()
+        u = u.copy()  # the rates stay: at the rest shape, too, inertia couples modal accelerations to the others
         for member in self.tree.members:
             if member.level == "ruthless":
                 u[member.u_modes] = 0.0

@@ -87,6 +87,7 @@ def _mass_and_bias(tree: DenseTree, k: int, eta: Real, etad: Real, w: Real) -> t
     """M and bias of first order at a state of the body: sums over its elements, evaluated at a complex step."""
     member, rotors = tree.members[k], [rotor for rotor in tree.rotors if rotor.member == k]
     model, m = member.model, member.model.mode_count
+    # A wheel's mass belongs to the body; its rotary inertia turns with the wheel's frame and is not truncated.
     mass = np.append(model.mass, [rotor.wheel.mass_kg for rotor in rotors])
     inertia = np.concatenate([model.inertia, np.zeros((len(rotors), 3, 3))])
     unit = np.eye(m + 6)
@@ -94,6 +95,7 @@ def _mass_and_bias(tree: DenseTree, k: int, eta: Real, etad: Real, w: Real) -> t
     turned = at.rotation.value[0] @ inertia @ np.swapaxes(at.rotation.value[0], -1, -2)
     L, W = at.position.rate, at.angular_velocity()
     M = np.einsum("p,ipa,jpa->ij", mass, L, L) + np.einsum("ipa,pab,jpb->ij", W, turned, W)
+    # eta and etad are of first order alike, hence i h with both; M (rates - g) has the accelerations, so none here.
     moving = _elements(tree, member, rotors, eta, 1j * STEP * etad[None], w[None], np.zeros((1, 3)))
     spin, turning = moving.angular_velocity()[0], moving.angular_acceleration()[0]
     torque = np.einsum("pab,pb->pa", turned, turning) + np.cross(spin, np.einsum("pab,pb->pa", turned, spin))
@@ -110,6 +112,7 @@ def _elements(
     q, u = np.zeros(tree.nq, complex), np.zeros((count, tree.nu), complex)
     q[member.q_modes], u[:, member.u_modes] = 1j * STEP * eta, etad
     motion = Motions(q, u, np.zeros_like(u))
+    # A body frame with constant w and without acceleration of its origin: R = 1, R' = w~, R'' = w~ w~.
     turn, none = skew(w)[:, None], np.zeros((count, 1, 3))
     body = MovingFrame(Jet(none, v[:, None], none), Jet(np.broadcast_to(np.eye(3), turn.shape), turn, turn @ turn))
     parts = [field(member, motion)]

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from flexmb.typing import Real
 
 TERMS = 24  # of the power series below: exact to round-off for |x| <= 2 pi
+# Series in x^2, because sin(x)/x has no derivative by the rotation vector that could be evaluated at x = 0.
 SERIES = np.zeros((TERMS, 2, 3))
 """sin(x)/x and (1 - cos(x))/x^2 as power series in x^2, and their first and second derivatives by x^2."""
 for _i in range(2):
@@ -161,6 +162,6 @@ def rotation_exponential(theta: Jet) -> Jet:
 def rotation_about(axis: ArrayLike, angle: Jet) -> Jet:
     """Rotation by a scalar angle about a unit vector: 1 + sin(angle) axis~ + (1 - cos(angle)) axis~^2."""
     cross = skew(np.asarray(axis, dtype=float))
-    s, c = np.sin(angle.value), np.cos(angle.value)
+    s, c = np.sin(angle.value), np.cos(angle.value)  # not the series: the angle may count many turns
     sine, versine = chain(s, c, -s, angle), chain(1.0 - c, s, c, angle)
     return constant(np.eye(3)) + scale(sine, constant(cross)) + scale(versine, constant(cross @ cross))

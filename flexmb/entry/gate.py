@@ -52,7 +52,7 @@ _making = RLock()
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(before=_making.acquire, after_in_parent=_making.release, after_in_child=_making.release)
 
-_LONG = 50  # number of speeds from which the kernel releases the interpreter's lock, which costs 50 ns
+_UNLOCKED_FROM = 50  # speeds: from so many on the kernel releases the interpreter's lock, which costs 50 ns
 
 
 @bundle
@@ -167,7 +167,7 @@ def _admitted(arguments, g):
 def _evaluated(arguments, g):
     """Whether the kernel returns OK."""
     t = value(word_at(arguments, 0))
-    if g.rates.shape[0] < _LONG:
+    if g.rates.shape[0] < _UNLOCKED_FROM:
         return _status(t, g) == OK
     thread = status_at(g.python[SAVE], ())
     status = _status(t, g)

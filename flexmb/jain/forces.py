@@ -14,7 +14,7 @@ from flexmb.tables.features import COUPLED_MODES, MODES
 def elastic_forces(c, w, k):
     """Add K eta + D etadot to z_f, with the true deformation also at level ruthless, whose inertia ignores it."""
     nm, q, u = c.body[k].modes, c.body[k].eta_index, c.body[k].etad_index
-    if not has(c, COUPLED_MODES) or c.body[k].uncoupled:
+    if not has(c, COUPLED_MODES) or c.body[k].uncoupled:  # K and D are diagonal, as of eigenmodes
         for n in range(nm):
             w.zf[k, n] += c.stiffness[k, n, n] * w.q[q + n] + c.damping[k, n, n] * w.u[u + n]
     else:

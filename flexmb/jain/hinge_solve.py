@@ -70,10 +70,12 @@ def eliminate(c, w, k):
         impose(c, w, k)
     P_R, z_R = about_hinge(c, w, k)
     P = load_inertia(P_R, 0)
+    # The bias acceleration a_m of O meets the inertia P_R, which the modes have left: z_R + P_R a_m.
     z = sum6(vec6(z_R, 0), inertia_times(P, vec6(w.body[k].bias, 0)))
     j = c.body[k].u_index
     if has(c, SEVERAL) and (c.body[k].axis < 0 or c.body[k].outboard_port >= 0 or c.speed[j].prescribed >= 0):
         return _eliminate_several(c, w, k, P, z)
+    # A single free axis is z of the hinge's axes: H selects one row, and no product with H is computed.
     row = ANGULAR_Z if turns(c, k) else LINEAR_Z
     PH = inertia_column(P, row)
     D = along(c, k, PH)
@@ -114,6 +116,7 @@ def _eliminate_several(c, w, k, P, z):
     if not cholesky(D, free):
         return False
     note_hinge(c, w, k, D, 0)
+    # With D_R = L L', forward substitution turns epsilon into L^-1 epsilon and P H' into P H' L'^-1 = G L.
     for a in range(free):
         for b in range(a):
             residual[a] -= D[a, b] * residual[b]
@@ -141,6 +144,7 @@ def accelerate(c, w, k, A):
         w.speed[j].acceleration = udot
         return move_along(c, k, moved, udot)
     D, G = w.hinge[k].factor, w.hinge[k].gain
+    # L' udot = L^-1 epsilon - (G L)' alpha^+, by back substitution from the last speed.
     for a in range(free - 1, -1, -1):
         udot = less6(w.hinge[k].residual[a], vec6(G[a], 0), A)
         for b in range(a + 1, free):

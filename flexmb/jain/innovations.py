@@ -65,6 +65,8 @@ def innovate(c, w, x, k):
             x.speed[j] = 0.0
     z = _force_at_hinge(c, w, x, k)
     start = c.body[k].etad_index
+    # `explicit` leaves D L' in pff, which multiplies D^-1 epsilon: `speed` is that first, and the roots of the pivots
+    # follow in a loop of their own.
     for n in range(c.body[k].modes):
         epsilon = x.speed[start + n] - x.zf[k, n]
         for i in range(n):

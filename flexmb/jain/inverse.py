@@ -37,6 +37,7 @@ def inverse_dynamics(c, w, tau):
         elastic_forces(c, w, k)
         node_loads(c, w, k)
         _inertial_force(c, w, k, tau)
+    # Connectors act on pairs of bodies: their loads are added when all bodies have forces, before any is passed inward.
     status = connect(c, w) if has(c, CONNECTORS) else OK
     for k in range(c.body.shape[0] - 1, -1, -1):
         _project_force(c, w, k, tau)

@@ -101,6 +101,7 @@ def _cross_hinge(c, w, k):
         V_rel, A_rel = catalogue.motion(c, kind, w.q, i, w.u, j, sequence, parameters, w.hinge[k].map)
         R, arm = matmul(R, R_hinge), add(arm, times(R, p_hinge))
         V, A = _carried(c, w, k, R, arm)
+        # V_rel has its components in turning axes, hence w x w_rel and w x v_rel; the latter counts twice (Coriolis).
         coriolis = cross(V[0], V_rel[0]), scale(2.0, cross(V[0], V_rel[1]))
         V, A = sum6(V, V_rel), sum6(sum6(A, coriolis), A_rel)
     store3(w.body[k].arm, 0, arm)

@@ -48,6 +48,7 @@ def _size(c, w, k):
 
     Both count, as magnitudes, so that what free wheels or level linear have subtracted from P is included.
     """
+    # Diagonals: of P at 0-2 (angular) and 15-17 (linear); of the body's own inertia at 4-6, and its mass at 0.
     P, own = w.body[k].inertia, c.body[k].rigid
     return (
         (sqrt(abs(P[0]) + own[4]), sqrt(abs(P[1]) + own[5]), sqrt(abs(P[2]) + own[6])),

@@ -24,9 +24,9 @@ from flexmb.motion.coordinates import hinge_forces
 from flexmb.tables.features import CONNECTORS, LOADS, MODES, WHEELS
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
 
-# Prefetch distance in bodies. The work on six bodies takes about as long as fetching a record from memory: a chain of
-# 100,000 bodies takes 169 ns a body in place of 308 without prefetching (measured).
-AHEAD = 6
+# In bodies. The work on six bodies takes about as long as fetching a record from memory: a chain of 100,000 bodies
+# takes 169 ns a body in place of 308 without prefetching (measured).
+PREFETCH_DISTANCE = 6
 
 
 @helper
@@ -80,7 +80,7 @@ def inward(c, w):
     """
     w.doubt[0] = 0
     for k in range(c.body.shape[0] - 1, -1, -1):
-        prefetch(w.body, k - AHEAD)
+        prefetch(w.body, k - PREFETCH_DISTANCE)
         sound = True
         if has(c, MODES):
             sound = eliminate_modes(c, w, k)

@@ -37,7 +37,7 @@ def wheel_forces(c, w, k):
         axial, axis = c.wheel[i].axial, spin_axis(c, w, i)
         gyroscopic = gyroscopic_torque(c, w, k, i, axis)
         f = c.speed[j].prescribed
-        if f >= 0:
+        if f >= 0:  # a driven wheel moves relative to the node as prescribed, so the body keeps its axial inertia
             torque = axpy(axial * w.function[f, 2], axis, gyroscopic)
         else:
             alpha, _ = port_bias(w, k, port)

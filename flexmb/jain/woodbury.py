@@ -32,6 +32,7 @@ def eliminate_modes(c, w, k):
         return False
     for i in range(c.body[k].nodes):
         _load_node(c, w, k, i)
+    # P_fr and P_rr are referred to O; the constants of (B4), from which D_f^-1 is computed, are about O already.
     if c.body[k].outboard_port >= 0:
         refer_coupling(c, w, k, -1.0)
         refer_rigid(c, w, k)

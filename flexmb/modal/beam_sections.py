@@ -51,7 +51,7 @@ def beam_sections(body: BeamBody, x: Real) -> BeamSections:
         columns = np.zeros((elements.size, 0))
     else:
         columns = beam_modes(elements, elements.stiffness(), elements.mass(stations, rigid_lumps), body.modes).columns
-    if body.mass == "consistent":
+    if body.mass == "consistent":  # no interval may contain a cut; the modes above stay those of the body in motion
         stations = inertia_stations(body, elements.mesh, table, cuts=x)
     points = points_of(body, elements, columns, stations, rigid_lumps)
     return BeamSections(

@@ -19,6 +19,7 @@ def eigenpairs(a: Real, b: Real) -> tuple[Real, Real]:
     _refuse_infinite(a)
     L = _factor(b)
     reduced = forward(L, forward(L, a).T)
+    # Rounding makes `reduced` slightly unsymmetric, and eigh reads one triangle only: average the two.
     values, columns = np.linalg.eigh((reduced + reduced.T) / 2.0)
     return values, np.linalg.solve(L.T, columns)
 

@@ -75,12 +75,13 @@ def massy_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:
     if not np.any(lump.inertia):
         return _massy(elements, columns, np.array([lump.x]), lump.com[None], np.array([lump.mass]))
     second_moment, axes = np.linalg.eigh(np.trace(lump.inertia) / 2.0 * np.eye(3) - lump.inertia)
-    floor = -8.0 * np.finfo(float).eps * np.trace(lump.inertia)
+    floor = -8.0 * np.finfo(float).eps * np.trace(lump.inertia)  # a flat lump has a zero eigenvalue, up to rounding
     if second_moment.min() < floor:
         raise ValueError(
             f"tip mass at x = {lump.x:g} m: impossible inertia (principal moments break the triangle inequality); "
             "check inertia_kg_m2"
         )
+    # Two of the six masses are on each axis: 2 (mass / 6) (3 s_k / mass) = s_k.
     arms = (axes * np.sqrt(3.0 * np.maximum(second_moment, 0.0) / lump.mass)).T
     offset = lump.com + np.concatenate([arms, -arms])
     return _massy(elements, columns, np.full(6, lump.x), offset, np.full(6, lump.mass / 6.0))

@@ -32,6 +32,7 @@ def with_equivalent_masses(model: FlexibleModel) -> FlexibleModel:
     m, count = model.mass[still], int(np.count_nonzero(still))
     if count == 0:
         return model
+    # Columns times sqrt(m): their scalar products are the integrals sum m a b, which an orthogonal map keeps.
     fields = [np.ones((count, 1)), model.position[still], model.translation[still].reshape(count, -1)]
     basis = _basis(np.concatenate(fields, axis=1) * np.sqrt(m)[:, None])
     if basis.shape[1] >= count:
@@ -63,7 +64,7 @@ def _basis(fields: Real) -> Real:
     """Orthonormal columns that span those of `fields` (points, n), each scaled to unit length first."""
     from scipy.linalg import qr  # slow to import, and only level stiffened needs it
 
-    size = np.linalg.norm(fields, axis=0)
+    size = np.linalg.norm(fields, axis=0)  # scaled columns make the test for rank independent of units and modal masses
     Q, R, _ = qr(fields[:, size > 0.0] / size[size > 0.0], mode="economic", pivoting=True)
     return np.asarray(Q[:, np.abs(np.diag(R)) > NEGLIGIBLE])
 

@@ -73,10 +73,12 @@ def _sums(model: FlexibleModel) -> FirstOrder:
     m, J, psi = model.mass, model.inertia, np.swapaxes(model.rotation, 1, 2)
     rho, u, a = _mass_centres(model)
     T = _turning(model)
+    # W_n = J_l(theta) psi_n = psi_n + 1/2 theta x psi_n + ...: its derivative by eta_k is half of `swirl`.
     swirl = np.cross(psi[:, :, None], psi[:, None])  # psi_k x psi_n  (p,k,n,3)
     spin = np.einsum("pab,pnb->pna", J, psi)  # J psi_n
     C1 = np.einsum("p,pkna->kna", m, np.cross(u[:, :, None], u[:, None]) + np.cross(rho[:, None, None], a))
     C1 += np.einsum("pkab,pnb->kna", T, psi) + 0.5 * np.einsum("pab,pknb->kna", J, swirl)
+    # Product rule for m u_n . u_i + W_n' J W_i: each velocity (the other one by symmetry in n and i), then the tensor.
     M1 = np.einsum("p,pkna,pia->kni", m, a, u, optimize=True)
     M1 += 0.5 * np.einsum("pkna,pia->kni", swirl, spin, optimize=True)
     M1 += np.swapaxes(M1, 1, 2) + np.einsum("pna,pkab,pib->kni", psi, T, psi, optimize=True)
@@ -121,6 +123,7 @@ def _inertia_curvature(model: FlexibleModel) -> Real:
     rho, u, a = _mass_centres(model)
     places = np.einsum("p,pna,pkb->nkab", model.mass, u, u, optimize=True)
     places += np.einsum("p,pa,pnkb->nkab", model.mass, rho, a, optimize=True)
+    # exp(theta~) J exp(-theta~) has the second-order part 1/2 (theta~^2 J + J theta~^2) - theta~ J theta~.
     psi, J = cross_matrix(np.swapaxes(model.rotation, 1, 2)), model.inertia
     twice = 0.5 * np.einsum("pnab,pkbc,pcd->nkad", psi, psi, J, optimize=True)
     across = 0.5 * np.einsum("pnab,pbc,pkcd->nkad", psi, J, psi, optimize=True)

@@ -79,7 +79,7 @@ class ModalIntegrals:
 
 def modal_integrals(model: FlexibleModel) -> ModalIntegrals:
     """All integrals of one flexible body."""
-    offset = np.any(model.com_offset != 0.0, axis=1)
+    offset = np.any(model.com_offset != 0.0, axis=1)  # such masses swing with their point: not polynomial in eta
     m = np.where(offset, 0.0, model.mass)
     r, phi = model.position, model.translation
     r_cross, phi_cross = cross_matrix(r), cross_matrix(np.swapaxes(phi, 1, 2))

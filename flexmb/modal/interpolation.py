@@ -48,7 +48,7 @@ def integrated_legendre(xi: Real, count: int) -> tuple[Real, Real]:
     """g_k(xi) = integral_0^xi P_k(2 t - 1) dt for k = 1..count, zero at 0 and 1, and dg_k/dxi; each (n, count)."""
     s = 2.0 * xi - 1.0
     p = legendre.legvander(s, count + 1)
-    k = np.arange(1, count + 1)
+    k = np.arange(1, count + 1)  # (2 k + 1) P_k = P'_(k+1) - P'_(k-1), and ds = 2 dxi
     return (p[:, 2:] - p[:, :-2]) / (2.0 * (2 * k + 1)), p[:, 1:-1]
 
 

@@ -46,10 +46,11 @@ def node_second_order(node: ModalNode) -> SecondOrder | None:
 def _affine(arrays: ModalArrays, Z: Real, X: Real) -> Real:
     """G (n,3,m,m), affine in the mass centres at rest p, with sum m G_a = Z_a and sum m p_b G_a = X_ab."""
     p = arrays.position + arrays.com_offset
-    size = np.max(np.abs(p), initial=0.0) or 1.0
+    size = np.max(np.abs(p), initial=0.0) or 1.0  # lengths in this unit make 1 and p comparable in `moments`
     rows = np.column_stack([np.ones(len(p)), p / size])
     moments = (rows.T * arrays.mass) @ rows
     wanted = np.concatenate([Z[:, None], X / size], axis=1)
+    # Points in a plane or on a line make `moments` singular: the pseudo-inverse leaves the slope across it at zero.
     parameters = np.einsum("bc,acnk->abnk", np.linalg.pinv(moments, rcond=_FLAT, hermitian=True), wanted)
     left = wanted - np.einsum("bc,acnk->abnk", moments, parameters)
     largest = np.max(np.abs(left[:, 1:]), axis=(2, 3))

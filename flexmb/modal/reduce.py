@@ -129,6 +129,7 @@ def _part(index: NDArray[np.intp], K: Real, M: Real, rigid: Real) -> _Coupled:
     MR = M @ rigid
     R = forward(np.linalg.cholesky(rigid.T @ MR), rigid.T).T
     deflation = M @ R @ R.T @ M
+    # The ratio of the traces gives rigid motions a stiffness of the size of the elastic ones: A is well conditioned.
     return _Coupled(index, R, K + np.trace(K) / np.trace(deflation) * deflation, M, M - deflation)
 
 
@@ -142,7 +143,7 @@ def _eigenmodes(part: _Coupled, count: int) -> list[tuple[float, Real]]:
     wanted = min(count, size)
     if wanted == 0:
         return []
-    compliance, columns = eigenpairs(part.M_elastic, part.A)
+    compliance, columns = eigenpairs(part.M_elastic, part.A)  # ascending: the low frequencies are at the end
     highest = slice(None, size - wanted - 1 if wanted < size else None, -1)
     return _mass_normalised(compliance[highest], columns[:, highest], part.M)
 
@@ -163,6 +164,7 @@ def _with_attachment(
     known = np.column_stack([part.rigid, *(column for _, column in eigenmodes)])
     for _ in range(2):  # "twice is enough" (Parlett): the second pass removes the rounding errors of the first
         static = static - known @ (known.T @ part.M @ static)
+    # Unit strain energy, so that deflections under forces and moments weigh alike whatever the units.
     static = static / np.sqrt(np.einsum("im,ij,jm->m", static, part.A, static))
     compliance, mix = eigenpairs(static.T @ part.M_elastic @ static, static.T @ part.A @ static)
     return eigenmodes + _mass_normalised(compliance[::-1], static @ mix[:, ::-1], part.M)

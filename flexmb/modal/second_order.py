@@ -33,6 +33,7 @@ def beam_second_order(elements: BeamElements, columns: Real, x: Real, offset: Re
     `columns` (size,m) are the modes. A point off the axis turns with its section, which adds
     theta_2 x o + 1/2 theta x (theta x o) to the displacement of the axis.
     """
+    # The integrals start at the root, so x = 0 is always among the places.
     where, place = np.unique(np.concatenate([[0.0], x]), return_inverse=True)
     axis = _axis(elements, columns, where).map(lambda G: G[place[1:]])
     theta = np.swapaxes(elements.motion(x, columns)[:, 3:], 1, 2)
@@ -66,6 +67,7 @@ def _integrals(elements: BeamElements, columns: Real, x: Real, weight: Real) -> 
 
 def _rates(elements: BeamElements, columns: Real, x: Real) -> tuple[Real, Real]:
     """For pairs of modes (n,m,m,3): theta_2', and u_2' without theta_2 x e_x."""
+    # The field is 1/2 eta' G eta: a term 1/2 a x b gives G the symmetric part of a x b, a term a x b twice that.
     theta = np.swapaxes(elements.motion(x, columns)[:, 3:], 1, 2)
     strain, curvature = (np.swapaxes(each, 1, 2) for each in elements.strain(x, columns))
     turning = _symmetric(np.cross(theta[:, :, None], curvature[:, None]))

@@ -75,7 +75,7 @@ def inertia_stations(
             np.bincount(element, values * (1.0 - xi), len(x)) + np.bincount(element + 1, values * xi, len(x))
             for values in (mass, inertia_y, inertia_z)
         )
-    kept = mass > 0.0
+    kept = mass > 0.0  # a point without mass would divide by zero in `section_points`
     return Stations(x[kept], mass[kept], inertia_y[kept], inertia_z[kept])
 
 
