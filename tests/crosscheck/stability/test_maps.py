@@ -23,10 +23,9 @@ from tests.crosscheck.sessions import here
 PROVIDER = "tests.crosscheck.stability.test_maps:coarse_maps"
 DECADES = {"gimbal_lock": 1.0}  # of a cell, where classes are narrower than two
 LARGEST = {"many_bodies": 150.0}  # largest value of x in these tests, where cells beyond it take long
-COSTLY = {  # a second and more: by default one map of each family
-    "integrator_flexmb_radau5", "integrator_exudyn_expliciteuler", "integrator_exudyn_rk44",
-    "integrator_exudyn_trapezoidalindex2", "integrator_exudyn_generalizedalpha", "integrator_mujoco_rk4",
-    "mass_ratio_frisch", "mass_ratio_composite", "closure_drift", "follower_force",
+COSTLY = {  # a second and more: by default one map for each scene and measure
+    "integrator_flexmb_radau5", "integrator_exudyn_expliciteuler", "integrator_exudyn_trapezoidalindex2",
+    "integrator_exudyn_generalizedalpha", "integrator_mujoco_rk4", "mass_ratio_frisch", "follower_force",
 }  # fmt: skip
 NAMES = tuple(stability_maps())
 WITHOUT_BOUNDARY = {name for name in NAMES if stability_maps()[name].overlay.name.startswith(("every", "no "))}
