@@ -64,11 +64,16 @@ class Method(NamedTuple):
 
 
 @helper
-def adaptive(method, problem, s, ends, clock, accuracy, out, counts, memory, watch):
-    """Integrate y' = f(t, y) from ends.y as told by `Integrator`: (status code, time of the last good state)."""
+def adaptive(method, problem, arrays, clock, out, run, memory, watch):
+    """Integrate y' = f(t, y) from ends.y as told by `Integrator`: (status code, time of the last good state).
+
+    arrays: s and `Ends`; run: accuracy and counts.
+    """
     attempt, accept, reject, after_leap, enter, recall, keep_more, state_at, exponent = method
     times, segment_ends, farthest = clock
-    y, samples, run = ends.y, (times, out), (accuracy, counts)
+    s, ends = arrays
+    accuracy, counts = run
+    y, samples = ends.y, (times, out)
     t = begin(problem, times, y, ends.y_new, memory, out, counts)
     known, kept = memory.numbers.copy(), False
     recall(memory, s, known, counts)

@@ -42,11 +42,16 @@ class FixedMethod(NamedTuple):
 
 
 @helper
-def equal_steps(method, problem, s, ends, clock, accuracy, out, counts, memory, watch):
-    """Integrate y' = f(t, y) from ends.y as told by `Integrator`: (status code, time of the last good state)."""
+def equal_steps(method, problem, arrays, clock, out, run, memory, watch):
+    """Integrate y' = f(t, y) from ends.y as told by `Integrator`: (status code, time of the last good state).
+
+    arrays: s and `Ends`; run: accuracy and counts.
+    """
     attempt, detour, accept, enter, recall, keep_more, state_at, looking = method
     times, segment_ends, _ = clock
-    y, samples, run = ends.y, (times, out), (accuracy, counts)
+    s, ends = arrays
+    accuracy, counts = run
+    y, samples = ends.y, (times, out)
     t = begin(problem, times, y, ends.y_new, memory, out, counts)
     known = memory.numbers.copy()
     recall(memory, s, known, accuracy, counts)

@@ -233,7 +233,7 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
         attempt, accept_by_error, reject_by_error, after_leap_by_error, enter_afresh, recall_nothing, keep_nothing,
         state_at, _ERROR_EXPONENT,
     )  # fmt: skip
-    return adaptive(method, problem, s, ends, clock, accuracy, out, counts, memory, watch)
+    return adaptive(method, problem, (s, ends), clock, out, (accuracy, counts), memory, watch)
 
 
 INTEGRATOR = Integrator(

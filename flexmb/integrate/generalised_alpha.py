@@ -263,7 +263,7 @@ def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
     ends = Ends(y, s.f, np.empty(n), s.f_new)
     looking = arrays(n, s.a, s.rate, s.f)
     method = FixedMethod(attempt, no_detour, accept, enter, recall, keep, inside, looking)
-    return equal_steps(method, problem, s, ends, clock, accuracy, out, counts, memory, watch)
+    return equal_steps(method, problem, (s, ends), clock, out, (accuracy, counts), memory, watch)
 
 
 INTEGRATOR = Integrator(

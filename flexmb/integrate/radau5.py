@@ -217,7 +217,7 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
     s = scratch(y.shape[0])
     ends = Ends(y, s.f, s.y_new, s.f_new)
     method = Method(attempt, accept, reject, after_leap, enter, recall, keep, state_at, _ERROR_EXPONENT)
-    return adaptive(method, problem, s, ends, clock, accuracy, out, counts, memory, watch)
+    return adaptive(method, problem, (s, ends), clock, out, (accuracy, counts), memory, watch)
 
 
 INTEGRATOR = Integrator(

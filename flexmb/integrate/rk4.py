@@ -136,7 +136,7 @@ def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
     k = np.empty((4, y.shape[0]))
     ends = Ends(y, k[0], np.empty(y.shape[0]), k[3])
     method = FixedMethod(attempt, detour, accept, enter, recall, keep, inside, k)
-    return equal_steps(method, problem, k, ends, clock, accuracy, out, counts, memory, watch)
+    return equal_steps(method, problem, (k, ends), clock, out, (accuracy, counts), memory, watch)
 
 
 INTEGRATOR = Integrator(

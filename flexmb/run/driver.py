@@ -46,7 +46,7 @@ CAN_GO_ON = (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED)
 """How a run ends that can be taken up."""
 
 
-class Instant(NamedTuple):
+class AfterEvents(NamedTuple):
     """After all that happens at one time: the state, and whether the run ends there by an event."""
 
     raw: Raw
@@ -133,7 +133,7 @@ class Driver:
 
     def _at_instant(
         self, raw: Raw, found: Sequence[SceneEvent], levels: Watch | None = None, early: float = 0.0
-    ) -> Instant:
+    ) -> AfterEvents:
         """All that happens at one time, in its order: events that are found, in that of the scene, then what stands on
         stops. Controllers that are due act where a run goes on, or is over.
         """
@@ -154,7 +154,7 @@ class Driver:
         self._agenda.take(self._situation.system.scene)  # rest on a stop adds an event
         self._sides.make_known(self._agenda.watched)
         ends = any(isinstance(action, EndRun) for event in (*arrived, *struck) for action in event.actions)
-        return Instant(raw, ends)
+        return AfterEvents(raw, ends)
 
     def _stand(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> list[SceneEvent]:
         """What stands on stops, see `flexmb.run.standing`; returns the events that happened."""
@@ -190,7 +190,7 @@ class Driver:
                         found.append(event)
         return found
 
-    def _over_after_events(self, instant: Instant) -> Trajectory:
+    def _over_after_events(self, instant: AfterEvents) -> Trajectory:
         """Over at the time of events: controllers that are due act after them, and so do events on what they say."""
         raw, ends = instant
         if any(each.period_s for each in self._situation.system.scene.controllers):
