@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flexmb import System
 from flexmb.entry import articulated
-from flexmb.jit.counting import _counting, _Interpreter
+from flexmb.jit.counting import Interpreter, _counting
 from flexmb.tables.state import State, pack
 
 BITS = np.finfo(np.longdouble).nmant
@@ -25,7 +25,7 @@ def accelerations(system: System, state: State) -> NDArray[np.longdouble]:
     c, w = system.constants, system.workspace()
     arguments = [_counting(each, np.longdouble) for each in (state.t, pack(state), c, w)]
     with np.errstate(all="ignore"):
-        status = _Interpreter(_Functions)(articulated.accelerations)(*arguments)
+        status = Interpreter(_Functions)(articulated.accelerations)(*arguments)
     if status != 0:
         raise ArithmeticError(f"status {status}")
     return np.array([speed.acceleration for speed in arguments[3].speed])

@@ -172,7 +172,7 @@ class _Reader:
         if not is_inside:
             self.line = line
             size = " x ".join(map(str, target.shape))
-            self._fail(f"{line.key}{line.indices} is no element of {name} ({size})", "correct its indices")
+            self._fail(f"{line.key}{line.indices} is not an element of {name} ({size})", "correct its indices")
         target[tuple(i - 1 for i in line.indices)] = value
 
     def _complete(self, found: dict[str, Taylor], expected: dict[str, tuple[int, int]], of: str) -> dict[str, Taylor]:

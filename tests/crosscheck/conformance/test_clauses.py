@@ -250,7 +250,7 @@ def at_many_samples(run: Trajectory) -> Trajectory:
 
 @pytest.fixture
 def nothing_kept(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(form, "PATIENCE_S", 0.1)  # what stays behind here stays for ever
+    monkeypatch.setattr(form, "CLEANUP_S", 0.1)  # what stays behind here stays for ever
     yield
     while KEPT:
         found = KEPT.pop()

@@ -181,5 +181,5 @@ def test_a_variant_of_pieces_is_refined_by_more_pieces() -> None:
     assert fine.bodies[0].level == "linear"
     assert [body.modes.count for body in coarse.bodies[:2]] == [1, 1]
     elsewhere = msgspec.structs.replace(variant, split_body="panel")
-    with pytest.raises(ValueError, match="no beam"):
+    with pytest.raises(ValueError, match="not a beam"):
         variant_scene(scene, elsewhere)
