@@ -84,11 +84,6 @@ def built(scene: Scene, model: Model) -> Scene:
     return scene
 
 
-def with_rung(model: Model, name: str, rung: BodyModel) -> Model:
-    """The same model with another rung for one body."""
-    return tuple((each, rung if each == name else own) for each, own in model)
-
-
 def rigid(scene: Scene, name: str) -> Scene:
     """The scene with that body at level "rigid" and without its modal state; nothing else changes."""
     bodies = tuple(replace(b, level="rigid") if b.name == name else b for b in scene.bodies)
