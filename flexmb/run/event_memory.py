@@ -84,8 +84,8 @@ def examined(memory: EventMemory, scene: Scene) -> EventMemory:
 
 
 def _items(scene: Scene) -> set[tuple[str, str, str]]:
-    """List, kind and name of a scene's items, which latches and changes of values keep. Sensors and events are left out,
-    because rest on a stop adds some."""
+    """List, kind and name of a scene's items, which latches and changes of values keep; without sensors and events,
+    because coming to rest on a stop adds some."""
     lists = {name: getattr(scene, name) for name in scene.__struct_fields__ if name not in ("sensors", "events")}
     return {
         (name, type(item).__name__, getattr(item, "name", ""))
