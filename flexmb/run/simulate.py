@@ -78,11 +78,11 @@ def simulate(
     closed, to 1e-13 of the mechanism's size. With a rate k (1/s) errors g of closures decay by g'' + 2 k g' + k^2 g = 0
     (Baumgarte), which costs less and leaves a drift; k times the step should stay below 1.
 
-    t_start (s): any finite time, at which functions of time start too; 0 or the state's own time if left out. state: a
-    `State`, such as `Trajectory.last_state`; or values of coordinates and speeds by name, all others being those of the
-    scene. Names are those in `Trajectory.q_names` and `u_names`, or a hinge, a wheel or "<body>.modes" for all its
-    coordinates, followed by ".speeds" for all its speeds; closed chains take the nearest state that closes their
-    closures. Or state is a `Restart`, from which a run of the same scene and method is resumed bit-identically.
+    t_start (s): any finite time, the argument of functions of time at the start; 0 or the state's own time if left out.
+    state: a `State`, such as `Trajectory.last_state`; or values of coordinates and speeds by name, all others being
+    those of the scene. Names are those in `Trajectory.q_names` and `u_names`, or a hinge, a wheel or "<body>.modes" for
+    all its coordinates, followed by ".speeds" for all its speeds; closed chains take the nearest state that closes
+    their closures. Or state is a `Restart`, from which a run of the same scene and method is resumed bit-identically.
 
     Warns (`SceneWarning`) of doubtful input. Raises SceneError for an invalid scene or one whose profiles end before
     t_end, NotImplementedError for one that is not supported yet, ValueError or TypeError for invalid settings, and
