@@ -119,7 +119,7 @@ def keep(memory, s):
 
 @handed_in
 def recall(memory, s, known, counts):
-    """The same of a run that is taken up, with factors made again; of another one that there is nothing."""
+    """Restore these for a resumed run and factorise again; in any other run the first step starts without them."""
     n = s.f.shape[0]
     if known[STEP_BEFORE] == 0.0 and known[FACTORED] == 0.0:
         known[ERROR_BEFORE], known[RENEW], known[FRESH] = 0.0, 1.0, 0.0
