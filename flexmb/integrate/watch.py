@@ -1,9 +1,9 @@
-"""Places where a run pauses: where an entry of the state, or a signal, comes to a level, in a step's dense output.
+"""Finds where an entry of the state, or a signal, reaches a level, in the dense output of a step; the run pauses there.
 
-A run pauses at the first of several levels that a step reaches. What is on another side of its level after a step has
-come to it. What is on the same side may have been beyond it in between: where it moves towards the level at the step's
-start and away from it at its end, its turning point is looked for. So what turns once within a step is seen; of what
-turns twice, the motion there and back between both turns is not.
+A run pauses at the first of the levels that a step reaches. A quantity whose side of its level differs between the ends
+of a step has reached the level. If the sides are equal, it may have crossed twice: where it moves towards the level at
+the start of the step and away from it at the end, its turning point is searched for. So crossings are found for a
+quantity with one turning point within a step, but may be missed between two turning points.
 
 An integrator says what a step is: `Ends`, and a helper `state_at(problem, step, ends, s, t, result, run)`, marked by
 `handed_on`, that puts the state at a time t (s) within it into `result` (n,) and returns a status code; s is whatever
@@ -27,13 +27,13 @@ from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
 CROSSED = -1  # returned in place of a status code: no end of the run
-UNKNOWN = 2  # a side that is for the first step to find
-RESTED = 2  # times the side from which something came that has been at its level for a step
+UNKNOWN = 2  # a side that the first step determines
+RESTED = 2  # factor on `came` for a quantity that has rested at its level for a step
 
-_FINEST = 2.0**-52  # of a step: instants within it are told apart no better
-_NEAR = 2.0**-13  # of a step: over so much of it rates are found as differences
-_NARROW = 2.0**-20  # of a step: a turning point that is found so well is found to rounding, as values are flat there
-_NOWHERE, _PASSES, _TURNS = range(3)  # what becomes of a level in a step
+_FINEST = 2.0**-52  # fraction of a step: resolution of times within it
+_NEAR = 2.0**-13  # fraction of a step over which rates are computed as differences
+_NARROW = 2.0**-20  # fraction of a step: accuracy of a turning point, where values are flat and then exact to rounding
+_NOWHERE, _PASSES, _TURNS = range(3)  # relation of a quantity to its level in a step
 
 
 class Watch(NamedTuple):
