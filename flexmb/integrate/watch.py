@@ -113,7 +113,7 @@ def _side(value, still):
 
 @helper
 def _first_side(value, change, still):
-    """The same where nothing is known yet; what is at zero is on the side to which it moves within a step."""
+    """The side of a value in the first step; a value at zero is on the side to which it moves within the step."""
     side = _side(value, still)
     return _side(change, still) if side == 0 else side
 
@@ -126,7 +126,7 @@ def _has_jumped(side, value, still):
 
 @helper
 def keep_sides(watch):
-    """Beside `flexmb.integrate.memory.keep`."""
+    """Save the sides, together with `flexmb.integrate.memory.keep`."""
     watch.kept[0] = 1
     for i in range(watch.entry.shape[0]):
         watch.kept_side[i], watch.kept_came[i] = watch.side[i], watch.came[i]
@@ -167,7 +167,7 @@ def _rates(problem, watch, t, y, dy, ahead, trial):
 
 @sweep
 def meets(problem, watch, step, ends):
-    """Whether a step may come to a level: (status, whether). If it does not, sides are those of its end."""
+    """Whether a step may reach a level: (status, whether). If it does not, sides are updated to those at its end."""
     h, count, trial = step.end - step.start, watch.entry.shape[0], np.empty(ends.y.shape[0])
     status = _rates(problem, watch, step.start, ends.y, ends.dy, _NEAR * h, trial)
     before, begun = watch.rate.copy(), watch.value.copy()
@@ -202,7 +202,7 @@ def meets(problem, watch, step, ends):
 def _leave(watch, i, change, value):
     """The side on which i leaves its level, by its change in the first step or, from rest, that from which it came.
 
-    What drifts beyond the level from rest comes to it again, also where it rests for a step before it does.
+    A quantity that drifts past the level from rest reaches it again, even if it has rested there for a step before.
     """
     came = watch.came[i]
     side = 1 if came > 0 else -1
@@ -263,8 +263,8 @@ def end_at_crossing(within, times, out):
 def pause(problem, watch, step, ends, state_at, s, samples, run):
     """ends.y at the first level that a step comes to: (CROSSED, the time); or the status of what fails, and the start.
 
-    Where it comes to none: OK, and its end if it was looked into, else its start. samples: times of samples, and
-    samples; run: accuracy and counts.
+    If it reaches none: OK, and its end if it was searched, else its start. samples: times of samples, and samples; run:
+    accuracy and counts.
     """
     status, some = meets(problem, watch, step, ends)
     if status != OK or not some:
@@ -291,10 +291,11 @@ def _value_at(within, i, t):
 
 @sweep
 def _beyond(within, i):
-    """Between which times what turns within a step comes to its level: (status, low, high); high is inf if it does not.
+    """A bracket of the time at which a quantity with a turning point reaches its level: (status, low, high); high is
+    inf if it does not.
 
-    The turning point is bracketed by the sign of differences. Where the level is not crossed in the way that counts, it
-    is on the way back: then the side is that beyond the level from now on.
+    The turning point is bracketed by the sign of differences. If only the crossing on the way back is in the direction
+    that counts, the side is set to that beyond the level.
     """
     watch, low, high = within.watch, within.step.start, within.step.end
     least = 4.0 * (np.nextafter(high, math.inf) - high)  # between times that rounding tells apart
@@ -322,10 +323,10 @@ def _beyond(within, i):
 
 @sweep
 def _arrival(within, i, low, high):
-    """When i comes to its level between two times, to rounding: (status, time).
+    """The time between two others at which i reaches its level, to rounding: (status, time).
 
-    By the regula falsi of Illinois; every third time, and where the step starts at the level, by halving. Beside time 0
-    floats are dense without end: there the rounding is that of the step, for one of 1e-323 s leads nowhere.
+    By the Illinois variant of the regula falsi, with a bisection every third time and where the step starts at the
+    level. Near time 0, where ulp(t) becomes arbitrarily small, the resolution is that of the step's length.
     """
     side, last_side, count = within.watch.side[i], 0, 0
     finest = _FINEST * (within.step.end - within.step.start)
