@@ -1,9 +1,9 @@
-"""The loop of the methods that adapt their steps: a run from segment to segment and from step to step.
+"""The loop over segments and steps of the methods that adapt their steps.
 
-A step that is accepted ends in this order: it is looked into for levels that are watched, its samples are stored, and
-its end becomes the last good state. A step whose right-hand side fails is tried again, shorter: it may only have
-reached too far. Near a singular position of a closed chain, where no shorter step helps, the run leaps
-(`flexmb.integrate.leap`). When a step gets too short to advance time, the run ends with the status of what failed.
+When a step is accepted, it is first searched for crossings of watched levels, then its samples are stored, then its end
+becomes the last good state. A step whose right-hand side fails is repeated with a smaller size, which may suffice. Near
+a singular position of a closed chain, where no smaller step succeeds, the run leaps (`flexmb.integrate.leap`). When a
+step becomes too short to advance time, the run ends with the status of the failure.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ from flexmb.tables.status import OK, STEP_TOO_SMALL
 
 
 class Method(NamedTuple):
-    """What a method brings to the loop. `known` (NUMBERS,) are the numbers of `flexmb.integrate.memory.Memory` as they
-    are before a step, s are arrays of the method, and all functions but `state_at` are marked by `handed_in`:
+    """The functions of a method that the loop calls. `known` (NUMBERS,) holds the numbers of
+    `flexmb.integrate.memory.Memory` before a step, s the arrays of the method. All functions except `state_at` are
+    marked by `handed_in`:
 
     attempt(problem, step, ends, s, known, accuracy, counts) -> (status code, verdict) tries a step: its end, projected,
     goes into ends.y_new and, where the step is accepted, the slope there into ends.dy_new. verdict: a tuple whose first
     entry is the error norm, 1 being just acceptable.
-    accept(step, cut, verdict, s, known, exponent) puts the next step into known[STEP]; `cut`: the step ends with its
-    segment.
+    accept(step, cut, verdict, s, known, exponent) puts the size of the next step into known[STEP]; `cut`: the step ends
+    with its segment.
     reject(step, status, verdict, s, known, exponent) does so after a step that failed or had too large an error.
     after_leap(length, cut, known, exponent) does so after a leap of this length (s).
-    enter(known) forgets what does not hold across the end of a segment.
-    recall(memory, s, known, counts) and keep(memory, s) read and write what else the method keeps for a run that is
-    taken up.
+    enter(known) discards what is not valid across the end of a segment.
+    recall(memory, s, known, counts) and keep(memory, s) read and write all else that the method needs to resume a run.
     state_at: see `flexmb.integrate.watch`.
     exponent: the error estimate is O(h^exponent).
     """
@@ -65,7 +65,7 @@ class Method(NamedTuple):
 
 @helper
 def adaptive(method, problem, arrays, clock, out, run, memory, watch):
-    """Integrate y' = f(t, y) from ends.y as told by `Integrator`: (status code, time of the last good state).
+    """Integrate y' = f(t, y) from ends.y as described in `Integrator`: (status code, time of the last good state).
 
     arrays: s and `Ends`; run: accuracy and counts.
     """
@@ -131,7 +131,7 @@ def adaptive(method, problem, arrays, clock, out, run, memory, watch):
 
 @handed_in
 def accept_by_error(step, cut, verdict, s, known, exponent):
-    """The next step by the error of this one and of the one before, for methods that know nothing else."""
+    """Size of the next step from the errors of this step and the one before."""
     length, error = step.end - step.start, verdict[0]
     factor = step_factor(error, known[ERROR_BEFORE], exponent, known[RETRIED] != 0.0)
     known[STEP] = next_step(known[STEP], length, factor, cut)
@@ -140,7 +140,7 @@ def accept_by_error(step, cut, verdict, s, known, exponent):
 
 @handed_in
 def reject_by_error(step, status, verdict, s, known, exponent):
-    """The next trial after a step that failed, or whose error was too large."""
+    """Size of the next trial after a step that failed or whose error was too large."""
     length = step.end - step.start
     known[STEP] = length * (shorter(verdict[0], exponent) if status == OK else retreat(status))
     known[RETRIED] = 1.0
@@ -148,7 +148,7 @@ def reject_by_error(step, status, verdict, s, known, exponent):
 
 @handed_in
 def after_leap_by_error(length, cut, known, exponent):
-    """The next step after a leap, as after a step of the same length with a small error."""
+    """Size of the next step after a leap, as after a step of the same length with a small error."""
     factor = step_factor(CALM, known[ERROR_BEFORE], exponent, known[RETRIED] != 0.0)
     known[STEP] = next_step(known[STEP], length, factor, cut)
     known[ERROR_BEFORE], known[RETRIED] = CALM, 0.0
@@ -156,15 +156,15 @@ def after_leap_by_error(length, cut, known, exponent):
 
 @handed_in
 def enter_afresh(known):
-    """A new segment: no step of it has been rejected."""
+    """Start a new segment, in which no step has been rejected."""
     known[RETRIED] = 0.0
 
 
 @handed_in
 def recall_nothing(memory, s, known, counts):
-    """Of a method that keeps nothing but the numbers of a `Memory`."""
+    """For methods whose only memory is the numbers of `Memory`."""
 
 
 @handed_in
 def keep_nothing(memory, s):
-    """Likewise."""
+    """For methods whose only memory is the numbers of `Memory`."""

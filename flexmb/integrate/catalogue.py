@@ -9,9 +9,9 @@ from flexmb.tables import arguments
 INTEGRATORS: dict[str, Integrator] = {
     module.INTEGRATOR.name: module.INTEGRATOR for module in (dop853, rk4, radau5, exponential, generalised_alpha)
 }
-"""By name."""
+"""All integrators by name."""
 
 
 def integrator(name: str) -> Integrator:
-    """The integrator of that name; ValueError for an unknown name."""
+    """The integrator with this name; ValueError for an unknown name."""
     return INTEGRATORS[arguments.one_of("method", name, INTEGRATORS)]

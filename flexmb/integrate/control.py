@@ -1,4 +1,4 @@
-"""Common parts of all runs: derivatives that are checked, error scale, first step, change of step, stretches of steps.
+"""Common parts of all integrators: checked derivatives, error norm, first step, step-size control, equal steps.
 
 The last components of a state y (n,) may be pure quadratures: only the first `controlled` ones enter a norm (see
 `Accuracy`).
@@ -17,18 +17,18 @@ from flexmb.tables.status import INTERRUPTED, MAX_STEPS, NONFINITE, NOT_CONVERGE
 SAFETY = 0.9
 SHRINK = 0.2  # strongest change of step after a rejection ...
 GROW = 10.0  # ... and after an acceptance
-# Share of the error before in the choice of a step, beta of Hairer, Norsett, Wanner II, IV.2.
+# Exponent of the previous error in the step-size controller: beta of Hairer, Norsett, Wanner II, IV.2.
 DAMPING = 0.04
-CALM = 1e-4  # the least error before that counts, and what stands for it where no step went before
-RETREAT = 0.1  # change of step where the right-hand side could not be evaluated at all
-HALVED = 0.5  # change of step where an iteration did not converge
-# A fixed step may exceed the one asked for by this fraction: 0.1 s in steps of 0.01 s are 10, whatever 0.1/0.01 rounds
-# to.
+CALM = 1e-4  # lower bound of the previous error in the controller, and its value before the first step
+RETREAT = 0.1  # factor on the step after a right-hand side that could not be evaluated
+HALVED = 0.5  # factor on the step after an iteration that did not converge
+# A fixed step may exceed the one requested by this fraction, so that 0.1 s is divided into 10 steps of 0.01 s however
+# 0.1 / 0.01 is rounded.
 _STEP_SLACK = 1e-9
-_ADVANCING = 1e3  # roundings of time: a first step is not shorter, whatever is guessed from a state at rest
+_ADVANCING = 1e3  # lower bound of the first step in ulp(t), because a guess from a state at rest may be too short
 
 # Entries of `counts`: evaluations, steps, samples stored, Jacobians, and factorisations or exponentials of a matrix.
-# STOP is not a count: another thread sets it during a run, and the run then ends.
+# STOP is not a count: another thread sets it during a run to end the run.
 EVALUATIONS, ACCEPTED, REJECTED, SAMPLES, STOP, JACOBIANS, FACTORISATIONS = range(7)
 COUNTS = 7  # their number: length of `counts`
 
@@ -43,7 +43,7 @@ class Interval(NamedTuple):
 
 @helper
 def copy(source, target):
-    """target = source. A slice assignment would compile a message about shapes as well: 3 s, most of the whole."""
+    """target = source. A slice assignment would also compile its error message about shapes, which takes 3 s."""
     for i in range(target.shape[0]):
         target[i] = source[i]
 
@@ -59,7 +59,7 @@ def all_finite(values):
 
 @written_out
 def derivative(problem, t, y, dy, counts):
-    """dy = f(t, y); returns a status code, which is never OK for a derivative that is not finite."""
+    """dy = f(t, y); returns a status code, which is not OK if the derivative is not finite."""
     counts[EVALUATIONS] += 1
     status = problem.rhs(t, y, dy, problem.constants, problem.workspace)
     if status == OK and not all_finite(dy):
@@ -71,7 +71,7 @@ def derivative(problem, t, y, dy, counts):
 def scaled_norm(values, y, accuracy):
     """Root mean square of values_i / (atol + rtol |y_i|) over the controlled components; 0 where there are none."""
     if accuracy.controlled == 0:
-        return 0.0  # nothing moves freely
+        return 0.0  # there are no degrees of freedom
     total = 0.0
     for i in range(accuracy.controlled):
         ratio = values[i] / (accuracy.atol + accuracy.rtol * abs(y[i]))
@@ -87,11 +87,11 @@ def shorter(error, exponent):
 
 @helper
 def step_factor(error, error_before, exponent, rejected_before):
-    """New step over old after a step that was accepted, from its error norm and that of the one accepted before.
+    """New step over old after an accepted step, from its error norm and that of the previous accepted step.
 
-    Hairer, Norsett, Wanner II, IV.2: where stability bounds the step, a choice by the last error alone swings between
-    steps that let the fastest modes grow and rejections; what they grow to is seen in loads. A step that follows a
-    rejection does not grow (I, II.4).
+    Hairer, Norsett, Wanner II, IV.2: where stability bounds the step, control by the last error alone alternates
+    between steps in which the fastest modes grow and rejections, and the growth is visible in loads. The step after a
+    rejected one does not grow (I, II.4).
     """
     if error == 0.0:
         factor = GROW
@@ -123,7 +123,7 @@ def initial_step(problem, segment, y, dy, accuracy, exponent, counts):
 
 @helper
 def enter_segment(problem, segment, y, dy, h, accuracy, exponent, counts):
-    """dy = f(t, y), afresh, for it may jump where a segment ends; returns a status code, and h, the first one for 0."""
+    """dy = f(t, y) at the start of a segment, where f may jump; returns (status code, h, or a first step if h = 0)."""
     status = derivative(problem, segment.start, y, dy, counts)
     if status == OK and h == 0.0:
         h = initial_step(problem, segment, y, dy, accuracy, exponent, counts)
@@ -132,7 +132,7 @@ def enter_segment(problem, segment, y, dy, h, accuracy, exponent, counts):
 
 @helper
 def permitted(max_steps, counts):
-    """OK where one more step may be made, or why not."""
+    """OK if another step is permitted, otherwise the status code that says why not."""
     if counts[STOP] != 0:
         return INTERRUPTED
     return MAX_STEPS if counts[ACCEPTED] + counts[REJECTED] >= max_steps else OK
@@ -140,10 +140,10 @@ def permitted(max_steps, counts):
 
 @helper
 def step_end(t, h, end, trouble, max_steps, counts):
-    """Where a step of size h ends, after a status code: OK, or why there is no further step.
+    """(status code, end of a step of size h). The status is OK, or says why there is no further step.
 
-    There may have been too many, or it is too short to advance time, unless it is to the end of a segment: that may be
-    as short as the rounding of time. No sliver of a step is left before it.
+    Either there were too many steps, or this one is too short to advance time. Only a step to the end of a segment may
+    be as short as the rounding of time. A step is extended by 1 % if it then reaches the end of the segment.
     """
     status, reaches = permitted(max_steps, counts), t + 1.01 * h >= end
     if status == OK and not reaches and h < 10.0 * (np.nextafter(t, math.inf) - t):
@@ -153,22 +153,22 @@ def step_end(t, h, end, trouble, max_steps, counts):
 
 @helper
 def next_step(h, length, factor, cut):
-    """Step after one of this length that was accepted; h was proposed for it, `cut`: the segment's end cut it short.
+    """Size of the step after an accepted one of this length. h was proposed for it; `cut`: it ends with its segment.
 
-    That says nothing against the longer one that was proposed.
+    A step that the end of its segment cut short does not reduce the size that was proposed.
     """
     return max(h, length * factor) if cut and factor >= 1.0 else length * factor
 
 
 @helper
 def retreat(status):
-    """New step over old where a trial did not come to an error estimate."""
+    """New step over old after a trial that failed before its error was estimated."""
     return HALVED if status == NOT_CONVERGED else RETREAT
 
 
 @helper
 def reason(status):
-    """What a step that gets too short reports: the failure that shortened it, or that steps do."""
+    """The status code if the step becomes too short: the failure that shortened it, else STEP_TOO_SMALL."""
     return STEP_TOO_SMALL if status in (OK, NOT_CONVERGED) else status
 
 
@@ -176,7 +176,7 @@ def reason(status):
 def stretch(t, sample, segment_end, step):
     """Equal steps from t to the next sample or segment end: (its time, their number, their size, last time before it).
 
-    Stages at the end of a segment see the right-hand side's limit from the left, at the time returned last.
+    Stages at the end of a segment use the right-hand side's limit from the left, at the last of the returned times.
     """
     end = min(sample, segment_end)
     steps = max(1, math.ceil((end - t) / step * (1.0 - _STEP_SLACK)))

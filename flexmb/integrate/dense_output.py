@@ -1,4 +1,4 @@
-"""Samples within a step, by the dense output of the method that made it."""
+"""Samples within a step, by the dense output of the method."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from flexmb.tables.status import OK
 def store_samples(problem, step, ends, state_at, s, samples, run):
     """Store the samples in a step, its end included; returns a status code.
 
-    `state_at` is the method's, as `flexmb.integrate.watch` asks for it. samples: (times, states); run: accuracy and
-    counts.
+    `state_at` is the method's function described in `flexmb.integrate.watch`. samples: (times, states); run: accuracy
+    and counts.
     """
     times, out = samples
     _, counts = run

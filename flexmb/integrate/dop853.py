@@ -1,8 +1,9 @@
 """DOP853: Runge-Kutta of order 8 with error control and dense output of order 7.
 
-Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (1993), II.5 and II.10. A step ends in this order:
-error test, projection of the new state, derivative at the projected state. That derivative is the first stage of the
-next step and belongs to the interpolant: both are consistent with the projected state, and projection costs no order.
+Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (1993), II.5 and II.10. After the stages of a step
+follow the error test, the projection of the new state, and the derivative at the projected state. This derivative is
+the first stage of the next step and enters the interpolant, so both are consistent with the projected state, and the
+projection does not reduce the order.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ from flexmb.tables.status import NONFINITE, OK
 
 
 class ExplicitStages(NamedTuple):
-    """Slopes k (STAGES_DENSE,n) of a step, coefficients f (7,n) of its interpolant, whether these are found (1,)."""
+    """Slopes k (STAGES_DENSE,n) of a step, coefficients f (7,n) of its interpolant, whether these are known (1,)."""
 
     k: np.ndarray
     f: np.ndarray
@@ -49,7 +50,7 @@ class ExplicitStages(NamedTuple):
 
 @helper
 def stages(problem, step, y, k, trial, counts):
-    """Stages 1 to 11 (stage 0 is given), then trial = y(step.end); a status code. No stage is later than step.last."""
+    """Stages 1 to 11 (stage 0 is given), then trial = y(step.end); a status code. No stage is after step.last."""
     h = step.end - step.start
     for s in range(1, STAGES + 1):
         combine(y, h, A[s], s, k, trial)
@@ -79,9 +80,9 @@ def attempt(problem, step, ends, s, known, accuracy, counts):
 
 @handed_on
 def state_at(problem, step, ends, s, t, result, run):
-    """The state inside a step, projected, so that quaternions are unit and prescribed coordinates exact there too.
+    """The state inside a step, projected, so that quaternions have unit norm and prescribed coordinates are exact.
 
-    The interpolant is found where it is asked for first: it takes three more stages.
+    The interpolant takes three more stages, so it is computed on first use.
     """
     h = step.end - step.start
     if s.has_interpolant[0] == 0:
@@ -99,7 +100,7 @@ def state_at(problem, step, ends, s, t, result, run):
 
 @kernel
 def dop853(problem, y, clock, accuracy, out, counts, memory, watch):
-    """Integrate y' = f(t, y) as told by `Integrator`."""
+    """Integrate y' = f(t, y) as described in `Integrator`."""
     n = y.shape[0]
     s = ExplicitStages(np.empty((STAGES_DENSE, n)), np.empty((7, n)), np.zeros(1, np.int64))
     ends = Ends(y, s.k[0], np.empty(n), s.k[END])

@@ -1,4 +1,4 @@
-"""The formulas of DOP853, written once for one run and for eight at once: arrays hold numbers, or lanes of them.
+"""The formulas of DOP853, for a single run and for eight at once: the arrays hold numbers, or SIMD lanes of them.
 
 Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (1993), II.5 and II.10.
 """
@@ -26,7 +26,7 @@ def weighted_sum(weights, count, k, i):
 
 @helper
 def combine(y, h, weights, count, k, result):
-    """result = y + h * sum over j < count of weights[j] k[j], along rows of k and past the many zero weights."""
+    """result = y + h * sum over j < count of weights[j] k[j]; loops run along rows of k and skip zero weights."""
     n = y.shape[0]
     for i in range(n):
         result[i] = weights[0] * k[0, i]
@@ -55,7 +55,7 @@ def error_sums(y, y_new, k, accuracy):
 
 @helper
 def error_norm(h, sum5, sum3, accuracy):
-    """Hairer's blend of both estimates over the tolerance: 1 is just acceptable. Of one run."""
+    """Hairer's combination of both estimates, relative to the tolerance, for one run: below 1 the step is accepted."""
     if sum5 == 0.0 and sum3 == 0.0:
         return 0.0
     return h * sum5 / math.sqrt((sum5 + 0.01 * sum3) * accuracy.controlled)

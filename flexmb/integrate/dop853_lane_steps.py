@@ -29,7 +29,7 @@ def _stages(problem, s, entries, control, counts):
 
 @helper
 def _judge(s, entries, control, accuracy):
-    """The error norm of each lane, infinite where its state is not finite; marks those that may accept their steps."""
+    """The error norm of each lane, infinite if its state is not finite; marks the lanes whose error is acceptable."""
     mark_finite(s.trial, s.chosen)
     s.norm[0], s.norm[1] = error_sums(s.y, s.trial, s.k, accuracy)
     for lane in range(LANES):
@@ -115,7 +115,7 @@ def _scaled_norms(s, accuracy):
 
 @helper
 def _scaled_norm_of(s, values, accuracy):
-    """The same of values (n,), into s.norm[2]."""
+    """Sum of squares of values (n,) over atol + rtol |y|, into s.norm[2]."""
     total = 0.0
     for i in range(accuracy.controlled):
         a = values[i] / (accuracy.atol + accuracy.rtol * abs(s.y[i]))
@@ -125,7 +125,7 @@ def _scaled_norm_of(s, values, accuracy):
 
 @helper
 def last_stages(problem, s, entries, control, counts):
-    """Coefficients s.f (7,n) of the interpolant on the step from y to y_new; three more stages. A status code."""
+    """Three more stages, then the coefficients s.f (7,n) of the interpolant from y to y_new. Returns a status code."""
     for stage in range(STAGES + 1, STAGES_DENSE):
         combine(s.y, s.h[0], A[stage], stage, s.k, s.trial)
         set_times(entries, control, C[stage])

@@ -14,7 +14,7 @@ from flexmb.tables.status import NONFINITE, OK
 
 @helper
 def _begin(problem, s, entries, control, clock, out, counts):
-    """Initial states put on their manifolds; they are the first samples, and every lane enters its first segment."""
+    """Project the initial states, store them as first samples, and start the first segment of every lane."""
     times, segment_ends, _ = clock
     set_all(entries.time, times[0])
     lane_copy(s.y, s.trial)
@@ -30,7 +30,8 @@ def _begin(problem, s, entries, control, clock, out, counts):
 
 @helper
 def _derivative_at_start(problem, s, entries, control, counts):
-    """k[0] of all lanes at their times, from the right: it may jump where a segment ends. Ends runs that have none."""
+    """k[0] of all lanes at the start of a segment, where f may jump: its limit from the right. Lanes whose derivative
+    is not finite end."""
     for lane in range(LANES):
         entries.time[0, lane] = control.t[lane]
     lane_copy(s.y, s.trial)
@@ -44,9 +45,9 @@ def _derivative_at_start(problem, s, entries, control, counts):
 
 @helper
 def _store_samples(problem, s, entries, control, times, out, counts):
-    """Samples in the steps that were accepted, their ends included; inside by the interpolant, if a lane needs it.
+    """Store the samples in accepted steps, their ends included; the interpolant is computed if a lane needs it.
 
-    Each round stores one sample of every lane that awaits one. Interpolated states are projected.
+    Each pass stores one sample of every lane that has samples left. Interpolated states are projected.
     """
     built = False
     while True:
@@ -83,10 +84,10 @@ def _store_samples(problem, s, entries, control, times, out, counts):
 
 @kernel
 def dop853_lanes(problem, s, entries, control, clock, accuracy, out, counts):
-    """Integrate from the states s.y (n,LANES) as `dop853` does each of them; returns a status code.
+    """Integrate from the states s.y (n,LANES), each as `dop853` does; returns a status code.
 
-    clock: times (T,) of the output and ends (LANES,S) of each lane's segments. out (LANES,T,n), counts (LANES,COUNTS).
-    The status is OK unless no lane can go on; control.status (LANES,) is OK for lanes that have reached their ends.
+    clock: output times (T,) and segment ends (LANES,S) of each lane. out (LANES,T,n), counts (LANES,COUNTS). The status
+    is OK unless no lane can continue; control.status (LANES,) is OK for lanes that have reached their end.
     """
     times, segment_ends, _ = clock
     _begin(problem, s, entries, control, clock, out, counts)

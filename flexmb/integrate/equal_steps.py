@@ -1,7 +1,7 @@
-"""The loop of the methods that take equal steps: every stretch between samples and ends of segments is divided evenly.
+"""The loop of the methods of equal steps: each interval between samples and segment ends is divided evenly.
 
-A step that is made ends in this order: it is looked into for levels that are watched, then its end becomes the last
-good state. A step that meets a singular position of a closed chain is made in another way, if the method knows one.
+When a step is complete, it is first searched for crossings of watched levels, then its end becomes the last good state.
+A step that meets a singular position of a closed chain is replaced by a detour, if the method has one.
 """
 
 from __future__ import annotations
@@ -17,18 +17,19 @@ from flexmb.tables.status import OK
 
 
 class FixedMethod(NamedTuple):
-    """What a method brings to the loop. `known` (NUMBERS,) are the numbers of `flexmb.integrate.memory.Memory` as they
-    are before a step, s are arrays of the method, and all functions but `state_at` are marked by `handed_in`:
+    """The functions of a method that the loop calls. `known` (NUMBERS,) holds the numbers of
+    `flexmb.integrate.memory.Memory` before a step, s the arrays of the method. All functions except `state_at` are
+    marked by `handed_in`:
 
     attempt(problem, step, h, ends, s, known, accuracy, counts) -> status code makes a step of size h (s): its end,
     projected, goes into ends.y_new, and the slope there into ends.dy_new.
-    detour(problem, watch, status, step, ends, s, samples, run) -> (status code, time of ends.y) goes on to the end of a
-    step that met a singular position, or further.
-    accept(s) follows a step that was made.
-    enter(known) forgets what does not hold across the end of a segment.
-    recall(memory, s, known, accuracy, counts) and keep(memory, s) read and write what else the method keeps for a run
-    that is taken up.
-    state_at: see `flexmb.integrate.watch`; it is handed `looking`, arrays of its own.
+    detour(problem, watch, status, step, ends, s, samples, run) -> (status code, time of ends.y) integrates to the end
+    of a step that met a singular position, or further.
+    accept(s) is called after a successful step.
+    enter(known) discards what is not valid across the end of a segment.
+    recall(memory, s, known, accuracy, counts) and keep(memory, s) read and write all else that the method needs to
+    resume a run.
+    state_at: see `flexmb.integrate.watch`; it is given the arrays `looking`, which only it uses.
     """
 
     attempt: Any
@@ -43,7 +44,7 @@ class FixedMethod(NamedTuple):
 
 @helper
 def equal_steps(method, problem, arrays, clock, out, run, memory, watch):
-    """Integrate y' = f(t, y) from ends.y as told by `Integrator`: (status code, time of the last good state).
+    """Integrate y' = f(t, y) from ends.y as described in `Integrator`: (status code, time of the last good state).
 
     arrays: s and `Ends`; run: accuracy and counts.
     """
@@ -85,7 +86,7 @@ def equal_steps(method, problem, arrays, clock, out, run, memory, watch):
             if t == segment_ends[segment]:
                 segment += 1
                 enter(known)
-        if counts[SAMPLES] == sample:  # not met within a leap
+        if counts[SAMPLES] == sample:  # otherwise a leap has stored it
             copy(y, out[sample])
             counts[SAMPLES] = sample + 1
     keep_place(memory, t, y, t, 0, known)

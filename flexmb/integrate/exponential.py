@@ -4,11 +4,12 @@ Over a step f(t, y) is a linear part J (y - y_n), treated exactly, and the rest
 
     r = f(t, y) - f(t_n, y_n) - J (y - y_n),
 
-a polynomial of degree 4 that matches at 0, 1/4, 1/2, 3/4 and 1 of the step. So a fast linear mode sets neither the step
-nor is it damped; what sets the step is how smooth the rest is. It is found by iteration, which converges however stiff
-J is, by two orders a sweep: r starts flat. J is the Jacobian at the start of each step, as in the exponential
-Rosenbrock methods of Hochbruck, Ostermann, Acta Numerica 19 (2010), 209, section 2.4, of which this is the one that
-collocates. The order is 6, that of Boole's rule at J = 0, and 5 whatever J is.
+which is collocated by a polynomial of degree 4 at 0, 1/4, 1/2, 3/4 and 1 of the step. So fast linear modes neither
+limit the step nor are damped; the step depends on the smoothness of r. The collocation equations are solved by a
+fixed-point iteration, which converges however stiff J is and gains two orders per sweep, because r starts flat.
+J is the Jacobian at the start of each step, as in the exponential Rosenbrock methods of Hochbruck, Ostermann, Acta
+Numerica 19 (2010), 209, section 2.4; this is the collocation method among them. Its order is 6, that of Boole's rule,
+at J = 0, and 5 for any J.
 """
 
 from __future__ import annotations
@@ -41,18 +42,18 @@ NODES = np.array([0.25, 0.5, 0.75, 1.0])
 # Row l: l-th derivative at 0 of the polynomial that vanishes at 0 and has given values at the nodes.
 _powers = np.arange(1, TERMS)
 DERIVATIVES = np.array([math.factorial(l) for l in _powers])[:, None] * np.linalg.inv(NODES[:, None] ** _powers)
-# The same of x (x - 1/4) (x - 3/4) (x - 1), by which the cubic without the middle node differs from the quartic.
+# Derivatives at 0 of x (x - 1/4) (x - 3/4) (x - 1): without the middle node the polynomial differs by a multiple of it.
 WITHOUT_MIDDLE = np.array([0.0, -3.0 / 16.0, 19.0 / 8.0, -12.0, 24.0])
 
-_SWEEPS = 8  # of the iteration, at most
-_CONVERGED = 0.02  # what the iteration may leave, in units of the tolerance
-RATE = 4.0  # per step, at which settles what projection has moved: within the step
+_SWEEPS = 8  # maximum number of sweeps of the iteration
+_CONVERGED = 0.02  # error that the iteration may leave, in units of the tolerance
+RATE = 4.0  # rate per step of `settle`: stiff components displaced by a projection relax within the step
 _ERROR_EXPONENT = 5.0  # the error estimate is O(h^5)
 
 
 class Collocation(NamedTuple):
-    """Arrays of a step: slope f at its start; J (n,n) and its flow; polynomials v, v_error (TERMS,n), their responses
-    X, X_error, states x (4,n).
+    """Arrays of a step: slope f at its start; J (n,n) and its flow; polynomials v, v_error (TERMS,n) and the responses
+    X, X_error to them; states x (4,n) at the nodes.
     """
 
     flow: Flow
@@ -78,7 +79,7 @@ class Collocation(NamedTuple):
 
 @helper
 def response(s, terms):
-    """x at the quarters of the step under the first terms of the polynomial v."""
+    """x at the quarters of the step as the response to the first `terms` terms of the polynomial v."""
     respond(s.flow, s.v, terms, s.X)
     at_quarters(s.flow, s.X, s.x)
 
@@ -120,7 +121,7 @@ def evaluate_rest(problem, step, y, s, counts):
 
 @helper
 def iterate(problem, step, y, s, accuracy, counts):
-    """Solve for x at the nodes; returns a status code, NOT_CONVERGED where the iteration would not end in time."""
+    """Solve for x at the nodes; returns a status code, NOT_CONVERGED if _SWEEPS sweeps are not expected to suffice."""
     h = step.end - step.start
     for i in range(y.shape[0]):
         s.v[0, i] = h * s.f[i] / s.flow.scale[i]
@@ -150,9 +151,10 @@ def iterate(problem, step, y, s, accuracy, counts):
 
 @helper
 def estimate(y, s, accuracy):
-    """Scaled norm of what the middle node does, to the end of the step or to its middle. Uses x_before.
+    """Scaled norm of the middle node's contribution, the larger one of those at the middle and the end. Uses x_before.
 
-    A component that follows the rest at once sees nothing of the middle node at the end; samples inside the step do.
+    The middle is included because a stiff component follows r at once: the middle node then has no effect at the end,
+    but affects samples inside the step.
     """
     n, flow = y.shape[0], s.flow
     for i in range(n):
@@ -208,7 +210,7 @@ def state_at(problem, step, ends, s, t, result, run):
 
 @helper
 def scratch(n):
-    """For n components."""
+    """Uninitialised arrays for n components."""
     flow = Flow(
         np.empty((n, n)), np.empty(n), np.empty((LEVELS, n, n)), np.empty((TERMS, n, n)), np.empty((5, n, n)),
         np.empty(1, np.int64),
@@ -223,9 +225,9 @@ def scratch(n):
 
 @kernel
 def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
-    """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
+    """Integrate y' = f(t, y) as described in `Integrator`; problem: a `StiffProblem`.
 
-    Where the iteration does not converge, the step is halved.
+    If the iteration does not converge, the step is halved.
     """
     s = scratch(y.shape[0])
     ends = Ends(y, s.f, s.y_new, s.f_new)

@@ -1,4 +1,4 @@
-"""The generalised-alpha method with a fixed step, on Lie groups too.
+"""The generalised-alpha method with a fixed step, also on Lie groups.
 
 Chung, Hulbert, J. Appl. Mech. 60 (1993), 371; on Lie groups Bruels, Cardona, J. Comput. Nonlinear Dyn. 5 (2010),
 031002, here for explicit equations of motion, udot = f(t, q, u):
@@ -6,8 +6,8 @@ Chung, Hulbert, J. Appl. Mech. 60 (1993), 371; on Lie groups Bruels, Cardona, J.
     q_1 = q_0 o exp(h u_0 + h^2 ((1/2 - beta) a_0 + beta a_1)),     u_1 = u_0 + h ((1 - gamma) a_0 + gamma a_1),
     (1 - alpha_m) a_1 + alpha_m a_0 = (1 - alpha_f) udot_1 + alpha_f udot_0.
 
-Order 2; the spectral radius at infinite frequency is the parameter: 1 damps nothing, 0 whatever the step does not
-resolve in one step.
+The order is 2; the parameter is the spectral radius at infinite frequency: 1 damps nothing, 0 removes in one step all
+modes that the step does not resolve.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from flexmb.integrate.watch import Ends
 from flexmb.jit.kernel import handed_in, handed_on, helper, kernel, sweep
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
-_ITERATIONS = 12  # of Newton's method, at most
-_ROUNDING = 2.0**-46  # a correction this far below accelerations is theirs: 64 roundings
-_WORN = 8  # iterations after which the Jacobian is renewed: it costs more than they do
+_ITERATIONS = 12  # maximum number of Newton iterations
+_ROUNDING = 2.0**-46  # relative size of corrections that count as rounding of accelerations: 64 ulp
+_WORN = 8  # number of iterations from which the Jacobian is renewed; fewer cost less than a new Jacobian
 _SAME = 1e-9  # relative difference of steps that share factors
 
 
@@ -60,7 +60,7 @@ def parameters(radius):
 
 @helper
 def largest(values):
-    """Largest magnitude."""
+    """The largest magnitude of the values."""
     size = 0.0
     for value in values:
         size = max(size, abs(value))
@@ -86,7 +86,7 @@ def factorise(s, h, accuracy, counts):
 
 @helper
 def end_of_step(problem, y, h, s, accuracy):
-    """y_new and a_new from udot at both ends; what follows the speeds is left alone."""
+    """y_new and a_new from udot at both ends; components after the speeds are not changed."""
     alpha_m, alpha_f, beta, gamma = parameters(accuracy.radius)
     nq = accuracy.coordinates
     for j in range(s.a.shape[0]):
@@ -101,7 +101,7 @@ def end_of_step(problem, y, h, s, accuracy):
 def newton(problem, t_new, y, h, s, accuracy, counts):
     """Solve for udot at the end of the step. Returns (status, iterations).
 
-    The first guess is the solution with f linearised at the start, so that no stiff mode is ever far out.
+    The first guess is the solution with f linearised at the start, so that stiff modes start close to their solution.
     """
     nq, nu = accuracy.coordinates, s.a.shape[0]
     copy(s.rate, s.rate_new)
@@ -117,7 +117,7 @@ def newton(problem, t_new, y, h, s, accuracy, counts):
     end_of_step(problem, y, h, s, accuracy)
     for iteration in range(1, _ITERATIONS + 1):
         status = derivative(problem, t_new, s.y_new, s.f_new, counts)
-        if status != OK:  # an iterate that runs away is no motion that diverges
+        if status != OK:  # an iterate that is not finite does not mean that the motion diverges
             return NOT_CONVERGED if status == NONFINITE else status, iteration
         for j in range(nu):
             s.correction[j] = s.f_new[nq + j] - s.rate_new[j]
@@ -138,9 +138,9 @@ def newton(problem, t_new, y, h, s, accuracy, counts):
 
 @sweep
 def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
-    """One step of size h from y to y_new, with a new Jacobian where the old one does not do.
+    """One step of size h from y to y_new, with a new Jacobian if the iteration does not converge with the old one.
 
-    Returns (status, h of the factors, 0 where they are worn).
+    Returns (status, step size of the factors, 0 if they are to be renewed).
     """
     status, iterations = NOT_CONVERGED, 0
     if h_factored > 0.0 and abs(h - h_factored) > _SAME * h:
@@ -160,7 +160,7 @@ def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
 
 @helper
 def finish(problem, step, h, ends, s, result, controlled):
-    """The state at the end of a step that was made, with its quadratures by the trapezoidal rule, projected."""
+    """The state at the end of a successful step, with its quadratures by the trapezoidal rule, projected."""
     for i in range(controlled):
         result[i] = s.y_new[i]
     for i in range(controlled, result.shape[0]):
@@ -170,7 +170,7 @@ def finish(problem, step, h, ends, s, result, controlled):
 
 @handed_in
 def attempt(problem, step, h, ends, s, known, accuracy, counts):
-    """See `FixedMethod`; known[FRESH]: slopes are to be found at the start, and a starts as udot there."""
+    """See `FixedMethod`; known[FRESH]: slopes are evaluated at the start of the step, where a is set to udot."""
     if known[FRESH] != 0.0:
         status = derivative(problem, step.start, ends.y, s.f, counts)
         if status != OK:
@@ -186,7 +186,7 @@ def attempt(problem, step, h, ends, s, known, accuracy, counts):
 
 @handed_on
 def inside(problem, step, ends, s, t, result, run):
-    """The state within a step, by a shorter one from the same start with a Jacobian of its own."""
+    """The state within a step, by a shorter step from the same start with a new Jacobian."""
     accuracy, counts = run
     shorter, h = Interval(step.start, t, step.last), t - step.start
     status, _ = step_once(problem, shorter, ends.y, h, 0.0, s, accuracy, counts)
@@ -216,7 +216,7 @@ def enter(known):
 
 @handed_in
 def keep(memory, s):
-    """Jacobian, slopes and a."""
+    """Store the Jacobian, slopes and a."""
     n, nu = s.f.shape[0], s.a.shape[0]
     for i in range(n):
         copy(s.J[i], memory.rows[i])
@@ -227,7 +227,7 @@ def keep(memory, s):
 
 @handed_in
 def recall(memory, s, known, accuracy, counts):
-    """The same of a run that is taken up, with factors made again; of another one that there is nothing."""
+    """Restore these for a resumed run and factorise again; in any other run the first step starts without them."""
     n, nu = s.f.shape[0], s.a.shape[0]
     if known[TAKEN_UP] == 0.0:
         known[FRESH] = 1.0
@@ -243,7 +243,7 @@ def recall(memory, s, known, accuracy, counts):
 
 @helper
 def arrays(n, a, rate, f):
-    """For n components, from a, udot and slope at the start of a step."""
+    """Arrays for n components; a, udot and the slope at the start of a step are given."""
     nu = a.shape[0]
     return NewmarkArrays(
         np.empty((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), a, np.empty(nu), rate, np.empty(nu),
@@ -253,10 +253,10 @@ def arrays(n, a, rate, f):
 
 @kernel
 def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
-    """Integrate y = [q, u, quadratures] as told by `Integrator`; problem: a `StiffProblem`.
+    """Integrate y = [q, u, quadratures] as described in `Integrator`; problem: a `StiffProblem`.
 
-    Newton's method stops where its correction is below rtol |y| + atol over the controlled components. a starts as
-    udot, at the start and after every segment end, where udot may jump.
+    Newton's method stops when its correction is below rtol |y| + atol in the norm of the controlled components. At the
+    start and after every segment end, where udot may jump, a is set to udot.
     """
     n, nu = y.shape[0], accuracy.controlled - accuracy.coordinates
     s = arrays(n, np.empty(nu), np.empty(nu), np.empty(n))

@@ -1,4 +1,4 @@
-"""What methods that linearise have in common: Jacobians that are counted and checked."""
+"""Jacobians that are counted and checked, for all methods that need them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from flexmb.tables.status import NONFINITE, OK
 
 @helper
 def linearisation(problem, t, y, J, counts):
-    """J = df/dy (n,n) at (t, y); returns a status code, which is never OK for a Jacobian that is not finite."""
+    """J = df/dy (n,n) at (t, y); returns a status code, which is not OK if the Jacobian is not finite."""
     counts[JACOBIANS] += 1
     status = problem.jacobian(t, y, J, problem.exact, problem.tangent)
     if status == OK:

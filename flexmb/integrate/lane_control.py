@@ -1,7 +1,7 @@
-"""What each of eight adaptive runs decides for itself: its time, step, samples and segments, and when it has ended.
+"""Step control of eight adaptive runs, one per lane: time, step, samples, segments, and the end of each run.
 
-All lanes try a step together. A lane that has reached its end, or whose run has failed, tries steps of no length until
-the others are ready.
+All lanes try a step together. A lane that has reached its end, or whose run has failed, tries steps of length zero
+until the others have ended.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
 
 class LaneControl(NamedTuple):
-    """What each lane (LANES,) knows of its own run: time, proposed step, end and length of the step it tries (s), last
-    time of a stage, error norms of this step and of the one accepted before, whether the last was rejected, segment,
-    number of its segments, and its status, RUNNING until it ends.
+    """The run of each lane (LANES,): time, proposed step, end and length of the present trial step (s), last time of a
+    stage (s), error norms of this step and of the previous accepted one, whether the last step was rejected, segment,
+    number of segments, and status, which is RUNNING until the run ends.
     """
 
     t: np.ndarray
@@ -49,14 +49,14 @@ RUNNING = -1
 
 
 def lane_control(ends: np.ndarray) -> LaneControl:
-    """For runs with so many (LANES,) segments."""
+    """The control of new runs; ends (LANES,): their numbers of segments."""
     floats, integers = np.zeros((7, LANES)), np.zeros((2, LANES), np.int64)
     return LaneControl(*floats, *integers, ends, np.full(LANES, RUNNING))
 
 
 @helper
 def set_times(entries, control, fraction):
-    """The time of each lane at this fraction of its step, not later than its last one."""
+    """Set the time of each lane to this fraction of its step, but not later than the last time of a stage."""
     for lane in range(LANES):
         time = control.t[lane] + fraction * control.length[lane]
         entries.time[0, lane] = min(time, control.last[lane])
@@ -64,7 +64,7 @@ def set_times(entries, control, fraction):
 
 @helper
 def begin_segment(control, segment_ends, lane):
-    """The next segment of a lane, or its end."""
+    """Start the next segment of a lane, or end its run."""
     segment = control.segment[lane]
     if segment == control.ends[lane]:
         control.status[lane] = OK
@@ -76,7 +76,7 @@ def begin_segment(control, segment_ends, lane):
 
 @helper
 def propose(entries, control, segment_ends, accuracy, counts):
-    """End and length of the step that each lane tries; of no length where it has ended."""
+    """Set end and length of the next trial step of each lane; the length is zero for lanes that have ended."""
     for lane in range(LANES):
         t = control.t[lane]
         end = t
@@ -93,7 +93,7 @@ def propose(entries, control, segment_ends, accuracy, counts):
 
 @helper
 def go_on(entries, control, segment_ends, exponent, counts):
-    """Each lane's next time and step, after the verdict; returns whether one has entered another segment.
+    """Update time and step of each lane after a trial step; returns whether a lane has entered another segment.
 
     The error of the method is O(h^exponent).
     """
@@ -132,6 +132,6 @@ def any_running(control):
 
 @helper
 def awaits_sample(control, times, counts, lane):
-    """Whether the step of a lane that has accepted it holds one more sample."""
+    """Whether the accepted step of a lane contains another sample."""
     sample = counts[lane, SAMPLES]
     return sample < times.shape[0] and times[sample] <= control.end[lane]

@@ -1,8 +1,8 @@
-"""Eight runs at once: their differential equations and all that an integrator of lanes writes.
+"""Eight runs at once: their differential equations, and the arrays of an integrator of lanes.
 
-What is heavy is done in lanes; what decides, step sizes for example, is done for one lane after the other, on the same
-numbers as arrays of floats. A lane whose state is no longer finite goes on as NaN and costs nothing more: who called
-finds it, and runs it alone.
+Expensive computations are done in SIMD lanes. Decisions, such as step sizes, are made for each lane separately, on the
+same memory as arrays of floats. A lane whose state is not finite any more continues with NaN at no cost; the caller
+detects it and runs it separately.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ class LaneStages:
 
     numbers = LANE
 
-    time: Real  # (1,LANES) s, of what is evaluated or projected
+    time: Real  # (1,LANES) s, at which a state is evaluated or projected
     trial: Real  # (n,LANES) the state that is evaluated or projected
     y: Real  # (n,LANES) where the step starts
     y_new: Real  # (n,LANES) where it ends
     k: Real  # (stages,n,LANES) slopes
     f: Real  # (7,n,LANES) coefficients of an interpolant
     h: Real  # (1,LANES) s, length of the step
-    fraction: Real  # (1,LANES) of the step, where the interpolant is asked
+    fraction: Real  # (1,LANES) of the step, at which the interpolant is evaluated
     norm: Real  # (3,LANES) sums over the components of a state
-    chosen: Real  # (1,LANES) 1 for lanes that go on, 0 for those that stay
-    stage: Index  # (1,) which slope is evaluated
+    chosen: Real  # (1,LANES) 1 for lanes that accept the step, 0 for others
+    stage: Index  # (1,) index of the slope that is evaluated
 
 
 @bundle
 class LaneEntries:
-    """The same numbers as floats, of which each lane reads and writes its own."""
+    """The same memory as arrays of floats, so that single lanes can be read and written."""
 
     time: Real
     trial: Real
@@ -72,21 +72,21 @@ class LaneProblem(NamedTuple):
 
 
 def lane_stages(n: int) -> LaneStages:
-    """For states of n numbers; one per thread."""
-    stages = STAGES_DENSE  # of the method that has most
+    """Arrays for states of n numbers; each thread needs its own."""
+    stages = STAGES_DENSE  # the largest number of any method
     shapes = {"time": (1,), "k": (stages, n), "f": (7, n), "h": (1,), "fraction": (1,), "norm": (3,), "chosen": (1,)}
     shapes |= {name: (n,) for name in ("trial", "y", "y_new")}
     return LaneStages(**{name: wide_zeros(shape) for name, shape in shapes.items()}, stage=np.zeros(1, np.int64))
 
 
 def lane_entries(s: LaneStages, doubt: Index) -> LaneEntries:
-    """The same arrays, and `doubt` (1,) of a workspace."""
+    """The arrays of s as floats, and `doubt` (1,) of a workspace."""
     names = [field.name for field in fields(LaneEntries) if field.name != "doubt"]
     return LaneEntries(**{name: getattr(s, name) for name in names}, doubt=doubt)
 
 
 def lane_problem(rhs: Any, project: Any, stages: LaneStages, constants: Any, workspace: Any) -> LaneProblem:
-    """Of kernels and bundles."""
+    """A `LaneProblem` from kernels and bundles."""
     return LaneProblem(
         pointer(rhs, STATUS, stages, constants, workspace),
         pointer(project, NOTHING, stages, constants),
@@ -98,7 +98,7 @@ def lane_problem(rhs: Any, project: Any, stages: LaneStages, constants: Any, wor
 
 @written_out
 def lane_derivative(problem, s, stage, counts):
-    """The slope of this stage; returns a status code. counts (LANES,COUNTS)."""
+    """Evaluate the slope of this stage; returns a status code. counts (LANES,COUNTS)."""
     for lane in range(LANES):
         counts[lane, EVALUATIONS] += 1
     s.stage[0] = stage
@@ -107,21 +107,21 @@ def lane_derivative(problem, s, stage, counts):
 
 @helper
 def lane_copy(source, target):
-    """target = source, of states."""
+    """target = source, for states."""
     for i in range(target.shape[0]):
         target[i] = source[i]
 
 
 @helper
 def set_all(row, value):
-    """The same number in all lanes of row (1,LANES)."""
+    """Set all lanes of row (1,LANES) to the same value."""
     for lane in range(LANES):
         row[0, lane] = value
 
 
 @helper
 def any_chosen(entries):
-    """Whether a lane is marked in entries.chosen."""
+    """Whether any lane is marked in entries.chosen."""
     total = 0.0
     for lane in range(LANES):
         total += entries.chosen[0, lane]
@@ -130,7 +130,7 @@ def any_chosen(entries):
 
 @helper
 def store_lane(values, lane, out):
-    """out (n,) = that lane of values (n,LANES)."""
+    """out (n,) = one lane of values (n,LANES)."""
     for i in range(out.shape[0]):
         out[i] = values[i, lane]
 
@@ -146,7 +146,7 @@ def mark_finite(values, mark):
 
 @kernel
 def first_derivative(problem, s, entries, t, counts):
-    """Put the states s.y on their manifold at time t and evaluate their slopes; returns a status code."""
+    """Project the states s.y to their manifold at time t and evaluate their slopes; returns a status code."""
     set_all(entries.time, t)
     lane_copy(s.y, s.trial)
     problem.project(problem.stages, problem.constants)

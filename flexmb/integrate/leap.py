@@ -1,7 +1,7 @@
-"""Steps over a place where y' = f(t, y) is not defined although the motion passes it smoothly: no stage is near it.
+"""Leaps over states at which y' = f(t, y) is not defined although the motion is smooth: no stage is evaluated there.
 
-Closed chains have such places, singular positions; trees have none. A step fails near one, whatever its length; the
-methods then come closer by shorter steps until the problem itself can leap, from one side to the other.
+Such states are the singular positions of closed chains; trees have none. Near one every step fails, whatever its size.
+The methods then approach it by smaller steps until the problem itself can leap from one side to the other.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from flexmb.integrate.watch import CROSSED, pause
 from flexmb.jit.kernel import handed_on, helper
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR, OK
 
-EVALUATED = 8  # about as often a leap evaluates equations of motion
+EVALUATED = 8  # approximate number of evaluations of the equations of motion in a leap
 
 
 @helper
 def may_leap(status):
-    """Whether a failure may be that of a place to leap over."""
+    """Whether a failure may be due to a singular position, over which a leap may be possible."""
     return status in (CLOSURE_SINGULAR, BRANCH_UNKNOWN, CLOSURE_OPEN)
 
 
 @helper
 def cubic(step, y, dy, y_new, dy_new, t, result):
-    """The state within a leap, by Hermite's cubic: it is much shorter than a step."""
+    """The state within a leap by Hermite's cubic; a leap is short enough for it, being much shorter than a step."""
     h = step.end - step.start
     x = (t - step.start) / h
     for i in range(y.shape[0]):
@@ -34,19 +34,19 @@ def cubic(step, y, dy, y_new, dy_new, t, result):
 
 @handed_on
 def in_leap(problem, step, ends, s, t, result, run):
-    """The state within a leap, as `flexmb.integrate.watch` asks for it."""
+    """The state within a leap; see `state_at` in `flexmb.integrate.watch`."""
     cubic(step, ends.y, ends.dy, ends.y_new, ends.dy_new, t, result)
     return OK
 
 
 @helper
 def leap_over(problem, watch, t, farthest, ends, samples, run):
-    """Leap from the last good state, ends.y at t (s), over the place where steps fail, not beyond `farthest` (s).
+    """Leap from the last good state, ends.y at t (s), over a singular position, not beyond `farthest` (s).
 
-    Stores the samples on the way and puts the state beyond, and its slope, into ends.y and ends.dy. Returns (OK, time
-    reached, length of the leap), of length 0 where none is possible yet; (CROSSED, its time, .) where the leap comes to
-    a level, with the times of the leap and its first state in `watch`; or the status of what fails. ends.y may change
-    by rounding. samples: times of samples, and samples; run: accuracy and counts.
+    Stores the samples in between and puts the state after the leap, and its slope, into ends.y and ends.dy. Returns
+    (OK, time reached, length of the leap), with length 0 if no leap is possible yet; (CROSSED, time, .) if the leap
+    reaches a level, with the times of the leap and its first state in `watch`; or the status of a failure. ends.y may
+    change by rounding. samples: times of samples, and samples; run: accuracy and counts.
     """
     _, counts = run
     counts[EVALUATIONS] += EVALUATED

@@ -4,10 +4,11 @@ With E = exp(tau Z) - 1 at tau = 2^-j and X_m(tau) the solution from zero under 
 
     E(2 tau) = 2 E + E E,       X_m(2 tau) = X_m + (1 + E) X_m + sum over l > m of tau^(l-m)/(l-m)! X_l,
 
-so that the matrices are multiplied once a step and each polynomial costs products with vectors only. Keeping E without
-its 1 keeps the digits of slow motions beside fast ones: squaring exp(tau Z) itself would lose 2^j of them. Levels
-between the smallest tau, which a Taylor series resolves, and tau = 1/4 are kept: they give the flow at any fraction of
-the step. Rows and columns of Z are balanced first (Osborne), for coordinates and speeds differ by the frequency.
+so that products of matrices are computed once per step, and each polynomial requires products with vectors only. E is
+stored without the identity to preserve the accuracy of slow motions beside fast ones: repeated squaring of exp(tau Z)
+itself would amplify rounding by 2^j. All levels from the smallest tau, which a Taylor series resolves, to tau = 1/4 are
+kept, because they give the flow at any fraction of the step. Rows and columns of Z are balanced first (Osborne),
+because the scales of coordinates and speeds differ by the frequency.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from flexmb.jit.kernel import helper, sweep
 
 LEVELS = 36
 QUARTER = 2  # level of tau = 1/4, the coarsest one kept
-TERMS = 5  # of the polynomial: constant to fourth power
-_RESOLVED = 0.25  # norm at which the Taylor series to power 12 is exact: 0.25^13 / 13! = 2e-18; phi_5 to 10 likewise
+TERMS = 5  # number of terms of the polynomial, from the constant to the fourth power
+# Norm at which the Taylor series to power 12 is exact to rounding, 0.25^13 / 13! = 2e-18, as is phi_5 to power 10.
+_RESOLVED = 0.25
 _POWER = 12
 
 
@@ -41,7 +43,7 @@ class Flow(NamedTuple):
 
 @sweep
 def multiply(A, B, C):
-    """C = A B, square, C neither of them: four rows of B at a time onto each row of C."""
+    """C = A B for square matrices, C being neither A nor B. Four rows of B at a time are added to each row of C."""
     n = A.shape[0]
     for i in range(n):
         target = C[i]
@@ -73,7 +75,7 @@ def add_product(A, x, y):
 
 @sweep
 def balance(Z, scale):
-    """Similarity by powers of two that brings rows and columns of Z to like sums; returns the norm that is left."""
+    """Balance Z by a similarity with powers of two, so that sums of rows and columns are alike; returns its norm."""
     n = Z.shape[0]
     for i in range(n):
         scale[i] = 1.0
@@ -147,7 +149,7 @@ def taylor(Z, tau, powers, P, E):
 
 @helper
 def prepare(flow, A, h):
-    """Everything that depends on Z = h A only; returns whether it is finite and not beyond the levels there are."""
+    """Compute everything that depends on Z = h A only; returns whether Z is finite and LEVELS suffice for its norm."""
     n = A.shape[0]
     for i in range(n):
         for j in range(n):
@@ -171,7 +173,7 @@ def prepare(flow, A, h):
 
 @sweep
 def series(Z, tau, v, x, term, product):
-    """x += flow from x over the short time tau under sum over l of v[l] t^l / l!, by its Taylor series."""
+    """Advance x by the flow over a short time tau under sum over l of v[l] t^l / l!, by its Taylor series."""
     n = x.shape[0]
     for i in range(n):
         term[i] = x[i]
@@ -189,7 +191,7 @@ def series(Z, tau, v, x, term, product):
 
 @sweep
 def respond(flow, v, terms, X):
-    """X[level, m] for the polynomial sum over l < terms of v[l] t^l / l!, at all levels kept."""
+    """X[level, m] for the polynomial sum over l < terms of v[l] t^l / l!, at all levels that are kept."""
     finest = flow.finest[0]
     n = v.shape[1]
     for m in range(TERMS):
@@ -209,7 +211,8 @@ def respond(flow, v, terms, X):
 
 @sweep
 def advance(E, x, X, m, t, result):
-    """result = (1 + E) x + sum over l >= m of t^(l-m)/(l-m)! X[l]: from time t on by the time of E and X."""
+    """result = (1 + E) x + sum over l >= m of t^(l-m)/(l-m)! X[l]: the solution from t to t + tau, tau that of E and X.
+    """
     n = x.shape[0]
     factor = 1.0
     for i in range(n):
@@ -246,7 +249,7 @@ def at_fraction(flow, v, X, x, theta, result, term, product):
             advance(flow.E[level], term, X[level], 0, t, result)
             t += tau
     rest = theta - t
-    # The polynomial's derivatives at t drive what is left of the way.
+    # The rest of the interval is driven by the derivatives of the polynomial at t.
     for k in range(TERMS):
         factor = 1.0
         for i in range(n):

@@ -1,4 +1,4 @@
-"""Lobatto's rule of order 6 over a unit: nodes at both ends, of weight 1/12, and at `INNER` from either, of 5/12."""
+"""Lobatto's rule of order 6 on a unit interval: both ends with weight 1/12, and `INNER` from either with 5/12."""
 
 import math
 

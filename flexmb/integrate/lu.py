@@ -1,4 +1,4 @@
-"""LU factors with partial pivoting, real or complex, in place: nothing is allocated, and inner loops run along rows."""
+"""LU factorisation with partial pivoting, real or complex, in place: no allocation, and inner loops run along rows."""
 
 from __future__ import annotations
 

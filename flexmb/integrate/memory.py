@@ -1,8 +1,8 @@
-"""Where a run can be taken up again: the state there, and what the next step needs to know of the steps before it.
+"""The memory from which a run is resumed: a state, and the data of earlier steps that the next step needs.
 
-A run is cut where it ends: its last step is shorter than the one that a longer run would make. So methods that adapt
-their steps keep what they knew before that step was cut, at a time before the end. Taken up from there they go on as if
-the run had never ended, to the last bit, and find by dense output what lies between the end and their first step's end.
+The end of a run cuts its last step short. So methods that adapt their steps save their memory before that step, at a
+time before the end. Resumed from there, a run is bit-identical to one that was not interrupted; its first step ends
+after the end of the first run, and dense output gives the states in between.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from flexmb.integrate.control import ACCEPTED, SAMPLES, copy
 from flexmb.jit.kernel import helper
 from flexmb.typing import Real
 
-# Entries of `numbers`: whether a run is taken up; the time of y; the next step and the error norm of the last one, and
-# whether it was rejected; of methods of equal steps, the start of the stretch and how many of its steps are done; of
-# methods with Jacobians, the step of the factors and the step before, 0 for none, whether the Jacobian is to be
-# renewed, and whether it is of this place.
+# Entries of `numbers`: whether a run is resumed; the time of y; the size of the next step, the error norm of the last
+# one, and whether it was rejected; for methods of equal steps, the start of the interval that is divided evenly and the
+# number of steps done in it; for methods with Jacobians, the step sizes of the factors and of the last step, 0 for
+# none, whether the Jacobian is to be renewed, and whether it was evaluated at the present state.
 (
     TAKEN_UP, TIME, STEP, ERROR_BEFORE, RETRIED, STRETCH, DONE, FACTORED, STEP_BEFORE, RENEW, FRESH,
 ) = range(11)  # fmt: skip
@@ -26,7 +26,7 @@ NUMBERS = 11  # their number: length of `numbers`
 
 
 class Memory(NamedTuple):
-    """numbers (NUMBERS,) as named above; y (n,) = [q, u, work]; rows (k,n) that a method keeps, its Jacobian first."""
+    """numbers (NUMBERS,) as named above; y (n,) = [q, u, work]; rows (k,n) of the method, its Jacobian first."""
 
     numbers: Real
     y: Real
@@ -34,16 +34,16 @@ class Memory(NamedTuple):
 
 
 def memory(n: int, rows: int) -> Memory:
-    """Of a run that begins afresh."""
+    """The memory of a new run."""
     return Memory(np.zeros(NUMBERS), np.zeros(n), np.zeros((rows, n)))
 
 
 @helper
 def begin(problem, times, y, scratch, memory, out, counts):
-    """The time at which a run begins or is taken up. Puts y on its manifold; the first sample is stored if it is there.
+    """The time at which a run begins or resumes. Projects y to its manifold; stores the first sample if it is due.
 
-    A state that is taken up lies on its manifold and keeps its last bits: only a copy in `scratch` (n,) is projected,
-    by which closures learn on which branch they are.
+    The state of a resumed run is on its manifold and must keep its last bits, so only a copy in `scratch` (n,) is
+    projected, by which closures determine their branch.
     """
     numbers = memory.numbers
     if numbers[TAKEN_UP] == 0.0:
@@ -60,8 +60,8 @@ def begin(problem, times, y, scratch, memory, out, counts):
 
 @helper
 def keep(memory, t, y, known, counts):
-    """Before a step of a method that adapts them, `known` (NUMBERS,) being its numbers. The first step of all depends
-    on the length of the run: it is left to be found again."""
+    """Save the memory of a method that adapts its steps before a step; known (NUMBERS,): its numbers. The size of a
+    run's first step depends on the run's length, so it is not saved but determined again."""
     numbers = memory.numbers
     copy(known, numbers)
     numbers[TIME] = t
@@ -72,7 +72,7 @@ def keep(memory, t, y, known, counts):
 
 @helper
 def keep_place(memory, t, y, stretch, done, known):
-    """Before a step of a method that takes equal ones, `known` (NUMBERS,) being its numbers."""
+    """Save the memory of a method of equal steps before a step; known (NUMBERS,): its numbers."""
     numbers = memory.numbers
     copy(known, numbers)
     numbers[TIME], numbers[STRETCH], numbers[DONE] = t, stretch, done

@@ -1,6 +1,6 @@
-"""The input of an integrator: a differential equation, the times of its output and the accuracy.
+"""The input of an integrator: a differential equation, output times and accuracy.
 
-Functions and tables are given by address, so that each integrator is compiled once.
+Functions and tables are passed by address, so that each integrator is compiled only once.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR, Pointer, p
 class Problem(NamedTuple):
     """y' = f(t, y) for y (n,) on a manifold.
 
-    rhs(t, y, dy, constants, workspace) puts f into dy and returns a status code; project(t, y, constants) puts y back
-    on its manifold. Where a step fails, back(y, constants) puts the last good state into y and returns its time, and
-    leap(end, y, dy, y_new, dy_new, constants) may go on from there: see `flexmb.integrate.leap`.
+    rhs(t, y, dy, constants, workspace) puts f into dy and returns a status code; project(t, y, constants) projects y to
+    its manifold. If a step fails, back(y, constants) puts the last good state into y and returns its time, from which
+    leap(end, y, dy, y_new, dy_new, constants) may continue: see `flexmb.integrate.leap`.
     """
 
     rhs: Pointer
@@ -33,11 +33,11 @@ class Problem(NamedTuple):
 
 
 class StiffProblem(NamedTuple):
-    """The same with its linearisation.
+    """A `Problem` with its linearisation.
 
     jacobian(t, y, J, exact, tangent) puts df/dy (n,n) into J and returns a status code.
     move(y, increment, result, constants) puts y = [q, u, ...] with q o exp(increment) into result, for methods on Lie
-    groups; increment (nu,). settles: whether `project` moves what is stiff: see `flexmb.integrate.settling`.
+    groups; increment (nu,). settles: whether `project` displaces stiff components: see `flexmb.integrate.settling`.
     """
 
     rhs: Pointer
@@ -54,12 +54,12 @@ class StiffProblem(NamedTuple):
 
 
 class Clock(NamedTuple):
-    """times (T,) s of the output, increasing, the first is the start of the run and the last is its end.
+    """times (T,) s: output times, increasing; the first is the start of the run and the last is its end.
 
-    segment_ends (S,) s, increasing: no step crosses one, and the stages before one see the right-hand side's limit from
-    the left. The last is the end of the run: times[-1], once more where a segment ends there in any longer run too; for
-    methods of equal steps it is infinite, as nothing need end where the run does. farthest (s): up to where a leap over
-    a singular position may go on beyond the end of the run.
+    segment_ends (S,) s, increasing: no step crosses one, and stages before one use the right-hand side's limit from the
+    left. The last is the end of the run, times[-1], which is repeated if a segment would end there in a longer run too;
+    for methods of equal steps it is infinite, because the end of a run need not end a segment. farthest (s): time up to
+    which a leap over a singular position may pass the end of the run.
     """
 
     times: np.ndarray
@@ -68,14 +68,14 @@ class Clock(NamedTuple):
 
 
 class Accuracy(NamedTuple):
-    """How a state y (n,) = [q (coordinates,), u, quadratures] is integrated; every method reads what it needs.
+    """How a state y (n,) = [q (coordinates,), u, quadratures] is integrated; every method uses the entries it needs.
 
-    rtol, atol    a norm weighs component i by atol + rtol |y_i|
-    controlled    only so many first components enter a norm: what follows are quadratures (work), which nothing depends
-                  on; they have no scale of their own to compare `atol` with, and are as smooth as the state, hence
-                  integrated as accurately by the same steps
+    rtol, atol    a norm divides component i by atol + rtol |y_i|
+    controlled    number of first components that enter a norm. The others are quadratures (work), on which nothing
+                  depends; they have no scale of their own to compare `atol` with, and are as smooth as the state, so
+                  that the same steps integrate them as accurately
     max_steps     accepted and rejected together
-    step          s, the longest of methods that take equal steps
+    step          s, upper bound of the steps of methods that take equal ones
     radius        spectral radius at infinite frequency of generalised-alpha
     coordinates   number of entries of q, for methods of second-order equations
     """
@@ -90,12 +90,13 @@ class Accuracy(NamedTuple):
 
 
 class Leaping(NamedTuple):
-    """Kernels `back` and `leap` of a `Problem` that can go on from where a step fails.
+    """Kernels `back` and `leap` of a `Problem` that can continue after a step has failed at a singular position.
 
-    beside(t, y, dy, constants) finds slopes where `leap` does, for what is around the problem; a status code.
-    watch_steps(constants, shorter) prepares it for a method that does not estimate errors: steps fail that are too long
-    to resolve what they meet, if it can take `shorter` ones. noticed(constants): where such steps were taken all the
-    same, and what they met, if there were any: (time at the end of the worst, number of what it met).
+    beside(t, y, dy, constants) evaluates slopes near singular positions, where `leap` does, for a closed loop around
+    the problem; returns a status code. watch_steps(constants, shorter) prepares it for a method without error
+    estimates: steps that are too long to resolve a singular position then fail, if it can take `shorter` ones.
+    noticed(constants): where such steps were taken nevertheless, (end of the worst one (s), index of the closure), or
+    None.
     """
 
     back: Any
@@ -106,7 +107,7 @@ class Leaping(NamedTuple):
 
 
 class Linear(NamedTuple):
-    """What a `StiffProblem` has that a `Problem` has not: kernels jacobian and move, bundles exact and tangent."""
+    """What a `StiffProblem` has in addition to a `Problem`: kernels jacobian and move, bundles exact and tangent."""
 
     jacobian: Any
     move: Any
@@ -126,7 +127,7 @@ def _no_leap(end, y, dy, y_new, dy_new, constants):
 
 
 def problem(rhs: Any, project: Any, constants: Any, workspace: Any, leaping: Leaping | None = None) -> Problem:
-    """Of kernels and bundles; without `leaping` nothing goes on from where a step fails."""
+    """A `Problem` from kernels and bundles; without `leaping`, no leap is possible after a step has failed."""
     anything = AnyBundle._numba_type_
     back, leap = leaping[:2] if leaping else (_no_way_back, _no_leap)
     known = constants if leaping else anything
@@ -143,7 +144,7 @@ def problem(rhs: Any, project: Any, constants: Any, workspace: Any, leaping: Lea
 def stiff_problem(
     rhs: Any, project: Any, constants: Any, workspace: Any, linear: Linear, leaping: Leaping | None = None
 ) -> StiffProblem:
-    """Likewise."""
+    """A `StiffProblem` from kernels and bundles, see `problem`."""
     jacobian, move, exact, tangent, settles = linear
     return StiffProblem(
         *problem(rhs, project, constants, workspace, leaping),

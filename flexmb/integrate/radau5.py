@@ -23,11 +23,11 @@ from flexmb.jit.kernel import handed_in, handed_on, helper, kernel
 from flexmb.tables.status import NOT_CONVERGED, OK
 
 _GROW = 8.0  # strongest growth of a step
-_KEEP = 1.2  # a growth below this is not worth new factors
+_KEEP = 1.2  # the step is kept for a growth below this, to avoid a new factorisation
 _SAME = 1e-9  # relative difference of steps that share factors
 _SLOW, _POOR = 1e-3, 0.03  # a contraction above this asks for a new Jacobian, after three iterations or more; after two
-_CONTRACTION = 0.15  # of Newton's method, which steps aim at where it bounds them
-_CUT = 0.7  # a step for which it failed becomes shorter by this at least
+_CONTRACTION = 0.15  # target contraction of Newton's method, where convergence limits the step
+_CUT = 0.7  # upper bound of the factor on a step for which Newton's method failed
 _ERROR_EXPONENT = 4.0  # the error estimate is O(h^4)
 
 
@@ -43,7 +43,7 @@ def estimate(y, slope, h, s, accuracy):
 
 @helper
 def new_over_old(h, h_before, error, error_before):
-    """Step size by the controller of Gustafsson (8.25): the error's trend is taken to go on."""
+    """New step over old by Gustafsson's predictive controller (8.25), which extrapolates the trend of the error."""
     if error == 0.0:
         return _GROW
     factor = error ** (-1.0 / _ERROR_EXPONENT)
@@ -109,7 +109,7 @@ def state_at(problem, step, ends, s, t, result, run):
 
 @handed_in
 def keep(memory, s):
-    """The Jacobian, and stages of the step before."""
+    """Store the Jacobian and the stages of the step before."""
     n = s.f.shape[0]
     for i in range(n):
         copy(s.J[i], memory.rows[i])
@@ -119,7 +119,7 @@ def keep(memory, s):
 
 @handed_in
 def recall(memory, s, known, counts):
-    """The same of a run that is taken up, with factors made again; of another one that there is nothing."""
+    """Restore these for a resumed run and factorise again; in any other run the first step starts without them."""
     n = s.f.shape[0]
     if known[STEP_BEFORE] == 0.0 and known[FACTORED] == 0.0:
         known[ERROR_BEFORE], known[RENEW], known[FRESH] = 0.0, 1.0, 0.0

@@ -13,9 +13,9 @@ from flexmb.integrate.problem import Accuracy
 from flexmb.tables import arguments
 
 FINEST_RTOL = 100 * np.finfo(float).eps
-COARSEST_RTOL = 1e-2  # estimates of a step's error are its leading term, which is none where two digits are lost
-MOST_STEPS = sys.maxsize  # that compiled code counts
-SHORTEST_STEP = 10 * np.finfo(float).eps  # fixed step over the length of the run: time would stand still
+COARSEST_RTOL = 1e-2  # error estimates are leading terms, which are not reliable for larger errors
+MOST_STEPS = sys.maxsize  # the largest count of compiled code
+SHORTEST_STEP = 10 * np.finfo(float).eps  # fixed step over t_end: shorter ones do not advance time
 DAMPING_NOTHING_SLOW = 0.8  # spectral radius: a mode that is not resolved loses nine tenths in ten steps
 
 

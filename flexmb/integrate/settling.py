@@ -1,9 +1,9 @@
-"""Back to the manifold of a constrained problem without setting what is stiff in motion.
+"""Projection to the manifold of a constrained problem without exciting stiff modes.
 
-`project` takes the shortest way by kinetic energy, which displaces what is stiff as well as what is not. Small as this
-is, forces that move it back are large, and a step after it has to resolve them. Where the projection changes y by dq,
-du, those stiff forces are let act on the change for a while 1/rate, by the implicit rule of Euler for the linear
-equations z' = J z:
+`project` takes the shortest way in the metric of kinetic energy, which also displaces stiff components. The change
+is small, but the restoring forces are large, and the next step would have to resolve them. So the change dq, du of a
+projection is relaxed under these forces for the time 1/rate, by one implicit Euler step of the linear equations
+z' = J z:
 
     (rate - J) z = rate [dq - qdot(du) / rate; du].
 
@@ -36,7 +36,7 @@ def settle(problem, t, rate, y, s, accuracy):
 
 @helper
 def prepare_settling(problem, rate, s):
-    """The factors, for methods that have none."""
+    """Factorise rate - J, for methods that have no factors of their own."""
     if problem.settles:
         for i in range(s.J.shape[0]):
             for j in range(s.J.shape[0]):

@@ -1,9 +1,9 @@
-"""Places where a run pauses: where an entry of the state, or a signal, comes to a level, in a step's dense output.
+"""Finds where an entry of the state, or a signal, reaches a level, in the dense output of a step; the run pauses there.
 
-A run pauses at the first of several levels that a step reaches. What is on another side of its level after a step has
-come to it. What is on the same side may have been beyond it in between: where it moves towards the level at the step's
-start and away from it at its end, its turning point is looked for. So what turns once within a step is seen; of what
-turns twice, the motion there and back between both turns is not.
+A run pauses at the first of the levels that a step reaches. A quantity whose side of its level differs between the ends
+of a step has reached the level. If the sides are equal, it may have crossed twice: where it moves towards the level at
+the start of the step and away from it at the end, its turning point is searched for. So crossings are found for a
+quantity with one turning point within a step, but may be missed between two turning points.
 
 An integrator says what a step is: `Ends`, and a helper `state_at(problem, step, ends, s, t, result, run)`, marked by
 `handed_on`, that puts the state at a time t (s) within it into `result` (n,) and returns a status code; s is whatever
@@ -27,13 +27,13 @@ from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
 CROSSED = -1  # returned in place of a status code: no end of the run
-UNKNOWN = 2  # a side that is for the first step to find
-RESTED = 2  # times the side from which something came that has been at its level for a step
+UNKNOWN = 2  # a side that the first step determines
+RESTED = 2  # factor on `came` for a quantity that has rested at its level for a step
 
-_FINEST = 2.0**-52  # of a step: instants within it are told apart no better
-_NEAR = 2.0**-13  # of a step: over so much of it rates are found as differences
-_NARROW = 2.0**-20  # of a step: a turning point that is found so well is found to rounding, as values are flat there
-_NOWHERE, _PASSES, _TURNS = range(3)  # what becomes of a level in a step
+_FINEST = 2.0**-52  # fraction of a step: resolution of times within it
+_NEAR = 2.0**-13  # fraction of a step over which rates are computed as differences
+_NARROW = 2.0**-20  # fraction of a step: accuracy of a turning point, where values are flat and then exact to rounding
+_NOWHERE, _PASSES, _TURNS = range(3)  # relation of a quantity to its level in a step
 
 
 class Watch(NamedTuple):
@@ -113,7 +113,7 @@ def _side(value, still):
 
 @helper
 def _first_side(value, change, still):
-    """The same where nothing is known yet; what is at zero is on the side to which it moves within a step."""
+    """The side of a value in the first step; a value at zero is on the side to which it moves within the step."""
     side = _side(value, still)
     return _side(change, still) if side == 0 else side
 
@@ -126,7 +126,7 @@ def _has_jumped(side, value, still):
 
 @helper
 def keep_sides(watch):
-    """Beside `flexmb.integrate.memory.keep`."""
+    """Save the sides, together with `flexmb.integrate.memory.keep`."""
     watch.kept[0] = 1
     for i in range(watch.entry.shape[0]):
         watch.kept_side[i], watch.kept_came[i] = watch.side[i], watch.came[i]
@@ -167,7 +167,7 @@ def _rates(problem, watch, t, y, dy, ahead, trial):
 
 @sweep
 def meets(problem, watch, step, ends):
-    """Whether a step may come to a level: (status, whether). If it does not, sides are those of its end."""
+    """Whether a step may reach a level: (status, whether). If it does not, sides are updated to those at its end."""
     h, count, trial = step.end - step.start, watch.entry.shape[0], np.empty(ends.y.shape[0])
     status = _rates(problem, watch, step.start, ends.y, ends.dy, _NEAR * h, trial)
     before, begun = watch.rate.copy(), watch.value.copy()
@@ -202,7 +202,7 @@ def meets(problem, watch, step, ends):
 def _leave(watch, i, change, value):
     """The side on which i leaves its level, by its change in the first step or, from rest, that from which it came.
 
-    What drifts beyond the level from rest comes to it again, also where it rests for a step before it does.
+    A quantity that drifts past the level from rest reaches it again, even if it has rested there for a step before.
     """
     came = watch.came[i]
     side = 1 if came > 0 else -1
@@ -263,8 +263,8 @@ def end_at_crossing(within, times, out):
 def pause(problem, watch, step, ends, state_at, s, samples, run):
     """ends.y at the first level that a step comes to: (CROSSED, the time); or the status of what fails, and the start.
 
-    Where it comes to none: OK, and its end if it was looked into, else its start. samples: times of samples, and
-    samples; run: accuracy and counts.
+    If it reaches none: OK, and its end if it was searched, else its start. samples: times of samples, and samples; run:
+    accuracy and counts.
     """
     status, some = meets(problem, watch, step, ends)
     if status != OK or not some:
@@ -291,10 +291,11 @@ def _value_at(within, i, t):
 
 @sweep
 def _beyond(within, i):
-    """Between which times what turns within a step comes to its level: (status, low, high); high is inf if it does not.
+    """A bracket of the time at which a quantity with a turning point reaches its level: (status, low, high); high is
+    inf if it does not.
 
-    The turning point is bracketed by the sign of differences. Where the level is not crossed in the way that counts, it
-    is on the way back: then the side is that beyond the level from now on.
+    The turning point is bracketed by the sign of differences. If only the crossing on the way back is in the direction
+    that counts, the side is set to that beyond the level.
     """
     watch, low, high = within.watch, within.step.start, within.step.end
     least = 4.0 * (np.nextafter(high, math.inf) - high)  # between times that rounding tells apart
@@ -322,10 +323,10 @@ def _beyond(within, i):
 
 @sweep
 def _arrival(within, i, low, high):
-    """When i comes to its level between two times, to rounding: (status, time).
+    """The time between two others at which i reaches its level, to rounding: (status, time).
 
-    By the regula falsi of Illinois; every third time, and where the step starts at the level, by halving. Beside time 0
-    floats are dense without end: there the rounding is that of the step, for one of 1e-323 s leads nowhere.
+    By the Illinois variant of the regula falsi, with a bisection every third time and where the step starts at the
+    level. Near time 0, where ulp(t) becomes arbitrarily small, the resolution is that of the step's length.
     """
     side, last_side, count = within.watch.side[i], 0, 0
     finest = _FINEST * (within.step.end - within.step.start)

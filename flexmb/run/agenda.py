@@ -1,4 +1,4 @@
-"""Which events of a scene can still happen in a run, and when those on time are due."""
+"""The events of a scene that can still happen in a run, and the times at which events on time are due."""
 
 from __future__ import annotations
 
@@ -18,25 +18,27 @@ from flexmb.tables.status import Status
 from flexmb.typing import Real
 
 WATCHED_AGAIN = 2.5
-"""Times by which an event happened before its instant: so long it is not watched, twice to its instant and beyond."""
+"""An event that happened a time e before its instant is not watched for WATCHED_AGAIN * e: for e up to its instant, for
+another e beyond it, and for a margin of e / 2."""
 
 
 class Agenda:
-    """The events of a scene, with what has become of them."""
+    """The events of a scene, with a record of which have happened."""
 
     def __init__(self, scene: Scene, sides: Sides, times: Real) -> None:
-        """times (T,) s of the output."""
+        """times (T,) s: output times."""
         self._sides, self._t_end = sides, float(times[-1])
         self._together = slack(float(times[0]), self._t_end)
-        """Instants this close (s) are one."""
+        """Times that differ by at most this (s) count as one instant."""
         self._done = set[str]()
-        """Names of events on time that have happened, or were due before the run."""
+        """Names of events on time that have happened or were due before the start of the run."""
         self._passed, self.until = set[str](), -np.inf
-        """Names of events that happened before their instant, and the time (s) up to which they are not watched."""
+        """Names of events that happened before their instant, and the time (s) until which they are not watched."""
         self.take(scene)
 
     def take(self, scene: Scene) -> None:
-        """The events of a scene as other events have left it; sensors are replaced by what they measure."""
+        """Use the events of this scene, which earlier events may have changed. Sensors of coordinates or speeds are
+        replaced by the names of these."""
         names = watchable(scene) if scene.events else {}
         self._events = tuple(structs.replace(each, watch=names.get(each.watch, each.watch)) for each in scene.events)
 
@@ -46,17 +48,17 @@ class Agenda:
 
     @property
     def watched(self) -> list[SceneEvent]:
-        """Events on what moves, in the order of the scene."""
+        """Events on coordinates, speeds or signals, in the order of the scene."""
         return [event for event in self._armed if event.watch != "time"]
 
     def due_at_start(self, t: float) -> list[SceneEvent]:
-        """Events on time that are due where the run starts; earlier ones are gone."""
+        """Events on time that are due at the start t (s) of the run; earlier ones are discarded."""
         timed = [event for event in self._events if event.watch == "time"]
         self._done |= {event.name for event in timed if event.level < t - self._together}
         return [event for event in timed if abs(event.level - t) <= self._together]
 
     def next_stop(self, t: float) -> tuple[float, list[SceneEvent]]:
-        """The time (s) up to which nothing is due after t, and the events on time that are due then."""
+        """The next time (s) after t at which the run has to stop, and the events on time that are due then."""
         timed = [event for event in self._armed if event.watch == "time" and event.name not in self._done]
         first = min((max(event.level, t) for event in timed), default=np.inf)
         end = first if first < self._t_end - self._together else self._t_end
@@ -64,7 +66,8 @@ class Agenda:
         return stop, [event for event in timed if event.level <= stop + self._together]
 
     def found(self, raw: Raw, levels: Watch | None, due: Sequence[SceneEvent], stop: float) -> list[SceneEvent]:
-        """What happens where a segment ended, in the order of the scene: what came to its level, and what is due."""
+        """The events at the end of a segment, in the order of the scene: those whose quantity reached its level, and
+        those on time that are due."""
         if raw.status is not Status.OK or raw.interrupted:
             return []
         crossed = [self.watched[i] for i in np.flatnonzero(levels.found)] if levels is not None and raw.paused else []
@@ -72,21 +75,21 @@ class Agenda:
         return [event for event in self._events if event in crossed or event in due]
 
     def happened(self, event: SceneEvent) -> None:
-        """Events on time happen once."""
+        """Record that an event happened: events on time happen only once."""
         if event.watch == "time":
             self._done.add(event.name)
 
     def pass_over(self, events: Sequence[SceneEvent], t: float, early: float) -> None:
-        """Events that happened so long (s) before their instant are not watched until that is over."""
+        """Stop watching events that happened at t, `early` (s) before their instant, until they lie behind."""
         self._passed |= {event.name for event in events}
         self.until = t + WATCHED_AGAIN * early
 
     def watch_again(self) -> None:
-        """All events, from now on."""
+        """Watch all events again."""
         self._passed.clear()
 
     def remember(self, scene: Scene, anew: bool, given: Scene) -> EventMemory:
-        """As things are; sides of the events that are watched are those of the moment."""
+        """The present state of all events of `scene`, for a restart; see `EventMemory` for `anew` and `given`."""
         sides = self._sides
         side = [1 if event.name in self._done else sides.side.get(event.name, 0) for event in scene.events]
         came = [sides.came.get(event.name, 0) for event in scene.events]
@@ -95,7 +98,7 @@ class Agenda:
         return EventMemory(*whole, self.until, anew, 0, given)
 
     def recall(self, memory: EventMemory) -> None:
-        """What a run knew that is taken up."""
+        """Restore the state that the resumed run had saved."""
         self.until = memory.until
         for i, event in enumerate(self._events):
             if memory.passed[i]:

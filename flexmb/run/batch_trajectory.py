@@ -16,9 +16,9 @@ from flexmb.typing import Index, Real
 class BatchTrajectory:
     """n runs at T output times t (s).
 
-    q (n,T,nq), u (n,T,nu) and work (n,T) J, as in `flexmb.Trajectory`, NaN where a run did not come; `status` (n,) of
-    `flexmb.Status`, `stopped_at` (n,) s the time of the last good state; evaluations, accepted_steps, rejected_steps
-    (n,). `batch.system(copy)` evaluates what else is observable at a state.
+    q (n,T,nq), u (n,T,nu) and work (n,T) J are as in `flexmb.Trajectory`, NaN at times that a run did not reach.
+    `status` (n,) holds values of `flexmb.Status`, `stopped_at` (n,) s the time of the last good state of each run;
+    evaluations, accepted_steps, rejected_steps (n,) count. `batch.system(copy)` evaluates all other quantities.
     """
 
     batch: Batch
@@ -34,7 +34,7 @@ class BatchTrajectory:
     rejected_steps: Index
 
     def __post_init__(self) -> None:
-        """TypeError or ValueError for parts that do not belong together; asked once more by what works with them."""
+        """TypeError or ValueError for inconsistent arrays. Methods that use them check again, as arrays may change."""
         self._refuse_torn()
 
     def _refuse_torn(self) -> None:
@@ -49,11 +49,11 @@ class BatchTrajectory:
         for name in ("fault", "evaluations", "accepted_steps", "rejected_steps"):
             arguments.held(name, getattr(self, name), (n,), "i")
         if not self.batch.shares_constants and n != len(self.batch.systems):
-            raise ValueError(f"there are {n} runs, and {len(self.batch.systems)} copies in the batch")
+            raise ValueError(f"there are {n} runs, but the batch has {len(self.batch.systems)} copies")
 
     @property
     def finished(self) -> bool:
-        """Whether all runs reached the end."""
+        """Whether all runs reached their end."""
         return not len(self.failed)
 
     @property
@@ -63,11 +63,11 @@ class BatchTrajectory:
 
     @property
     def failed(self) -> Index:
-        """Numbers of the copies that did not."""
+        """Indices of the copies whose runs did not reach their end."""
         return np.flatnonzero(self.status != OK)
 
     def message(self, copy: int) -> str:
-        """How a run ended, in words; ValueError or TypeError for the number of a copy that there is not."""
+        """How the run of a copy ended, in words; ValueError or TypeError for an invalid index."""
         self._refuse_torn()
         copy = arguments.index("copy", copy, len(self.status))
         status, t = Status(int(self.status[copy])), self.stopped_at[copy]

@@ -1,4 +1,4 @@
-"""Channels: the named signals in which two runs are compared, how far apart two signals are, and how large one is."""
+"""Channels: the named signals by which two runs are compared, the distance of two signals, and the size of one."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Path(Protocol):
 
 
 class Recorded(Protocol):
-    """A trajectory, ours or another code's: loads and connectors (T,6), drives and hinge forces (T,k), energies (T,),
-    momentum (T,6), work (T,)."""
+    """A trajectory computed by flexmb or by another code: loads and connectors (T,6), drives and hinge forces (T,k),
+    energies (T,), momentum (T,6), work (T,)."""
 
     @property
     def markers(self) -> Mapping[str, Path]: ...
@@ -47,7 +47,7 @@ class Recorded(Protocol):
     def work(self) -> Real | None: ...
 
 
-_SAFE = (1e-100, 1e100)  # squares of numbers in between are neither lost nor infinite
+_SAFE = (1e-100, 1e100)  # squares of numbers in this range neither underflow nor overflow
 UNITS = {
     ".position": "m",
     ".orientation": "rad",
@@ -63,8 +63,8 @@ UNITS = {
 def channels_of(trajectory: Recorded) -> dict[str, Real]:
     """All signals of a trajectory, each (T, k), in World axes.
 
-    Torque and force, angular and linear parts are channels of their own: a norm never mixes units. The total energy is
-    the sum of the kinds the engine knows. "work" is the work done on the system, where the engine integrates it.
+    Torque and force, angular and linear parts are separate channels, so that no norm mixes units. The total energy is
+    the sum of the kinds that the engine reports. "work" is the work done on the system, if the engine integrates it.
     """
     found: dict[str, Real] = {}
     for name, path in trajectory.markers.items():
@@ -90,9 +90,9 @@ def channels_of(trajectory: Recorded) -> dict[str, Real]:
     return found
 
 
-@lru_cache(maxsize=2**16)  # a session asks a million times for some thousands of answers
+@lru_cache(maxsize=2**16)  # a harness session calls this a million times with a few thousand distinct arguments
 def matches(pattern: str, channel: str) -> bool:
-    """Whether `pattern` names the channel: itself, a shell pattern of it, or its beginning up to a "." or ":"."""
+    """Whether `pattern` selects the channel: its name, a shell pattern, or the part of its name before a "." or ":"."""
     return any(fnmatchcase(channel, form) for form in (pattern, f"{pattern}.*", f"{pattern}:*"))
 
 
@@ -116,8 +116,8 @@ def unit(channel: str) -> str:
 def distance(channel: str, a: Real, b: Real) -> Real:
     """Distance of two signals at each time, (T,): the Euclidean norm of a - b, for orientations the angle between them.
 
-    Quaternions q and -q are one orientation; the angle is 4 asin(|q_a - q_b| / 2), accurate for small angles. What is
-    not finite has no finite distance.
+    Quaternions q and -q are one orientation; the angle is 4 asin(|q_a - q_b| / 2), accurate for small angles. Where a
+    signal is not finite, neither is the distance.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         return _distance(channel, a, b)
@@ -131,30 +131,30 @@ def _distance(channel: str, a: Real, b: Real) -> Real:
 
 
 def norms(rows: Real) -> Real:
-    """Euclidean norm of each row, (T,), neither lost below nor beyond the range of the numbers it is squared in.
+    """Euclidean norm of each row, (T,), without underflow or overflow of the squares.
 
-    Rows are scaled by powers of two, which rounds nothing. What is not finite stays so.
+    Rows are scaled by powers of two, which introduces no rounding. Norms of rows that are not finite are not finite.
     """
     largest = np.max(np.abs(rows), axis=1, initial=0.0)
     if _SAFE[0] < np.min(largest, where=largest > 0.0, initial=1.0) and np.max(largest, initial=0.0) < _SAFE[1]:
-        return np.linalg.norm(rows, axis=1)  # the same digits in half the time
+        return np.linalg.norm(rows, axis=1)  # the same result in half the time
     exponent = np.where(np.isfinite(largest), np.frexp(largest)[1], 0)
     with np.errstate(over="ignore", invalid="ignore"):
         return np.ldexp(np.linalg.norm(np.ldexp(rows, -exponent[:, None]), axis=1), exponent)
 
 
 def magnitude(channel: str, values: Real) -> float:
-    """Largest size of the signal itself, to which round-off is proportional (rad for orientations: half a turn)."""
+    """Largest norm of the signal over time, to which round-off is proportional (for orientations pi rad)."""
     if channel.endswith(".orientation"):
         return float(np.pi)
     return float(np.max(norms(values), initial=0.0))
 
 
 def signal_range(channel: str, values: Real) -> float:
-    """The channel's range, to which goals are relative.
+    """The channel's range, to which accuracy goals are relative.
 
-    For positions and orientations the farthest the signal gets from where it starts (a choice of origin must not
-    matter); for everything else, where zero means something, its largest magnitude.
+    For positions and orientations this is the largest distance from the initial value, which does not depend on the
+    choice of the origin; for all others, whose zero has a physical meaning, it is the largest magnitude.
     """
     if channel.endswith((".position", ".orientation")):
         start = np.broadcast_to(values[:1], values.shape)

@@ -1,4 +1,4 @@
-"""Events without end: so many of them in so little time that a run would never come to its end."""
+"""Chattering (Zeno behaviour): so many events in so short a time that the run would never reach its end."""
 
 from __future__ import annotations
 
@@ -6,24 +6,23 @@ import numpy as np
 
 from flexmb.typing import Real
 
-# A run ends where so many instants of events lie within this part of it, and where fewer do between which nothing
-# moves further than the error that is allowed. Sequences of events without end come to any pace, for their intervals
-# shrink by a factor from one to the next.
+# A run ends when MANY instants of events, or FEW between which nothing moves by more than `atol`, lie within the
+# fraction PART of its duration. A Zeno sequence meets any such criterion: its intervals shrink geometrically.
 MANY, FEW, PART = 1000, 50, 1e-6
-ULPS = 16.0  # events that follow each other within so many roundings of time make no progress
+ULPS = 16.0  # events within ULPS ulp(t) of each other make no progress
 
 
 class Chattering:
-    """Counts the instants of events of a run from t_start to t_end (s)."""
+    """Counts the instants of events in a run from t_start to t_end (s)."""
 
     def __init__(self, t_start: float, t_end: float, atol: float) -> None:
         self._soon, self._atol = PART * (t_end - t_start), atol
         self._instants: list[float] = []
         self._idle: list[float] = []
-        """Times of the last events, between which nothing moved."""
+        """Times of the latest events, between which nothing moved by more than `atol`."""
 
     def count(self, t_before: float, t: float, speeds: tuple[Real, Real]) -> None:
-        """An instant of events at t (s), after a segment with these speeds (nu,) at its start and its end."""
+        """Count an instant of events at t (s) after a segment from t_before with these speeds (nu,) at its two ends."""
         fastest, lasted = max(np.max(np.abs(u), initial=0.0) for u in speeds), t - t_before
         if fastest * lasted > self._atol and lasted > ULPS * np.spacing(abs(t)):
             self._idle.clear()
@@ -32,7 +31,7 @@ class Chattering:
 
     @property
     def is_endless(self) -> bool:
-        """Whether there is no end of it."""
+        """Whether the events counted so far amount to chattering."""
         return any(
             len(times) >= many and times[-1] - times[-many] < self._soon
             for times, many in ((self._idle, FEW), (self._instants, MANY))

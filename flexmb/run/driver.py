@@ -1,8 +1,8 @@
-"""The driver of a run: one loop over segments, with what happens between them, joined to one trajectory.
+"""The driver of a run: a loop over segments and the events between them, whose outputs are joined to one trajectory.
 
 A segment is integrated in compiled code (`flexmb.run.segments`). What follows depends on why it ended (`SegmentEnd`):
-at an event the actions of all events at that instant change the scene and the state, and the next segment begins anew;
-at the end of the run's time, or where nothing goes on, the run is over.
+at an event the actions of all events at that instant change the scene and the state, and the next segment starts with
+an integrator without memory; at the end of the run's time, or after a failure, the run is over.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ from flexmb.tables.status import Status
 from flexmb.typing import Real
 
 CAN_GO_ON = (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED)
-"""How a run ends that can be taken up."""
+"""Statuses of runs that can be resumed."""
 
 
 class AfterEvents(NamedTuple):
-    """After all that happens at one time: the state, and whether the run ends there by an event."""
+    """The state after all events of one instant, and whether one of them ends the run."""
 
     raw: Raw
     ends: bool
@@ -60,7 +60,7 @@ class Driver:
         self, system: System, times: Real, settings: Settings, algorithm: Algorithm, stabilise: float,
         taken_up: EventMemory | None = None, made_by: Making | None = None,
     ) -> None:  # fmt: skip
-        """times (T,) s of the output; taken_up: what was known of events where the run ended that is taken up."""
+        """times (T,) s: output times; taken_up: the events' state at the end of the run that is resumed, if any."""
         self._times, self._settings, self._taken_up, self._made_by = times, settings, taken_up, made_by
         given = None if taken_up is None else taken_up.given
         self._situation = Situation(_with_stops(system), settings, given)
@@ -72,13 +72,13 @@ class Driver:
         self._happened: list[EventRecord] = []
         self._whole: Trajectory | None = None
         self._cut: Restart | None = None
-        """From before the step in which an event was found though the end of the run had cut it short."""
+        """Restart before a step that the end of the run cut short and in which an event was found."""
         self.was_interrupted = False
-        """By Ctrl-C, once the run is over."""
+        """Whether Ctrl-C ended the run; set when the run is over."""
 
     @property
     def doubts(self) -> list[str]:
-        """What is to be said about a run that ended well all the same."""
+        """Warnings about a run that reached its end."""
         return self._solver.doubts
 
     def __call__(self, begin: Beginning) -> Trajectory:
@@ -111,7 +111,7 @@ class Driver:
             begin = self._situation.going_on(instant.raw)
 
     def _next(self, begin: Beginning) -> Segment:
-        """The next segment; its outputs are joined, and sides are those of its end."""
+        """Integrate the next segment, append its outputs and update the sides to those at its end."""
         watched = self._agenda.watched
         segment = self._segments(begin)
         if segment.early:
@@ -127,15 +127,15 @@ class Driver:
         return segment
 
     def _after_sample(self, segment: Segment) -> Segment:
-        """Sampled controllers have acted where the run's time is over: what they say may bring events."""
+        """Sampled controllers act at the end of the run's time, too: their outputs may trigger events there."""
         jumped = self._jumped(segment.raw) if segment.end is SegmentEnd.TIME else []
         return segment._replace(end=SegmentEnd.SAMPLE, found=jumped) if jumped else segment
 
     def _at_instant(
         self, raw: Raw, found: Sequence[SceneEvent], levels: Watch | None = None, early: float = 0.0
     ) -> AfterEvents:
-        """All that happens at one time, in its order: events that are found, in that of the scene, then what stands on
-        stops. Controllers that are due act where a run goes on, or is over.
+        """Process one instant: first the events that were found, in the order of the scene, then bodies in contact with
+        stops. Controllers that are due act later, when the next segment starts or the run ends.
         """
         y, _ = self._situation.apart(raw.y)
         watched = self._agenda.watched
@@ -145,19 +145,19 @@ class Driver:
             self._happened += [replace(record, early=early) for record in records]
             self._agenda.happened(event)
         raw = self._situation.with_motion(raw, y)
-        if self._whole is None:  # the run starts
+        if self._whole is None:  # this is the start of the run
             self._sides.start(watched, y)
         else:
             self._sides.move(watched, raw, found, y)
         struck = self._stand(raw, found, y)
         raw = self._situation.with_motion(raw, y)
-        self._agenda.take(self._situation.system.scene)  # rest on a stop adds an event
+        self._agenda.take(self._situation.system.scene)  # coming to rest on a stop adds an event
         self._sides.make_known(self._agenda.watched)
         ends = any(isinstance(action, EndRun) for event in (*arrived, *struck) for action in event.actions)
         return AfterEvents(raw, ends)
 
     def _stand(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> list[SceneEvent]:
-        """What stands on stops, see `flexmb.run.standing`; returns the events that happened."""
+        """Process bodies in contact with stops, see `flexmb.run.standing`; returns the events that happened."""
         struck = []
         for event in self._agenda.watched:
             is_new = event not in found and self._sides.came[event.name] == 0
@@ -176,7 +176,7 @@ class Driver:
         return self._solver.accelerations(raw, motion)
 
     def _jumped(self, raw: Raw) -> list[SceneEvent]:
-        """Events on what controllers said only where the run was over already."""
+        """Events on outputs of sampled controllers that jumped at the end of the run."""
         found: list[SceneEvent] = []
         if raw.controllers is None:
             return found
@@ -191,7 +191,8 @@ class Driver:
         return found
 
     def _over_after_events(self, instant: AfterEvents) -> Trajectory:
-        """Over at the time of events: controllers that are due act after them, and so do events on what they say."""
+        """End the run at an instant of events: controllers that are due act after these, and events on the controllers'
+        outputs follow."""
         raw, ends = instant
         if any(each.period_s for each in self._situation.system.scene.controllers):
             with self._solver.integration() as solve:
@@ -205,7 +206,8 @@ class Driver:
         return self._over_anew(raw, ends)
 
     def _over_anew(self, raw: Raw, ends: bool) -> Trajectory:
-        """Over where events happened: the state after them is an output too, and a run that takes it up begins anew."""
+        """End the run after events: the state after them is one more output, and a run that resumes from here starts
+        with an integrator without memory."""
         chatters = not ends and raw.t < self._times[-1]
         last = raw._replace(states=raw.y[None], status=Status.CHATTERING if chatters else raw.status)
         with self._solver.integration() as solve:
@@ -223,12 +225,12 @@ class Driver:
         return self._over(raw, anew=True, ends=ends, chatters=chatters)
 
     def _over(self, raw: Raw, anew: bool = False, ends: bool = False, chatters: bool = False) -> Trajectory:
-        """The whole run; anew: events happened at its end."""
-        assert self._whole is not None  # there was a segment
+        """The trajectory of the whole run; anew: whether events happened at its end."""
+        assert self._whole is not None  # there was at least one segment
         self.was_interrupted = raw.interrupted
         can_go_on = not chatters and raw.status in CAN_GO_ON and raw.memory is not None
-        # Events are counted: found again in a step that is not cut short, their instants differ by the error of its
-        # dense output.
+        # A resumed run finds events of the step that was cut short again, at instants that differ by the error of the
+        # dense output. So they are recognised by their number, not by their times.
         shown = 0 if self._taken_up is None else self._taken_up.shown
         return replace(
             self._whole,
@@ -238,7 +240,7 @@ class Driver:
         )
 
     def _restart_of(self, raw: Raw, memory: Memory, ends: bool, anew: bool) -> Restart:
-        """Of a run that is over: from before what its end has cut short, or from where it is."""
+        """The restart of a run that is over: before the step that the end of the run cut short, or at the end."""
         if self._cut is not None and self._cut.events is not None and not ends:
             shown = sum(record.t > self._cut.since for record in self._happened)
             return replace(self._cut, t=raw.t, events=self._cut.events._replace(shown=shown))
@@ -254,8 +256,8 @@ class Driver:
         return Restart(self._settings.method, scene, raw.t, memory, raw.controllers, events)
 
     def _keep_cut(self, raw: Raw) -> None:
-        """Before a step that the end of the run cut short, and in which an event was found all the same: it is found
-        otherwise, in the last bits, by a run that goes on."""
+        """Keep a restart before a step that the end of the run cut short and in which an event was found: a longer run
+        takes the whole step, and finds the event at a time that differs by rounding."""
         if self._cut is None and raw.memory is not None:
             self._cut = self._restart(raw, raw.memory, anew=False)
 
@@ -264,7 +266,7 @@ class Driver:
 
 
 def _with_stops(system: System) -> System:
-    """The same with sensors for the loads of stops on which something may come to rest."""
+    """The system with sensors for the loads of all stops on which a coordinate may come to rest."""
     if not system.scene.events:
         return system
     scene = with_stops(system.scene)

@@ -1,4 +1,4 @@
-"""What a run with events knows where it is taken up."""
+"""The state of a scene's events at the end of a run, from which the run can be resumed."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
 from flexmb.typing import Index
 
-_KEY = "events_"  # before the names of its entries in a file
+_KEY = "events_"  # prefix of the names of its arrays in a file
 SIDES, CAMES = (-1, 0, 1, UNKNOWN), (-RESTED, -1, 0, 1, RESTED)
-MOST = 2**53  # that a number can count
+MOST = 2**53  # the largest count that a float represents exactly
 
 
 class EventMemory(NamedTuple):
-    """By event (k,), in the order of the scene: side, came as in `flexmb.integrate.watch.Watch`, side of one on time 1
-    where it has happened; passed 1 where it happened before its instant, within a leap, and is not watched up to the
-    time `until` (s).
+    """By event (k,), in the order of the scene: side and came are as in `flexmb.integrate.watch.Watch`, but the side of
+    an event on time is 1 once it has happened; passed is 1 for an event that happened before its instant, within a
+    leap, and is not watched until the time `until` (s).
 
-    anew: whether the integration begins anew, as it does after an event. shown: how many events happen again, in steps
-    that the end of the run has cut short, which are in its trajectory already. given: the scene whose coordinates come
-    back where they are released, as changes alone have left it.
+    anew: whether the integrator restarts without memory, as it does after an event. shown: the number of events that
+    the resumed run finds again, because they lie in a step that the end of the run cut short, although the trajectory
+    contains them already. given: the scene altered by changes of values alone, without latches; a coordinate that is
+    released is again what it is there.
     """
 
     side: Index
@@ -40,11 +41,11 @@ class EventMemory(NamedTuple):
 
 
 NAMES = tuple(_KEY + name for name in EventMemory._fields)
-"""Of its arrays in a file."""
+"""Names of its arrays in a file."""
 
 
 def written(memory: EventMemory | None) -> dict[str, Any]:
-    """Arrays for a file."""
+    """The arrays to be stored in a file, by name."""
     if memory is None:
         return {}
     given = np.frombuffer(msgspec.json.encode(memory.given), np.uint8)
@@ -52,38 +53,39 @@ def written(memory: EventMemory | None) -> dict[str, Any]:
 
 
 def read(file: Mapping[str, Any]) -> EventMemory:
-    """What a file says, to be examined; KeyError for what it lacks, ValueError for what is nothing of the kind."""
+    """What a file contains, not yet validated; KeyError for a missing array, ValueError for one of the wrong form."""
     side, came, passed, *numbers, given = (file[name] for name in NAMES)
     until, anew, shown = (each.item() for each in numbers)
     if anew not in (0, 1):
-        raise ValueError(f"{_KEY}anew is {anew:g}, and is 0 or 1")
+        raise ValueError(f"{_KEY}anew is {anew:g}, but must be 0 or 1")
     scene = msgspec.json.decode(given.tobytes(), type=Scene)
     return EventMemory(side, came, passed, until, bool(anew), shown, scene)
 
 
 def examined(memory: EventMemory, scene: Scene) -> EventMemory:
-    """A copy that runs of this scene may have left; ValueError or TypeError where none has."""
+    """A validated copy; ValueError or TypeError for values that no run of this scene can have left."""
     events, rows = len(scene.events), dict[str, Index]()
     for name, known in (("side", SIDES), ("came", CAMES), ("passed", (0, 1))):
         row = arguments.shaped(name, getattr(memory, name), (events,))
         if not np.all(np.isin(row, known)):
-            raise ValueError(f"{name} of the events is {row}, and each is one of {known}")
+            raise ValueError(f"{name} of the events is {row}, but each must be one of {known}")
         rows[name] = row.astype(np.int64)
     shown = arguments.number("shown", memory.shown)
     if not isinstance(memory.until, float) or math.isnan(memory.until):
-        raise ValueError(f"until is {memory.until!r}, and is a time, or -inf")
+        raise ValueError(f"until is {memory.until!r}, but must be a time (s) or -inf")
     if not isinstance(memory.anew, bool) or not isinstance(memory.given, Scene):
-        raise TypeError("anew is True or False, given a scene")
+        raise TypeError("anew must be True or False, and given must be a Scene")
     if not 0.0 <= shown <= MOST or shown != int(shown):
-        raise ValueError(f"shown is {shown:g}, and counts events")
+        raise ValueError(f"shown is {shown:g}, but must be a number of events")
     if _items(memory.given) != _items(scene):
-        raise ValueError("what changes have left of the scene has other bodies or hinges than the scene")
+        raise ValueError("the scene in `given` has other bodies or hinges than the scene of the run")
     check_scene(memory.given)
     return EventMemory(**rows, until=memory.until, anew=memory.anew, shown=int(shown), given=memory.given)
 
 
 def _items(scene: Scene) -> set[tuple[str, str, str]]:
-    """By list, kind and name what neither latches nor changes of values alter; stops add sensors and events."""
+    """List, kind and name of a scene's items, which latches and changes of values keep; without sensors and events,
+    because coming to rest on a stop adds some."""
     lists = {name: getattr(scene, name) for name in scene.__struct_fields__ if name not in ("sensors", "events")}
     return {
         (name, type(item).__name__, getattr(item, "name", ""))

@@ -1,4 +1,4 @@
-"""What is recorded of an event that happened in a run."""
+"""The record of an event that happened in a run."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from flexmb.typing import Real
 class EventRecord:
     """An event that happened at t (s).
 
-    impulses: by coordinate, what its hinge or wheel exerted along it (N s or N m s), of held ones too; energy_change
-    (J), which the work of the trajectory counts; before, after: the states. closures: by closure, what it exerted,
-    (6,) [N m s; N s] on body_b about frame B, World axes. NaN what redundant closures leave open. early (s):
-    by how much it happened before its instant, not zero only where that is at a singular position of a closed chain.
+    impulses: by coordinate, the impulse of its hinge or wheel along it (N s or N m s), also of coordinates that are
+    held. energy_change (J) is included in the work of the trajectory. before, after: the states. closures: by closure,
+    its impulse (6,) [N m s; N s] on body_b about frame B, World axes. Impulses that redundant closures leave
+    undetermined are NaN. early (s): how long before its instant the event happened; it is not zero only if the instant
+    lies near a singular position of a closed chain.
     """
 
     name: str

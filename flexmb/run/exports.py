@@ -1,6 +1,6 @@
 """Trajectories for other programs: tables of pandas, Parquet and NumPy, datasets of xarray, recordings of rerun.
 
-Each is imported where it is used: none belongs to what flexmb needs. Names and units go along everywhere.
+These packages are optional, so each is imported where it is used. All formats contain names and units.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     import xarray
 
 AXES = {3: ("axis", ("x", "y", "z")), 4: ("component", ("w", "x", "y", "z"))}
-"""Dimension and its labels of the last axis of vectors and quaternions."""
+"""By number of components: name and labels of the last dimension of vectors and quaternions."""
 
 
 def write_npz(trajectory: RunArrays, path: Path) -> None:
-    """`names` (n,), `units` (n,), `values` (T,n), `scene`: text and numbers only, nothing that has to be unpickled."""
+    """Write `names` (n,), `units` (n,), `values` (T,n) and `scene`: text and numbers only, no pickled objects."""
     names, units, values = zip(*trajectory.columns(), strict=True)
     path = path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz")  # as NumPy names it
     with whole_file(path) as beside, beside.open("wb") as file:
@@ -36,7 +36,7 @@ def write_npz(trajectory: RunArrays, path: Path) -> None:
 
 
 def data_frame(trajectory: RunArrays) -> pandas.DataFrame:
-    """One column a channel, time as the index; `attrs` has the units by name, and the scene."""
+    """A table with one column per channel and time as the index; `attrs` has the units by name, and the scene."""
     try:
         import pandas
     except ImportError:
@@ -50,7 +50,7 @@ def data_frame(trajectory: RunArrays) -> pandas.DataFrame:
 
 
 def write_parquet(trajectory: RunArrays, path: Path) -> None:
-    """One column a channel, its unit in the metadata of its field; the scene in those of the file."""
+    """Write one column per channel, its unit in the metadata of its field, the scene in the metadata of the file."""
     try:
         import pyarrow
         from pyarrow import parquet
@@ -65,7 +65,8 @@ def write_parquet(trajectory: RunArrays, path: Path) -> None:
 
 
 def dataset(trajectory: RunArrays) -> xarray.Dataset:
-    """A variable a channel, (t), (t, axis) or, of quaternions, (t, component); units in `attrs`, as usual there."""
+    """One variable per channel, (t), (t, axis) or, for quaternions, (t, component); units in `attrs` (the convention of
+    xarray)."""
     try:
         import xarray
     except ImportError:
@@ -85,7 +86,7 @@ def dataset(trajectory: RunArrays) -> xarray.Dataset:
 
 
 def write_recording(trajectory: RunArrays, path: Path) -> None:
-    """A recording for the viewer rerun: markers as moving frames with their paths, all other channels as curves."""
+    """Write a recording for the viewer rerun: markers are moving frames with paths, all other channels are curves."""
     try:
         import rerun
     except ImportError:
@@ -104,7 +105,7 @@ def _record(rerun: Any, recording: Any, trajectory: RunArrays) -> None:
     recording.log("markers", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for name, marker in trajectory.markers.items():
         entity = f"markers/{rerun.escape_entity_path_part(name)}"
-        turned = np.roll(marker.quaternion, -1, axis=1)  # the scalar last
+        turned = np.roll(marker.quaternion, -1, axis=1)  # rerun expects the scalar last
         recording.send_columns(
             entity, indexes=time, columns=rerun.Transform3D.columns(translation=marker.position, quaternion=turned)
         )
@@ -126,7 +127,7 @@ def _record(rerun: Any, recording: Any, trajectory: RunArrays) -> None:
 
 
 def _blueprint(blueprint: Any) -> Any:
-    """Markers and their paths in space, loads and energies beneath each other."""
+    """The layout of the viewer: markers and their paths in space; loads, energies and all curves below each other."""
     curves = blueprint.Vertical(
         *(
             blueprint.TimeSeriesView(origin=f"curves/{kind}", name=name)
@@ -138,7 +139,7 @@ def _blueprint(blueprint: Any) -> Any:
 
 
 def _channels(trajectory: RunArrays) -> Iterator[tuple[str, str, Real]]:
-    """(name, unit, values (T,k)) of channels, with coordinates and speeds."""
+    """(name, unit, values (T,k)) of all coordinates, speeds and channels."""
     for names, values in ((trajectory.q_names, trajectory.q), (trajectory.u_names, trajectory.u)):
         for i, (name, units) in enumerate(names):
             yield name, units, values[:, i : i + 1]

@@ -1,11 +1,11 @@
-"""Impulses along speeds, which give some speeds new values at once and leave positions as they are.
+"""Impulses along speeds, which give some speeds new values instantaneously and leave positions unchanged.
 
 With A = [E; J], E picking these speeds, J u the rates of closures' rows, M = F F' and impulses p of both,
 
     M (u+ - u-) = A' p,    A u+ = [given; 0],
 
-and x = F' (u+ - u-) is the shortest with (F^-1 A')' x = A u+ - A u-, p the shortest with F^-1 A' p = x. Impulses that
-the motion does not determine, of redundant rows and what is held beside them, are NaN.
+where x = F' (u+ - u-) is the minimum-norm solution of (F^-1 A')' x = A u+ - A u-, and p that of F^-1 A' p = x.
+Impulses that the motion does not determine, because rows are redundant, are NaN.
 """
 
 from __future__ import annotations
@@ -24,13 +24,14 @@ if TYPE_CHECKING:
     from flexmb.closure.impulses import RowMotion
 
 ROUNDING = 2.0**-52
-SAME = 1e-7  # impulses that differ by less, beside the largest that do, are the same
+SAME = 1e-7  # relative to the largest component: smaller components of undetermined impulses count as zero
 
 
 class Struck(NamedTuple):
-    """u (nu,) afterwards; impulses by place in u (N s or N m s), on the outboard side; energy gained (J).
+    """u (nu,) after the impulses; impulses by index in u (N s or N m s), on the outboard side; energy gained (J).
 
-    closures: (6,) [N m s; N s] on body_b about frame B, World axes, by name. NaN what the motion does not determine.
+    closures: (6,) [N m s; N s] on body_b about frame B, World axes, by name. Impulses that the motion does not
+    determine are NaN.
     """
 
     u: Real
@@ -40,12 +41,12 @@ class Struck(NamedTuple):
 
 
 def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
-    """The speeds after impulses that give those at some places in u the values that `speeds` says.
+    """The speeds after impulses that give some speeds new values: `speeds` by index in u.
 
-    Prescribed speeds keep theirs, by impulses of their drives, and closures stay closed, by theirs. All momentum passes
-    through the hinges: that of the whole changes by what those on the ground take. The energy is the impulses' work, at
-    the mean of the speeds before and after. Raises DynamicsError where the mass matrix is not positive definite, or
-    where closures do not allow such speeds.
+    Impulses of drives keep prescribed speeds unchanged, and impulses of closures keep closures closed. All impulses act
+    through hinges: the total momentum changes only by those of hinges on the ground. The energy is the impulses' work,
+    at the mean of the speeds before and after. Raises DynamicsError if the mass matrix is not positive definite, or if
+    closures do not allow such speeds.
     """
     prescribed = np.flatnonzero(system.constants.speed["prescribed"] >= 0).tolist()
     places = sorted({*prescribed, *speeds})
@@ -64,7 +65,7 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     u = state.u + factors.solve(along.T @ impulses)
     u[places] = state.u[places] + change[: len(places)]
     if rank == system.nu and not np.any(u[places]):
-        u[:] = 0.0  # no freedom is left: of rounding alone closures would seem to open
+        u[:] = 0.0  # no freedom is left: rounding errors in u would violate the closures
     held = impulses[: len(places)]
     energy = 0.5 * float(held @ (u[places] + state.u[places]))
     if rows is None:
@@ -78,13 +79,13 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
 
 
 def _determined(values: Real, others: Real, rounding: float) -> Real:
-    """NaN where one of several sets (k,...) of impulses that change no motion would change a value."""
+    """The values, NaN where one of the sets `others` (k,...) of impulses that change no motion has a component."""
     return np.where(np.max(np.abs(others), axis=0, initial=0.0) > rounding, np.nan, values)
 
 
 def _rows(system: System, state: State) -> RowMotion:
-    """Of all closures."""
-    from flexmb.closure.impulses import RowMotion  # a tree needs none of it
+    """The rows of all closures."""
+    from flexmb.closure.impulses import RowMotion  # imported here because trees do not need it
     from flexmb.system.closed import ClosedSystem
 
     assert isinstance(system, ClosedSystem)
@@ -92,7 +93,8 @@ def _rows(system: System, state: State) -> RowMotion:
 
 
 def _sizes(half: Real, coordinates: int) -> Real:
-    """By which responses are compared: each coordinate's own, and one of all rows, whose impulses are the least."""
+    """Scales of the columns of `half`: for each coordinate its own norm, for all rows of closures their largest norm,
+    because the impulses of closures are those of minimum norm."""
     size = np.linalg.norm(half, axis=0)
     size[coordinates:] = np.max(size[coordinates:], initial=0.0)
     return np.where(size > 0.0, size, 1.0)
@@ -103,19 +105,20 @@ def _by_name(system: System, wrenches: Real) -> dict[str, Real]:
 
 
 def _unavoidable(moved: Real, moving: float, opening: Real) -> float:
-    """What is left of a change that closures allow, as all here in roots of energy; moving: the speeds before.
+    """Bound on the residual of a change of speed that closures allow, in sqrt(J) as all arguments are; moving: the norm
+    of the speeds before.
 
-    Rounding; motions that count as dependent, which do not take part, and move by twice the speeds at most; and by what
-    closures open anyway, which redundant ones need not agree about.
+    It sums rounding; the motions that count as dependent and are left out, which change by at most twice the speeds;
+    and the rates by which closures open already, which may be inconsistent for redundant rows.
     """
     rounding = (len(moved) + len(opening)) * ROUNDING * float(np.linalg.norm(moved))
     return rounding + 2.0 * DEPENDENT * moving + float(np.linalg.norm(opening))
 
 
 def _refuse_unreached(left: Real, unavoidable: float, state: State) -> None:
-    """DynamicsError where closures and drives leave too little freedom for what an event asks for."""
+    """DynamicsError if closures and drives leave too little freedom for the speed that an event requires."""
     if not np.max(left, initial=0.0) <= unavoidable:
         raise DynamicsError(
-            f"at t = {state.t:g} s an event asks for a speed that closures and prescribed motions do not allow: the "
-            "coordinate has no freedom of its own there; prescribe less, or act on what is free"
+            f"at t = {state.t:g} s an event requires a speed that closures and prescribed motions do not allow: the "
+            "coordinate has no freedom of its own there; prescribe fewer coordinates, or act on a free one"
         )

@@ -1,4 +1,4 @@
-"""Ctrl-C while compiled code runs: Python sees it, and the run ends at its next step and keeps what it reached."""
+"""Ctrl-C while compiled code runs: the run ends at its next step, and its results up to there are kept."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from typing import Any
 from flexmb.run.trajectory import Trajectory
 from flexmb.typing import Index
 
-PATIENCE = 0.1  # s between looks at the keyboard, where waiting itself does not see it (Windows)
+PATIENCE = 0.1  # s between checks for Ctrl-C, for systems where it does not interrupt waiting for a lock (Windows)
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C ended a run. `trajectory` holds the run up to there, like that of any run that stopped."""
+    """Ctrl-C ended a run. `trajectory` holds the run up to there, as for any run that stopped early."""
 
     def __init__(self, trajectory: Trajectory) -> None:
         super().__init__(trajectory)
         self.trajectory = trajectory
 
     def __str__(self) -> str:
-        return f"{self.trajectory.message}; what was reached is in the attribute `trajectory`"
+        return f"{self.trajectory.message}; the results up to there are in the attribute `trajectory`"
 
 
 class _SpareThread:
-    """A thread that does one thing after another: to start one costs as much as a short run."""
+    """A worker thread that is reused, because starting a thread costs as much as a short run."""
 
     def __init__(self) -> None:
         self.process = os.getpid()
@@ -35,7 +35,7 @@ class _SpareThread:
         _thread.start_new_thread(self._serve, ())
 
     def do(self, work: Callable[[], None]) -> None:
-        """Begin with what raises nothing, after all that came before is done."""
+        """Start `work`, which must not raise, once earlier work is done."""
         self._work.append(work)
         self._asked.release()
 
@@ -45,11 +45,11 @@ class _SpareThread:
             self._work.pop()()
 
 
-_idle: list[_SpareThread] = []  # of the main thread, which alone has others work for it
+_idle: list[_SpareThread] = []  # used by the main thread only
 
 
 def _idle_worker() -> _SpareThread:
-    """One that nobody waits for; a process that was forked off has none of its parent's threads."""
+    """An idle worker thread. Threads of a parent process are discarded: they do not exist after a fork."""
     while _idle:
         worker = _idle.pop()
         if worker.process == os.getpid():
@@ -61,11 +61,11 @@ def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Ind
     """The result of `run`, and whether Ctrl-C was pressed, in which case stop[0] = 1 asks `run` to return soon.
 
     Python handles signals in the main thread, and only between its own instructions: so compiled code runs in another
-    thread, and the main one waits. Called from another thread, `run` is called there, and Ctrl-C is for others to see.
+    thread, and the main one waits. When called from another thread, `run` is executed there and cannot be interrupted.
     """
     if threading.current_thread() is not threading.main_thread():
         return run(*arguments), False
-    done, found = _thread.allocate_lock(), list[Any]()  # a lock alone: an Event costs as much as a short run
+    done, found = _thread.allocate_lock(), list[Any]()  # a bare lock, because an Event costs as much as a short run
 
     def work() -> None:
         try:
@@ -87,12 +87,12 @@ def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Ind
     except KeyboardInterrupt:
         stop[0], interrupted = 1, True
         wait()
-    except BaseException:  # of a handler of another signal, an alarm for example
+    except BaseException:  # raised by a handler of another signal, such as an alarm
         stop[0] = 1
         wait()
         raise
     finally:
-        if found:  # else a second Ctrl-C: it is still at work
+        if found:  # otherwise a second Ctrl-C was pressed, and the worker is still busy
             _idle.append(worker)
     result, problem = found[0]
     if problem is not None:

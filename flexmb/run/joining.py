@@ -1,4 +1,4 @@
-"""Two runs, one after the other, as one trajectory."""
+"""Joins two consecutive runs to one trajectory."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SAME_NAMES = (
 
 
 def joined(first: Run, later: Run) -> Run:
-    """See `Trajectory.then`; the later run may have no output where the first one ended."""
+    """See `Trajectory.then`. The later run need not have an output at the end of the first one."""
     for key in SAME_NAMES:
         strange = set(getattr(first, key)) ^ set(getattr(later, key))
         if strange:
@@ -28,7 +28,7 @@ def joined(first: Run, later: Run) -> Run:
     if len(later.t) == 0:
         return _ended(first, later)
     kept = int(np.searchsorted(first.t, later.t[0]))
-    # a run that was taken up has counted on by itself
+    # the work of a resumed run already includes that of the first run
     counted = first.work[-1] - later.work[0] if len(first.work) and later.work[0] == 0.0 else 0.0
 
     def both(a: Real, b: Real) -> Real:
@@ -60,21 +60,21 @@ def _ended(whole: Run, later: Run) -> Run:
 
 
 def _sum(a: Any, b: Any) -> Any:
-    """Of statistics."""
+    """The sum of two `Statistics`."""
     return type(a)(*(getattr(a, field.name) + getattr(b, field.name) for field in fields(a)))
 
 
 def _path(a: MarkerPath, b: MarkerPath, kept: int) -> MarkerPath:
-    """A marker's path without a jump of the quaternion's sign."""
+    """The joined path of a marker, without a jump of the quaternion's sign."""
     turned = kept > 0 and float(a.quaternion[kept - 1] @ b.quaternion[0]) < 0.0
     b = replace(b, quaternion=-b.quaternion) if turned else b
     return type(b)(*(np.concatenate([getattr(a, f.name)[:kept], getattr(b, f.name)]) for f in fields(b)))
 
 
 def _of_some(first: RunArrays, later: RunArrays, kept: int, key: str) -> dict[str, Real]:
-    """Drives, signals, powers: one of the runs alone may have a name, or another number of columns under it.
+    """Joined drives, signals or powers, whose names and numbers of columns may differ between the runs.
 
-    What is not driven takes no load and no power, and is zero then; a signal that there is not is NaN.
+    Missing drives and powers are zero, because a coordinate that is not driven takes none; missing signals are NaN.
     """
     missing = np.nan if key == "signals" else 0.0
     a, b, found = getattr(first, key), getattr(later, key), {}

@@ -1,4 +1,4 @@
-"""Runs of a batch: in lanes where the method and the scenes allow, copy by copy where they do not, in threads."""
+"""Runs of a batch, in threads: in SIMD lanes if the method and the scenes allow it, otherwise copy by copy."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from flexmb.tables.status import INTERRUPTED, MAX_STEPS, NONFINITE, NOT_POSITIVE
 from flexmb.typing import Index, Real
 
 _IN_LANES = ("rk4", "dop853")
-_DECIDED = (OK, MAX_STEPS, INTERRUPTED)  # how lanes end as well as they would alone
+_DECIDED = (OK, MAX_STEPS, INTERRUPTED)  # statuses of lanes that are final; other copies are run again one by one
 _NOT_YET = -1
 
 
 class Runs(NamedTuple):
-    """What the runs of N copies write: n of a batch, and more of the last one until blocks of LANES are full."""
+    """Results of N runs: the n copies of a batch, the last one repeated until N is a multiple of LANES."""
 
     y: Real  # (N,nq+nu+1) initial states
     out: Real  # (N,T,nq+nu+1)
@@ -46,7 +46,7 @@ class Runs(NamedTuple):
 
 
 def runs(q: Real, u: Real, samples: int) -> Runs:
-    """Room for the runs of copies with these initial states (n,nq), (n,nu)."""
+    """Arrays for the runs of copies with initial states q (n,nq), u (n,nu)."""
     n = len(q) + -len(q) % LANES
     y = np.concatenate([q, u, np.zeros((len(q), 1))], axis=1)
     y = np.concatenate([y, np.repeat(y[-1:], n - len(q), axis=0)])
@@ -58,7 +58,7 @@ def runs(q: Real, u: Real, samples: int) -> Runs:
 
 
 class BatchRun:
-    """A method applied to the copies of a batch."""
+    """Runs of the copies of a batch by one method."""
 
     def __init__(self, batch: Batch, times: Real, settings: Settings, found: Runs) -> None:
         self._batch, self._times, self._settings, self._found = batch, times, settings, found
@@ -76,7 +76,7 @@ class BatchRun:
         in_threads(self._alone, left, threads if self._batch.in_lanes and not controlled else 1)
 
     def _copies_ends(self, copies: Sequence[int]) -> list[Real]:
-        """Ends of the segments of each copy."""
+        """Segment ends (s) of each of these copies."""
         last = len(self._ends) - 1
         return [self._ends[min(copy, last)] for copy in copies]
 
@@ -86,7 +86,7 @@ class BatchRun:
                 self._block(first, tables)
 
     def _block(self, first: int, tables: LaneTables) -> None:
-        """Run LANES copies; those whose end the lanes do not decide are left for later."""
+        """Run LANES copies at once; those that end with a status that is not in _DECIDED are left for single runs."""
         w, s, entries, _ = tables
         place = slice(first, first + LANES)
         found = Runs(*(part[place] for part in self._found))
@@ -115,7 +115,7 @@ class BatchRun:
             found.status[lane], found.stopped_at[lane] = status[lane], stopped_at[lane]
 
     def _examine(self, first: int, status: Index) -> None:
-        """Copies whose inertias are not positive definite at the start, or are so beyond rounding, do not run."""
+        """Set the status of copies that cannot run, because an inertia is not positive definite at the start."""
         for lane in range(LANES):
             copy = min(first + lane, len(self._batch.systems) - 1)
             system = self._batch.systems[copy]
@@ -123,19 +123,19 @@ class BatchRun:
             if np.isfinite(y).all():
                 try:
                     precision = system.precision(system.state(y[: system.nq], y[system.nq : -1]))
-                except (ValueError, DynamicsError):  # no orientation, or overflow
+                except (ValueError, DynamicsError):  # a zero quaternion, or overflow
                     status[lane] = NONFINITE
                     continue
                 if precision.status != OK:
                     status[lane], self._found.fault[first + lane] = NOT_POSITIVE_DEFINITE, precision.fault
 
     def _alone(self, copies: Iterable[int]) -> None:
-        """Run copies one after the other, each by its own system."""
+        """Run copies one after the other, each with its own system."""
         found, accuracy = self._found, self._settings.accuracy(self._batch.nq, self._batch.nu)
         last, solve = None, None
         for copy in copies:
             system = self._batch.system(copy)
-            if solve is None or system is not last or system.scene.closures:  # chains remember their branch
+            if solve is None or system is not last or system.scene.closures:  # closed chains store their branch
                 last, solve = system, alone(system, self._settings.integrator)
             [ends] = self._copies_ends([copy])
             found.counts[copy, :STOP], found.out[copy] = 0, np.nan
@@ -145,19 +145,19 @@ class BatchRun:
 
 
 def alone(system: System, method: Integrator) -> Alone | Controlled:
-    """An integrator for copies of one system, one at a time."""
+    """An integrator for single runs of copies of one system."""
     return Controlled(system, method) if system.scene.controllers else Alone(system, method)
 
 
 class Controlled:
-    """Of a system with controllers, which begin anew in each run."""
+    """Single runs of a system with controllers, which are initialised for each run."""
 
     def __init__(self, system: System, method: Integrator) -> None:
         self._own, self._method = fresh_copy(system), method
         self._solve = Integration(self._own, algorithms.chosen("articulated"), self._own.route(), method)
 
     def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
-        """See `Integrator`; out (T,nq+nu+1) is without the states of controllers."""
+        """See `Integrator`; out (T,nq+nu+1) does not contain the states of controllers."""
         begin = Beginning(self._own.layout.known(float(clock.times[0]), y), y, None)
         y, clock, accuracy = self._solve.begin(begin, clock, accuracy, counts)
         found = np.empty((len(out), len(y)))
@@ -173,7 +173,7 @@ class Controlled:
 
 
 class Alone:
-    """Of a system without."""
+    """Single runs of a system without controllers."""
 
     def __init__(self, system: System, method: Integrator) -> None:
         self._method = method
@@ -181,7 +181,7 @@ class Alone:
             algorithm = algorithms.chosen("articulated")
             whole = Integration(system, algorithm, system.route(), method)
             self._solve, self._workspace = whole, whole
-        else:  # every mode is eliminated explicitly, as in lanes
+        else:  # all modes are eliminated explicitly, as in lanes, so that both give the same results
             self._workspace = system.workspace()
             self._solve = partial(method.run, recursion(system.constants, self._workspace))
 

@@ -1,4 +1,4 @@
-"""How a trajectory was made: what asks more of a run than it has kept needs its system, and can repeat it."""
+"""How a trajectory was computed: its system, for quantities that the run did not store, and a way to repeat the run."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from flexmb.run.run_arrays import RunArrays
 from flexmb.system.tree_system import System
 from flexmb.typing import Real
 
-TIGHTER = 100.0  # of rtol and atol: the error of the second run is a hundredth of the first one's
-HALF = 4.0 / 3.0  # error over its change where the step is halved, of a method of order two; less of higher orders
+TIGHTER = 100.0  # factor on rtol and atol: the error of the second run is a hundredth of the first run's
+HALF = 4.0 / 3.0  # error over its change when the step is halved, for a method of order two; smaller for higher orders
 
 
 @dataclass(frozen=True)
 class Making:
-    """The system of a run, its output times (T,) s and settings, and how to run the same with other settings."""
+    """The system of a run, its output times (T,) s and settings, and a function that repeats it with other settings."""
 
     system: System
     times: Real
@@ -28,9 +28,9 @@ class Making:
 
 
 def error_estimate(trajectory: RunArrays, made_by: Making) -> dict[str, Real]:
-    """Distance (T,) of every channel from that of a second run, a hundred times as tight or in half the step.
+    """Estimated error (T,) of every channel, from a second run with rtol and atol / 100, or with half the step.
 
-    NaN after the end of a second run that stops earlier. ValueError where the settings cannot be tighter.
+    NaN after the end of a second run that stops earlier. ValueError if the settings cannot be made tighter.
     """
     settings, share = _tighter(made_by.settings)
     other = channels_of(made_by.again(settings))
@@ -44,14 +44,14 @@ def error_estimate(trajectory: RunArrays, made_by: Making) -> dict[str, Real]:
 
 
 def _tighter(given: Settings) -> tuple[Settings, float]:
-    """The settings of the second run, and the error of the first one over the distance of the two."""
+    """The settings of the second run, and the ratio of the first run's error to the distance of both runs."""
     if given.integrator.fixed:
-        assert given.step is not None  # of methods of fixed steps
+        assert given.step is not None  # methods of fixed steps have one
         finer = replace(given, step=given.step / 2.0, max_steps=2 * given.max_steps + 1)
         return replace(finer, rtol=max(given.rtol / TIGHTER, FINEST_RTOL), atol=given.atol / TIGHTER), HALF
     if given.rtol / TIGHTER < FINEST_RTOL:
         raise ValueError(
-            f"rtol is {given.rtol:g}, and double precision resolves {FINEST_RTOL:.1e}: no run is {TIGHTER:g} times as "
-            f"tight; estimate the error of a run with rtol {TIGHTER * FINEST_RTOL:.1e} or more"
+            f"rtol is {given.rtol:g}, and double precision resolves {FINEST_RTOL:.1e}: a second run cannot be "
+            f"{TIGHTER:g} times as tight; estimate the error of a run with rtol {TIGHTER * FINEST_RTOL:.1e} or more"
         )
     return replace(given, rtol=given.rtol / TIGHTER, atol=given.atol / TIGHTER, max_steps=10 * given.max_steps), 1.0

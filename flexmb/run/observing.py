@@ -1,4 +1,4 @@
-"""What is observed at the samples of a run, as rows of numbers; in compiled code where that is possible."""
+"""Evaluates all observables at the samples of a run, as rows of numbers; in compiled code where that is possible."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from flexmb.system.observables import Observation
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 
-PATIENCE = 0.05  # s that compiled code may take before Python looks at the keyboard
+PATIENCE = 0.05  # s that compiled code may take between checks for Ctrl-C
 
 Sampler = Callable[[Real, Real, Real], int]
 
 
 class Rows(NamedTuple):
-    """Observed at the first samples, (T,m) as `Observation.columns` has them, and what ended it, if anything did."""
+    """Observables at the first T samples, (T,m) as in `Observation.columns`, and the exception that stopped it."""
 
     rows: Real
     trouble: DynamicsError | KeyboardInterrupt | None
 
 
 class Observed(Protocol):
-    """A system, or a closed loop around one, as outputs are asked of it."""
+    """A system, or a closed loop of one with its controllers, whose observables can be evaluated."""
 
     @property
     def observation(self) -> Observation: ...
@@ -38,10 +38,10 @@ class Observed(Protocol):
 
 
 def batch(observed: Observed, motion: tuple[Any, ...], observing: Any, n: int) -> Sampler:
-    """A function of times (T,), states (T,n) and rows (T,m) that fills rows and returns how many, up to the first that
-    is for Python to look into. It has outputs of its own.
+    """A function of times (T,), states (T,n) and rows (T,m) that fills rows and returns their number; it stops before
+    the first sample that raises an error or a warning, which is left to Python. It uses output arrays of its own.
 
-    motion: a right-hand side with its constants and workspace; `observing` is a kernel of these and of the outputs.
+    motion: a right-hand side with its constants and workspace; `observing`: a kernel that takes these and the outputs.
     """
     rhs, constants, workspace = motion
     out, slope = observed.observation.outputs(), np.empty(n)
@@ -54,9 +54,9 @@ def batch(observed: Observed, motion: tuple[Any, ...], observing: Any, n: int) -
 
 
 def observe(system: Observed, algorithm: Algorithm, times: Real, states: Real, sampled: Sampler | None) -> Rows:
-    """Rows at all states (T,n) that are reached at these times, or up to where it fails or Ctrl-C is pressed.
+    """Rows at all states (T,n), which belong to the first T of these times, up to a failure or Ctrl-C.
 
-    `sampled` does many at once; what it leaves is evaluated as a single state is, with its errors and warnings.
+    `sampled` evaluates many samples at once; those it leaves out are evaluated singly, with their errors and warnings.
     """
     rows, done, many = np.zeros((len(states), system.observation.width)), 0, 1
     try:

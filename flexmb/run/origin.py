@@ -20,12 +20,12 @@ from flexmb.typing import Real
 
 Values = Mapping[str, float | Sequence[float] | Real]
 Given = State | Restart | Values | None
-SAME = 1e-9  # relative difference of a value that is given and one that a prescribed motion has
+SAME = 1e-9  # allowed relative difference of a given value from that of a prescribed motion
 
 
 class Beginning(NamedTuple):
-    """state: what the run starts from, with its time; y (nq+nu+1,) = [q, u, work], a copy; of one taken up its memory,
-    those of its controllers and events, and states of controllers before the work in y."""
+    """state: the state and time at which the run starts; y (nq+nu+1,) = [q, u, work], a copy. For a resumed run also
+    the memories of its integrator, controllers and events; y then has the controllers' states before the work."""
 
     state: State
     y: Real
@@ -35,7 +35,7 @@ class Beginning(NamedTuple):
 
 
 def start_time(t_start: float | None, state: Given) -> float:
-    """Time (s) at which a run begins; ValueError or TypeError for one that makes no sense."""
+    """Time (s) at which a run begins; ValueError or TypeError for an invalid one."""
     if isinstance(state, Restart):
         state = state.examined()
     own = state.t if isinstance(state, State | Restart) else 0.0
@@ -44,17 +44,17 @@ def start_time(t_start: float | None, state: Given) -> float:
     t_start = arguments.number("t_start", t_start)
     if isinstance(state, Restart) and not state.since <= t_start <= own:
         raise ValueError(
-            f"t_start is {t_start:g} s, but the run that is taken up goes on from {state.since:.17g} s and ended at "
+            f"t_start is {t_start:g} s, but the run to resume continues from {state.since:.17g} s and ended at "
             f"{own:.17g} s: leave t_start out, or give a time between these"
         )
     return t_start
 
 
 def origin(system: System, t: float, state: Given, method: str) -> Beginning:
-    """What a run by this method begins with at time t (s).
+    """The beginning of a run by this method at time t (s).
 
     ValueError for a restart of another scene or method, for values that do not belong to the scene or contradict its
-    prescribed motions, for a state that closes its closures only roughly; TypeError for anything else than `Given`.
+    prescribed motions, and for a state that is far from closing its closures; TypeError for other types than `Given`.
     """
     if isinstance(state, Restart):
         return _taken_up(system, state, method)
@@ -84,13 +84,14 @@ def _taken_up(system: System, restart: Restart, method: str) -> Beginning:
 
 
 def _count_rows(system: System, t: float, motion: Real) -> None:
-    """Of a scene that events have left, with hinges that are held, the run itself may know the only closed state."""
-    from flexmb.closure.closures import ClosureError  # a tree needs none of it
+    """Have the independent rows of closures counted. If no closed state is found from the scene's own initial state, as
+    after events that hold hinges, the state of the resumed run is used."""
+    from flexmb.closure.closures import ClosureError  # imported here because trees do not need it
     from flexmb.system.closed import ClosedSystem
 
     assert isinstance(system, ClosedSystem)
     try:
-        system.initial_state  # noqa: B018 - counts them
+        system.initial_state  # noqa: B018 - counts the rows
     except ClosureError:
         system.closures.begin_at(t, motion)
 
@@ -109,7 +110,7 @@ def _named(system: System, t: float, values: Values) -> State:
         row = [value] if is_one else value
         numbers = arguments.finite(called, arguments.vector(called, row, place.stop - place.start))
         if np.any(given[place] & (y[place] != numbers)):
-            raise ValueError(f"{called} is {value}, and another name gives the same coordinates other values")
+            raise ValueError(f"{called} is {value}, but another name gives the same coordinates other values")
         y[place], given[place] = numbers, True
     _, whole = system.layout.whole(t, y)
     found = system.admissible(system.layout.known(t, whole), given)
@@ -118,10 +119,10 @@ def _named(system: System, t: float, values: Values) -> State:
 
 
 def names_of_places(system: System) -> dict[str, slice]:
-    """Places in [q, u, work] of all that a state may be given by.
+    """Places in [q, u, work] by all names that a state may be given by.
 
-    Single entries as in `Trajectory.q_names` and `u_names`; "<hinge>", "<wheel>", "<body>.modes" for all coordinates of
-    one, with ".speeds" behind it for all its speeds.
+    These are single entries as in `Trajectory.q_names` and `u_names`; "<hinge>", "<wheel>" or "<body>.modes" for all
+    coordinates of an item; and the same followed by ".speeds" for all its speeds.
     """
     q, u = system.state_names
     found = {name: slice(i, i + 1) for i, (name, _) in enumerate((*q, *u))}
@@ -133,13 +134,13 @@ def names_of_places(system: System) -> dict[str, slice]:
 
 
 def _refuse_other_than_prescribed(system: System, whole: Real, found: State, given: Real) -> None:
-    """A value that is given says where the motion starts: a prescribed motion must agree."""
+    """ValueError for a given value that differs from that of a prescribed motion."""
     names = [name for names in system.state_names for name, _ in names]
     speed = system.constants.speed
     for j in np.flatnonzero(speed["prescribed"] >= 0).tolist():
         for i in (int(speed["coordinate"][j]), system.nq + j):
             if given[i] and abs(whole[i] - found.y[i]) > SAME * max(1.0, abs(found.y[i])):
                 raise ValueError(
-                    f'state: "{names[i]}" is prescribed, and its motion has {found.y[i]:g} at t = {found.t:g} s, not '
-                    f"{whole[i]:g}: leave it out, or change the function"
+                    f'state: "{names[i]}" is prescribed, and its function gives {found.y[i]:g} at t = {found.t:g} s, '
+                    f"not {whole[i]:g}: leave it out, or change the function"
                 )

@@ -1,4 +1,4 @@
-"""The trajectory of what an integrator left: everything observable at the samples reached, and how the run ended."""
+"""Makes a trajectory from an integrator's result: all observables at the samples reached, and how the run ended."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from flexmb.typing import Real
 
 
 def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve: Integration) -> Trajectory:
-    """Evaluate everything observable at the samples reached, of a run by `solve`."""
+    """The trajectory of an integration by `solve`: all observables at the samples reached, a subset of `times`."""
     start = perf_counter()
     rows, trouble = observe(solve.feedback or system, algorithm, times, raw.states, solve.batch)
     status, stopped_at, message = raw.status, raw.t, ending(system, raw)
@@ -60,15 +60,15 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve:
 
 
 def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:
-    """Of the end of the outputs; squares overflow earlier than the state itself, and fixed steps may have jumped over
-    the place where the dynamics ends."""
+    """The status of a run whose outputs cannot be evaluated. This happens where the integration did not fail because
+    squares overflow earlier than the state itself, and because fixed steps may pass over a singular mass matrix."""
     if isinstance(trouble, KeyboardInterrupt):
         return Status.INTERRUPTED
     return Status.NONFINITE if isinstance(trouble, NotFiniteError) else Status.NOT_POSITIVE_DEFINITE
 
 
 def doubt_about(system: System, solve: Integration) -> str | None:
-    """Where steps were too long for a singular position that a run came near, if it ended well all the same."""
+    """A warning if steps were too long for a singular position near which the run passed without failing."""
     if solve.noticed is None:
         return None
     t, fault = solve.noticed

@@ -17,11 +17,11 @@ from flexmb.typing import Real
 
 _SIZE = (9.0, 5.5)  # inches
 _RESOLUTION = 120  # dots per inch
-_MOST = 10  # curves of a panel: matplotlib has ten colours, and more names do not fit beside them
+_MOST = 10  # curves per panel: matplotlib has ten colours, and a longer legend would not fit
 
 
 def write_plots(trajectory: RunArrays, folder: Path) -> list[Path]:
-    """Write markers, energy, momentum, loads and drives, as far as the run has them; returns the paths."""
+    """Write charts of markers, energy, momentum, loads and drives, if the run has them; returns the paths."""
     wanted: dict[str, tuple[Callable[[RunArrays, Figure], None], bool]] = {
         "markers": (_markers, bool(trajectory.markers)),
         "energy": (_energy, True),
@@ -46,7 +46,7 @@ def _write(trajectory: RunArrays, path: Path, draw: Callable[[RunArrays, Figure]
 
 
 def _rows(figure: Figure, *labels: str) -> list[Axes]:
-    """One panel below the other with a common time axis."""
+    """Panels below each other with a common time axis."""
     panels = list(np.atleast_1d(figure.subplots(len(labels), sharex=True)))
     for panel, label in zip(panels, labels, strict=True):
         panel.set_ylabel(label)
@@ -54,7 +54,7 @@ def _rows(figure: Figure, *labels: str) -> list[Axes]:
 
 
 def _draw(panel: Axes, t: Real, curves: dict[str, Real], size: Callable[[Real], Any]) -> None:
-    """Curves by name; of more than `_MOST`, those of the largest `size`, and the panel says so."""
+    """Plot curves by name; of more than `_MOST`, those of the largest `size`, which the panel's title states."""
     sizes = {name: np.nan_to_num(size(values)) for name, values in curves.items()}
     shown = set(sorted(sizes, key=lambda name: -sizes[name])[:_MOST])
     for name, values in curves.items():
@@ -67,7 +67,7 @@ def _draw(panel: Axes, t: Real, curves: dict[str, Real], size: Callable[[Real], 
 def _markers(trajectory: RunArrays, figure: Figure) -> None:
     for axis, panel in enumerate(_rows(figure, "x (m)", "y (m)", "z (m)")):
         curves = {name: path.position[:, axis] for name, path in trajectory.markers.items()}
-        _draw(panel, trajectory.t, curves, np.ptp)  # how far each moves, wherever it is
+        _draw(panel, trajectory.t, curves, np.ptp)  # the largest are those that move farthest
 
 
 def _energy(trajectory: RunArrays, figure: Figure) -> None:
@@ -88,7 +88,7 @@ def _momentum(trajectory: RunArrays, figure: Figure) -> None:
 
 
 def _loads(trajectory: RunArrays, figure: Figure) -> None:
-    """Magnitudes: components of many hinges in one chart are not legible; the CSV has them."""
+    """Plot magnitudes: components of many hinges in one chart are not legible; the CSV file has them."""
     loads = trajectory.loads | trajectory.wheel_loads
     for part, panel in enumerate(_rows(figure, "|torque| (N m)", "|force| (N)")):
         curves = {name: _magnitude(load[:, 3 * part : 3 * part + 3]) for name, load in loads.items()}
@@ -106,5 +106,5 @@ def _drives(trajectory: RunArrays, figure: Figure) -> None:
 
 
 def _magnitude(vectors: Real) -> Real:
-    """Lengths of (T,3); hypot does not overflow where a diverging run's squares would."""
+    """Norms of vectors (T,3); hypot does not overflow where the squares of a diverging run would."""
     return np.hypot(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2])

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 class Raw(NamedTuple):
     """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost.
 
-    y (n,): the last good state; memory, controllers: how it can be taken up there, None where it leapt over its end;
-    paused: whether it stopped at a level.
+    y (n,): the last good state; memory, controllers: what is needed to resume there, None if a leap passed the end;
+    paused: whether it stopped at the level of an event.
     """
 
     states: Real
@@ -59,26 +59,26 @@ class Raw(NamedTuple):
 
 
 def recursion(constants: Constants, workspace: Any) -> Problem:
-    """The equations of motion by the recursion."""
+    """The equations of motion by the O(N) recursion."""
     return problem(articulated.rhs, coordinates.project, constants, workspace)
 
 
 class Integration:
-    """An integrator with a problem and a workspace of its own, ready to be called."""
+    """An integrator with its own problem and workspace, ready to be called."""
 
     def __init__(self, system: System, algorithm: DynamicsAlgorithm, route: Route, integrator: Integrator) -> None:
         constants, self._workspace = route.tables()
         self.system, self._integrator = system, integrator
         self.feedback: Feedback | None = None
-        """Of a scene with controllers, or with events that watch signals."""
+        """The closed loop of a scene with controllers, or with events that watch signals."""
         if system.scene.controllers or watches_signals(system.scene):
-            from flexmb.control.feedback import Feedback  # few scenes need it
+            from flexmb.control.feedback import Feedback  # imported here because few scenes need it
 
             self.feedback = Feedback(system, algorithm, route, (constants, self._workspace))
         self._linear: Linear | None = None
         motion = route.rhs, route.project, constants, self._workspace
         if integrator.linearises:
-            assert route.linear is not None  # else `refuse_without_jacobian`
+            assert route.linear is not None  # `refuse_without_jacobian` has checked this
             self._linear = route.linear(constants, self._workspace)
             self._problem: Any = stiff_problem(*motion, self._linear, route.leaping)
             if self.feedback is not None:
@@ -89,12 +89,12 @@ class Integration:
         if integrator.fixed and route.leaping is not None:
             route.leaping.watch_steps(constants, not integrator.linearises)
         self.batch: Sampler | None = None
-        """Observes many samples at once."""
+        """Evaluates the outputs of many samples at once, in compiled code."""
         self._batched = algorithm.observing is not None and not system.scene.closures
         if self._batched and self.feedback is None:
             moving = route.rhs, constants, self._workspace
             self.batch = batch(system, moving, algorithm.observing, system.nq + system.nu + 1)
-        self._enter: dict[bool, Any] = {}  # by whether levels are watched
+        self._enter: dict[bool, Any] = {}  # compiled integrators, by whether levels are watched
         self._at_first = [(array, array.copy()) for array in route.remembered(constants)]
 
     def __call__(self, *given: Any) -> tuple[int, float]:
@@ -103,18 +103,18 @@ class Integration:
         return self._enter[given[-1] is not None](self._problem, *given)
 
     def forget(self) -> None:
-        """Be as it was made: closed chains remember the branch that they are on."""
+        """Restore the initial state: closed chains store the branch that they are on."""
         for array, at_first in self._at_first:
             array[...] = at_first
 
     def compile(self, *given: Any) -> None:
-        """For a call with these, unless that is done."""
+        """Compile for a call with these arguments, unless that has been done."""
         watched = given[-1] is not None
         if watched not in self._enter:
             self._enter[watched] = undispatched(self._integrator.run, self._problem, *given)
 
     def begin(self, begin: Beginning, clock: Clock, accuracy: Accuracy, counts: Index) -> tuple[Real, Clock, Accuracy]:
-        """State, clock and accuracy of a run; of a scene with controllers those of the closed loop."""
+        """State, clock and accuracy of a run; for a scene with controllers, those of the closed loop."""
         if self.feedback is None:
             return begin.y, clock, accuracy
         self._problem, y, clock, accuracy = self.feedback.begin(begin, clock, accuracy, self._linear)
@@ -124,9 +124,10 @@ class Integration:
         return y, clock, accuracy
 
     def ended(self, acting: tuple[float, Real] | None) -> LoopMemory | None:
-        """What controllers know at the end of a run, which is looked at from now on; raises what they raised.
+        """The memory of controllers at the end of an integration, whose outputs can be evaluated from now on. Raises
+        exceptions of controllers.
 
-        acting: time (s) and state where the run is over, at which sampled ones may be due; None where it may go on.
+        acting: time (s) and state at the end of the run, where sampled controllers may be due; None if the run goes on.
         """
         if self.feedback is None:
             return None
@@ -143,12 +144,12 @@ class Integration:
 
     @property
     def noticed(self) -> tuple[float, int] | None:
-        """Of a run that went on all the same, where its steps were most too long, and for what: see `Leaping`."""
+        """Where steps were too long for a singular position, if the run did not fail there: see `Leaping.noticed`."""
         return None if self._leaping is None else self._leaping.noticed(self._constants)
 
     @property
     def fault(self) -> int:
-        """Where an evaluation failed."""
+        """Index of the item at which an evaluation failed."""
         return int(self._workspace.fault[0])
 
 
@@ -156,9 +157,9 @@ class Integration:
 def integration(
     system: System, algorithm: Algorithm, stabilise: float, integrator: Integrator
 ) -> Iterator[Integration]:
-    """One that nobody else uses meanwhile; kept for the next run.
+    """An integration for exclusive use within the context; it is kept for the next run.
 
-    ValueError and others for what does not go together: see `System.route`.
+    Raises what `System.route` raises for an invalid combination of arguments.
     """
     route = system.route(algorithm, stabilise)
     spare: list[Integration] = system.kept.setdefault((Integration, algorithm, integrator.name, route.beginning), [])
@@ -166,7 +167,7 @@ def integration(
         found = spare.pop()
         found.forget()
     except IndexError:
-        if system.scene.controllers:  # they write into functions of time: of a system that nobody else has
+        if system.scene.controllers:  # they write into functions of time, so the system must not be shared
             system = copy(system)
             route = system.route(algorithm, stabilise)
         found = Integration(system, algorithms.chosen(algorithm), route, integrator)
@@ -175,7 +176,7 @@ def integration(
 
 
 def unmoved(begin: Beginning, status: Status = Status.OK, fault: int = 0) -> Raw:
-    """A run that has only begun, as if an integration had ended there."""
+    """The result of an integration that ends where it begins."""
     nothing = np.empty((0, len(begin.y)))
     return Raw(
         nothing, status, fault, begin.state.t, [0] * COUNTS, 0.0, 0.0, interrupted=False, y=begin.y,
@@ -187,10 +188,10 @@ def integrate(
     solve: Integration, begin: Beginning, times: Real, settings: Settings, watch: Watch | None = None,
     breaks: bool = False, goes_on: bool = False,
 ) -> Raw:  # fmt: skip
-    """Run over the whole time, after what has to be compiled for it.
+    """Integrate over times (T,) s, compiling first if necessary.
 
-    breaks: something is due at its end, where even a method of equal steps has to end one, and every method a leap.
-    goes_on: it is a part of a run, at whose end sampled controllers do not act yet.
+    breaks: an event is due at the end, so that methods of equal steps must end a step there, and no leap may pass it.
+    goes_on: the run continues after this segment, so that sampled controllers do not act at its end yet.
     """
     system, method = solve.system, settings.integrator
     accuracy = settings.accuracy(system.nq, system.nu)
@@ -202,7 +203,7 @@ def integrate(
         refuse_other_division(begin.memory, clock.times, float(clock.segment_ends[0]), accuracy.step)
     out = np.empty((len(times), len(y)))
     if watch is not None and np.any(watch.entry < 0):
-        assert solve.feedback is not None  # somebody watches signals
+        assert solve.feedback is not None  # events watch signals
         watch = solve.feedback.watching(watch)
     given = y, clock, accuracy, out, counts, memory, watch
     start = perf_counter()

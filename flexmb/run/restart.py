@@ -1,4 +1,4 @@
-"""A run that ended, ready to be taken up: by another call, or from a file by another process."""
+"""Restarts: a run that ended can be resumed by another call, or from a file by another process."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from flexmb.scene.reading import Unreadable
 from flexmb.scene.schema import Scene
 
 VERSION = 1
-"""Of the file; one that says none is of version 1 too."""
+"""Version of the file format; files without an entry are of version 1."""
 _NUMBERS = ("version", "t", "scene", *Memory._fields, *LoopMemory._fields, *event_memory.NAMES)
 _KINDS = {"method": TEXT} | dict.fromkeys(_NUMBERS, REAL)
-"""By name of an array in the file, what it may hold."""
+"""The type of each array in the file, by name."""
 
 
 @dataclass(frozen=True, eq=False)
 class Restart:
-    """Where a run ended, and what its method knew then: `simulate(scene, t_end, method, state=restart)` takes it up.
+    """The end of a run and the memory of its integrator: `simulate(scene, t_end, method, state=restart)` resumes it.
 
-    The runs before and after it are, to the last bit, one that had never ended, whatever the method. It asks for the
-    same scene, method and settings; of methods that take equal steps also for the same output times, between which
-    they divide the time. Methods that adapt their steps cut the last one short where a run ends: they are taken up at
-    `since` (s), where that step began, and output times of the second run may begin at any time from there to `t` (s),
-    where the run ended and where they begin by default. Closed chains choose the independent rows of their closures
-    anew, and are the same unless two choices are equally good. What controllers know goes on too, and what events do:
-    those from `since` to `t` happen once more, to the last bit as in a run that had never ended, and are shown once.
+    By every method the two runs are bit-identical to one uninterrupted run. This requires the same scene, method and
+    settings, and for methods of equal steps also the same output times, between which they divide the time. Methods
+    that adapt their steps cut the last step short at the end of a run: they resume at `since` (s), where that step
+    began. Output times of the second run may begin at any time from `since` to `t` (s), the end of the first run, which
+    is the default. Closed chains choose the independent rows of their closures again; the choice is the same unless two
+    are equally good. Controllers and events resume too: events from `since` to `t` happen again, bit-identical to those
+    of an uninterrupted run, and are reported once.
     """
 
     method: Method
@@ -48,11 +48,11 @@ class Restart:
 
     @property
     def since(self) -> float:
-        """Time (s) from which the run is taken up."""
+        """Time (s) from which the run is resumed."""
         return float(self.memory.numbers[TIME])
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write to a file of NumPy (`.npz`) that is read back exactly."""
+        """Write to a NumPy file (`.npz`), from which `load` reads the same bits."""
         self._refuse_other_parts()
         with whole_file(Path(path)) as beside, beside.open("wb") as file:
             np.savez(
@@ -64,9 +64,9 @@ class Restart:
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Restart:
-        """Read what `save` wrote; ValueError for any other file, OSError where there is none.
+        """Read a file written by `save`; ValueError for any other file, OSError if it cannot be read.
 
-        Sizes are bounded before anything is unpacked. Whether it belongs to a scene is seen when it is taken up.
+        Sizes are bounded before anything is unpacked. `simulate` checks whether the restart belongs to its scene.
         """
         try:
             return _read(path).examined()
@@ -77,14 +77,14 @@ class Restart:
         except (ValueError, TypeError, RecursionError) as error:
             why = str(error)
         raise ValueError(
-            f"{os.fspath(path)} holds no restart of a run ({why}): give the restart.npz that a run has written to its "
-            "end, or run the first part again"
+            f"{os.fspath(path)} holds no restart of a run ({why}): give the restart.npz of a run that was written "
+            "completely, or repeat the first run"
         )
 
     def examined(self) -> Restart:
-        """A copy that holds what runs write, as far as that can be told without the system; ValueError or TypeError.
+        """A copy, validated as far as possible without the system; ValueError or TypeError for invalid contents.
 
-        Whether all of it belongs to a system is for `flexmb.run.taking_up` to ask.
+        `flexmb.run.taking_up` checks whether it belongs to a system.
         """
         self._refuse_other_parts()
         t, memory = restart_form.memory(self.method, self.t, self.memory)
@@ -93,7 +93,7 @@ class Restart:
         return replace(self, t=t, memory=memory, controllers=known, events=events)
 
     def _refuse_other_parts(self) -> None:
-        """TypeError for anything else than a run has left."""
+        """TypeError for parts of another type than runs leave."""
         for name, part, kind in (("scene", self.scene, Scene), ("memory", self.memory, Memory)):
             if not isinstance(part, kind):
                 raise TypeError(f"{name} is a {type(part).__name__}: a restart holds the {kind.__name__} of its run")
@@ -103,21 +103,21 @@ class Restart:
             raise TypeError(f"events is a {type(self.events).__name__}: a restart holds an EventMemory")
 
     def taken_up(self) -> Memory:
-        """A copy of the memory for an integrator that goes on from it."""
+        """A copy of the memory, marked for an integrator that resumes from it."""
         copy = Memory(*(each.copy() for each in self.memory))
         copy.numbers[TAKEN_UP] = 1.0
         return copy
 
 
 def _read(path: str | os.PathLike[str]) -> Restart:
-    """What a file says; KeyError for what it lacks, ValueError for what is nothing of the kind."""
+    """The contents of a file, not yet validated; KeyError for a missing array, ValueError for one of the wrong form."""
     file = unpacked(path, _KINDS)
     version = file.get("version", np.array(VERSION))
     if version.shape or version != VERSION:
-        raise ValueError(f"it is of version {version} of the format, and this flexmb reads version {VERSION}")
+        raise ValueError(f"it is of version {version} of the format, but this flexmb reads version {VERSION}")
     for name in ("method", "t"):
         if file[name].shape:
-            raise ValueError(f'"{name}" has the shape {file[name].shape}, and is one value')
+            raise ValueError(f'"{name}" has the shape {file[name].shape}, but must be one value')
     if file["scene"].dtype != np.uint8:
         raise ValueError(f'"scene" holds numbers of type {file["scene"].dtype}, not bytes')
     scene = msgspec.json.decode(file["scene"].tobytes(), type=Scene)

@@ -1,6 +1,6 @@
-"""What a restart may hold, whatever its scene: the right kinds of numbers, finite, and none that no run writes.
+"""Checks of a restart that do not depend on its scene: types, shapes, finite numbers, and ranges of values.
 
-A restart comes from a file that may be damaged, or from somebody who has changed it; kernels believe all of it.
+A restart may come from a damaged file or may have been altered, and kernels do not check what they are given.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from flexmb.typing import Real
 
 SWITCHES = {TAKEN_UP: "TAKEN_UP", RETRIED: "RETRIED", RENEW: "RENEW", FRESH: "FRESH"}
 SIZES = {STEP: "STEP", ERROR_BEFORE: "ERROR_BEFORE", DONE: "DONE", FACTORED: "FACTORED", STEP_BEFORE: "STEP_BEFORE"}
-MOST_STEPS = 2**53  # that a number can count
+MOST_STEPS = 2**53  # the largest count that a float represents exactly
 
 
 def memory(method: Any, t: Any, given: Memory) -> tuple[float, Memory]:
-    """Time (s) and memory of a method, copied; ValueError or TypeError for what no run by it has left."""
+    """Time (s) and memory of a method, copied; ValueError or TypeError for values that no run by it can have left."""
     chosen, t = integrator(method), arguments.number("t", t)
     y = _row("y", given.y)
     rows = len(y) + 3 if chosen.keeps_jacobian else 0
@@ -48,13 +48,13 @@ def memory(method: Any, t: Any, given: Memory) -> tuple[float, Memory]:
 
 
 def controllers(given: LoopMemory) -> LoopMemory:
-    """What controllers know, copied. Sensors that nobody reads may have said NaN."""
+    """The memory of controllers, copied. Signals may be NaN, because sensors that no controller reads may give NaN."""
     state, held = _row("state", given.state), arguments.array("held", given.held)
     if held.ndim != 2:
-        raise ValueError(f"held has the shape {held.shape}, and has a row for each sample")
+        raise ValueError(f"held has the shape {held.shape}, but must have two dimensions, with one row per sample")
     happened = float(_finite("instants", given.instants, (1,))[0])
     if not 0.0 <= happened < MOST_STEPS or happened != int(happened):
-        raise ValueError(f"instants is {happened:g}, and counts how often controllers have acted")
+        raise ValueError(f"instants is {happened:g}, but must be the number of times at which controllers have acted")
     return LoopMemory(
         _row("signal", given.signal).copy(), _finite("state", state, state.shape), _finite("held", held, held.shape),
         np.array([happened]),
@@ -62,30 +62,30 @@ def controllers(given: LoopMemory) -> LoopMemory:
 
 
 def _refuse_other_numbers(numbers: Real, t: float) -> None:
-    """ValueError for what no integrator leaves at the end (s) of a run."""
+    """ValueError for values that no integrator leaves at the end t (s) of a run."""
     for place, name in SWITCHES.items():
         if numbers[place] not in (0.0, 1.0):
-            raise ValueError(f"numbers[{name}] is {numbers[place]:g}, and is 0 or 1")
+            raise ValueError(f"numbers[{name}] is {numbers[place]:g}, but must be 0 or 1")
     for place, name in SIZES.items():
         if numbers[place] < 0.0:
-            raise ValueError(f"numbers[{name}] is {numbers[place]:g}, and is not negative")
+            raise ValueError(f"numbers[{name}] is {numbers[place]:g}, but must not be negative")
     done = numbers[DONE]
     if done != np.floor(done) or done >= MOST_STEPS:
-        raise ValueError(f"numbers[DONE] is {done:g}, and is a number of steps")
+        raise ValueError(f"numbers[DONE] is {done:g}, but must be a number of steps")
     if not numbers[STRETCH] <= numbers[TIME] <= t:
         raise ValueError(
-            f"it goes on from {numbers[TIME]:.17g} s in a stretch from {numbers[STRETCH]:.17g} s, and ended at "
-            f"{t:.17g} s: these are not in order"
+            f"numbers[STRETCH] is {numbers[STRETCH]:.17g} s, numbers[TIME] {numbers[TIME]:.17g} s and t "
+            f"{t:.17g} s: these times must be in ascending order"
         )
 
 
 def _row(name: str, values: Any) -> Real:
     found = arguments.array(name, values)
     if found.ndim != 1:
-        raise ValueError(f"{name} has the shape {found.shape}, and is a row of numbers")
+        raise ValueError(f"{name} has the shape {found.shape}, but must be a row of numbers")
     return found
 
 
 def _finite(name: str, values: Any, shape: tuple[int, ...]) -> Real:
-    """A copy."""
+    """A copy of finite values of this shape; ValueError or TypeError for others."""
     return arguments.finite(name, arguments.shaped(name, values, shape)).copy()

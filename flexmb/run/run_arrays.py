@@ -1,4 +1,4 @@
-"""One run as arrays, and whether they belong together: each has a row for each time, and all its components."""
+"""The arrays of one run, and the check that they are consistent: one row per time, with all components."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from flexmb.tables.status import Status
 from flexmb.typing import Real
 
 SPATIAL = {"loads": 6, "wheel_loads": 6, "connectors": 6, "hinge_forces": 1}
-"""Fields by name of a hinge or another, with the number of columns."""
+"""Fields that are dictionaries of arrays by name of an item, with the number of columns."""
 SOME = "drives", "signals", "power"
-"""The same with any number of columns."""
+"""Such fields with any number of columns."""
 PATH = {"position": 3, "quaternion": 4, "velocity": 6, "acceleration": 6}
 
 
 @dataclass(frozen=True)
 class MarkerPath:
-    """Motion of a marker in World axes.
+    """The motion of a marker in World axes.
 
     position (T,3) m; quaternion (T,4) scalar first, marker to World components, without jumps of sign; velocity and
     acceleration (T,6) [angular; linear], the linear one being the classical acceleration of the marker point.
@@ -38,7 +38,7 @@ class MarkerPath:
     acceleration: Real
 
     def angles(self, sequence: str = "zyx") -> Angles:
-        """Angles (T,3) rad of a gimbal's `sequence` of axes, without whole turns of jumps; (T,) where singular.
+        """Angles (T,3) rad of a gimbal's `sequence` of axes, without jumps by whole turns, and where they are singular.
 
         See `flexmb.scene.angles.angles_of`.
         """
@@ -49,9 +49,9 @@ class MarkerPath:
 
 @dataclass(frozen=True)
 class Statistics:
-    """The cost of a run: seconds of compiling (or of reading compiled kernels), of integrating, of evaluating outputs.
+    """The cost of a run: counts, and seconds for compiling (or reading compiled kernels), integrating and outputs.
 
-    `factorisations` counts those of a matrix of the size of the state, or of its exponential.
+    `factorisations` counts factorisations, or exponentials, of matrices of the size of the state.
     """
 
     evaluations: int
@@ -66,7 +66,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class RunArrays:
-    """What one run has found at the output times that were reached; `flexmb.Trajectory` describes the fields."""
+    """The results of one run at the output times that were reached; `flexmb.Trajectory` describes the fields."""
 
     scene: str
     status: Status
@@ -93,12 +93,12 @@ class RunArrays:
     events: tuple[EventRecord, ...] = ()
 
     def __post_init__(self) -> None:
-        """TypeError or ValueError for parts that do not belong together; asked once more by what works with them."""
+        """TypeError or ValueError for inconsistent arrays. Methods that use them check again, as arrays may change."""
         refuse_torn(self)
 
     @property
     def undetermined(self) -> dict[str, NDArray[np.bool_]]:
-        """What the motion does not determine, where closures suppress what others suppress already (docs/notation.md).
+        """Loads that the motion does not determine, because closures are redundant (docs/notation.md).
 
         By name of a hinge or closure, which components (6,) of `loads` are NaN, at one output time or more; by
         "<name>.drive" which (n,) of `drives`. Empty where all loads are determined.
@@ -111,18 +111,19 @@ class RunArrays:
 
     @property
     def total_energy(self) -> Real:
-        """Sum of all kinds of energy (T,) J."""
+        """The sum of all kinds of energy (T,) J."""
         refuse_torn(self)
         return np.sum(list(self.energy.values()), axis=0)
 
     @property
     def energy_drift(self) -> Real:
-        """Energy gained beyond the work done (T,) J: zero but for the error of the integration."""
+        """Energy gained beyond the work done (T,) J: zero except for the error of the integration."""
         return self.total_energy - self.total_energy[0] - (self.work - self.work[0])
 
     @property
     def energy_scale(self) -> float:
-        """The scale of a drift of energy (J): the largest change of work or of any kind of energy."""
+        """The scale (J) to which a drift of energy is compared: the largest change of work or of any kind of energy, or
+        the largest kinetic energy."""
         refuse_torn(self)
         changes = [float(np.ptp(each)) for each in (self.work, *self.energy.values())]
         return max(*changes, float(np.max(self.energy["kinetic"])))
@@ -168,11 +169,12 @@ class RunArrays:
 
 
 def refuse_torn(run: RunArrays) -> None:
-    """TypeError or ValueError for a trajectory that was put together, or altered, so that its parts do not fit."""
+    """TypeError or ValueError for a trajectory whose arrays are inconsistent, because it was altered or put together
+    from others."""
     arguments.held("t", run.t, (None,))
     T = len(run.t)
     if not np.isfinite(run.t).all() or np.any(np.diff(run.t) < 0.0):
-        raise ValueError("t: finite times are needed, each not before the last")
+        raise ValueError("t: times must be finite, and none may be earlier than the one before it")
     for name, names in (("q", run.q_names), ("u", run.u_names)):
         arguments.held(name, getattr(run, name), (T, len(names)))
     for name, columns in SPATIAL.items():
@@ -190,7 +192,7 @@ def refuse_torn(run: RunArrays) -> None:
 
 
 def refuse_torn_path(name: str, path: Any, times: int | None = None) -> None:
-    """The same of the path of a marker, at so many times; None for as many as it has."""
+    """TypeError or ValueError for an inconsistent path of a marker; `times`: their number, None for any."""
     for part, columns in PATH.items():
         if not hasattr(path, part):
             raise TypeError(f"{name} is a {type(path).__name__}: give a MarkerPath")

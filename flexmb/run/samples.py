@@ -1,4 +1,4 @@
-"""Output times of a run, and the memory that they take."""
+"""The output times of a run, and the memory that its outputs take."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ from flexmb.tables import arguments
 from flexmb.typing import Real
 
 OUTPUT_BYTES = 2**32
-"""Memory that the outputs of one run may take."""
-_NUMBER_BYTES, _SAMPLE_BYTES = 16, 200  # evaluated in rows, then gathered by name; times and what numpy needs
-_TOO_MANY = f"outputs would take more than {OUTPUT_BYTES / 2**30:g} GiB; ask for fewer, or run the time in pieces"
+"""Limit (bytes) of the memory for the outputs of one run."""
+# Bytes per number, which is stored in a row and again by name; bytes per sample for its time and for NumPy's overhead.
+_NUMBER_BYTES, _SAMPLE_BYTES = 16, 200
+_TOO_MANY = f"outputs would take more than {OUTPUT_BYTES / 2**30:g} GiB; ask for fewer, or divide the run into several"
 
 
 def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: float = 0.0) -> Real:
-    """Times (T,) from t_start to t_end (s), so many or these; ValueError or TypeError for what makes no sense."""
+    """Output times (T,) from t_start to t_end (s); samples: their number, or the times. ValueError or TypeError for
+    invalid ones."""
     if np.ndim(samples) == 0:
         number = arguments.whole("samples", samples)
         if number < 2:
@@ -27,7 +29,7 @@ def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: f
         times = np.linspace(t_start, t_end, number)
         if np.all(np.diff(times) > 0.0):
             return times
-        raise ValueError(f"samples is {number}: there are not so many numbers from {t_start:g} to t_end = {t_end:g} s")
+        raise ValueError(f"samples is {number}: too many to be distinct from {t_start:g} to t_end = {t_end:g} s")
     times = arguments.array("samples", samples)
     increasing = times.ndim == 1 and len(times) > 1 and bool(np.all(np.diff(times) > 0.0))
     if not (increasing and times[0] == t_start and times[-1] == t_end):
@@ -38,14 +40,14 @@ def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: f
 
 
 def refuse_too_many(samples: int, system: System) -> None:
-    """ValueError where the outputs would not fit into OUTPUT_BYTES."""
+    """ValueError if the outputs would exceed OUTPUT_BYTES."""
     most = OUTPUT_BYTES // sample_bytes(system)
     if samples > most:
-        raise ValueError(f"samples is {samples}, and this scene allows {most}: {_TOO_MANY}")
+        raise ValueError(f"samples is {samples}, but this scene allows {most}: {_TOO_MANY}")
 
 
 def sample_bytes(system: System) -> int:
-    """Memory that one output time of a run takes, at most."""
+    """Upper bound (bytes) of the memory for one output time of a run."""
     scene = system.scene
     loaded = (scene.hinges, scene.wheels, scene.closures, scene.point_masses, scene.connectors)
     places = sum(map(len, loaded))

@@ -1,4 +1,4 @@
-"""Section loads over time as a table in a file."""
+"""Writes section loads over time to a CSV file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HEADER = (
 
 
 def write_sections(path: Path, t: Real, loads: SectionLoads) -> None:
-    """One row a time (T,) and section, 17 digits: they read back exactly."""
+    """Write one row per time t (T,) and section, with 17 digits, which are read back exactly."""
     with whole_file(path) as beside, beside.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(HEADER)

@@ -1,4 +1,4 @@
-"""Segments of a run: in compiled code from where one begins to the next place at which something happens."""
+"""Segments of a run: each is integrated in compiled code from its start to the next event or the end of the run."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ class SegmentEnd(Enum):
     TIME = auto()
     """The run's time is over, and no event is due there."""
     EVENT = auto()
-    """Something came to its level, or an event on time is due."""
+    """A quantity reached the level of an event, or an event on time is due."""
     SAMPLE = auto()
-    """The run's time is over, and what a sampled controller says there comes to the level of an event."""
+    """The run's time is over, and an output that a sampled controller sets there reaches the level of an event."""
     LEAP = auto()
     """Events that happened before their instant, which lies within a leap, are watched again from here."""
     FAILURE = auto()
-    """Nothing goes on: the status says why, or the run was interrupted."""
+    """The run cannot continue: its status says why, or it was interrupted."""
 
 
 class Segment(NamedTuple):
-    """From one place at which something happens to the next.
+    """The part of a run between two instants at which something happens.
 
-    raw: as the integrator left it. levels: what was watched. part: its outputs. found: events that happen at its end,
-    by `early` (s) before their instant.
+    raw: the integrator's result. levels: the quantities that were watched. part: outputs. found: the events at its end,
+    which happen `early` (s) before their instant.
     """
 
     end: SegmentEnd
@@ -57,20 +57,20 @@ class Segment(NamedTuple):
 
 
 class Segments:
-    """Integrates the system of a situation from segment to segment, and observes it at the run's output times."""
+    """Integrates the system of a situation segment by segment, and evaluates the outputs of the run."""
 
     def __init__(self, situation: Situation, agenda: Agenda, sides: Sides, times: Real, solver: Solver) -> None:
-        """times (T,) s of the output."""
+        """times (T,) s: output times of the run."""
         self._situation, self._agenda, self._sides = situation, agenda, sides
         self._times, self._solver = times, solver
         self._steps = 0
-        """Made by the segments before, accepted or rejected."""
+        """Number of steps of earlier segments, accepted or rejected."""
 
     def __call__(self, begin: Beginning) -> Segment:
-        """Run to the next event, or to the next time at which one is due, or to the end.
+        """Run to the next event, to the next time at which one is due, or to the end.
 
-        Near a singular position of a closed chain a run cannot be taken up. An event on time that is due there happens
-        before its instant: the segment is integrated once more, to a place far enough from the singular position.
+        No segment can start near a singular position of a closed chain. An event on time that is due there happens
+        before its instant: the segment is integrated again, to a position far enough from the singular one.
         """
         stop, due = self._agenda.next_stop(begin.state.t)
         again = begin._replace(y=begin.y.copy())
@@ -84,7 +84,7 @@ class Segments:
         return segment
 
     def _to(self, stop: float, begin: Beginning, due: Sequence[SceneEvent]) -> Segment:
-        """Run to the next level that is watched, or to `stop` (s), where these events are due."""
+        """Run to the next level that is watched, or to `stop` (s), where the events `due` happen."""
         times, shown = self._output(begin, stop)
         early, is_last = 0.0, stop == self._times[-1]
         with self._solver.integration() as solve:
@@ -96,7 +96,7 @@ class Segments:
                 if not all(isinstance(action, EndRun) for event in found for action in event.actions):
                     raw, early = placed(self._situation, raw, levels, times, self._further)
                 elif levels.leap[0] < raw.t < levels.leap[1]:
-                    raw = raw._replace(memory=None)  # nothing goes on from there
+                    raw = raw._replace(memory=None)  # the run ends within a leap, from which it cannot be resumed
             kept = shown[: len(raw.states)]
             part = self._solver.observed(raw._replace(states=raw.states[kept]), times[: len(kept)][kept], solve)
         if part.status is not Status.OK or raw.interrupted:
@@ -118,7 +118,7 @@ class Segments:
         return times, np.isin(times, wanted)
 
     def _further(self, raw: Raw, t: float) -> Raw:
-        """On to a time (s), whatever comes to its level."""
+        """Continue to a time t (s) without watching for events."""
         begin = self._situation.going_on(raw._replace(y=raw.y.copy()))
         with self._solver.integration() as solve:
             nothing = watch((), (), (), (), (), (), self._sides.size(solve))
@@ -126,6 +126,6 @@ class Segments:
 
     @property
     def _left(self) -> Settings:
-        """The settings with as many steps as the segments before have left."""
+        """The settings with the number of steps that earlier segments have left."""
         settings = self._solver.settings
         return replace(settings, max_steps=max(settings.max_steps - self._steps, 0))

@@ -1,4 +1,4 @@
-"""On which side of its level everything is that a run with events watches, from instant to instant."""
+"""Keeps, from instant to instant, on which side of its level each watched quantity is."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DIRECTIONS = {"rising": 1, "falling": -1, "either": 0}
 
 
 class Sides:
-    """`side` and `came` as in `Watch`, by the name of an event."""
+    """`side` and `came` as in `Watch`, by name of event."""
 
     def __init__(
         self, situation: Situation, settings: Settings, integration: Callable[[], AbstractContextManager[Integration]]
@@ -27,29 +27,30 @@ class Sides:
         self._situation, self._settings, self._integration = situation, settings, integration
 
     def start(self, watched: Sequence[SceneEvent], y: Real) -> None:
-        """Where a run starts."""
+        """Set the sides at the start of a run."""
         self.side = {event.name: self._first_side(event, y) for event in watched}
         self.came = dict.fromkeys(self.side, 0)
 
     def make_known(self, watched: Sequence[SceneEvent]) -> None:
-        """What was not watched before the instant is where it comes from."""
+        """Set the sides of events that were not watched before: the side from which they can happen."""
         for event in watched:
             if event.name not in self.side:
                 self.side[event.name], self.came[event.name] = -DIRECTIONS[event.crossing], 0
 
     def take(self, watched: Sequence[SceneEvent], side: Sequence[int], came: Sequence[int]) -> None:
-        """As they are in a `Watch`."""
+        """Copy sides from a `Watch`, whose entries are in the order of `watched`."""
         names = [event.name for event in watched]
         self.side, self.came = (dict(zip(names, map(int, each), strict=True)) for each in (side, came))
 
     def near(self, event: SceneEvent) -> float:
-        """What is nearer to its level is at it: no run tells it from there."""
+        """Distance within which a quantity counts as being at its level, by the tolerances of the run."""
         return self._settings.atol + self._settings.rtol * abs(event.level)
 
     def _first_side(self, event: SceneEvent, y: Real) -> int:
-        """On which side of its level something is where a run starts; at it, on that to which it moves.
+        """The side of a quantity at the start of a run; if it is at its level, the side towards which it moves.
 
-        It has been at it before. Of signals the first step tells.
+        So an event whose quantity starts at its level does not happen until the quantity has left the level and
+        returned. The sides of signals are determined in the first step.
         """
         if self.is_signal(event):
             return UNKNOWN
@@ -91,23 +92,23 @@ class Sides:
         return watch(entries, levels, directions, sides, came, still, self.size(solve))
 
     def size(self, solve: Integration) -> int:
-        """Of what is integrated, [q, u, work] or [q, u, x, work]."""
+        """Size of the state that is integrated, [q, u, work] or [q, u, x, work]."""
         controlled = 0 if solve.feedback is None else len(solve.feedback.state_names)
         return self._situation.system.nq + self._situation.system.nu + controlled + 1
 
     def arriving(
         self, watched: Sequence[SceneEvent], raw: Raw, found: Sequence[SceneEvent], levels: Watch | None, y: Real
     ) -> list[SceneEvent]:
-        """Those that come to their levels, where coordinates are set exactly.
+        """The events among `found` whose quantities move towards their levels; sets coordinates in y exactly to theirs.
 
-        Rounding may find one again that flies off.
+        Because of rounding, an event that just happened may be found again while its quantity leaves the level.
         """
         off = []
         for i, event in enumerate(watched):
             if levels is not None and event in found:
                 if self.is_signal(event):
                     has_jumped = not levels.found[i] or self.side[event.name] * levels.value[i] < -self.near(event)
-                    rate = levels.rate[i] or self.probe(raw, event, raw.t, y)[1]  # steps may be roundings of time
+                    rate = levels.rate[i] or self.probe(raw, event, raw.t, y)[1]  # 0 if the step was as short as ulp(t)
                     rate = 0.0 if has_jumped else rate
                 else:
                     y[self._situation.places[event.watch]] = event.level
@@ -118,10 +119,10 @@ class Sides:
         return [event for event in found if event not in off]
 
     def move(self, watched: Sequence[SceneEvent], raw: Raw, found: Sequence[SceneEvent], y: Real) -> None:
-        """After events. What was found at its level is beyond it, or back where it does not go on, or at it: 0; of
-        what is left at rest the next steps tell, and `came` from where it came.
+        """Update sides after events. A quantity at its level is on the side to which it moves next, or at the level (0)
+        if it is at rest; then the next steps decide, and `came` is the side from which it arrived.
 
-        By what events make of them signals pass no level.
+        Jumps of signals that events cause do not count as reaching a level.
         """
         heights = self._heights(raw, y, [event for event in watched if self.is_signal(event)])
         for event in watched:
@@ -136,20 +137,20 @@ class Sides:
                 self.side[event.name], self.came[event.name] = UNKNOWN if is_signal else side, came
 
     def _side_after(self, raw: Raw, event: SceneEvent, came: int, y: Real) -> tuple[int, int]:
-        """Side, and `came`, of what was found at its level: it goes on, or back, or stays."""
+        """`side` and `came` of a quantity found at its level, which passes it, returns, or stays."""
         if self._situation.is_held(event.watch):
             return 0, 0
         if self._situation.rate_of(event.watch) is None and not self.is_signal(event):
             return -came, 0
         height, rate = self.probe(raw, event, raw.t, y)
         if abs(height) > self.near(event):
-            return int(np.sign(height)), 0  # of a signal that jumped, or by its own event comes to jump
+            return int(np.sign(height)), 0  # a signal that jumped, also by its own event
         if rate == 0.0:
             return UNKNOWN if self.is_signal(event) else 0, came
         return (-came if came * rate < 0.0 else came), 0
 
     def _heights(self, raw: Raw, y: Real, events: Sequence[SceneEvent]) -> dict[str, float]:
-        """Of signals above their levels, before controllers act that are due."""
+        """Heights of signals above their levels, before controllers that are due act."""
         if not events:
             return {}
         with self._integration() as solve:

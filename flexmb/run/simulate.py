@@ -1,4 +1,4 @@
-"""The one entry point that runs a scene: integrate in the compiled loop, then evaluate what is observable."""
+"""The entry point that runs a scene: it integrates in compiled code, then evaluates all observables."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from flexmb.typing import Real
 
 
 class RunSettings(TypedDict, total=False):
-    """How accurately `simulate` integrates, and in which steps; a setting that is left out is as in `Settings`.
+    """Accuracy and steps of `simulate`; settings that are left out have the default values of `Settings`.
 
     rtol = 1e-10, atol = 1e-12 (SI units), step (s), max_steps = 1,000,000, spectral_radius = 0.8
     """
@@ -78,19 +78,19 @@ def simulate(
     closed, to 1e-13 of the mechanism's size. With a rate k (1/s) errors g of closures decay by g'' + 2 k g' + k^2 g = 0
     (Baumgarte), which costs less and leaves a drift; k times the step should stay below 1.
 
-    t_start (s), any finite time, which functions of time know: 0 or the state's own if left out. state: a `State`, such
-    as `Trajectory.last_state`; or values of coordinates and speeds by name, all others being the scene's: names as in
-    `Trajectory.q_names` and `u_names`, or all coordinates of a hinge, wheel or "<body>.modes", with ".speeds" behind it
-    all its speeds; closed chains take the nearest state that closes their closures. Or a `Restart`, by which a run of
-    the same scene and method is taken up to the last bit.
+    t_start (s): any finite time, the argument of functions of time at the start; 0 or the state's own time if left out.
+    state: a `State`, such as `Trajectory.last_state`; or values of coordinates and speeds by name, all others being
+    those of the scene. Names are those in `Trajectory.q_names` and `u_names`, or a hinge, a wheel or "<body>.modes" for
+    all its coordinates, followed by ".speeds" for all its speeds; closed chains take the nearest state that closes
+    their closures. Or state is a `Restart`, from which a run of the same scene and method is resumed bit-identically.
 
-    Warns (`SceneWarning`) of what is doubtful. Raises SceneError for a scene that is wrong or whose profiles end before
-    t_end, NotImplementedError for one that is not supported yet, ValueError or TypeError for settings that make no
-    sense, ClosureError where no initial state closes the closures or they leave no motion, or the state that is given
-    is far from it. A run that fails raises
-    nothing: `status` and `message` of the trajectory say why it stopped, and the samples up to there are kept. Ctrl-C
-    ends a run at its next step and raises `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up
-    to there; a second Ctrl-C while their outputs are evaluated keeps those that are finished.
+    Warns (`SceneWarning`) of doubtful input. Raises SceneError for an invalid scene or one whose profiles end before
+    t_end, NotImplementedError for one that is not supported yet, ValueError or TypeError for invalid settings, and
+    ClosureError if no initial state closes the closures, if they leave no motion, or if the given state is far from
+    closing them. A run that fails raises nothing: `status` and `message` of the trajectory say why it stopped, and the
+    samples up to there are kept. Ctrl-C ends a run at its next step and raises `Interrupted`, a KeyboardInterrupt,
+    whose `trajectory` holds the samples up to there; a second Ctrl-C while outputs are evaluated keeps those that are
+    finished.
     """
     refuse_unknown("simulate", settings)
     t_end, t = _end(t_end), start_time(t_start, state)
@@ -127,9 +127,9 @@ def simulate(
 
 
 def _again(system: System, t_end: float, settings: Settings, **same: Any) -> Trajectory:
-    """The same run with other settings; ValueError for one that was taken up, whose beginning is another run's."""
+    """The same run with other settings; ValueError for a resumed run, whose restart already contains errors."""
     if isinstance(same["state"], Restart):
-        raise ValueError("this run took up another, and only that one's beginning is exact: ask a run of both for this")
+        raise ValueError("error_estimate() is not available for a resumed run; rerun from t_start")
     return simulate(
         system, t_end, settings.method, rtol=settings.rtol, atol=settings.atol, step=settings.step,
         max_steps=settings.max_steps, spectral_radius=settings.spectral_radius, **same,
@@ -137,28 +137,28 @@ def _again(system: System, t_end: float, settings: Settings, **same: Any) -> Tra
 
 
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
-    """NotImplementedError where a method that linearises finds no Jacobian."""
+    """NotImplementedError if a method that needs Jacobians is used where there are none."""
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
     if system.scene.closures:
-        from flexmb.system.closed import ClosedSystem  # a tree needs none of it
+        from flexmb.system.closed import ClosedSystem  # imported here because trees do not need it
 
         assert isinstance(system, ClosedSystem)
         if system.closures.at_rest:
             raise NotImplementedError(
-                f'method "{method}" needs Jacobians, which closed chains have none of where a body is of level '
-                f'"ruthless", as "{system.fault_name(Status.OUT_OF_RANGE, system.closures.at_rest[0])}": its inertia '
-                f'is not where closures join it; use level "linear" or a better one, or method {others}'
+                f'method "{method}" needs Jacobians, which are not available for closed chains with a body of level '
+                f'"ruthless", such as "{system.fault_name(Status.OUT_OF_RANGE, system.closures.at_rest[0])}": its '
+                f'inertia is not where closures join it; use level "linear" or a better one, or method {others}'
             )
     if not algorithms.chosen(algorithm).jacobian:
         alone = " or ".join(f'"{name}"' for name in algorithms.WITH_JACOBIAN)
         raise NotImplementedError(
-            f'method "{method}" needs Jacobians, which algorithm {alone} alone has: leave algorithm out, or use '
+            f'method "{method}" needs Jacobians, which only algorithm {alone} has: leave algorithm out, or use '
             f"method {others}"
         )
 
 
 def refuse_unknown(function: str, settings: RunSettings) -> None:
-    """TypeError for what is no setting of a run."""
+    """TypeError for names that are not settings of a run."""
     known = RunSettings.__annotations__
     for name in settings:
         if name not in known:
@@ -166,7 +166,7 @@ def refuse_unknown(function: str, settings: RunSettings) -> None:
 
 
 def _end(t_end: float) -> float:
-    """Plain; whether a run can end there is for the scene's check to say."""
+    """t_end (s) as a float; values that are not finite are left for the scene's check to refuse."""
     try:
         return arguments.number("t_end", t_end)
     except ValueError:  # not finite

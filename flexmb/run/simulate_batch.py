@@ -1,4 +1,4 @@
-"""The entry point that runs many copies of a scene: other initial states, other masses, lengths, stiffnesses."""
+"""The entry point that runs many copies of a scene with different initial states, masses, lengths or stiffnesses."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ def simulate_batch(
     threads: int | None = None,
     **settings: Unpack[RunSettings],
 ) -> BatchTrajectory:
-    """Simulate many copies of a scene from t = 0 to `t_end` (s): each as `simulate` would, many times faster.
+    """Simulate many copies of a scene from t = 0 to `t_end` (s): each as `simulate` would, but many times faster.
 
-    copies: scenes of one structure, each with numbers of its own, or the `Batch` that `compile_batch` makes of them; or
-    one compiled system, whose copies differ in their initial states. q (n,nq), u (n,nu): initial coordinates and speeds
-    of all copies, by default those of the scenes. method, samples and settings: see `simulate`. "rk4" and "dop853" run
-    eight copies at once in the lanes of the processor, each with steps of its own; the other methods, and scenes with
-    closures or controllers, run one copy after the other. In lanes all modes are eliminated explicitly. threads: how
-    many, by default one for each processor.
+    copies: scenes of one structure with different numbers, or the `Batch` that `compile_batch` makes of them; or one
+    compiled system, whose copies differ in their initial states. q (n,nq), u (n,nu): initial coordinates and speeds of
+    all copies, by default those of the scenes. method, samples and settings: see `simulate`. "rk4" and "dop853" run
+    eight copies at once in SIMD lanes of the processor; with "dop853" each copy has its own steps. The other methods,
+    and scenes with closures or controllers, run one copy after the other. In lanes all modes are eliminated explicitly.
+    threads: number of threads, by default one per processor.
 
-    A run that fails fails no other one and raises nothing: `status` and `message` of the result say why it stopped.
-    Raises SceneError, ValueError, TypeError or NotImplementedError as `simulate` does, ValueError where states do not
-    fit the copies, and KeyboardInterrupt for Ctrl-C.
+    A run that fails raises nothing and does not affect the others: `status` and `message` of the result say why it
+    stopped. Raises SceneError, ValueError, TypeError or NotImplementedError as `simulate` does, ValueError for states
+    that do not fit the copies, and KeyboardInterrupt for Ctrl-C.
     """
     refuse_unknown("simulate_batch", settings)
     batch = copies if isinstance(copies, Batch) else _batch(copies)
@@ -58,14 +58,14 @@ def simulate_batch(
     for system in batch.systems:
         refuse_times(system, 0.0, t_end)
         if system.scene.events:
-            raise NotImplementedError(f'scene "{system.scene.name}" has events, which simulate alone runs')
+            raise NotImplementedError(f'scene "{system.scene.name}" has events: run its copies one by one by simulate')
     times = sample_times(samples, t_end)
     rows = batch.states(*_given(batch, q, u))
     number = number_of_threads(threads, -(-len(rows[0]) // LANES))
     _refuse_too_many(len(rows[0]), len(times), batch)
     found = runs(*rows, len(times))
     if len(rows[0]):
-        stop = found.counts.T[STOP : STOP + 1]  # of all runs at once
+        stop = found.counts.T[STOP : STOP + 1]  # stops all runs at once
         _, interrupted = interruptible(BatchRun(batch, times, chosen, found), (len(rows[0]), number), stop)
         if interrupted:
             raise KeyboardInterrupt
@@ -77,7 +77,7 @@ def _batch(copies: System | Sequence[Scene]) -> Batch:
 
 
 def _given(batch: Batch, q: Any, u: Any) -> tuple[Any, Any]:
-    """Initial coordinates and speeds, those of the scenes where none are given; as many rows of either."""
+    """Initial coordinates and speeds with equally many rows; those of the scenes are used where none are given."""
     if q is not None and u is not None:
         return q, u
     own_q, own_u = batch.initial_states()
@@ -93,13 +93,13 @@ def _refuse_too_many(n: int, samples: int, batch: Batch) -> None:
     size = 8 * n * samples * (batch.nq + batch.nu + 1)
     if size > OUTPUT_BYTES:
         raise ValueError(
-            f"{n} copies at {samples} output times take {size / 2**30:.1f} GiB, and {OUTPUT_BYTES / 2**30:g} are "
-            "allowed: ask for fewer samples, or run the copies in parts"
+            f"{n} copies at {samples} output times take {size / 2**30:.1f} GiB, but {OUTPUT_BYTES / 2**30:g} GiB are "
+            "allowed: ask for fewer samples, or run fewer copies at once"
         )
 
 
 def _gathered(batch: Batch, times: Real, found: Runs, n: int) -> BatchTrajectory:
-    """The runs of n copies; what was not reached is NaN."""
+    """The result for n copies; values at times that a run did not reach are NaN."""
     states, counts = found.out[:n], found.counts[:n]
     states[np.arange(len(times)) >= counts[:, SAMPLES, None]] = np.nan
     return BatchTrajectory(

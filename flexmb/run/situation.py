@@ -1,4 +1,4 @@
-"""What the actions of events make of a scene, its system and its state."""
+"""Applies the actions of events to a scene, its system and its state."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from flexmb.tables.state import State
 from flexmb.typing import Real
 
 Accelerations = Callable[[float, Real], Real]
-"""(nu,) at a time (s) and y = [q, u, work]."""
+"""Accelerations (nu,) at a time (s) and y = [q, u, work]."""
 
 
 class Situation:
-    """The scene as events have left it, with its system; systems that come back are not built again."""
+    """The scene as altered by events, and its system; systems are kept, because the same scene often recurs."""
 
     def __init__(self, system: System, settings: Settings, given: Scene | None = None) -> None:
-        """given: of a run that is taken up, the scene as changes alone have left it."""
+        """given: for a resumed run, the scene altered by changes of values alone; see `EventMemory`."""
         self.system = system
         self._settings = settings
         self.given = given or system.scene
@@ -42,36 +42,37 @@ class Situation:
 
     @cached_property
     def _paths(self) -> dict[str, str]:
-        """Of scalar coordinates in the scene, by name; events change none of them."""
+        """Paths of scalar coordinates in the scene, by name; events do not alter them."""
         return scalar_paths(self.given)
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """Of coordinates and speeds in [q, u, work], by name."""
+        """Indices of coordinates and speeds in [q, u, work], by name."""
         q, u = self.system.state_names
         return {name: i for i, (name, _) in enumerate((*q, *u))}
 
     @property
     def speeds(self) -> slice:
-        """Places of all speeds in [q, u, work]."""
+        """Indices of all speeds in [q, u, work]."""
         return slice(self.system.nq, self.system.nq + self.system.nu)
 
     def apart(self, y: Real) -> tuple[Real, Real]:
-        """[q, u, work], and the states of controllers, which events do not touch."""
+        """Divide y into [q, u, work] and the states of controllers, which events do not change."""
         motion = self.speeds.stop
         return np.r_[y[:motion], y[-1]], y[motion:-1]
 
     def with_motion(self, raw: Raw, motion: Real) -> Raw:
-        """What an integration left, with another motion [q, u, work]."""
+        """The result of an integration with its motion replaced by [q, u, work]."""
         return raw._replace(y=np.concatenate([motion[:-1], self.apart(raw.y)[1], motion[-1:]]))
 
     def going_on(self, raw: Raw) -> Beginning:
-        """From where an integration ended; controllers know what they knew."""
+        """The beginning of a segment at the end of an integration; controllers keep their memory."""
         state = self.system.layout.known(raw.t, np.r_[self.apart(raw.y)[0][:-1], 0.0])
         return Beginning(state, raw.y, None, raw.controllers)
 
     def happen(self, event: SceneEvent, t: float, y: Real, accelerations: Accelerations) -> list[EventRecord]:
-        """Do what an event says at time t to y = [q, u, work], in place; and have come to rest what does."""
+        """Apply the actions of an event at time t to y = [q, u, work], in place. A coordinate whose rebound is
+        negligible comes to rest on its stop."""
         before = y.copy()
         found = [self._recorded(event.name, t, y, [partial(self._do, action) for action in event.actions])]
         self._become(off_stop(self.system.scene, event), t, y)
@@ -83,18 +84,18 @@ class Situation:
         return found
 
     def rest(self, event: SceneEvent, impact: Impact, push: int, t: float, y: Real) -> EventRecord:
-        """Have what stands on a stop rest on it; push: the sign of its loads."""
+        """Hold the coordinate of an impact at rest on its stop; push: the sign of the stop's load."""
         rest = partial(self._rest, event, impact.coordinate, push)
         return self._recorded(f"{event.name}: at rest", t, y, [rest])
 
     def at_rest(self, coordinate: str, t: float, y: Real) -> Real:
-        """A copy of y = [q, u, work] after an impulse that takes the speed of a coordinate away."""
+        """A copy of y = [q, u, work] after an impulse that makes the speed of a coordinate zero."""
         stopped = y.copy()
         self._strike(t, stopped, coordinate, 0.0, {}, {})
         return stopped
 
     def speed(self, coordinate: str, y: Real) -> float:
-        """Of a scalar coordinate."""
+        """The speed of a scalar coordinate."""
         return float(y[self._rate_place(coordinate)])
 
     def _recorded(self, name: str, t: float, y: Real, actions: Sequence[Callable[..., None]]) -> EventRecord:
@@ -105,9 +106,9 @@ class Situation:
         return EventRecord(name, t, impulses, float(y[-1]) - work, before, self._state(t, y), closures)
 
     def _is_spent(self, name: str, push: int, t: float, y: Real, accelerations: Accelerations) -> bool:
-        """Whether a rebound leads no further from a stop, against what presses on it, than the error that is allowed.
+        """Whether a rebound rises from the stop by no more than the tolerance, against the acceleration towards it.
 
-        What presses is that on a body at rest there: loads that change with the rebound are no longer what they were.
+        The acceleration is that of the coordinate at rest, because loads may depend on the speed of the rebound.
         """
         place = self._rate_place(name)
         rebound = push * y[place]
@@ -119,14 +120,14 @@ class Situation:
         self, event: SceneEvent, name: str, push: int, t: float, y: Real, impulses: dict[str, float],
         closures: dict[str, Real],
     ) -> None:  # fmt: skip
-        """Held on a stop from now on, its motor beside it."""
+        """Stop a coordinate and hold it on its stop; a motor that acts along it remains."""
         self._strike(t, y, name, 0.0, impulses, closures)
         held = changed_at(self.system.scene, self._paths[name], self._held(y[self.places[name]], keeps_motor=True))
         self._become(on_stop(held, event, name, push), t, y)
         self.system.project(t, y, self.system.constants)
 
     def rate_of(self, watched: str) -> int | None:
-        """Place in [q, u, work] of the rate of a coordinate; None for what is a rate itself."""
+        """Index in [q, u, work] of the rate of a coordinate; None for any other quantity."""
         path = self._paths.get(watched)
         return None if path is None else self.places[rate_name(watched, path)]
 
@@ -164,7 +165,7 @@ class Situation:
     def _strike(
         self, t: float, y: Real, name: str, factor: float, impulses: dict[str, float], closures: dict[str, Real]
     ) -> None:
-        """An impulse that multiplies a speed."""
+        """Apply an impulse that multiplies the speed of a coordinate by `factor`."""
         rates = {self.places[rate_name(each, path)]: each for each, path in self._paths.items()}
         place = self.places[rate_name(name, self._paths[name])]
         found = struck(self.system, self._state(t, y), {place - self.system.nq: factor * y[place]})
@@ -198,11 +199,11 @@ class Situation:
                 self.system = system
                 return
         before = self.system
-        with asking(before.kernels):  # those of the whole run
+        with asking(before.kernels):  # the same kind of kernels during the whole run
             self.system = assembled(scene)
         self._built.append(self.system)
         if scene.closures:
-            from flexmb.system.closed import ClosedSystem  # a tree needs none of it
+            from flexmb.system.closed import ClosedSystem  # imported here because trees do not need it
 
             assert isinstance(self.system, ClosedSystem) and isinstance(before, ClosedSystem)
             self.system.closures.begin_at(t, y, before.closures)

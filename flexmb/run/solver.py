@@ -1,4 +1,4 @@
-"""How all segments of a run are solved: by one method and one algorithm, for the system as events have left it."""
+"""Integrates all segments of a run by one method and one algorithm, for the system as altered by events."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from flexmb.typing import Real
 
 
 class Solver:
-    """Integrates and observes the system of a situation. stabilise (1/s): see `flexmb.simulate`."""
+    """Integrates the system of a situation and evaluates its outputs. stabilise (1/s): see `flexmb.simulate`."""
 
     def __init__(self, situation: Situation, settings: Settings, algorithm: Algorithm, stabilise: float) -> None:
         self._situation, self.settings = situation, settings
         self._algorithm, self._stabilise = algorithm, stabilise
         self.doubts: list[str] = []
-        """About runs that ended well all the same."""
+        """Warnings about integrations that did not fail."""
 
     def integration(self) -> AbstractContextManager[Integration]:
-        """An integrator that nobody else uses meanwhile."""
+        """An integration for exclusive use within the context."""
         system, integrator = self._situation.system, self.settings.integrator
         return integration(system, self._algorithm, self._stabilise, integrator)
 
@@ -37,7 +37,8 @@ class Solver:
         return part
 
     def accelerations(self, raw: Raw, motion: Real) -> Real:
-        """(nu,) under what controllers say where an integration ended, with another motion [q, u, work] there."""
+        """Accelerations (nu,) with the controllers' outputs at the end of an integration, but with another motion
+        [q, u, work]."""
         begin = self._situation.going_on(self._situation.with_motion(raw, motion))
         with self.integration() as solve:
             if solve.feedback is None:

@@ -1,4 +1,4 @@
-"""A manoeuvre in stages: one run after the other, each from where the last one ended, under its own scene."""
+"""A manoeuvre in stages: consecutive runs, each of which starts where the last one ended, with its own scene."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from flexmb.tables import arguments
 
 @dataclass(frozen=True)
 class RunStage:
-    """So long (s), and what is different from the stage before: another scene, other values in it, or nothing.
+    """The duration (s) of a stage, and its differences from the stage before: another scene, other values, or none.
 
-    values: see `Scene.with_values`; they stay in the stages that follow. samples: number of output times, both ends
+    values: see `Scene.with_values`; they remain in the stages that follow. samples: number of output times, both ends
     included.
     """
 
@@ -39,14 +39,14 @@ def simulate_stages(
     state: Given = None,
     **settings: Unpack[RunSettings],
 ) -> Trajectory:
-    """Simulate stages in sequence; one trajectory, whose status is that of the first stage that fails.
+    """Simulate stages in sequence and return one trajectory, which ends with the first stage that fails.
 
-    Time goes on from stage to stage, also for functions of time. Each stage starts with the coordinates and speeds that
-    the last one ended with: scenes must have the same ones, and the same markers and hinges. Controllers begin anew.
-    A motion that is prescribed in a stage begins where the coordinate is; where it does not, in value or rate,
-    ValueError says so.
-    method, t_start, state and settings: see `simulate`. Raises what `simulate` does, before anything runs where a
-    scene is wrong, and ValueError for stages that do not fit each other.
+    Time continues from stage to stage, also for functions of time. Each stage starts with the coordinates and speeds at
+    the end of the last one: scenes must have the same ones, and the same markers and hinges. Controllers are
+    initialised in each stage. A motion that is prescribed in a stage must start with the value and rate that the
+    coordinate then has, otherwise ValueError is raised.
+    method, t_start, state and settings: see `simulate`. Raises what `simulate` raises, for an invalid scene before
+    anything runs, and ValueError for stages that do not fit each other.
     """
     systems = _systems(scene, stages)
     t = start_time(t_start, state)
@@ -63,12 +63,12 @@ def simulate_stages(
         if not run.finished:
             break
         t = end
-    assert whole is not None  # there is a stage
+    assert whole is not None  # there is at least one stage
     return whole
 
 
 def _systems(scene: Scene, stages: Sequence[RunStage]) -> list[System]:
-    """Of all stages, which fit each other; a scene that does not change is compiled once."""
+    """The systems of all stages; a scene that does not change is compiled once. ValueError if they do not fit."""
     if not stages:
         raise ValueError("there are no stages: give at least one")
     found: list[System] = []
@@ -77,7 +77,7 @@ def _systems(scene: Scene, stages: Sequence[RunStage]) -> list[System]:
             raise ValueError(f"stages[{i}] lasts {stage.duration_s:g} s: give a positive duration")
         if found and found[-1].scene.events:
             raise NotImplementedError(
-                f"stages[{i - 1}] has events, which change its scene: let events on time do what stages would"
+                f"stages[{i - 1}] has events, which change its scene: use events on time in place of later stages"
             )
         scene = (stage.scene or scene).with_values(stage.values)
         found.append(found[-1] if found and found[-1].scene == scene else compile(scene))

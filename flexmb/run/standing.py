@@ -1,10 +1,11 @@
-"""What stands on a stop where a run begins, or is let go there: it has not come to the stop, and is held by it.
+"""Bodies in contact with a stop at the start of a run, or when they are released there.
 
-A stop is an event with an `Impact` that watches a place. Nothing arrives at a stop on which it already is, so nothing
-that watches steps would stop it. A body is on a stop where it is nearer than the error that the run allows, on the side
-from which `crossing` says that it comes; of a stop that is hit from either side, where the loads press against it, or
-without loads where the body moves to. What moves into the stop is struck. What is at rest and pressed rests, where the
-stop `rests`; else it is seen to come to it as soon as it drifts. Everything else leaves.
+A stop is an event with an `Impact` that watches a coordinate or signal, not a rate. A body in contact with it does not
+cross its level, so the search for crossings within steps does not find it. A body is in contact if its distance is
+within the tolerance of the run. Its side is the one from which `crossing` says that it arrives; for a stop that is hit
+from either side, the side from which loads press the body against it, or without loads the one from which it moves. If
+the body moves into the stop, the impact happens. If it is at rest and pressed against the stop, it comes to rest if the
+stop `rests`; otherwise the event happens as soon as it drifts past the level. In all other cases it leaves the stop.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class Stood(NamedTuple):
 
 
 def stops(situation: Situation, event: SceneEvent) -> Impact | None:
-    """The impact of an event that watches a place: not time, nor the rate of a coordinate."""
+    """The impact of an event that watches a coordinate or signal: neither time nor the rate of a coordinate."""
     is_place = event.watch != "time" and (
         event.watch not in situation.places or situation.rate_of(event.watch) is not None
     )
@@ -45,9 +46,9 @@ def stops(situation: Situation, event: SceneEvent) -> Impact | None:
 def stand(
     situation: Situation, event: SceneEvent, t: float, y: Real, near: float, probe: Probe, accelerations: Accelerations
 ) -> Stood | None:
-    """Whether something stands on a stop, and what becomes of it; what happens changes y in place. None if it does not.
+    """Process a body that is in contact with a stop, changing y in place; None if there is none.
 
-    near: so far from its level it is at it.
+    near: the distance from the level within which it is in contact.
     """
     impact = stops(situation, event)
     if impact is None or situation.is_held(event.watch) or situation.is_held(impact.coordinate):
@@ -78,7 +79,7 @@ def _pressed(
     situation: Situation, event: SceneEvent, impact: Impact, t: float, y: Real, probe: Probe,
     accelerations: Accelerations,
 ) -> tuple[int, int]:  # fmt: skip
-    """Signs of the ways that what is watched, and the coordinate, would take from rest, if there were no stop."""
+    """Signs of the motions of the watched quantity and of the coordinate from rest, if there were no stop."""
     still = situation.at_rest(impact.coordinate, t, y)
     gained, moving = accelerations(t, still), still.copy()
     moving[situation.system.nq : -1], still[situation.system.nq : -1] = gained, 0.0
@@ -88,6 +89,6 @@ def _pressed(
 
 
 def _put(situation: Situation, event: SceneEvent, y: Real) -> None:
-    """Coordinates are put at their level exactly, as where they arrive."""
+    """Set a watched coordinate exactly to its level, as when it reaches it."""
     if event.watch in situation.places:
         y[situation.places[event.watch]] = event.level

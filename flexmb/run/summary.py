@@ -12,7 +12,7 @@ from flexmb.run.channels import channels_of, signal_range, unit
 from flexmb.run.trajectory import Trajectory
 from flexmb.typing import Real
 
-MOST_EVENTS = 8  # that are told one by one
+MOST_EVENTS = 8  # number of events that are listed
 
 
 def summary(trajectory: Trajectory) -> Listing:
@@ -63,7 +63,7 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
 
 
 def _undetermined(trajectory: Trajectory) -> str:
-    """Loads that closures leave open, component by component: "pin (torque x, y; force z)"."""
+    """Components of loads that redundant closures leave undetermined, as "pin (torque x, y; force z)"."""
     found = []
     for name, is_open in trajectory.undetermined.items():
         letters = [[axis for axis, each in zip("xyz", is_open[i : i + 3], strict=False) if each] for i in (0, 3)]
@@ -73,20 +73,20 @@ def _undetermined(trajectory: Trajectory) -> str:
 
 
 def _events(trajectory: Trajectory) -> str:
-    """The first few by name and time."""
+    """Names and times of the first MOST_EVENTS events, and the number of the others."""
     told = [f"{event.name} at {event.t:.6g} s" for event in trajectory.events[:MOST_EVENTS]]
     left = len(trajectory.events) - len(told)
     return ", ".join(told) + (f", and {left} more" if left else "")
 
 
 def _energy(trajectory: Trajectory) -> str:
-    """The largest gain of energy beyond the work done, and relative to the energy that moved."""
+    """The largest drift of energy, also relative to `energy_scale`."""
     drift, scale = np.abs(trajectory.energy_drift).max(), trajectory.energy_scale
     relative = f" ({drift / scale:.1e} of {scale:.4g} J)" if scale > 0.0 else ""
     return f"{drift:.1e} J{relative}"
 
 
 def _momentum(trajectory: Trajectory) -> list[tuple[str, str]]:
-    """Largest change of either momentum: a drift only where nothing pushes from outside."""
+    """The largest change of angular and linear momentum, which is an error only without external forces."""
     change = np.abs(trajectory.momentum_drift)
     return [("momentum change", f"{change[:, :3].max():.1e} N m s angular, {change[:, 3:].max():.1e} N s linear")]

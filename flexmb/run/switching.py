@@ -1,4 +1,4 @@
-"""What a scene's functions of time say about runs: where no step may cross, and how far they are defined."""
+"""Properties of a scene's functions of time that matter to runs: times that no step may cross, and their domain."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from flexmb.scene.tree import watches_signals
 from flexmb.system.tree_system import System
 from flexmb.typing import Real
 
-MOST_TURNS = 1_000_000  # of a sine in a run: nobody makes so many steps
+MOST_TURNS = 1_000_000  # extremes of a sine in a run; for more, a step for each would exceed max_steps
 
 
 class Timing(NamedTuple):
-    """switches (s), increasing: where a function jumps or is no longer smooth; from `start` to `end` (s) all are
-    defined. sines, and knots (s) of tables: where functions turn."""
+    """switches (s), increasing: times at which a function jumps or is not smooth. start, end (s): the interval in which
+    all functions are defined. sines, and knots (s) of tables, determine where functions have extremes."""
 
     switches: tuple[float, ...]
     start: float
@@ -31,11 +31,11 @@ class Timing(NamedTuple):
     knots: tuple[float, ...]
 
     def between(self, t_start: float, t_end: float) -> list[float]:
-        """Switches in (t_start, t_end): no step may cross one (s)."""
+        """Switches (s) in (t_start, t_end), none of which a step may cross."""
         return [time for time in self.switches if t_start < time < t_end]
 
     def turns(self, t_start: float, t_end: float) -> list[float]:
-        """Times in (t_start, t_end) between which functions hardly turn more than once: extremes of sines, knots."""
+        """Extremes of sines and knots of tables in (t_start, t_end): between them functions rarely turn twice."""
         found = {time for time in self.knots if t_start < time < t_end}
         for sine in self.sines:
             half, phase = np.pi / abs(sine.angular_frequency_rad_s), sine.phase_rad / sine.angular_frequency_rad_s
@@ -47,7 +47,7 @@ class Timing(NamedTuple):
 
 
 def timing(scene: Scene) -> Timing:
-    """Of all functions of a scene."""
+    """The timing of all functions of a scene."""
     switches, start, end = set[float](), -inf, inf
     sines, knots = list[Sine](), set[float]()
     for _, _, function in values(ROOT, scene):
@@ -72,7 +72,7 @@ def timing(scene: Scene) -> Timing:
 
 
 def timing_of(system: System) -> Timing:
-    """The same of a system's scene, found once."""
+    """The timing of a system's scene, which is computed once."""
     if Timing not in system.kept:
         system.kept[Timing] = timing(system.scene)
     found: Timing = system.kept[Timing]
@@ -80,10 +80,10 @@ def timing_of(system: System) -> Timing:
 
 
 def segment_ends(system: System, t_start: float, t_end: float, equal_steps: bool, breaks: bool = False) -> Real:
-    """The clock's ends of segments of a run: see `flexmb.integrate.problem.Clock`. breaks: whether one is its end.
+    """The segment ends of a run's clock: see `flexmb.integrate.problem.Clock`. breaks: a segment ends at t_end.
 
-    Where events watch signals, these are also where functions turn: steps resolve what moves, and a load on something
-    at rest moves nothing.
+    If events watch signals, segments also end where functions turn: error control resolves the motion only, and a load
+    on a body that is held varies without any motion.
     """
     found = timing_of(system)
     ends, is_switch = found.between(t_start, t_end), breaks or t_end in found.switches
@@ -97,7 +97,7 @@ def segment_ends(system: System, t_start: float, t_end: float, equal_steps: bool
 def clock_of(system: System, t_start: float, times: Real, equal_steps: bool, breaks: bool) -> Clock:
     """The clock of a run from t_start (s) with these output times (T,) s; breaks: see `segment_ends`.
 
-    A leap over a singular position near the end of the run may go on beyond it, up to where a function switches.
+    A leap over a singular position near the end of the run may pass the end, up to the next switch of a function.
     """
     found, t_end = timing_of(system), times[-1]
     ends = segment_ends(system, t_start, t_end, equal_steps, breaks)
@@ -106,7 +106,7 @@ def clock_of(system: System, t_start: float, times: Real, equal_steps: bool, bre
 
 
 def refuse_times(system: System, t_start: float, t_end: float) -> None:
-    """SceneError unless the run has finite ends in order, and every profile covers it."""
+    """SceneError unless t_start < t_end are finite and every profile covers the run."""
     found = timing_of(system)
     if not max(found.start, -1e300) <= t_start < t_end <= min(found.end, 1e300):
         check_run(system.scene, t_end, t_start)

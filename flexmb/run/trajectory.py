@@ -1,4 +1,4 @@
-"""The result of a run: everything observable at the output times, as arrays, with its units when written to a file."""
+"""The result of a run: all observables at the output times, as arrays; files contain their units."""
 
 from __future__ import annotations
 
@@ -40,33 +40,34 @@ class Trajectory(RunArrays):
     by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
     motors, dampers, friction, actuators and loads. `stopped_at` is the time of the last good state: the end of the run
     if it finished. connectors by name (T,6) [torque; force] on body_b about frame B, World axes; hinge_forces (T,1) of
-    connectors along hinges, along their coordinates. `restart`: how the run is taken up there, None if it failed.
-    `events`: what happened, in the order of time. signals (T,k) by sensor and controller, power (T,k) W that each
-    output of a controller puts into the motion, of a scene that has some. Loads and drives that the motion does not
-    determine, of redundant closures, are NaN: see `undetermined`.
+    connectors along hinges, along their coordinates. `restart`: resumes the run at its end, None if the run failed.
+    `events`: the events that happened, in the order of time. If the scene has controllers: signals (T,k) by sensor and
+    controller, and power (T,k) W that each output of a controller puts into the motion. Loads and drives that the
+    motion does not determine, because closures are redundant, are NaN: see `undetermined`.
     """
 
     made_by: Making | None = field(default=None, repr=False, compare=False)
-    """The system and the settings of the run; None where it was put together otherwise."""
+    """The system and the settings of the run; None for a trajectory that is not one run of `simulate`."""
 
     def __repr__(self) -> str:
-        """What a prompt shows: how the run ended and what there is, not thousands of numbers."""
+        """How the run ended and the size of its results, for an interactive prompt."""
         size = f"{len(self.t)} times, {len(self.q_names)} coordinates, {len(self.markers)} markers"
         return f"<Trajectory of {self.scene!r}: {self.message}; {size}>"
 
     def error_estimate(self) -> dict[str, Real]:
         """Error (T,) of every channel, in its unit (orientations: rad), by a second, tighter run from start to end.
 
-        That run has rtol and atol of a hundredth, or half the step; its distance from this one is the error of this
-        one but for a hundredth, or a third, which is added. NaN where the second run did not come. Errors that both
-        have in common, such as too few modes, do not show. ValueError where settings cannot be tighter.
+        That run has rtol / 100 and atol / 100, or half the step. The distance of the runs is the estimate for the
+        former, 4/3 of it for the latter. NaN at times that the second run did not reach. Errors that both runs have in
+        common, such as those of too few modes, are not included. ValueError if the settings cannot be made tighter, or
+        for a resumed run.
         """
         return error_estimate(self, self._making("its error"))
 
     def loads_in(self, axes: Axes = "world", about: tuple[str, str] | None = None) -> dict[str, Real]:
         """`loads` (T,6) in the axes of each hinge's own frame "inboard" or "outboard", and about a node (body, node).
 
-        NaN what the motion does not determine in these axes. See `System.hinge_loads`.
+        Components that the motion does not determine in these axes are NaN. See `System.hinge_loads`.
         """
         system, found = self._making("a hinge's frame").system, {name: load.copy() for name, load in self.loads.items()}
         for i, state in enumerate(map(State, self.q, self.u, self.t.tolist())):
@@ -78,8 +79,8 @@ class Trajectory(RunArrays):
     def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
         """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).
 
-        See `System.section_loads`. Raises DynamicsError where a state has no accelerations, NotImplementedError for a
-        scene with controllers, of whose loads a state by itself knows nothing.
+        See `System.section_loads`. Raises DynamicsError if a state has no accelerations, NotImplementedError for a
+        scene with controllers, whose loads do not follow from the state alone.
         """
         system = self._making("a section's load").system
         refuse_feedback(system.scene, "a section's load")
@@ -98,7 +99,7 @@ class Trajectory(RunArrays):
             or (self.q_names, self.u_names) != made_by.system.state_names
         ):
             raise ValueError(
-                f"this trajectory is not one run as simulate made it, and {wanted} needs that: ask each run for itself"
+                f"{wanted} needs a trajectory that is one run as simulate made it: use the trajectory of each run"
             )
         return made_by
 
@@ -113,20 +114,20 @@ class Trajectory(RunArrays):
         return State(self.q[sample], self.u[sample], float(self.t[sample]))
 
     def values_at(self, sample: int) -> dict[str, float]:
-        """The same by the names of coordinates and speeds, for a scene that shares some of them."""
+        """The state at an output time by names of coordinates and speeds, as `simulate` accepts it."""
         refuse_torn(self)
         values = zip((*self.q_names, *self.u_names), (*self.q[sample], *self.u[sample]), strict=True)
         return {name: float(value) for (name, _), value in values}
 
     def then(self, later: Trajectory) -> Trajectory:
-        """This run and a later one as one: output times of this one, as far as the later one does not have them.
+        """This run and a later one as one trajectory, with this run's output times before the start of the later one.
 
-        Work is counted on, statistics are added; status, message and restart are the later one's. Drives, signals and
-        powers that one of them lacks are NaN there. ValueError where coordinates, markers, hinges or connectors differ,
-        or the later one begins after this one has ended.
+        Work is accumulated and statistics are added; status, message and restart are the later run's. Where only one
+        run has a drive, signal or power, the other's drives and powers are zero and its signals NaN. ValueError if
+        coordinates, markers, hinges or connectors differ, or if the later run begins after this one has ended.
         """
         if not isinstance(later, Trajectory):
-            raise TypeError(f"a Trajectory can follow, not a {type(later).__name__}")
+            raise TypeError(f"the later run is a {type(later).__name__}: give a Trajectory")
         refuse_torn(self)
         refuse_torn(later)
         if len(later.t) and later.t[0] > self.stopped_at:
@@ -136,7 +137,7 @@ class Trajectory(RunArrays):
         return joined(self, later)
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write all channels, one row a time, under a header "name [unit]"; 17 digits: they read back exactly."""
+        """Write all channels, one row per time, under a header "name [unit]"; 17 digits are read back exactly."""
         columns = list(self.columns())
         with whole_file(Path(path)) as beside, beside.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
@@ -172,14 +173,14 @@ class Trajectory(RunArrays):
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write charts of markers, energy, loads and drives to `folder` as PNG; returns their paths."""
-        from flexmb.run.plots import write_plots  # matplotlib is slow to import, and only needed here
+        from flexmb.run.plots import write_plots  # imported here because matplotlib is slow to import
 
         refuse_torn(self)
         return write_plots(self, Path(folder))
 
 
 def gathered(observation: Observation, rows: Real) -> dict[str, Any]:
-    """Fields of a `Trajectory` that are what was observed, in rows (T,width)."""
+    """The fields of a `Trajectory` that are observables, from rows (T,width)."""
     names, found = observation.names, observation.columns_of(rows)
     return {
         "markers": {name: _marker_path(found["markers"][:, i]) for i, name in enumerate(names.markers)},
@@ -194,12 +195,12 @@ def gathered(observation: Observation, rows: Real) -> dict[str, Any]:
 
 
 def _by_name(names: Sequence[str], values: Real) -> dict[str, Real]:
-    """Of (T,n) or (T,n,k)."""
+    """The columns of values (T,n) or (T,n,k) by name."""
     return {name: values[:, i].copy() for i, name in enumerate(names)}
 
 
 def _marker_path(rows: Real) -> MarkerPath:
-    """Of rows (T,24) as `Outputs` has them."""
+    """The path of a marker from rows (T,24) as in `Outputs`."""
     return MarkerPath(
         position=rows[:, :3].copy(),
         quaternion=_continuous_quaternions(rows[:, 3:12].reshape(-1, 3, 3)),

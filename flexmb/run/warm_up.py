@@ -1,8 +1,8 @@
-"""Compile ahead: `python -m flexmb.warmup SCENE` makes the special kernels of a scene, which later runs then take.
+"""Compile ahead: `python -m flexmb.warmup SCENE` compiles the special kernels of a scene, which later runs then use.
 
-They are for what the scene contains: those of one scene serve all that contain the same kinds of hinges, levels, loads
-and so on. Without scenes, general kernels are compiled, which contain everything, where the installation has none.
-Compiled is what `simulate` runs by its defaults; --method, --algorithm and --scene add others.
+Special kernels contain only what the scene needs, and serve all scenes with the same kinds of hinges, levels, loads and
+so on. Without scenes, general kernels are compiled, which serve all scenes, unless the installation contains them. By
+default the kernels for the default arguments of `simulate` are compiled; --method, --algorithm and --scene add others.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def pendulum() -> Scene:
 
 
 def with_panel() -> Scene:
-    """The same with a beam of so many modes that they are condensed."""
+    """The pendulum with a beam that has so many modes that they are eliminated in condensed form."""
     panel = _bob().revolute("pivot", "ground", "bob").beam(
         "panel", length=1.0, elements=8, modes=16, level="ruthless",
         section=beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=1.7e-10, Iz=1.7e-10, rho=2700.0),
@@ -59,13 +59,13 @@ def warm_up(
     algorithms: Sequence[Algorithm] = ("articulated",),
     scenes: Sequence[Kind | Scene] = ("tree",),
 ) -> float:
-    """Compile, or find compiled, all kernels behind `simulate` and `System`; returns the seconds it took.
+    """Compile all kernels of `simulate` and `System` that are not compiled yet; returns the seconds it took.
 
-    scenes: a scene, for its special kernels, which systems of such scenes take from then on unless they are asked not
-    to (`compile`); or the name of a kind, for general ones: "tree";
-    "condensed", trees with bodies of so many modes that they are eliminated in condensed form; "closed", scenes with
-    closures. Every method is compiled with every algorithm and scene that `simulate` runs it with. Raises ValueError
-    for a name that does not exist, and what `compile` raises for a scene.
+    scenes: a scene, for its special kernels, which systems of such scenes use from then on unless `compile` is told
+    otherwise; or the name of a kind, for general kernels: "tree"; "condensed", trees with bodies that have so many
+    modes that they are eliminated in condensed form; "closed", scenes with closures. Every method is compiled with
+    every algorithm and scene that `simulate` supports it for. Raises ValueError for an unknown name, and what `compile`
+    raises for a scene.
     """
     for what, names, known in (
         ("method", methods, INTEGRATORS), ("algorithm", algorithms, RUNNING),
@@ -97,7 +97,7 @@ def _compile(scene: Scene, kind: Kind, methods: Sequence[Method], algorithms: Se
 
 
 def _runs(kind: Kind, algorithm: Algorithm, method: Method) -> bool:
-    """Whether `simulate` takes them together; where it is condensed matters to the recursion only."""
+    """Whether `simulate` supports this combination; "condensed" concerns the articulated algorithm only."""
     if INTEGRATORS[method].linearises and algorithm not in WITH_JACOBIAN:
         return False
     if kind == "closed":

@@ -1,9 +1,9 @@
 """Events whose instant lies within a leap of a closed chain over a singular position (`flexmb.closure.leap`).
 
-The motion there is known, by the leap's polynomial; loads are not, and a run can be taken up only where the singular
-position itself is far enough. Whether it is, is tried, on the way on and on the way back, for an event may turn the
-motion over. Where it is not, the event happens before its instant: where the leap starts, or as long before as leaps
-last at most, a 2^-9 of the time in which the mechanism moves as far as it is large.
+Within a leap the motion is known from the leap's polynomial, but loads are not, and a new segment can start only far
+enough from the singular position. Whether it can is tried, both forwards and with all speeds reversed, because an event
+may reverse the motion. If it cannot, the event happens before its instant: at the start of the leap, or earlier by the
+longest duration of a leap, which is 2^-9 of the time in which the mechanism moves by its own size.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from flexmb.typing import Real
 AT_SINGULAR_POSITIONS = (Status.CLOSURE_SINGULAR, Status.BRANCH_UNKNOWN, Status.CLOSURE_OPEN)
 
 Further = Callable[[Raw, float], Raw]
-"""On from where a segment ended to a time (s), whatever comes to its level meanwhile."""
+"""Continues from the end of a segment to a time (s) without watching for events."""
 
 
 def placed(situation: Situation, raw: Raw, levels: Watch, times: Real, further: Further) -> tuple[Raw, float]:
-    """A segment that came to a level, as it ends for the event, and how long (s) before the level that is.
+    """A segment that reached a level, ended where the event happens, and how long (s) before its instant that is.
 
-    times (T,) s of its samples.
+    times (T,) s: output times of the segment.
     """
     start, end = levels.leap.tolist()
     if not start < raw.t < end or _goes_on(situation, raw, end - start, further):
@@ -38,9 +38,9 @@ def placed(situation: Situation, raw: Raw, levels: Watch, times: Real, further: 
 
 
 def too_near(situation: Situation, raw: Raw, t_start: float, due: float, further: Further) -> float:
-    """How long (s) before a time that is due an event has to happen, after a run that was to end there; 0 for not.
+    """How long (s) before the time `due` its event has to happen, given the segment up to there; 0 if at that time.
 
-    t_start (s): before it nothing can happen.
+    t_start (s): start of the segment, before which the event cannot happen.
     """
     longest = _longest_leap(situation.system, raw)
     if longest >= due - t_start:
@@ -53,7 +53,7 @@ def too_near(situation: Situation, raw: Raw, t_start: float, due: float, further
 
 
 def _goes_on(situation: Situation, raw: Raw, span: float, further: Further) -> bool:
-    """Whether a run can be taken up where a segment ended, for `span` (s), as it moves and the other way."""
+    """Whether a segment of length `span` (s) can start where another ended, with its speeds and with reversed ones."""
     back = raw.y.copy()
     back[situation.speeds] *= -1.0
     return all(
@@ -62,8 +62,8 @@ def _goes_on(situation: Situation, raw: Raw, span: float, further: Further) -> b
 
 
 def _longest_leap(system: System, raw: Raw) -> float:
-    """How long (s) a leap may last where a segment ended; infinite at rest."""
-    from flexmb.closure.leap import LEAP  # trees need none of it
+    """The longest duration (s) of a leap at the end of a segment; infinite at rest."""
+    from flexmb.closure.leap import LEAP  # imported here because trees do not need it
     from flexmb.system.closed import ClosedSystem
 
     assert isinstance(system, ClosedSystem)

@@ -111,7 +111,7 @@ def test_a_run_that_failed_has_no_restart():
 def test_what_cannot_be_taken_up_is_refused(systems, tmp_path):
     system = systems["closed"]
     run = fm.simulate(system, 0.1, samples=2, rtol=1e-6)
-    with pytest.raises(ValueError, match='by method "dop853"'):
+    with pytest.raises(ValueError, match='made by method "dop853"'):
         fm.simulate(system, 0.2, "rk4", step=0.01, state=run.restart)
     with pytest.raises(ValueError, match="with other contents"):
         fm.simulate(systems["tree"], 0.2, state=run.restart)

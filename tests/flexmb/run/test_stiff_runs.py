@@ -123,7 +123,7 @@ def test_what_is_refused():
         fm.simulate(scene, 1.0, "exponential", spectral_radius=0.5)
     with pytest.raises(ValueError, match="method is 'euler': use one of 'dop853', 'rk4', 'radau5'"):
         fm.simulate(scene, 1.0, "euler")
-    with pytest.raises(NotImplementedError, match='needs Jacobians, which algorithm "articulated" alone has'):
+    with pytest.raises(NotImplementedError, match='needs Jacobians, which only algorithm "articulated" has'):
         fm.simulate(scene, 1.0, "radau5", algorithm="frisch")
 
 
