@@ -23,7 +23,7 @@ from flexmb.tables.state import Layout
 from flexmb.tables.status import CLOSURE_SINGULAR, OUT_OF_RANGE
 from flexmb.typing import Flags, Index, Real
 
-STIFF = 100.0  # weight of modal stiffness in assembly, as 1/(2 pi) periods of the slowest mode
+STIFF = 100.0  # in assembly, modal masses are M + K (STIFF/omega)^2 with the lowest modal frequency omega
 BESIDE = 2.0**-11  # distance from a singular position, in sizes of the mechanism, at which loads are evaluated
 SAME = 1e-7  # relative difference below which loads count as equal
 
