@@ -1,10 +1,17 @@
-"""Closed chains: a tree and closures on top of it, by the operational-space inertia of the closures' nodes.
+"""Closed chains: a tree with loop closures, solved by the operational-space inertia of the closure nodes.
 
-The tree moves by the recursion of `flexmb.jain`. A closure suppresses relative motions of two ports; the loads that do
-it follow from unit loads passed inward through the articulated quantities. `rows` says what a closure suppresses,
-`groups` which closures feel each other's loads, so that all others are solved by themselves, `unit_loads` makes loads
-on rows forces on the tree and passes these inward, `sizes` says what rows are compared with, `factor` finds the
-independent ones, `clusters` couples groups that one base carries, `forces` adds the closure loads to an evaluation,
-`projection` takes a state back to where the closures are closed, `branch` notices singular positions, `leap` passes
-them, `dynamics` holds the entry points, `tangent` that of exact derivatives at given closure loads.
+The tree is evaluated by the recursion of `flexmb.jain`. A closure constrains the relative motion of two ports (a frame
+on each of two bodies); each suppressed motion is a row of the constraint Jacobian. The constraint loads follow from
+unit loads that are propagated inward through the articulated-body quantities.
+
+- `rows`: value, rate and acceleration of each constraint row
+- `groups`: which loops are dynamically coupled; independent groups are solved separately
+- `unit_loads`: response of the tree to a unit load on each row
+- `sizes`: reference magnitudes for the rank decision
+- `factor`: rank-revealing factorisation
+- `clusters`: coupling of groups that are carried by the same base
+- `forces`: adds the constraint loads to an evaluation
+- `projection`: projects a state onto the constraint manifold
+- `branch`: detects singular positions; `leap` passes them
+- `dynamics`: entry points; `tangent`: exact derivatives at given constraint loads
 """

@@ -1,8 +1,8 @@
-"""What a user asks of an initial state: which values are to be kept, and which are guesses.
+"""Which values of an initial state must be kept, and which are only guesses.
 
-A value is *given* if it is not what it is by default (zero, and no rotation), or if it is named where a run begins; it
-is *insisted* on if the scene marks its coordinate by `given = true`, or again if it is named. Values that belong
-together, as those of a quaternion or a vector, are given together.
+A value is *given* if it differs from its default (zero, or no rotation) or is named in the call that starts the run. It
+is *insisted* on if the scene marks its coordinate by `given = true` or if it is named in that call. All components of a
+quaternion or vector have the same status.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ import numpy as np
 
 from flexmb.typing import Index, Real
 
-MOVED = 1e-6  # of a value, or absolute below 1: people write six digits, and stabilised runs drift by less
+MOVED = 1e-6  # relative, absolute below 1: users write about six digits, and stabilised runs drift by less
 MOST_NAMES = 5
 
 Value = tuple[tuple[int, ...], tuple[int, ...]]
-"""Of one value: its places in [q, u, work], and the speeds that must not change for it to stay."""
+"""One value: its indices in [q, u, work], and the speeds that must be held so that it does not change."""
 
 
 class KeptValues(NamedTuple):
-    """Places in [q, u, work] of coordinates and of speeds that stay as they are, and speeds that nothing may move."""
+    """Indices in [q, u, work] of the coordinates and speeds to keep, and the speeds that must not be changed."""
 
     coordinates: Index
     speeds: Index
@@ -29,17 +29,16 @@ class KeptValues(NamedTuple):
 
 
 class Wishes(NamedTuple):
-    """Of all coordinates, or of all speeds."""
+    """The values of all coordinates, or of all speeds, by how firmly the user asked for them."""
 
     given: tuple[Value, ...] = ()
     insisted: tuple[Value, ...] = ()
 
 
 class AskedFor(NamedTuple):
-    """modes: all of them, as values; prescribed: numbers of speeds that move by themselves. names: of all places in
-    [q, u].
+    """modes: all modal values; prescribed: indices of the prescribed speeds; names: of all entries of [q, u].
 
-    is_marked: what is insisted on is so in the scene, and not to keep it is an error.
+    is_marked: the insisted values are marked in the scene, and it is an error if they cannot be kept.
     """
 
     coordinates: Wishes
@@ -51,7 +50,7 @@ class AskedFor(NamedTuple):
     is_marked: bool
 
     def hold(self, values: tuple[Value, ...], *, modes: bool) -> KeptValues:
-        """Of these values, with all modes too if these are not to move."""
+        """What keeps these values, and all modal values too if `modes` is set."""
         values = (*values, *self.modes) if modes else values
         places = [place for value, _ in values for place in value]
         fixed = {speed for _, speeds in values for speed in speeds}
@@ -62,13 +61,13 @@ class AskedFor(NamedTuple):
         )
 
     def name(self, value: Value) -> str:
-        """The name of its first place."""
+        """The name of its first component."""
         return self.names[value[0][0]]
 
     def broken(self, before: Real, after: Real) -> str:
-        """What of it was not kept between two [q, u, work], "<name> from ... to ..."; "" if nothing.
+        """The given values that differ between two [q, u, work], as "<name> from ... to ..."; "" if none does.
 
-        Beside coordinates that are insisted on, and were kept, others are guesses that say which branch is meant.
+        If insisted coordinates were kept, the other coordinates count as guesses that select the assembly branch.
         """
         of_coordinates = self.coordinates.insisted or self.coordinates.given
         asked = [place for value, _ in (*of_coordinates, *self.speeds.given) for place in value]

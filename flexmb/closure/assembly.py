@@ -1,12 +1,13 @@
-"""Initial conditions that close all closures, from a user's rough ones, or why there are none.
+"""Assembly: consistent initial conditions from a user's approximate ones, or an error that says why there are none.
 
-Coordinates by damped Gauss-Newton steps (Levenberg and Marquardt), then the speeds, each the least in one metric: that
-of kinetic energy, with modes so much heavier, in proportion to their stiffness, that they only move where hinges cannot
-close the loop. Prescribed coordinates and speeds stay as they are. Rows are weighed with a length of the scene, and
-compared with the size of their closure.
+Coordinates are corrected by damped Gauss-Newton steps (Levenberg-Marquardt), then the speeds. Each correction is the
+smallest in the metric of kinetic energy, in which modal masses are increased in proportion to the modal stiffness, so
+that modes change only where hinges cannot close the loop. Prescribed coordinates and speeds are not changed. Rows are
+weighted with a length of the scene, and compared with the size of their closure.
 
-What a user has asked for is held where the rest can close the loops (`flexmb.closure.asked`): first everything given,
-modes at rest; modes may move where hinges alone would not do; then what is insisted on; then nothing.
+Values that the user asked for (`flexmb.closure.asked`) are held if the remaining ones can close the loops. These are
+tried in turn: all given values and all modes are held; all given values are held and modes may change; only insisted
+values are held; nothing is held.
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ from flexmb.tables.status import OK
 from flexmb.typing import Real
 
 STEPS = 200
-NEARLY_CLOSED = 2.0**-40  # of what is held: as closed as rounding leaves what few speeds have to close
-STRONGEST = 1e12  # damping beyond which no step makes the errors smaller
+NEARLY_CLOSED = 2.0**-40  # gap that counts as closed if values are held: few free speeds amplify rounding
+STRONGEST = 1e12  # damping at which the iteration gives up
 
 
 def consistent(closures: Closures, t: float, y: Real, asked: AskedFor = NOTHING_ASKED) -> Real:
-    """y = [q, u, work] with closed closures, close to the one given, that keeps what is asked for to the last digit.
+    """y = [q, u, work] near the given one that fulfils all closures and keeps the requested values exactly.
 
-    Where that cannot be kept, the nearest one; ClosureError where there is none, or where what is insisted on in the
-    scene cannot be kept.
+    If these cannot be kept, the nearest closed state. ClosureError if there is none, or if values that the scene marks
+    as given cannot be kept.
     """
     y = _as_asked(closures, t, y.copy(), asked.coordinates, asked, _closed, _errors)
     closures.linearise(t, y)
@@ -48,8 +49,10 @@ Opening = Callable[[Closures, float, Real, Real], float]
 def _as_asked(
     closures: Closures, t: float, y: Real, wishes: Wishes, asked: AskedFor, closing: Closing, opening: Opening
 ) -> Real:
-    """By `closing`, which takes a hold and may raise ClosureError; `opening`: how far one y is from closed, beside
-    another."""
+    """The result of `closing`, which takes the values to hold and may raise ClosureError.
+
+    `opening`: how far a state y is from closed, relative to another state.
+    """
     if opening(closures, t, y, y) <= CLOSED:
         return y
     for wish in dict.fromkeys((wishes.given, wishes.insisted)):
@@ -65,7 +68,7 @@ def _as_asked(
     if wishes.insisted and asked.is_marked:
         names = ", ".join(f'"{asked.name(each)}"' for each in wishes.insisted)
         raise ClosureError(
-            f"marked as given, but closures do not allow these values: {names}. Correct them, or leave out the mark of "
+            f"marked as given, but closures do not allow these values: {names}. Correct them, or remove the mark of "
             "one, which then follows from the others"
         )
     return nearest
@@ -74,7 +77,7 @@ def _as_asked(
 def _holds(
     closures: Closures, t: float, y: Real, wish: tuple[Value, ...], asked: AskedFor, closing: Closing
 ) -> Iterator[KeptValues]:
-    """Modes give way only where hinges alone do not close the loops, whatever is asked for."""
+    """The values to hold, in the order in which they are tried: modes are released only if hinges alone fail."""
     yield asked.hold(wish, modes=True)
     if asked.modes and not _closes(closing, closures, t, y, asked.hold((), modes=True)):
         yield asked.hold(wish, modes=False)
@@ -95,7 +98,7 @@ def _closed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
         if _largest(errors) <= CLOSED or damping > STRONGEST:
             break
         found = decomposed(closures, t, y, hold)
-        # the damping fades with the errors: convergence is quadratic, even where redundant rows become dependent
+        # The damping decreases with the errors, so that convergence is quadratic, also where rows become dependent.
         fading = damping * min(1.0, float(np.linalg.norm(errors)))
         floor = fading * found.largest**2 + np.finfo(float).tiny
         trial = closures.moved(t, y, -found.damped(errors, floor))
@@ -109,15 +112,15 @@ def _closed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
     if not _largest(errors) <= OPEN:
         where = closures.worst(errors)
         raise ClosureError(
-            f"{where}: no coordinates close it; the nearest that were found leave this. Check lengths, axes and "
-            "offsets, give initial coordinates closer to a closed configuration, or, where closures suppress more "
-            "motions than rigid bodies leave, more digits or flexible bodies"
+            f"{where}: no coordinates close it; this gap remains in the nearest configuration found. Check lengths, "
+            "axes and offsets, or give initial coordinates closer to a closed configuration; if the closures "
+            "overconstrain the rigid bodies, give more digits or use flexible bodies"
         )
     return y
 
 
 def _moving(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
-    """Speeds in the range that the closures leave."""
+    """y with speeds that the closures allow."""
     start = y
     closures.linearise_stiff(t, y)
     rates, largest = closures.rates()
@@ -129,17 +132,17 @@ def _moving(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
         y = closures.pushed(t, y, -found.damped(rates, 0.0))
         y[hold.speeds] = start[hold.speeds]
         rates, largest = closures.rates()
-    if not (largest <= MOVING_APART or _largest(rates) <= NEARLY_CLOSED * taken):  # the latter where it is at rest
+    if not (largest <= MOVING_APART or _largest(rates) <= NEARLY_CLOSED * taken):  # the second where it is at rest
         where = closures.worst(rates, rates=True)
         raise ClosureError(
-            f"{where}: no speeds keep it closed; the nearest leave this. Prescribed motions ask for what the closures "
-            "do not allow: the mechanism is locked; free a hinge, or use flexible bodies"
+            f"{where}: no speeds keep it closed; this remains with the nearest ones. The closures do not allow the "
+            "prescribed motions: the mechanism is locked. Free a hinge, or use flexible bodies"
         )
     return y
 
 
 class Group(NamedTuple):
-    """Singular values of B' of a group in its own columns, U s V', and U' times the columns that its cluster shares."""
+    """Singular value decomposition U s V' of B' of a group in its own columns, and U' times the shared columns."""
 
     of: GroupResponse
     U: Real
@@ -156,13 +159,13 @@ class Decomposed(NamedTuple):
 
     @property
     def largest(self) -> float:
-        """The largest singular value of all."""
+        """The largest singular value of all groups."""
         return max((float(group.s[0]) for groups in self.clusters for group in groups if len(group.s)), default=0.0)
 
     def damped(self, values: Real, floor: float) -> Real:
-        """x (nu,) = B (B'B + floor)^-1 values (G,) of the rows; without a floor the least squares' solution.
+        """x (nu,) = B (B'B + floor)^-1 values (G,) of the rows; with a floor of zero the least-squares solution.
 
-        What groups share comes in by Woodbury's formula, as in `flexmb.closure.clusters`.
+        Shared columns enter by the Woodbury formula, as in `flexmb.closure.clusters`.
         """
         x = np.zeros(self.speeds)
         for groups in self.clusters:
@@ -180,7 +183,7 @@ class Decomposed(NamedTuple):
 
 
 class Held(NamedTuple):
-    """The responses of all rows to what moves nothing of what is held, B'P = U s V'."""
+    """The responses of all rows, projected on changes that leave the held values as they are: B'P = U s V'."""
 
     U: Real
     s: Real
@@ -192,7 +195,7 @@ class Held(NamedTuple):
         return float(self.s[0]) if len(self.s) else 0.0
 
     def damped(self, values: Real, floor: float) -> Real:
-        """As of `Decomposed`."""
+        """See `Decomposed.damped`."""
         kept = self.s > (0.0 if floor > 0.0 else DEPENDENT * self.largest)
         s = self.s[kept]
         found: Real = self.Vt[kept].T @ (s / (s * s + floor) * (self.U[:, kept].T @ values))
@@ -200,7 +203,7 @@ class Held(NamedTuple):
 
 
 def decomposed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Decomposed | Held:
-    """At the state y that was linearised last."""
+    """The decomposition at the state y that was linearised last."""
     speeds, responses = len(closures.constants[0].speed), closures.responses()
     if not len(hold.fixed):
         return Decomposed(speeds, [[_decomposed(of) for of in groups] for groups in responses])
@@ -217,7 +220,7 @@ def _decomposed(of: GroupResponse) -> Group:
 
 
 def _refuse_half_a_turn(closures: Closures) -> None:
-    """Axes that should be equal may have come out opposite."""
+    """ClosureError where axes that should be equal are opposite: the rows vanish there too."""
     for name, turned in closures.half_turned():
         if turned:
             raise ClosureError(
@@ -237,7 +240,7 @@ def _errors(closures: Closures, t: float, y: Real, _: Real) -> float:
 
 
 def _rates(closures: Closures, t: float, y: Real, before: Real) -> float:
-    """Beside the speeds now, or at rest, where rounding is all of these, beside what was taken away."""
+    """How fast closures open, relative to the present speeds or, at rest, to the speeds that were removed."""
     closures.linearise_stiff(t, before)
     taken = _largest(closures.rates()[0])
     closures.linearise_stiff(t, y)

@@ -1,24 +1,25 @@
-"""Whether a run goes through a singular position, where a mechanism can go on along more than one branch.
+"""Detection of singular positions, at which a mechanism can continue along more than one branch.
 
-The basis Q of the chosen rows, B P = Q R by Gram-Schmidt in a fixed order with positive pivots, turns as smoothly as
-the mechanism moves. At a singular position a pivot passes zero, and beyond it what was left of that row points the
-other way: the row of Q is turned over, in however short a step. Looking at pivots alone would miss it, since steps
-jump over the place where they vanish.
+The basis Q of the chosen rows, B P = Q R by Gram-Schmidt in a fixed order with positive pivots, varies as smoothly as
+the mechanism moves. At a singular position a pivot passes through zero, and beyond it the remainder of that row has the
+opposite direction: the row of Q reverses, however short the step is. The pivots alone would not show this, since a step
+jumps over the position where they vanish.
 
-So every evaluation of a step compares its Q with that of the state from which the step starts, row by row. A row that
-has turned by more than 60 degrees has either been turned over or moved further than a step can tell. Methods that adapt
-their steps try a shorter one, and so come ever closer to a singular position from one side, until nothing tells its
-branches apart: at a distance of d sizes of the mechanism they differ by d^2 in the gap of the closure, which is closed
-to 2^-44. So no step goes where a pivot falls so fast that it vanishes within `AT_CROSSING`, well above 2^-22.
-What leads on, `flexmb.closure.leap`, starts from the last good state, which is kept here, and from further away: steps
-come closer than `TO_LEAP` only where there was no leap.
+Therefore every evaluation in a step compares its Q row by row with that of the state from which the step starts. A row
+that has turned by more than 60 degrees has either reversed or moved further than one step can resolve. Adaptive methods
+then retry with a shorter step, and approach a singular position from one side until its branches can no longer be
+distinguished: at a distance of d sizes of the mechanism they differ by d^2 in the gap of the closure, which is closed
+to 2^-44. So a step is refused where a pivot falls so fast that it vanishes within `AT_CROSSING`, well above 2^-22. The
+leap over the position (`flexmb.closure.leap`) starts from the last accepted state, which is stored here, and from
+further away: steps come closer than `TO_LEAP` only if a leap was not possible.
 
-Distances are in sizes of the mechanism. How far it moves in a step is the step over `passing_time`, in which ports move
-by one size; how much of the distance to a singular position that is, `covered`, is seen by how rows change.
+Distances are measured in sizes of the mechanism. The motion in a step is the step divided by `passing_time`, the time
+in which a port moves by one size. The part of the distance to a singular position that a step has `covered` follows
+from the change of the rows.
 
-Errors of a step are powers of what it covers of the distance to a singular position, be it one that the mechanism only
-passes. Methods that estimate their errors shorten their steps there; of others, whose steps are equal, those fail that
-are too long for the distance (`unresolved`), or are noticed where they are not to be shortened (`notice`).
+The error of a step grows as a power of the part of the distance to a singular position that it covers, also where the
+mechanism only passes near it. Methods with error estimates shorten their steps there. With fixed steps, a step that is
+too long for the distance fails (`unresolved`) or, where the step size must not be changed, is recorded (`notice`).
 """
 
 from math import inf, sqrt
@@ -27,41 +28,41 @@ from flexmb.closure.factor import entry
 from flexmb.closure.rows import largest_gap
 from flexmb.jit.kernel import helper
 
-# Cosine of the angle by which a row of Q may turn in a step. A near miss turns it by a right angle in all, and no step
-# takes the whole of it.
+# Cosine of the largest angle by which a row of Q may turn in a step. Passing near a singular position turns it by a
+# right angle in all, and no step makes the whole of this turn.
 TURNED = 0.5
-# Leaps go from 2^-10 and are tried wherever a step fails: steps fail before they leave that range.
+# Leaps start from a distance of up to 2^-10 and are tried whenever a step fails: steps must fail within that range.
 TO_LEAP = 2.0**-12
-# There branches differ by 2^-40 in the gap of a closure: 16 times what closed closures are left open by.
+# At this distance branches differ by 2^-40 in the gap of a closure: 16 times the gap of closed closures.
 AT_CROSSING = 2.0**-20
-# Beyond this distance no leap goes: twice 2^-10.
+# Leaps end within this distance: twice 2^-10.
 AWAY = 2.0**-9
-# What rounding may change a pivot by: 1e-12 of the responses of its ports, `flexmb.closure.sizes`.
+# Bound of the rounding error of a pivot, relative to the response of its ports: 1e-12, see `flexmb.closure.sizes`.
 ROUND_OFF = 2.0**-40
-# Fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large. A pivot is a sine
-# of what turns, in that response, and falls by all of it in a radian; speeds that are added up make that half. What
-# falls faster has been put right by a projection, whatever the step.
+# Largest decrease of a pivot, relative to its ports' response, while the ports move by one size of the mechanism. In
+# units of that response a pivot is a sine, which falls by one within a radian; the sum of the ports' speeds makes that
+# a half. A faster decrease is the effect of a projection, and does not depend on the step.
 FASTEST = 2.0
-# Of the distance to a singular position what a step of fixed length may cover. It errs by the fifth power of this part,
-# 1e-6, times what is small in Runge's rule: 1e-8, and passing takes some 100 such steps.
+# Part of the distance to a singular position that a step of fixed length may cover. Its error is the fifth power of
+# this part, 1e-6, times the small error constant of the Runge-Kutta rule: 1e-8. Passing takes some 100 such steps.
 RESOLVED = 2.0**-4
-# Far from singular positions a step changes a row by less than what its mechanism moves, in its sizes: `passing_time`
-# adds the ports' speeds up, several times the true one. Twice that is a distance below half of the size.
+# Far from singular positions a step changes a row by less than the motion of its mechanism in sizes, since
+# `passing_time` adds up the ports' speeds, several times the true one. A change of twice that motion means a distance
+# of less than half the size.
 NEARBY = 2.0
-# Of the distance no step covers more, however far its mechanism moves: the row could vanish within two of them.
+# Part of the distance that no step may exceed, however far its mechanism moves: the row could vanish within two steps.
 HALF = 0.5
-# What is noticed of steps that are not to be shortened: how far closures are open, and how long they are.
+# What is recorded of steps that must not be shortened: the gaps of closures, and also the lengths of the steps.
 NOTHING, GAPS, GAPS_AND_LENGTHS = range(3)
-# Root of the gap of a stabilised closure, over the distance to a singular position: branches differ by the square of
-# the distance in the gap, and speeds that are added up make the distance pass for several times what it is.
+# Square root of the gap of a stabilised closure over the distance to a singular position: the gap between branches is
+# the square of the distance, and the sum of the ports' speeds overestimates the distance several times.
 CLEAR = 2.0**-5
 
 
 def watch_steps(chain, shorter):
-    """Of a method whose errors do not shorten its steps: let those fail that are too long near a singular position.
+    """For a method without error control: make steps fail that are too long near a singular position.
 
-    Not where steps are those that the user gave, whatever they lead to: `shorter` is false, or closures are stabilised.
-    There such steps are noticed.
+    If the step size is fixed by the user (`shorter` is false) or closures are stabilised, such steps are only recorded.
     """
     if shorter and chain.cw.gain[0] == 0.0:
         chain.cw.resolved[0] = RESOLVED
@@ -70,7 +71,7 @@ def watch_steps(chain, shorter):
 
 
 def noticed(chain):
-    """End (s) and closure of the step that was most too long for a singular position that it came near; or None."""
+    """End (s) and closure of the step that was the worst resolved near a singular position, or None."""
     _, t, closure = chain.cw.noticed
     return None if closure < 0.0 else (float(t), int(closure))
 
@@ -83,15 +84,15 @@ def has_started(cw):
 
 @helper
 def is_further(t, cw):
-    """Whether time t is beyond the last state of the run: not a sample within its last step."""
+    """Whether time t is after the last accepted state, and so is no sample within the last step."""
     return t > cw.time[0]
 
 
 @helper
 def passing_time(cc, cw, g):
-    """The least time (s) in which a closure of group g moves as far as it is large; inf at rest.
+    """The least time (s) in which a closure of group g moves by its own size; inf at rest.
 
-    Speeds are the larger ones of those now and of those where the step started: where a port turns back, it has none.
+    The larger of the speeds now and at the start of the step is taken, since the speed is zero where a port turns back.
     """
     least = inf
     for r in range(cc.group[g].row_start, cc.group[g].row_stop):
@@ -104,11 +105,11 @@ def passing_time(cc, cw, g):
 
 @helper
 def at_crossing(t, cc, cw):
-    """The first chosen row that is about to vanish, or -1. Needs `factorise`, and a state from which the step starts.
+    """The first chosen row that is about to vanish, or -1. Requires `factorise` and the state at the start of the step.
 
-    At the rate at which it has fallen since the step started, a pivot vanishes after some time, which is compared with
-    that in which its mechanism moves as far as it is large. What falls faster than ports move has been put right by the
-    projection: of a mechanism that comes to rest that is all.
+    The time until a pivot vanishes, at the rate of its decrease since the start of the step, is compared with the time
+    in which the mechanism moves by its own size. A pivot that falls faster than the ports move was changed by the
+    projection; in a mechanism that comes to rest, that is the only change.
     """
     near = AT_CROSSING if cw.closer[0] != 0 else TO_LEAP
     for g in range(cc.group.shape[0]):
@@ -136,7 +137,7 @@ def along(cc, cw, g, a):
 
 @helper
 def turned_over(cc, cw):
-    """The first chosen row that points another way than when the step started, or -1. Needs the same."""
+    """The first chosen row that has reversed since the step started, or -1. Requires the same as `at_crossing`."""
     for g in range(cc.group.shape[0]):
         for a in range(cw.rank[g]):
             if not along(cc, cw, g, a) >= TURNED:
@@ -146,10 +147,10 @@ def turned_over(cc, cw):
 
 @helper
 def covered(cc, cw, g, a):
-    """Part of the distance to where row a of group g vanishes that the step has covered.
+    """Part of the distance to the position where row a of group g vanishes that the step has covered.
 
-    What is left of a row is a vector that vanishes at a singular position, R[a, a] times row a of Q. In terms of its
-    length the step changes it by that part, whether the mechanism goes there or only passes.
+    The remainder of a row, R[a, a] times row a of Q, vanishes at a singular position. Its change in the step relative
+    to its length is this part, whether the mechanism reaches the position or only passes near it.
     """
     start, own, stop = cc.group[g].column_start, cc.group[g].own_stop, cc.group[g].column_stop
     total, at = 0.0, cc.group[g].half + a * (stop - start)
@@ -161,13 +162,13 @@ def covered(cc, cw, g, a):
 
 @helper
 def may_cover(moved, resolved):
-    """Part of the distance that a step may cover in which the mechanism has moved by so many of its sizes."""
+    """Part of the distance that a step may cover if the mechanism has moved by `moved` of its sizes in it."""
     return min(max(resolved, NEARBY * moved), HALF)
 
 
 @helper
 def unresolved(t, cc, cw):
-    """The first chosen row near whose vanishing the step is too long, or -1. Needs the same."""
+    """The first chosen row for whose singular position the step is too long, or -1. Requires the same."""
     if cw.resolved[0] == 0.0:
         return -1
     for g in range(cc.group.shape[0]):
@@ -180,8 +181,7 @@ def unresolved(t, cc, cw):
 
 @helper
 def leave(t, cc, cw):
-    """Have steps keep their distance again once they have left a position that there was no leap over. Needs the same.
-    """
+    """Restore the minimum distance of steps once they have left a position that no leap passed. Requires the same."""
     if cw.closer[0] == 0:
         return
     for g in range(cc.group.shape[0]):
@@ -194,9 +194,9 @@ def leave(t, cc, cw):
 
 @helper
 def notice(t, cc, cw):
-    """Keep in cw.noticed that a step is taken that is too long near a singular position. Needs the same, and rows.
+    """Record in cw.noticed a step that is too long near a singular position. Requires the same, and evaluated rows.
 
-    Or that closures which are stabilised are open there so far that they could be on either of two branches.
+    Also recorded are gaps of stabilised closures there that are so large that the branch is ambiguous.
     """
     if cw.notices[0] == NOTHING:
         return
@@ -215,7 +215,7 @@ def notice(t, cc, cw):
 
 @helper
 def remember(t, y, cc, cw):
-    """Take the state y, factorised last, for the one from which the next step starts."""
+    """Store the state y, factorised last, as the start of the next step."""
     cw.time[0] = t
     for i in range(y.shape[0]):
         cw.state[i] = y[i]
@@ -232,7 +232,7 @@ def remember(t, y, cc, cw):
 
 @helper
 def recall(cw):
-    """Choose the rows that were chosen where the step starts, to try it again."""
+    """Restore the rows that were chosen at the start of the step, to retry it."""
     if has_started(cw):
         for r in range(cw.chosen.shape[0]):
             cw.chosen[r] = cw.former_rows[r]

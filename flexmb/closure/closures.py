@@ -1,4 +1,4 @@
-"""The closures of one scene from Python: accelerations and loads of the closed chain."""
+"""The closures of one scene as a Python object: accelerations and loads of the closed chain."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from flexmb.tables.state import Layout
 from flexmb.tables.status import CLOSURE_SINGULAR, OUT_OF_RANGE
 from flexmb.typing import Flags, Index, Real
 
-STIFF = 100.0  # periods of the slowest mode, over 2 pi, for which bodies resist being bent by the closing of loops
-BESIDE = 2.0**-11  # sizes of the mechanism, from a singular position to where its closure loads are found
-SAME = 1e-7  # loads that differ by less, in the size of the loads, are the same
+STIFF = 100.0  # in assembly, modal masses are M + K (STIFF/omega)^2 with the lowest modal frequency omega
+BESIDE = 2.0**-11  # distance from a singular position, in sizes of the mechanism, at which loads are evaluated
+SAME = 1e-7  # relative difference below which loads count as equal
 
 
 class ClosureError(ValueError):
-    """Closures that cannot be closed, or leave no motion; the message names the closure, the gap and the remedy."""
+    """Closures cannot be closed or allow no motion; the message names the closure, the gap and the remedy."""
 
 
 class Spread(NamedTuple):
-    """How loads change with each of k null loads of the rows, which move nothing: drives (k,nu), hinges (k,N,6),
-    closures (k,C,6), World axes. A change of `rounding` or less is none."""
+    """Change of the loads by each of k null loads of the rows (loads that cause no acceleration): drives (k,nu),
+    hinges (k,N,6), closures (k,C,6), World axes. A change of `rounding` or less counts as zero."""
 
     drives: Real
     hinges: Real
@@ -42,7 +42,7 @@ class Spread(NamedTuple):
     rounding: float
 
     def leaves_open(self, changes: Real) -> NDArray[np.bool_]:
-        """Which components the motion does not determine, of changes (k,...)."""
+        """Which components are not determined by the motion, from their changes (k,...)."""
         found: NDArray[np.bool_] = np.any(np.abs(changes) > self.rounding, axis=0)
         return found
 
@@ -50,7 +50,7 @@ class Spread(NamedTuple):
 class ClosedMotion(NamedTuple):
     """Accelerations (nu,), drive loads (nu,), loads (N,6) of hinges and (C,6) of closures, World axes.
 
-    The loads are those of the least loads of the rows; `spread`, None where they are the only ones.
+    The loads are those of the minimum-norm row loads. `spread` is None where the loads are unique.
     """
 
     accelerations: Real
@@ -61,7 +61,7 @@ class ClosedMotion(NamedTuple):
 
 
 class GroupResponse(NamedTuple):
-    """Of one group: its rows; its columns, numbers of speeds, the first `own` of them its own; B' (rows,columns)."""
+    """One group: its rows; its columns (indices of speeds, the first `own` are not shared); B' (rows,columns)."""
 
     rows: slice
     columns: Index
@@ -70,17 +70,17 @@ class GroupResponse(NamedTuple):
 
 
 class _Counted(NamedTuple):
-    """By group, the independent rows of a closed configuration, -1 before they are known; the size of all rows' ports
-    there. It is never written to: who counts anew puts another one in its place, and threads read one or the other."""
+    """Number of independent rows of each group in a closed configuration, -1 before it is known, and the size of all
+    rows' ports there. Immutable: a new count replaces the whole object, so that threads read a consistent one."""
 
     ranks: Index
     size: Real
 
 
 class Closures:
-    """The closures of one scene and the tree under them.
+    """The closures of one scene and their tree.
 
-    What is asked for in several steps is kept from one to the next: `for_thread` gives another thread the same ones.
+    Methods keep results in workspaces for later calls. Each thread needs an object of its own: see `for_thread`.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class Closures:
         slowest: float,
         check: Callable[[int, int], None],
     ) -> None:
-        """`tree` makes workspaces; `slowest`: lowest modal frequency (rad/s), infinite without modes.
+        """`tree` makes workspaces of the tree; `slowest`: lowest modal frequency (rad/s), infinite without modes.
 
         `check` raises unless a status is OK; its second argument is the body or closure at fault.
         """
@@ -104,25 +104,25 @@ class Closures:
         self._chain = self._evaluated = self.chain("articulated")
         self._composite: Closed | None = None
         self.is_singular = False
-        """Whether the last motion failed because fewer rows are independent there than elsewhere."""
+        """Whether the last motion failed at a singular position, where fewer rows are independent than elsewhere."""
 
     def on_tree(self, constants: Constants, tree: Callable[[], Workspace]) -> Closures:
-        """The same closures on the same tree with other functions of time, and workspaces for them."""
+        """The same closures and tree with other functions of time, and with workspaces of their own."""
         return Closures(self.scene, constants, self.constants[1], self._layout, tree, self._slowest, self._check)
 
     def for_thread(self) -> Closures:
-        """The same with workspaces of its own: whoever counts the independent rows does so for all."""
+        """The same closures with workspaces of their own; the count of independent rows is shared."""
         found = self.on_tree(self.constants[0], self._tree)
         found._counted = self._counted
         return found
 
     @property
     def row_loads(self) -> Real:
-        """(G,) loads of the rows in the motion that was evaluated last."""
+        """(G,) loads of the rows in the last evaluated motion."""
         return self._evaluated.cw.row["load"].copy()
 
     def chain(self, algorithm: str, rate: float = 0.0) -> Closed:
-        """The chain with workspaces of its own, for an algorithm; with a `rate` (1/s) closures are stabilised."""
+        """The chain for an algorithm, with workspaces of its own; with a `rate` (1/s) closures are stabilised."""
         c, cc = self.constants
         w, route = self._tree(), self._route(algorithm)
         own = workspace(cc, c, len(w.q))
@@ -138,7 +138,7 @@ class Closures:
 
     @property
     def at_rest(self) -> list[int]:
-        """Bodies whose inertia is that of their rest shape, and so not where closures join them."""
+        """Bodies whose inertia is that of the undeformed shape, while closures act on the deformed one."""
         body = self.constants[0].body
         return [k for k in np.flatnonzero(body["modes"]).tolist() if LEVELS[body["level"][k]].at_rest]
 
@@ -148,7 +148,7 @@ class Closures:
 
     @property
     def doubt(self) -> Index:
-        """(1,) whether the last motion met a pivot of the tree that may be rounding."""
+        """(1,) whether a pivot of the tree was at rounding level in the last motion."""
         return self._evaluated.w.doubt
 
     @property
@@ -157,20 +157,20 @@ class Closures:
         return int(self._chain.fault[0])
 
     def motion(self, t: float, y: Real) -> ClosedMotion:
-        """Everything about accelerations and loads at y = [q, u, work], which must be closed.
+        """Accelerations and loads at y = [q, u, work], which must fulfil the closures.
 
-        ValueError or TypeError for what does not fit, DynamicsError where the closures are singular.
+        ValueError or TypeError if y does not fit the system, DynamicsError where the closures are singular.
         """
         return self._motion(t, y, self._chain)
 
     def composite_motion(self, t: float, y: Real) -> ClosedMotion:
-        """The same by composite bodies."""
+        """As `motion`, by composite bodies."""
         if self._composite is None:
             self._composite = self.chain("composite")
         return self._motion(t, y, self._composite)
 
     def beside(self, t: float, y: Real, rates: Real, side: int) -> tuple[float, Real]:
-        """Time and closed state a little before (side -1) or after (1) a singular one with these rates dq/dt (nq,)."""
+        """Time and closed state just before (side -1) or after (1) a singular state with rates dq/dt (nq,)."""
         moving = self._evaluated.cw.closure
         moving = moving[moving["speed"] > 0.0]
         step = side * BESIDE * float(np.min(moving["size"] / moving["speed"], initial=1.0))
@@ -186,7 +186,7 @@ class Closures:
         self.is_singular = status == CLOSURE_SINGULAR
         self._check(status, int(s.fault[0]))
         least, null = s.cw.row["load"].copy(), self._null_loads(s)
-        least -= null @ (null.T @ least)  # without their shadow on null loads they are the least of all
+        least -= null @ (null.T @ least)  # without their component along null loads they have minimum norm
         if not null.shape[1]:
             return self._under(s, least)
         size = max(1.0, float(np.max(np.abs(least))))
@@ -202,28 +202,28 @@ class Closures:
         )
 
     def _under_anew(self, t: float, y: Real, s: Closed, loads: Real) -> ClosedMotion:
-        """The same as `_under`, where another motion has been evaluated since."""
+        """As `_under`, after another state has been linearised."""
         self._check(dynamics.linearise(*self._layout.whole(t, y), s), int(s.fault[0]))
         return self._under(s, loads)
 
     def _under(self, s: Closed, loads: Real) -> ClosedMotion:
-        """The motion under these loads (G,) of the rows, at the state that was linearised last."""
+        """The motion under row loads (G,) at the state linearised last."""
         hinges, closures = np.zeros((len(s.c.body), 6)), np.zeros((len(s.cc.closure), 6))
         s.cw.row["load"] = loads
         dynamics.loads(s, hinges, closures)
         drives = np.where(s.c.speed["prescribed"] >= 0, s.w.speed["drive"], 0.0)
         return ClosedMotion(s.w.speed["acceleration"].copy(), drives, hinges, closures)
 
-    # Newton's steps, for initial conditions
+    # Newton steps for initial conditions
 
     def linearise(self, t: float, y: Real) -> None:
-        """Rows' values, rates and responses to unit loads at y."""
+        """Evaluate values and rates of the rows and their responses to unit loads at y."""
         self._check(dynamics.linearise(t, y, self._chain), self.fault)
 
     def linearise_stiff(self, t: float, y: Real) -> int:
-        """The same with the metric that hardly bends bodies; returns the status code.
+        """As `linearise`, in the metric with increased modal masses; returns the status code.
 
-        Of bodies that are bent already the heavy modes may pass for out of range: then with their own masses.
+        If the increased masses fail the range check of an already deformed body, the true masses are used.
         """
         status = int(dynamics.linearise(t, y, replace(self._chain, c=self._stiff)))
         if status == OUT_OF_RANGE:
@@ -232,13 +232,13 @@ class Closures:
 
     @cached_property
     def _stiff(self) -> Constants:
-        """The tree with modal masses M + K (STIFF/omega)^2, omega its lowest modal frequency."""
+        """The tree with modal masses M + K (STIFF/omega)^2, where omega is the lowest modal frequency."""
         c = self.constants[0]
         heavier = c.mff + (STIFF / self._slowest) ** 2 * c.stiffness
         return replace(c, mff=heavier)
 
     def responses(self) -> list[list[GroupResponse]]:
-        """By cluster and group, B' of the rows in the size of their closures, those that suppress nothing zero."""
+        """By cluster and group, B' of the rows relative to the size of their closures; zero for ineffective rows."""
         cc, own = self.constants[1], self._own
         scale = self._scale("size")
         found = []
@@ -249,11 +249,11 @@ class Closures:
         return [found[cluster["group_start"] : cluster["group_stop"]] for cluster in cc.cluster]
 
     def errors(self) -> Real:
-        """Values of the rows in the size of their closures (G,)."""
+        """Values of the rows (G,) relative to the size of their closures."""
         return self._scale("size") * self._own.row["value"]
 
     def rates(self) -> tuple[Real, float]:
-        """Rates of the rows (G,) scaled as `responses` are, and the largest in the speed of its ports."""
+        """Rates of the rows (G,), scaled as in `responses`, and the largest one relative to the speed of its ports."""
         fastest = np.abs(self._scale("speed") * self._own.row["rate"])
         return self._scale("size") * self._own.row["rate"], float(np.max(fastest, initial=0.0))
 
@@ -263,19 +263,19 @@ class Closures:
         return c.weight / np.where(size > 0.0, size, 1.0)
 
     def moved(self, t: float, y: Real, x: Real) -> Real:
-        """y displaced by the motion that x stands for; rows' values are those of the result."""
+        """y displaced by the motion M^-1 J' of x; the row values are evaluated at the result."""
         y = y.copy()
         dynamics.move(t, y, x, dynamics.COORDINATES, self._chain)
         return y
 
     def pushed(self, t: float, y: Real, x: Real) -> Real:
-        """y with its speeds changed by what x stands for; rows' rates are those of the result."""
+        """y with its speeds changed likewise; the row rates are evaluated at the result."""
         y = y.copy()
         dynamics.move(t, y, x, dynamics.SPEEDS, self._chain)
         return y
 
     def moving(self, t: float, y: Real) -> Real:
-        """(nu,nu) how speeds change with every x of `pushed`, at the state y that was linearised last."""
+        """(nu,nu) change of the speeds by every component of x in `pushed`, at the state y linearised last."""
         c = self.constants[0]
         still, found = y.copy(), np.empty((len(c.speed), len(c.speed)))
         place = slice(len(y) - 1 - len(c.speed), len(y) - 1)
@@ -286,12 +286,12 @@ class Closures:
         return found
 
     def gaps(self, t: float, y: Real) -> dict[str, tuple[float, float]]:
-        """Distance and (sine of the) angle by which every closure is open."""
+        """Gap of every closure: distance, and sine of the angle."""
         dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.NOTHING, self._chain)
         return {closure.name: self._gap(i, "value") for i, closure in enumerate(self.scene)}
 
     def passing_time(self, t: float, y: Real) -> float:
-        """The least time (s) in which a closure moves as far as it is large; inf at rest."""
+        """The least time (s) in which a closure moves by its own size; inf at rest."""
         dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.NOTHING, self._chain)
         moving = self._own.closure[self._own.closure["speed"] > 0.0]
         return float(np.min(moving["size"] / moving["speed"], initial=np.inf))
@@ -303,14 +303,14 @@ class Closures:
         return float(np.linalg.norm(values[~turns])), float(np.linalg.norm(values[turns]))
 
     def count_rows(self) -> None:
-        """Independent rows at the state linearised last, taken as those of the mechanism."""
+        """Count the independent rows at the state linearised last, and keep the count for the mechanism."""
         dynamics.count_rows(self._chain.cc, self._own)
         self._counted[0] = _Counted(self._own.rank.copy(), self._own.size.copy())
 
     def begin_at(self, t: float, y: Real, before: Closures | None = None) -> None:
-        """Count the independent rows at y = [q, u, work], which closes all closures, where the scene's values may not.
+        """Count the independent rows at y = [q, u, work], which fulfils all closures (the scene's values may not).
 
-        `before`: the same closures in the scene before; their rows are taken where the same speeds were prescribed.
+        `before`: the same closures in the previous scene; its count is reused if the same speeds are prescribed.
         """
         if before is not None and np.array_equal(self._is_prescribed, before._is_prescribed):
             self._counted[0] = before._counted[0]
@@ -324,42 +324,42 @@ class Closures:
 
     @property
     def rank(self) -> int:
-        """Independent rows of a closed configuration; -1 before the first one is known."""
+        """Number of independent rows in a closed configuration; -1 before it is known."""
         ranks = self._counted[0].ranks
         return int(np.sum(ranks)) if np.all(ranks >= 0) else -1
 
     @property
     def counted(self) -> tuple[bytes, bytes]:
-        """What chains are made from that counting anew changes."""
+        """The counts and sizes that chains are built from, as a key that changes with a new count."""
         ranks, size = self._counted[0]
         return ranks.tobytes(), size.tobytes()
 
     @property
     def independent(self) -> int:
-        """Independent rows at the state evaluated last."""
+        """Number of independent rows at the state evaluated last."""
         return int(np.sum(self._own.rank))
 
     @property
     def mobility(self) -> int:
-        """Free speeds that the closures leave, modes and wheels included."""
+        """Degrees of freedom that the closures leave, modes and wheels included."""
         return int(np.sum(self.constants[0].speed["prescribed"] < 0)) - self.rank
 
     def worst(self, errors: Real, *, rates: bool = False) -> str:
-        """The closure with the largest error, and its gap or the speed at which it opens."""
+        """The closure with the largest error, and its gap or opening speed."""
         i = int(self.constants[1].row["closure"][np.argmax(np.abs(errors))])
         gap, angle = self._gap(i, "rate" if rates else "value")
         s = "/s" if rates else ""
         return f'closure "{self.scene[i].name}" (gap {gap:.3g} m{s}, angle {angle:.3g} rad{s})'
 
     def half_turned(self) -> Iterator[tuple[str, bool]]:
-        """Whether axes that a closure keeps parallel point opposite ways."""
+        """By closure, its name and whether axes that it keeps parallel are opposite."""
         for closure, state in zip(self.scene, self._own.closure, strict=True):
             R = state["rotation"].reshape(3, 3)
             about = {"weld": (1, 2), "prismatic": (1, 2), "universal": (), "spherical": ()}.get(closure.type, (2,))
             yield closure.name, any(R[i, i] < 0.0 for i in about)
 
     def determined(self, t: float, y: Real) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Whether each component of the hinges' (N,6) and closures' (C,6) loads is the same for all null loads."""
+        """Whether each component of the loads of hinges (N,6) and closures (C,6) is unaffected by all null loads."""
         motion = self.motion(t, y)
         if motion.spread is None:
             return np.ones(motion.hinges.shape, bool), np.ones(motion.closures.shape, bool)
@@ -367,7 +367,7 @@ class Closures:
         return ~spread.leaves_open(spread.hinges), ~spread.leaves_open(spread.closures)
 
     def opening(self, t: float, y: Real) -> tuple[Real, Real]:
-        """Accelerations (G,) of the rows without loads of closures, and B' (G,nu) of all rows."""
+        """Row accelerations (G,) without constraint loads, and B' (G,nu) of all rows."""
         self.linearise(t, y)
         c, own = self.constants[0], self._own
         half = np.zeros((len(own.row), len(c.speed)))
@@ -376,7 +376,7 @@ class Closures:
         return own.row["acceleration"].copy(), half
 
     def null_loads(self) -> Real:
-        """Orthonormal loads (G,k) of the rows that move nothing, at the state evaluated last."""
+        """Orthonormal null loads (G,k) of the rows (they cause no acceleration), at the state evaluated last."""
         return self._null_loads(self._chain)
 
     def _null_loads(self, s: Closed) -> Real:
@@ -400,7 +400,7 @@ def blocks(cc: ClosureConstants, cw: ClosureWorkspace) -> Iterator[GroupResponse
 
 
 def null_loads(cc: ClosureConstants, cw: ClosureWorkspace) -> list[tuple[slice, Real]]:
-    """Orthonormal loads (rows,k) of the rows of a group that move nothing, of all groups that have such loads."""
+    """Slice of the rows and orthonormal null loads (rows,k), for each group that has null loads."""
     found = []
     for (rows, _, whole, own), rank in zip(blocks(cc, cw), cw.rank.tolist(), strict=True):
         half = whole[:, :own]

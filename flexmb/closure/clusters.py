@@ -1,15 +1,16 @@
-"""Groups that feel each other through what carries them: their loads, at the cost of each and a few speeds in common.
+"""Loads of groups that are coupled only by the bodies that carry them (a cluster).
 
-The rows of a cluster are B' = [R'Q', S], speeds that are a group's own before those that all share, so that
+The cost is that of the single groups plus that of the few shared speeds. The rows of a cluster are B' = [R'Q', S],
+where the columns of the speeds of one group come before those of the shared speeds, so that
 
     Lambda^-1 = R'R + S S',   R'R in a block for each group.
 
-With T = R'^-1 S, which stands beside Q where the rows are made orthonormal, and z = R f the loads follow from
+With T = R'^-1 S, which is stored beside Q when the rows are orthonormalised, and z = R f the loads follow from
 
     (1 + T T') z = R'^-1 b,   (1 + T T')^-1 = 1 - T (1 + T'T)^-1 T'   (Woodbury),
 
-where 1 + T'T is as large as there are shared speeds. Its Cholesky factor C is found by rotations of the rows of T into
-the unit matrix, never from T'T: its pivots are 1 or more.
+where the order of 1 + T'T is the number of shared speeds. Its Cholesky factor C is found by Givens rotations of the
+rows of T into the unit matrix, without forming T'T; all its pivots are at least 1.
 """
 
 from math import sqrt
@@ -19,14 +20,14 @@ from flexmb.jit.kernel import helper
 
 @helper
 def shared_place(cc, g, a):
-    """Where the shared part of row a of the basis of group g begins, of T, in cw.basis."""
+    """Index in cw.basis where the row of T that belongs to row a of group g begins."""
     group = cc.group[g]
     return group.half + a * (group.column_stop - group.column_start) + group.own_stop - group.column_start
 
 
 @helper
 def factorise_shared(cc, cw):
-    """C of every cluster, upper triangular with C'C = 1 + T'T, of the groups that were factorised last."""
+    """Compute C of every cluster, upper triangular with C'C = 1 + T'T, for the groups that were factorised last."""
     for k in range(cc.cluster.shape[0]):
         cluster = cc.cluster[k]
         n = cluster.shared
@@ -41,7 +42,7 @@ def factorise_shared(cc, cw):
 
 @helper
 def _rotate_into(cw, factor, n, at):
-    """Givens rotations of the row of T from cw.basis[at] on, and of C, that leave nothing of the row."""
+    """Eliminate the row of T that begins at cw.basis[at] by Givens rotations with the rows of C."""
     C, row = cw.shared_factor, cw.shared
     for j in range(n):
         row[j] = cw.basis[at + j]
@@ -57,7 +58,7 @@ def _rotate_into(cw, factor, n, at):
 
 @helper
 def subtract_shared(cc, cw, k, z):
-    """z = (1 + T T')^-1 z for the places of cluster k in z."""
+    """z = (1 + T T')^-1 z for the entries of cluster k."""
     cluster, y, C = cc.cluster[k], cw.shared, cw.shared_factor
     n = cluster.shared
     for j in range(n):

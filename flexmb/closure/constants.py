@@ -29,7 +29,7 @@ SUPPRESSED = {
 def closure_constants(
     scene: s.Scene, constants: Constants, ports: Sequence[tuple[int, int]]
 ) -> t.ClosureConstants:
-    """Constants of a scene's closures; `ports` are (body, port) of both sides of each, (-1, -1) on the ground."""
+    """Constants of a scene's closures; `ports`: (body, port) of both sides of each closure, (-1, -1) on the ground."""
     sides = np.zeros((len(scene.closures), 2), t.SIDE)
     closures = np.zeros(len(scene.closures), t.CLOSURE)
     for i, closure in enumerate(scene.closures):
@@ -80,7 +80,7 @@ def _length(constants: Constants, sides: np.ndarray) -> float:
 
 
 def slowest_mode(chain: list[BodyLink]) -> float:
-    """The lowest frequency (rad/s) of a mode by itself, body held; infinite where none has stiffness."""
+    """The lowest uncoupled modal frequency (rad/s), body held; infinite where no mode has stiffness."""
     found = [np.inf]
     for link in chain:
         if link.mode_count == 0:

@@ -1,4 +1,4 @@
-"""Entry points of closed chains: right-hand side, what is observable at one state, linearised closures, projection."""
+"""Entry points of closed chains: right-hand side, observation at one state, linearised closures, projection."""
 
 from flexmb.closure.factor import choose_rows
 from flexmb.closure.forces import accelerate, choose, free_tree, locate, on_branch, refine, respond, row_loads, transmit
@@ -17,18 +17,18 @@ NOTHING, COORDINATES, SPEEDS = range(3)
 
 @kernel
 def rhs(t, y, dy, s, _):
-    """dy/dt of y = [q, u, work] at time t; returns a status code, that of the projection before it too.
+    """dy/dt of y = [q, u, work] at time t; returns a status code, also that of a preceding projection.
 
-    A closed chain is constants and workspace in one: it is passed as both.
+    The closed chain holds constants and workspace: it is passed for both arguments.
     """
     return slope(t, y, dy, s)
 
 
 @written_out
 def slope(t, y, dy, s):
-    """The same within other kernels."""
+    """The right-hand side, for calls from other kernels."""
     c, w, cw = s.c, s.w, s.cw
-    if cw.failure[0] != OK and t >= cw.time[1]:  # earlier: a step is tried again, shorter
+    if cw.failure[0] != OK and t >= cw.time[1]:  # at an earlier time a shorter step is tried
         w.fault[0] = cw.failure[1]
         return cw.failure[0]
     load_state(t, y, c, w)
@@ -47,13 +47,14 @@ def slope(t, y, dy, s):
 
 @kernel
 def project(t, y, s):
-    """Put y on the manifold of closures, unit quaternions and prescribed coordinates."""
+    """Project y on the manifold of closures, unit quaternions and prescribed coordinates."""
     project_closed(t, y, s)
 
 
 @kernel
 def linearise(t, y, s):
-    """The tree without closure loads at y: rows with accelerations, half-solved unit loads, sizes; returns a status."""
+    """Evaluate, at y and without constraint loads, the rows with their accelerations, the half-solved unit loads and
+    the sizes; returns a status code."""
     load_state(t, y, s.c, s.w)
     status = free_tree(s.route, s)
     if status == OK:
@@ -71,9 +72,10 @@ def count_rows(cc, cw):
 
 @kernel
 def move(t, y, x, what, s):
-    """Change y by M^-1 J'f, x (nu,) being what f leaves at the state linearised last; find its rows' values and rates.
+    """Change y by M^-1 J'f and evaluate the rows' values and rates there; x (nu,) are the innovations of J'f at the
+    state linearised last.
 
-    what: COORDINATES displaces it, SPEEDS adds to the speeds, NOTHING leaves it.
+    what: COORDINATES displaces y, SPEEDS adds to the speeds, NOTHING leaves y unchanged.
     """
     if what != NOTHING:
         respond(s.route, s, x, s.cw.step)

@@ -1,11 +1,12 @@
-"""Rank-revealing factorisation of Lambda^-1 = B'B: B P = Q R with column pivoting, never B'B itself.
+"""Rank-revealing factorisation of Lambda^-1 = B'B: B P = Q R with column pivoting, without forming B'B.
 
-Each group of closures is factorised by itself, in the columns that are its own (`flexmb.closure.groups`); what groups
-feel of each other through shared columns comes in when loads are solved for (`flexmb.closure.clusters`).
-Modified Gram-Schmidt; its R is as good as Householder's, and only R is used to solve (the semi-normal equations). A row
-is counted as dependent on those chosen before it when what is left of it is below `DEPENDENT` times how far the ports
-of its closure move by themselves, cw.size of `flexmb.closure.sizes`, rotations weighed with a length of the scene. On a
-closed configuration what is left of a redundant row is round-off and the residual of the assembly, 1e-12 or less.
+Each group of closures is factorised separately, in its own columns (`flexmb.closure.groups`); the coupling of groups
+by shared columns enters when the loads are solved for (`flexmb.closure.clusters`).
+The algorithm is modified Gram-Schmidt. Its R is as accurate as that of Householder's method, and only R is used in the
+solution (semi-normal equations). A row counts as dependent on those chosen before it if its remainder is smaller than
+`DEPENDENT` times the response of the separate ports of its closure, cw.size of `flexmb.closure.sizes`, where rotations
+are weighted with a length of the scene. In a closed configuration the remainder of a redundant row is round-off and
+the residual of the assembly, 1e-12 or less.
 """
 
 from math import sqrt
@@ -18,7 +19,7 @@ DEPENDENT = 1e-9
 
 @helper
 def norm(x, first, count):
-    """Of count numbers from x[first] on."""
+    """Euclidean norm of x[first : first + count]."""
     total = 0.0
     for j in range(first, first + count):
         total += x[j] * x[j]
@@ -27,31 +28,31 @@ def norm(x, first, count):
 
 @helper
 def rows(cc, g):
-    """How many rows group g has."""
+    """Number of rows of group g."""
     return cc.group[g].row_stop - cc.group[g].row_start
 
 
 @helper
 def columns(cc, g):
-    """How many speeds loads of group g may change."""
+    """Number of speeds that loads of group g may change."""
     return cc.group[g].column_stop - cc.group[g].column_start
 
 
 @helper
 def own_columns(cc, g):
-    """How many of them are its own: the first ones."""
+    """Number of those speeds that no other group shares; they come first."""
     return cc.group[g].own_stop - cc.group[g].column_start
 
 
 @helper
 def row_place(cc, g, r):
-    """Where row r, of group g, begins in cw.half; in cw.basis what is at place r of cw.chosen."""
+    """Index where row r of group g begins in cw.half; in cw.basis, that of the row at position r of cw.chosen."""
     return cc.group[g].half + (r - cc.group[g].row_start) * columns(cc, g)
 
 
 @helper
 def entry(cc, g, a, b):
-    """Place of R[a, b] of group g in cw.factor."""
+    """Index of R[a, b] of group g in cw.factor."""
     return cc.group[g].factor + a * rows(cc, g) + b
 
 
@@ -74,18 +75,18 @@ def choose_rows(cc, cw):
 
 @helper
 def _choose(cc, cw, g, wanted):
-    """Order the rows of group g; returns how many independent ones were found, `wanted` at most."""
+    """Order the rows of group g by pivot; returns the number of independent ones, at most `wanted`."""
     first, stop, own = cc.group[g].row_start, cc.group[g].row_stop, own_columns(cc, g)
     for r in range(first, stop):
         cw.chosen[r] = r
     for j in range(cc.group[g].half, cc.group[g].half + (stop - first) * columns(cc, g)):
-        cw.basis[j] = cw.half[j]  # until they are in order, rows stand in it as in `half`
+        cw.basis[j] = cw.half[j]  # before the pivoting, rows have the order of `half`
     found = 0
     while first + found < stop and found != wanted:
         best, at = DEPENDENT, -1
         for place in range(first + found, stop):
             r = cw.chosen[place]
-            if cw.size[r] > 0.0:  # ports that nothing moves have rows of zeros
+            if cw.size[r] > 0.0:  # ports that cannot move have rows of zeros
                 left = cc.weight[r] * norm(cw.basis, row_place(cc, g, r), own) / cw.size[r]
                 if left > best:
                     best, at = left, place
@@ -102,9 +103,9 @@ def _choose(cc, cw, g, wanted):
 
 @helper
 def _orthogonalise(basis, x, along, extent, squared):
-    """x -= along (along . x) / squared, both numbers of the basis from there on; returns the coefficient.
+    """x -= along (along . x) / squared, where x and along are start indices in `basis`; returns the coefficient.
 
-    extent: (how many enter the product, how many are changed).
+    extent: (number of entries in the product, number of entries that are changed).
     """
     own, width = extent
     total = 0.0
@@ -118,7 +119,7 @@ def _orthogonalise(basis, x, along, extent, squared):
 
 @sweep
 def factorise(cc, cw):
-    """R of the chosen rows; returns -1, or the row that depends on those before it."""
+    """Compute R of the chosen rows; returns -1, or the row that depends on the rows before it."""
     for g in range(cc.group.shape[0]):
         for a in range(cw.rank[g]):
             row = cw.chosen[cc.group[g].row_start + a]
@@ -131,7 +132,7 @@ def factorise(cc, cw):
 
 @helper
 def _orthonormalise(cc, cw, g, a, row):
-    """Make a row the one numbered a of the basis of its group, after those before it: column a of R; its pivot."""
+    """Orthogonalise a row against the first a rows of its group's basis, into column a of R; returns its pivot."""
     first, own, width = cc.group[g].row_start, own_columns(cc, g), columns(cc, g)
     x, half = row_place(cc, g, first + a), row_place(cc, g, row)
     for j in range(width):
@@ -147,7 +148,7 @@ def _orthonormalise(cc, cw, g, a, row):
 
 @sweep
 def solve(cc, cw):
-    """Loads f of the chosen rows, Lambda^-1 f = cw.scratch (by place in cw.chosen), into cw.row.load; others are 0."""
+    """Solve Lambda^-1 f = cw.scratch (ordered as cw.chosen) for the loads f, into cw.row.load; other rows get 0."""
     for r in range(cw.row.shape[0]):
         cw.row[r].load = 0.0
     R, b = cw.factor, cw.scratch

@@ -1,6 +1,6 @@
-"""Closure loads that keep closures closed, added to what the forward dynamics of the tree has found.
+"""Constraint loads of closures, added to the result of the forward dynamics of the tree.
 
-By unit loads that pass through the articulated quantities, `Recursion`; all other routes are in `generalised`.
+With the route `Recursion`, unit loads pass through the articulated-body quantities; `generalised` has all other routes.
 """
 
 from flexmb.closure import generalised
@@ -20,7 +20,7 @@ from flexmb.motion.coordinates import load_state
 from flexmb.spatial.spatial_vector import add6, vec6
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_SINGULAR, OK
 
-DELICATE = 2.0**-10  # pivots, as part of their ports' responses, of bodies a million times lighter than others
+DELICATE = 2.0**-10  # pivot relative to its ports' response, as of bodies a million times lighter than others
 
 
 @kernel
@@ -48,7 +48,7 @@ def _pass_outward(route, s, x, v):
 
 @helper
 def _accelerate(route, s):
-    """In the terms of `flexmb.jain.sweeps`: z_f -= J_f'f, z_R and epsilon likewise, and outward once more."""
+    """In the notation of `flexmb.jain.sweeps`: z_f -= J_f'f, likewise z_R and epsilon, then another outward sweep."""
     c, w, cc, cw = s.c, s.w, s.cc, s.cw
     clear(c, cw.response)
     for i in range(cc.closure.shape[0]):
@@ -77,7 +77,7 @@ def _locate(route, t, y, s):
 
 @helper
 def _refine(route, s):
-    """What rounding has left of the rows' accelerations is taken from those of the speeds; needs `accelerate`."""
+    """Remove the rounding residual of the row accelerations by one refinement step; requires `accelerate`."""
     if not _is_delicate(s.cc, s.cw):
         return
     evaluate_rows(s.c, s.w, s.cc, s.cw, True)
@@ -90,7 +90,7 @@ def _refine(route, s):
 
 @helper
 def _is_delicate(cc, cw):
-    """Whether loads that nearly cancel accelerate what is light between closures: pivots far below their ports'."""
+    """Whether nearly cancelling loads accelerate light bodies between closures: pivots far below port responses."""
     for g in range(cc.group.shape[0]):
         for a in range(cw.rank[g]):
             r = cw.chosen[cc.group[g].row_start + a]
@@ -104,7 +104,7 @@ def _as_it_is(route, s):
     pass
 
 
-# By unit loads where the route is the Recursion, else by generalised forces. Each takes s.route, then:
+# Choosers between unit loads (route Recursion) and generalised forces. Each takes s.route, then:
 # (s): the tree without closure loads, its accelerations, the rows, and x of a unit load of every row; a status code.
 free_tree = by_bundle(Recursion, _tree_and_rows, generalised.tree_and_rows)
 # (s, i, x, at): x of the forces in cw.response on the bodies on the path of closure i, by column from x[at] on.
@@ -123,7 +123,7 @@ locate = by_bundle(Recursion, _locate, generalised.locate)
 
 @helper
 def factorised(w, cc, cw):
-    """R of the chosen rows; a status code."""
+    """Factorise the chosen rows; returns a status code."""
     dependent = factorise(cc, cw)
     if dependent >= 0:
         w.fault[0] = cc.row[dependent].closure
@@ -133,7 +133,7 @@ def factorised(w, cc, cw):
 
 @helper
 def on_branch(t, w, cc, cw):
-    """Whether the chosen rows, factorised, still belong to the branch on which the step started; a status code."""
+    """Check that the factorised rows still belong to the branch on which the step started; returns a status code."""
     if not (has_started(cw) and is_further(t, cw)):
         return OK
     row, status = at_crossing(t, cc, cw), CLOSURE_SINGULAR
@@ -162,7 +162,7 @@ def row_loads(w, cc, cw):
 
 @helper
 def _stop_rows(cc, cw):
-    """Loads that remove the rows' accelerations, and let what is stabilised decay."""
+    """Solve for the loads that remove the row accelerations, or make stabilised gaps decay."""
     for g in range(cc.group.shape[0]):
         first = cc.group[g].row_start
         for place in range(first, first + cw.rank[g]):
@@ -174,7 +174,7 @@ def _stop_rows(cc, cw):
 
 @helper
 def choose(w, cc, cw):
-    """Choose the independent rows anew; a status code."""
+    """Choose the independent rows again; returns a status code."""
     short = choose_rows(cc, cw)
     if short < 0:
         return OK

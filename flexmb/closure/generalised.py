@@ -1,13 +1,13 @@
 """Closures as generalised forces J'f on the tree: for bodies of level `ruthless`, and for composite bodies.
 
-Two cases where unit loads cannot pass through the articulated quantities. A body of level `ruthless` has its inertia
-at rest shape, but closures join the nodes where they truly are: J, its rate and the loads are those of the true shape,
-kept in a workspace `seen` of their own, and M stays as it is. Composite bodies leave no articulated quantities, but a
-Cholesky factor of M. With M = F F' from either, rows F^-1 J' are what `half_solve` finds otherwise, and Lambda^-1 =
-J M^-1 J'.
+In these two cases unit loads cannot pass through the articulated-body quantities. The inertia of a body of level
+`ruthless` is that of the undeformed shape, but closures act on the deformed nodes: J, its rate and the loads belong to
+the deformed shape, which has a workspace `seen` of its own, while M is unchanged. The composite-body algorithm provides
+no articulated-body quantities, but a Cholesky factor of M. With M = F F' from either algorithm, the rows F^-1 J' take
+the place of those that `half_solve` finds, and Lambda^-1 = J M^-1 J'.
 
-The load of a hinge is what inertia asks for, less what closures do to all that the hinge carries, about O in the axes
-of the hinge: so its components along the hinge's motions are what springs and motors do.
+The load of a hinge is the inertial load minus the constraint loads on everything that the hinge carries, about O in the
+axes of the hinge: its components along the hinge's free motions are the loads of springs and motors.
 """
 
 from flexmb.closure.factor import row_place, sum_rows
@@ -39,7 +39,7 @@ def _by_composite_bodies(route, c, w):
 
 @helper
 def _half_by_recursion(response, s, i, x, at):
-    """F^-1 T of T in cw.response.speed, Jain & Rodriguez (55): only bodies on the path of closure i feel it."""
+    """F^-1 T of T in cw.response.speed, Jain & Rodriguez (55); nonzero only for bodies on the path of closure i."""
     cc, g = s.cc, s.cc.closure[i].group
     for j in range(cc.group[g].column_start, cc.group[g].column_stop):
         response.speed[cc.column[j]] = s.cw.response.speed[cc.column[j]]
@@ -121,7 +121,7 @@ def tree_and_rows(route, s):
 
 @helper
 def _half_solve(s):
-    """J' of every row into cw.half, then F^-1 J'."""
+    """Write J' of every row to cw.half, then replace it by F^-1 J'."""
     c, cc, cw = s.c, s.cc, s.cw
     for i in range(cc.closure.shape[0]):
         for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
@@ -131,7 +131,7 @@ def _half_solve(s):
 
 @sweep
 def pass_load(route, s, i, x, at):
-    """F^-1 of the generalised forces of the forces in cw.response on the path of closure i; by column from x[at] on."""
+    """F^-1 T for the generalised forces T of cw.response on the path of closure i; by column, from x[at] on."""
     for j in range(s.cc.closure[i].path_start, s.cc.closure[i].path_stop):
         innovations.project(s.c, s.seen, s.cw.response, s.cc.path[j])
     _half(s.route, s, i, x, at)
@@ -139,13 +139,13 @@ def pass_load(route, s, i, x, at):
 
 @sweep
 def respond(route, s, y, v):
-    """v = F'^-1 y: the change of all speeds; prescribed ones do not change."""
+    """v = F'^-1 y: the change of all speeds; zero for prescribed ones."""
     _rest(s.route, s.c, s.w, y, v)
 
 
 @helper
 def accelerate(route, s):
-    """Let cw.row.load act beside everything else: accelerations and drive loads."""
+    """Add the effect of cw.row.load to the accelerations and drive loads."""
     cw, y = s.cw, s.cw.coefficient
     sum_rows(s.cc, cw, y)
     respond(route, s, y, cw.step)
@@ -159,7 +159,8 @@ def accelerate(route, s):
 
 @helper
 def hinge_and_drive_loads(route, s):
-    """w.body.load and w.speed.drive for the accelerations and closure loads found; the factors of M are lost."""
+    """Compute w.body.load and w.speed.drive from the accelerations and constraint loads; overwrites the factors of M.
+    """
     c, w, cc, cw = s.c, s.w, s.cc, s.cw
     tau, T = cw.step, cw.response.speed
     inverse_dynamics(c, w, tau)
@@ -180,7 +181,7 @@ def hinge_and_drive_loads(route, s):
 
 @sweep
 def locate(route, t, y, s):
-    """Rows' values and rates at y; the factors of M stay."""
+    """Evaluate the rows' values and rates at y; keeps the factors of M."""
     load_state(t, y, s.c, s.seen)
     velocity_sweep(s.c, s.seen, True, True)
     pose_sweep(s.c, s.seen)

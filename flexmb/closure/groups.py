@@ -1,16 +1,16 @@
-"""Which closures feel each other's loads, which speeds these may change, and which bodies carry several loops at once.
+"""Which loops are dynamically coupled, which speeds their loads change, and which bodies carry several loops.
 
-Loads act on a tree by the accelerations that they cause. With M = F F', those of a closure are F'^-1 x of an x that is
-zero but for the speeds of bodies between its ports and the ground, so that J M^-1 J' of two closures vanishes unless a
-body on both paths has a speed that is free. Hence loops that hang from the ground side by side, or from a base that is
-welded or driven, cost as much as each by itself: their sum, not the cube of their number.
+With M = F F', the loads of a closure cause the accelerations F'^-1 x, where x is zero except for the speeds of bodies
+between its ports and the ground. Therefore J M^-1 J' of two closures vanishes unless a body on both paths has a free
+speed. The cost of loops that hang side by side from the ground, or from a welded or driven base, is the sum of the
+costs of the single loops and does not grow with the cube of their number.
 
-A base that moves feels them all, yet a loop does not know that its base moves: both its ports hang from one rigid body,
-the junction, and no motion of this body or of those that carry it opens or closes the loop. J has columns for what is
-below the junction only, so rows are independent, singular or turned over by these columns alone. Closures are one group
-where they share such a body; groups that share nothing but what carries them are a cluster, and feel each other through
-these few speeds (`flexmb.closure.clusters`). A body that bends between the ports of a loop does open it: then its own
-speeds are the loop's too, and the junction is what carries it.
+A moving base couples all its loops, but its motion neither opens nor closes a loop whose two ports are carried by one
+rigid body, the junction. J is nonzero only in the columns of bodies outboard of the junction, so that the
+independence, singularity and reversal of rows depend on these columns alone. Closures that share such a body are one
+group. Groups that share only carrying bodies are a cluster and are coupled by the few speeds of those bodies
+(`flexmb.closure.clusters`). A flexible body that deforms between the ports of a loop does open it: then its speeds
+belong to the loop, and the junction is the body that carries it.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from flexmb.typing import Index, Record
 
 
 class LoadPath(NamedTuple):
-    """Bodies that loads on one closure pass on their way to the ground: below its junction, and what carries these."""
+    """Bodies between a closure and the ground: its own ones outboard of the junction, and those that carry these."""
 
     own: frozenset[int]
     carriers: frozenset[int]
 
     @property
     def bodies(self) -> list[int]:
-        """All of them, tips first."""
+        """All bodies, outermost first."""
         return sorted(self.own | self.carriers, reverse=True)
 
 
 def path(c: Constants, parent: Sequence[int], bodies: Sequence[int]) -> LoadPath:
-    """Of a closure between two bodies, -1 for the ground."""
+    """The load path of a closure between two bodies, -1 for the ground."""
     one, other = (_ancestors(parent, k) for k in bodies)
     carriers = one & other
     if carriers and c.body["modes"][max(carriers)] > 0:
@@ -47,7 +47,7 @@ def path(c: Constants, parent: Sequence[int], bodies: Sequence[int]) -> LoadPath
 
 
 def _ancestors(parent: Sequence[int], k: int) -> set[int]:
-    """A body and all that carry it; bodies are numbered from the ground outwards."""
+    """A body and all bodies that carry it; bodies are numbered from the ground outward."""
     found = set()
     while k >= 0:
         found.add(k)
@@ -67,8 +67,8 @@ def clusters(c: Constants, paths: Sequence[LoadPath]) -> list[list[list[int]]]:
 
 
 def _joined(bodies: Sequence[Iterable[int]]) -> list[list[int]]:
-    """Places in a list of sets of bodies, those together that have one in common, directly or by way of others."""
-    first: dict[int, int] = {}  # place that had a body first
+    """Connected components of a list of sets, as indices: sets with a common body are connected."""
+    first: dict[int, int] = {}  # by body, the index of the first set that has it
     leader = list(range(len(bodies)))
 
     def leader_of(i: int) -> int:
@@ -97,7 +97,7 @@ class GroupTables(NamedTuple):
 def group_tables(
     c: Constants, members: Sequence[Sequence[Sequence[int]]], paths: Sequence[LoadPath], rows: Sequence[int]
 ) -> GroupTables:
-    """Of closures by group and cluster; `rows`: how many each closure has."""
+    """The tables of closures sorted by group and cluster; `rows`: number of rows of each closure."""
     moves = _moves(c)
     groups, columns = np.zeros(sum(map(len, members)), t.GROUP), list[int]()
     clusters = np.zeros(len(members), t.CLUSTER)
@@ -105,7 +105,7 @@ def group_tables(
     for cluster, its_groups in zip(clusters, members, strict=True):
         own = [_union(paths[i].own for i in group) for group in its_groups]
         carriers = _union(paths[i].carriers for group in its_groups for i in group) - _union(own)
-        if len(its_groups) == 1:  # nobody to share them with
+        if len(its_groups) == 1:  # a single group shares no speeds
             own, carriers = [own[0] | carriers], set()
         shared = _speeds(c, sorted(k for k in carriers if moves[k]))
         cluster["group_start"], cluster["group_stop"] = place, place + len(its_groups)
@@ -127,7 +127,7 @@ def _union(sets: Iterable[Iterable[int]]) -> set[int]:
 
 
 def _moves(c: Constants) -> list[bool]:
-    """Whether loads on each body change a speed of its own: a hinge's that is free, or a mode's."""
+    """Whether each body has a free speed: an unprescribed one of its hinge, or that of a mode."""
     free = np.append(0, np.cumsum(c.speed["prescribed"] < 0))
     first = c.body["u_index"]
     found: list[bool] = ((free[first + c.body["nv"]] > free[first]) | (c.body["modes"] > 0)).tolist()
@@ -135,7 +135,7 @@ def _moves(c: Constants) -> list[bool]:
 
 
 def _speeds(c: Constants, bodies: Sequence[int]) -> list[int]:
-    """All speeds of these bodies: of hinge, modes and wheels."""
+    """Indices of all speeds of these bodies: of hinge, modes and wheels."""
     found = list[int]()
     for body in c.body[list(bodies)]:
         for first, count in (("u_index", "nv"), ("etad_index", "modes")):

@@ -1,4 +1,4 @@
-"""What impulses need to know of closures: how their rows move with the speeds, and impulses of rows as wrenches."""
+"""Closures for impulse computations: the Jacobian of their rows, and impulses of rows as wrenches."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flexmb.typing import Real
 
 
 class RowMotion:
-    """The rows of closures at y = [q, u, work] and time t (s), whose rates are J u, of all speeds, prescribed too."""
+    """The rows of closures at y = [q, u, work] and time t (s); their rates are J u, prescribed speeds included."""
 
     def __init__(self, closures: Closures, t: float, y: Real) -> None:
         constants, self._own = closures.constants
@@ -43,7 +43,7 @@ class RowMotion:
 
 
 def _without_prescribed(c: Constants) -> Constants:
-    """The same tree, every speed of which is free."""
+    """The same tree with all speeds free."""
     speed = c.speed.copy()
     speed["prescribed"] = -1
     return replace(c, speed=speed)

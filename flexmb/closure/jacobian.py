@@ -1,13 +1,13 @@
 """The Jacobian of a closed chain's equations of motion, exact to round-off: eight columns in two evaluations.
 
-The equations are those of all coordinates, `flexmb.closure.dynamics.rhs`: loads f of the closures keep the rows' g''
-zero, or let g decay. They hold beside the manifold of closed states too, where stages and iterates of implicit methods
-are: whatever gap there is opens as fast as it does. So they are differentiated in all directions, as those of a tree.
-Where y changes by dy, and with it g'' by dg'' under the same loads, loads change by df,
+The equations are those of all coordinates, `flexmb.closure.dynamics.rhs`: constraint loads f keep the row
+accelerations g'' zero, or make g decay. They are also defined off the constraint manifold, where the stages and
+iterates of implicit methods lie, so they are differentiated in all directions, as those of a tree. If a change dy of y
+changes g'' by dg'' under constant loads, the loads change by df,
 
     Lambda^-1 df = -dg''.
 
-Directions are evaluated first under the loads at y, then under loads that change by df.
+Each direction is evaluated first under the loads at y, then under loads that change by df.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from flexmb.typing import Real
 
 @bundle
 class ChainTangent:
-    """What a Jacobian needs beside the chain itself."""
+    """Workspace of a Jacobian, in addition to the chain."""
 
     w: TangentWorkspace
     cw: ClosureTangentWorkspace
@@ -40,7 +40,7 @@ class ChainTangent:
 
 
 def chain_tangent(c: Constants, cc: ClosureConstants, nq: int, nu: int) -> ChainTangent:
-    """What `jacobian` writes; one per thread."""
+    """Make the workspace of `jacobian`; one per thread."""
     return ChainTangent(
         w=tangent_workspace(c, nq, nu), cw=closure_tangent_workspace(cc), load=np.zeros(len(cc.row)),
         slope=np.zeros(nq + nu + 1),
@@ -51,7 +51,7 @@ def chain_tangent(c: Constants, cc: ClosureConstants, nq: int, nu: int) -> Chain
 def jacobian(t, y, J, s, x):
     """J (n,n) = d(dy/dt)/dy at y = [q, u, work] (n,), row by row as `rhs` orders them; returns a status code.
 
-    Of the rows that s has chosen. Columns and rows of prescribed coordinates and speeds vanish.
+    It holds for the constraint rows that s has chosen. Columns and rows of prescribed coordinates and speeds vanish.
     """
     n, columns, w, cw = y.shape[0], x.w.column.shape[0], x.w, x.cw
     status = slope(t, y, x.slope, s)
@@ -85,7 +85,7 @@ def jacobian(t, y, J, s, x):
 
 @helper
 def _hold_rows(s, cw, lane):
-    """Let loads change along a direction so that the rows' accelerations do as they do at y."""
+    """Set the change of the loads along each direction that keeps the row accelerations at their values at y."""
     for g in range(s.cc.group.shape[0]):
         first = s.cc.group[g].row_start
         for place in range(first, first + s.cw.rank[g]):
@@ -100,5 +100,5 @@ def _hold_rows(s, cw, lane):
 
 @kernel
 def move(y, increment, result, s):
-    """Coordinates of result = those of y moved for a unit of time at the constant speeds `increment` (nu,)."""
+    """Coordinates of result = those of y after motion for a unit of time at the constant speeds `increment` (nu,)."""
     retraction.move_by(y, increment, result, s.c)

@@ -1,26 +1,26 @@
-"""Through a singular position on the branch that momentum demands: a leap from one side to the other.
+"""A leap over a singular position, from one side to the other, on the branch that the momentum selects.
 
-At a singular position pivots of B P = Q R vanish and branches of the motion cross. A mechanism that moves goes on along
-the branch whose direction it has: loads are bounded, so its speeds cannot jump to those of another branch. On either
-side accelerations are smooth; only at the position itself, and for what strays from the branch near it, no stage of an
-integrator can be evaluated. So a run comes close by ordinary steps and then leaps:
+At a singular position pivots of B P = Q R vanish and branches of the motion cross. A moving mechanism continues on the
+branch of its present direction: loads are bounded, so its speeds cannot jump to those of another branch. Accelerations
+are smooth on both sides; integrator stages cannot be evaluated only at the position itself, and near it off the branch.
+So a run approaches by ordinary steps and then leaps:
 
-1. `_length`: a short probe along the velocity shows how fast pivots fall, hence how far the position is. A leap goes
-   from between `NEAREST` and `LEAP` sizes of the mechanism, over twice the distance.
+1. `_length`: a short probe along the velocity shows how fast pivots fall, hence how far the position is. A leap starts
+   from a distance between `NEAREST` and `LEAP` sizes of the mechanism, and covers twice the distance.
 2. `_lands`: one step by Lobatto's rule of order 6, with nodes at both ends and at `INNER` from either, none of which is
-   near the position. States there are by the trapezoidal rule, which errs by the cube of the leap over twelve, 2^-30 of
-   a size from the furthest; what remains of that after the one pass is 2^-39, and 2^-44 from half as far.
-3. `_same_branch`: what comes before the position and what comes after it are on one branch where
+   near the position. The states at the nodes are found by the trapezoidal rule. Its error is the cube of the leap over
+   twelve, 2^-30 of a size from the largest distance; 2^-39 of it remains after one pass, 2^-44 from half that distance.
+3. `_same_branch`: the states before and after the position are on one branch if
 
-   - every pivot that was to vanish has the size on the other side that its fall predicted, and its row of Q is turned
-     over, while all other rows are where they were; and
-   - the accelerations that the closures demand along these rows go on smoothly: between the inner nodes they change as
-     they do between these and the ends. A mechanism that only passes near a singular position turns there, within the
-     leap, and its accelerations before and after are opposite. On branches that are hyperbolas x y = c they jump by
+   - every pivot that was predicted to vanish has, on the other side, the size that its rate of fall predicts, and its
+     row of Q is reversed, while all other rows have kept their direction; and
+   - the accelerations that the closures demand along these rows are smooth: they change between the inner nodes as
+     between these and the ends. A mechanism that only passes near a singular position turns round within the leap, and
+     has opposite accelerations before and after. On branches that are hyperbolas x y = c the accelerations jump by
      4 c/d^3 at a distance of d.
 
-Else there is no leap, and as long as the position is within `LEAP` steps may come closer (cw.closer): they pass by what
-is no singular position after all, or the run ends with the status it had.
+Otherwise there is no leap, and steps may come closer while the position is within `LEAP` (cw.closer): they pass if the
+position is not singular after all, or the run ends with the status it had.
 """
 
 from math import inf
@@ -40,31 +40,31 @@ from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.motion.coordinates import load_state, put_back, store_slope
 from flexmb.tables.status import CLOSURE_SINGULAR, OK
 
-# Sizes of the mechanism to a singular position from where a leap goes: the error above.
+# Largest distance from a singular position, in sizes of the mechanism, at which a leap starts: see the error above.
 LEAP = 2.0**-10
-# A leap from nearer may end where its steps may not be, and gaps of 2^-50 become accelerations.
+# A leap from nearer may end where steps are refused, and gaps of 2^-50 affect the accelerations.
 NEAREST = TO_LEAP / 2.0
-# Gap of closures at all nodes of a leap: eight roundings of their size.
+# Gap of closures at all nodes of a leap: eight units of rounding of their size.
 TIGHT = 2.0**-50
-# Sizes that are tried to see how pivots fall: less than `NEAREST`, so on this side of the position, and more than 2^-4
-# of the distance, which pivots show to nine digits.
+# Length of the probe, in sizes: less than `NEAREST`, so that it stays on this side of the position, and more than 2^-4
+# of the distance, which the pivots then show to nine digits.
 PROBE = 2.0**-14
-# Times the distance of a singular position, that of the next one that is not leapt over too: a leap ends at twice the
-# distance, and is then as far from the next as it started from the first.
+# Least distance of the next singular position, relative to that of the first, that is not leapt over together with it:
+# a leap ends at twice the distance, and is then as far from the next position as it started from the first.
 APART = 3.0
-# Of the distance before it, the least beyond the position where the run's end or a segment's cuts a leap short.
+# Least distance after the position, relative to that before it, if the end of the run or segment cuts a leap short.
 BEYOND = 0.25
-# c of hyperbolas x y = c that gaps of closures may feign: `TIGHT` times 2^8, for ports whose speed is that of a few
-# bodies added up, and closures far from the origin. Smooth accelerations jump by the cube of the leap: far less. The
-# campaign in tests/flexmb/closure/test_near_singular.py tells how far it may be moved either way.
+# Constant c of a hyperbola x y = c that cannot be told from the gaps of closures: `TIGHT` times 2^8, which allows for
+# port speeds that are sums over several bodies and for closures far from the origin. Smooth accelerations differ by
+# the cube of the leap, far less. tests/flexmb/closure/test_near_singular.py measures the admissible range.
 UNSEEN = 2.0**-42
-# By which the trapezoidal rule converges: Euler's, then its own twice.
+# Evaluations by which the trapezoidal rule converges: one Euler step, then two iterations of the rule.
 APPROACHES = 3
 
 
 @kernel
 def back(y, s):
-    """Put the last good state of the run into y; returns its time (s), -inf where there is none."""
+    """Copy the last accepted state of the run to y; returns its time (s), -inf if there is none."""
     if s.cw.time[0] > -inf:
         for i in range(y.shape[0]):
             y[i] = s.cw.state[i]
@@ -73,10 +73,11 @@ def back(y, s):
 
 @kernel
 def leap(end, y, dy, y_new, dy_new, s):
-    """Leap from the last good state of the run, y, over a singular position, not beyond time `end` (s).
+    """Leap from the last accepted state of the run, y, over a singular position, not beyond time `end` (s).
 
-    Returns the length of the leap (s), with slopes dy at y, which is closed to rounding first, and dy_new at y_new, the
-    last good state from now on. 0 where there is none: too far from such a position, or it is not seen how to go on.
+    Returns the length of the leap (s), with slopes dy at y, which is first projected to round-off, and dy_new at y_new,
+    which becomes the last accepted state. Returns 0 if there is no leap: no singular position is near enough, or the
+    continuation is not clear.
     """
     cw, t = s.cw, s.cw.time[0]
     if not t > -inf:
@@ -96,9 +97,9 @@ def leap(end, y, dy, y_new, dy_new, s):
 
 @kernel
 def beside(t, y, dy, s):
-    """dy at y beside a singular position, on whichever side, y being closed to rounding first; returns a status code.
+    """dy at y near a singular position, on either side, y being projected to round-off first; returns a status code.
 
-    For controllers, whose part in a leap is known once it has been made: where it ended, y is the last good state now.
+    Controllers use it, whose effect on a leap is known only afterwards: at its end, y becomes the last accepted state.
     """
     status = _slope(t, y, dy, s)
     if status == OK and t == s.cw.time[0]:
@@ -108,7 +109,7 @@ def beside(t, y, dy, s):
 
 @sweep
 def _slope(t, y, dy, s):
-    """dy at y once it is closed to rounding; a status code, and what is left in R, loads and Q belongs to y."""
+    """dy at y after projection to round-off; returns a status code. R, Q and the loads then belong to y."""
     put_back(t, y, s.c)
     status = _tree(t, y, s)
     if status != OK:
@@ -135,10 +136,10 @@ def _tree(t, y, s):
 
 @helper
 def _length(t, end, y, dy, trial, s):
-    """How far to leap: twice to where the last of the pivots vanishes that vanish soon, or to `end`; 0 for none.
+    """Length of the leap (s): twice the time until the last of the nearby pivots vanishes, or to `end`; 0 for none.
 
-    Leaves in cw.vanishing (s) when each chosen row does, inf for those that do not soon, and in cw.demand[0] what the
-    closures demand along them now.
+    Writes to cw.vanishing (s) when each chosen row vanishes, inf for those that do not soon, and to cw.demand[0] the
+    accelerations that the closures demand along the rows now.
     """
     cc, cw = s.cc, s.cw
     if _slope(t, y, dy, s) != OK:
@@ -162,9 +163,9 @@ def _length(t, end, y, dy, trial, s):
 
 @helper
 def _is_near(cc, cw):
-    """Whether a singular position is within half of `LEAP`, by what the probe covers of the distance.
+    """Whether a singular position is within half of `LEAP`, by the part of the distance that the probe covers.
 
-    Pivots do not tell of a near miss: they may rise again before the probe ends.
+    The pivots alone do not show a near miss: they may rise again before the probe ends.
     """
     for g in range(cc.group.shape[0]):
         for a in range(cw.rank[g]):
@@ -175,9 +176,9 @@ def _is_near(cc, cw):
 
 @helper
 def _vanish(probe, cc, cw):
-    """When each chosen row vanishes that does so soon: last of these times (s), 0 for none; whether one is too near.
+    """The last of the times (s) at which chosen rows vanish soon, 0 for none; and whether one of them is too near.
 
-    Rows that vanish not much later are among them: a leap must not end near another singular position.
+    Rows that vanish a little later are included: a leap must not end near another singular position.
     """
     last, too_near = 0.0, False
     for g in range(cc.group.shape[0]):
@@ -210,7 +211,7 @@ def _vanish(probe, cc, cw):
 def _lands(t, h, y, dy, y_new, dy_new, s):
     """Whether there is a y_new on the same branch: by the trapezoidal rule, then by Lobatto's.
 
-    Leaves in cw.demand what the closures demand at all four nodes.
+    Writes to cw.demand the accelerations that the closures demand at all four nodes.
     """
     for approach in range(APPROACHES):
         for i in range(y.shape[0]):
@@ -238,9 +239,9 @@ def _lands(t, h, y, dy, y_new, dy_new, s):
 
 @helper
 def _same_branch(h, cc, cw):
-    """Whether rows are turned over that were to vanish in the leap of h (s), as the third point above says.
+    """Whether the rows that were predicted to vanish in the leap of h (s) are reversed: the third point above.
 
-    The jump of accelerations is compared with what gaps feign at the node that is nearest to where the row vanishes.
+    The jump of the accelerations is compared with the effect of gaps at the node nearest to the singular position.
     """
     for g in range(cc.group.shape[0]):
         for a in range(cw.rank[g]):
@@ -267,7 +268,7 @@ def _same_branch(h, cc, cw):
 
 @helper
 def _jump(cw, place):
-    """By how much more accelerations along a row change between the inner nodes than beside them: 0 of a parabola."""
+    """Excess change of the acceleration along a row between the inner nodes over that beside them; 0 for a parabola."""
     d = cw.demand
     outside = 0.5 * (d[1, place] - d[0, place] + d[3, place] - d[2, place]) / INNER
     return d[2, place] - d[1, place] - (1.0 - 2.0 * INNER) * outside
@@ -275,8 +276,7 @@ def _jump(cw, place):
 
 @helper
 def _keep_demands(node, cc, cw):
-    """What the closures demand along the rows of Q, as it was at the first node: beyond its position a row is reversed.
-    """
+    """Store the accelerations demanded along the rows of Q, signed as at the first node: rows reverse in the leap."""
     for g in range(cc.group.shape[0]):
         for a in range(cw.rank[g]):
             demand = _demand(cc, cw, g, a)
@@ -286,7 +286,7 @@ def _keep_demands(node, cc, cw):
 
 @helper
 def _demand(cc, cw, g, a):
-    """Acceleration that the loads cause along row a of Q of group g: an element of R f."""
+    """Acceleration caused by the loads along row a of Q of group g: an element of R f."""
     total, first = 0.0, cc.group[g].row_start
     for b in range(a, cw.rank[g]):
         total += cw.factor[entry(cc, g, a, b)] * cw.row[cw.chosen[first + b]].load

@@ -1,7 +1,7 @@
-"""Derivatives of what sensors read of a closed chain, at given closure loads and by these, exact to round-off.
+"""Derivatives of the observed quantities of a closed chain by state and constraint loads, exact to round-off.
 
-As `flexmb.closure.tangent` has those of the accelerations. How the loads change with the motion is for
-`flexmb.linear.observed` to find, so that the rows' accelerations stay zero.
+`flexmb.closure.tangent` has those of the accelerations. `flexmb.linear.observed` then finds the change of the loads
+with the state that keeps the row accelerations zero.
 """
 
 from flexmb.closure.rows import load_on_b

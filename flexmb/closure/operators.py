@@ -1,4 +1,4 @@
-"""What closures add to the operators of a tree: the inertia that they feel, Jain & Rodriguez, section VIII."""
+"""Closures and the operators of a tree: the inverse inertia at the closures, Jain & Rodriguez, section VIII."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ class ClosureOperators:
 
     rows (G,)               "<closure>.rotation.x" and so on, axes of frame A turned so that the closure's axis is z
     J (G,nu)                rates of the rows are J u, of all speeds
-    Lambda_inverse (G,G)    J M^-1 J' of the free speeds, the inverse of the tree's effective inertia reflected at the
-                            closures: what unit loads of the rows do to the rows. As B'B, found by the recursion
-    opening (G,)            J udot_0 + gamma, at which closures would open under the accelerations udot_0 of the tree
-    loads (G,)              what closures exert along the rows on body_b, N and N m, the least where rows are redundant
+    Lambda_inverse (G,G)    J M^-1 J' of the free speeds, the inverse of the effective inertia of the tree at the
+                            closures: row accelerations under unit row loads. Computed as B'B by the recursion
+    opening (G,)            J udot_0 + gamma, row accelerations under the accelerations udot_0 of the tree
+    loads (G,)              loads along the rows on body_b, N and N m; minimum-norm ones where rows are redundant
 
     M is the mass matrix and udot_0 the accelerations of the tree: those of `flexmb.System(scene)`.
     """
@@ -34,7 +34,7 @@ class ClosureOperators:
 
 
 def closure_operators(closures: Closures, t: float, y: Real) -> ClosureOperators:
-    """At y = [q, u, work], which closes all closures; DynamicsError where they are singular."""
+    """The operators at y = [q, u, work], which must fulfil all closures; DynamicsError where they are singular."""
     closures.motion(t, y)
     loads = closures.row_loads
     opening, B = closures.opening(t, y)

@@ -1,7 +1,8 @@
-"""Projection on closed closures: the nearest coordinates and speeds in the metric of kinetic energy.
+"""Projection on the constraint manifold: the nearest coordinates and speeds in the metric of kinetic energy.
 
 Positions: dq = -M^-1 J' (J M^-1 J')^-1 g, repeated with the same matrices until g vanishes to round-off; then speeds
-likewise with J u. Prescribed coordinates stay. Only independent rows are corrected; the others must follow.
+likewise with J u. Prescribed coordinates do not change. Only independent rows are corrected; dependent rows must be
+fulfilled with them.
 """
 
 import numpy as np
@@ -14,24 +15,24 @@ from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.motion.coordinates import configuration_rate, load_state, normalise_quaternions, put_back
 from flexmb.tables.status import CLOSURE_OPEN, OK
 
-CLOSED = 2.0**-44  # a closed row's value in the size of its closure: 5.7e-14, two hundred roundings
+CLOSED = 2.0**-44  # a closed row's value relative to the size of its closure: 5.7e-14 = 256 * 2^-52
 OPEN = 1e-10  # beyond this a closure is open
-ADRIFT = 1e-2  # beyond this a stabilised closure is open: what its rows are corrected by has no effect
-MOVING_APART = 1e-8  # beyond this, in the speed of its ports, a closure opens ...
-SLOWEST = OPEN / MOVING_APART  # ... that pass so many sizes in a step: of a mechanism at rest rounding is all the speed
+ADRIFT = 1e-2  # beyond this a stabilised closure is open: the stabilisation is not effective
+MOVING_APART = 1e-8  # beyond this, relative to the speed of its ports, a closure opens ...
+SLOWEST = OPEN / MOVING_APART  # ... which counts as at least so many sizes per step: at rest speeds are only rounding
 REPEATS = 6
 
 
 @helper
 def project_closed(t, y, s):
-    """Put y on the manifold of the closures, in place; what prevents it is left in cw.failure."""
+    """Project y on the manifold of the closures, in place; a failure is stored in cw.failure."""
     put_back(t, y, s.c)
     s.cw.failure[0] = OK
     status = _project(t, y, s)
     if status != OK:
         s.cw.failure[0] = status
         s.cw.failure[1] = s.w.fault[0]
-        s.cw.time[1] = np.nextafter(t, -np.inf)  # the last stage of a segment is evaluated that much earlier
+        s.cw.time[1] = np.nextafter(t, -np.inf)  # the last stage of a segment is evaluated one ulp before its end
         recall(s.cw)
     elif is_further(t, s.cw):
         remember(t, y, s.cc, s.cw)
@@ -61,7 +62,7 @@ def _project(t, y, s):
 
 @helper
 def _choose_further(t, s):
-    """Choose the independent rows for the next step, once the last one is seen to have stayed on its branch."""
+    """Choose the independent rows for the next step, after checking that the last one stayed on its branch."""
     status = OK
     if has_started(s.cw):
         status = factorised(s.w, s.cc, s.cw)
@@ -113,7 +114,7 @@ def _response(s):
 
 @sweep
 def displace(t, y, s):
-    """y moves by the displacement cw.step for a unit of time."""
+    """Move y by the displacement cw.step."""
     c, w = s.c, s.w
     load_state(t, y, c, w)
     for j in range(w.u.shape[0]):

@@ -1,8 +1,8 @@
-"""What a closure suppresses: value, rate and acceleration of each row, from the motion of its two ports.
+"""The rows of a closure, its suppressed motions: value, rate and acceleration, from the motion of its two ports.
 
 Relative motion of frame B seen from frame A, in A axes: R_AB = R_WA'R_WB, p_AB = R_WA'(p_WB - p_WA), W being World,
-and their rates. A translation row along axis i is p_AB,i. A rotation row sets an axis a of A at right angles to an axis
-b of B, g = a . R_AB b:
+and their rates. A translation row along axis i is p_AB,i. A rotation row makes an axis a of A orthogonal to an axis b
+of B, g = a . R_AB b:
 
     about x: a = -y, b = z      about y: a = x, b = z      about z: a = -x, b = y,
 
@@ -33,7 +33,7 @@ from flexmb.spatial.vector import (
 
 @helper
 def pose(w, side):
-    """Position and rotation of a port in World. Needs the pose sweep."""
+    """Position and rotation of a port in World. Requires the pose sweep."""
     if side.body == ON_GROUND:
         return vec3(side.position, 0), mat3(side.rotation, 0)
     R = mat3(w.body[side.body].pose_rotation, 0)
@@ -64,7 +64,7 @@ def norm1(x):
 
 @sweep
 def evaluate_rows(c, w, cc, cw, accelerated):
-    """Fill cw.closure and cw.row; row accelerations only where `accelerated`, which needs those of the bodies.
+    """Fill cw.closure and cw.row; row accelerations only if `accelerated`, which requires those of the bodies.
 
     p_WA, R_WA, V_WA, A_WA are frame A's position, rotation, velocity and acceleration in World; those of B from A, in A
     axes, are p_AB, R_AB, V_AB, A_AB.
@@ -81,7 +81,7 @@ def evaluate_rows(c, w, cc, cw, accelerated):
 
 @helper
 def evaluate_closure(c, w, cc, cw, i, accelerated):
-    """The same for closure i, without its size and speed; returns p_WA, V_WA and V_WB."""
+    """As `evaluate_rows` for closure i, without its size and speed; returns p_WA, V_WA and V_WB."""
     A, B = cc.side[i, 0], cc.side[i, 1]
     p_WA, R_WA = pose(w, A)
     p_WB, R_WB = pose(w, B)
@@ -120,7 +120,7 @@ def _relative_acceleration(difference, alpha_A, w_A, p_AB, V_AB):
 
 @helper
 def axes(axis, R_AB):
-    """The axes a of A and R_AB b, b of B, that rotation row `axis` sets at right angles, in A axes."""
+    """The axes a of A and R_AB b, b of B, that rotation row `axis` makes orthogonal, in A axes."""
     if axis == 0:
         return (0.0, -1.0, 0.0), (R_AB[2], R_AB[5], R_AB[8])
     if axis == 1:
@@ -177,7 +177,7 @@ def load_on_b(cc, cw, i):
 
 @helper
 def largest_gap(cc, cw):
-    """Largest weighted value of a row in the size of its closure, and the closure: (gap, i)."""
+    """Largest weighted value of a row relative to the size of its closure, and the closure: (gap, i)."""
     worst, at = 0.0, 0
     for r in range(cc.row.shape[0]):
         i = cc.row[r].closure
@@ -189,9 +189,9 @@ def largest_gap(cc, cw):
 
 @helper
 def fastest_opening(cc, cw, slowest):
-    """Largest weighted rate of a row in the speed of its closure, and the closure: (rate, i).
+    """Largest weighted rate of a row relative to the speed of its closure, and the closure: (rate, i).
 
-    `slowest` (1/s): sizes of its closure that speed is at least.
+    `slowest` (1/s): lower bound of that speed, in sizes of the closure.
     """
     worst, at = 0.0, 0
     for r in range(cc.row.shape[0]):

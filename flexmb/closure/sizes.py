@@ -1,18 +1,18 @@
-"""What a row is compared with to see whether it suppresses any motion: how far its closure's ports move by themselves.
+"""Scale of each row, by which it is decided whether the row suppresses any motion: the response of separate ports.
 
-A row of `half` is the response of port B less that of port A. Where both move as one, on bodies that are welded
-together or to the ground, the two cancel and the row is what rounding leaves of them. A load that passes `depth`
-bodies on its way is rounded some 72 times on each, which leaves no more than 72 depth 2^-53 of either response: below
-1e-12 in any scene, whatever the masses. So the scale of a row is the response of its ports before they are subtracted,
-to all six unit loads on each, since a load along one axis that moves nothing is rounded into the others. Torques are
-weighed with the length of the scene, as rows are.
+A row of `half` is the response of port B minus that of port A. If both ports move as one, on bodies that are welded
+together or to the ground, the two responses cancel and the row consists of rounding errors. A load that passes `depth`
+bodies is rounded some 72 times on each, which leaves at most 72 depth 2^-53 of either response: below 1e-12 in any
+scene, whatever the masses. Therefore the scale of a row is the response of its ports before the subtraction, to all six
+unit loads on each port, since rounding spreads a load along one axis to the others. Torques are weighted with the
+length of the scene, as rows are.
 
-Loads cancel in one more place. Where a body's hinge sits on a node that deforms, its modes feel a load less the
-reaction of the hinge: what they feel of a unit load at the hinge counts too, so that the node at which a flexible body
-is held does not pass for one that moves.
+Loads cancel in one more case. If a body's hinge is at a node that deforms, the load on its modes is the applied load
+minus the reaction of the hinge. So the modal response to a unit load at the hinge is included; without it, the
+supported node of a flexible body would count as one that moves.
 
-Responses hardly change in the course of a motion, compared with the seven decades between rounding and what counts as
-independent (`flexmb.closure.factor.DEPENDENT`): they are measured where rows are counted and kept for a run.
+Responses change little during a motion, compared with the seven decades between rounding and the threshold of
+independence (`flexmb.closure.factor.DEPENDENT`): they are computed when rows are counted, and kept for the run.
 """
 
 from math import sqrt
@@ -30,7 +30,7 @@ _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @helper
 def measure_ports(s):
-    """cw.size of every row, at the state that was linearised last."""
+    """Compute cw.size of every row, at the state linearised last."""
     cc, cw = s.cc, s.cw
     for i in range(cc.closure.shape[0]):
         total = 0.0
@@ -56,7 +56,7 @@ def _response(s, i, side, F):
 
 @helper
 def _reaction(s, i, k, F):
-    """|x| of what the modes of body k feel of a load at the node that its hinge sits on, body axes."""
+    """|x| of the modal forces on body k by a load at the node of its hinge, body axes."""
     clear_path(s.c, s.cc, s.cw, i)
     for n in range(s.c.body[k].modes):
         s.cw.response.zf[k, n] = -dot6(mode_motion(s.seen, s.c.body[k].outboard_port, n), F)
@@ -65,6 +65,6 @@ def _reaction(s, i, k, F):
 
 @sweep
 def _passed(s, i):
-    """|x|, in the columns that rows are judged by, of the forces in cw.response, which are on the path of closure i."""
+    """|x| in the group's own columns of the forces in cw.response, which act on the path of closure i."""
     pass_load(s.route, s, i, s.cw.coefficient, 0)
     return norm(s.cw.coefficient, 0, own_columns(s.cc, s.cc.closure[i].group))

@@ -1,12 +1,12 @@
-"""The arrays of closures: what a scene fixes, and what one evaluation writes.
+"""The arrays of closures: constants of a scene, and the workspace of one evaluation.
 
 C closures with G suppressed motions ("rows") in all, on N bodies with at most m modes and nu speeds. Frame A is on
 body_a (the inboard side), frame B on body_b, both turned so that an axis is z; rows are in A axes.
 
-Closures are in one of K groups by the bodies that their loads move, and groups in one of L clusters by the bodies that
-carry them (`flexmb.closure.groups`); Lambda^-1 has a block for each cluster and zeros elsewhere. Rows are numbered
-group by group, groups cluster by cluster. A group has matrices of its own, (rows, columns) row by row in one array: a
-row's columns are the speeds that loads of its group may change, first its own, then those that its cluster shares.
+Closures form K groups by the bodies that their loads move, and groups form L clusters by the bodies that carry them
+(`flexmb.closure.groups`); Lambda^-1 is block diagonal with a block for each cluster. Rows are numbered group by group,
+groups cluster by cluster. The matrices of all groups, (rows, columns) each, are stored row by row in one array; the
+columns are the speeds that loads of the group may change, first its own, then those that its cluster shares.
 """
 
 from __future__ import annotations
@@ -38,24 +38,24 @@ SIDE = _record(
 CLOSURE = _record(
     ("row_start", _I),
     ("row_stop", _I),
-    ("path_start", _I),  # its rows of `path`
+    ("path_start", _I),  # range of `path`
     ("path_stop", _I),
     ("group", _I),
 )
 GROUP = _record(
-    ("row_start", _I),  # its rows, and their places in the order of pivots
+    ("row_start", _I),  # range of rows, also in the order of pivots
     ("row_stop", _I),
-    ("column_start", _I),  # its part of `column`
-    ("own_stop", _I),  # where in it shared columns begin
+    ("column_start", _I),  # range of `column`
+    ("own_stop", _I),  # index in it where the shared columns begin
     ("column_stop", _I),
-    ("half", _I),  # where its matrices begin in `half`, `basis` and `former`
+    ("half", _I),  # start index of its matrices in `half`, `basis` and `former`
     ("factor", _I),  # and in `factor`, (rows, rows)
 )
 CLUSTER = _record(
-    ("group_start", _I),  # its groups
+    ("group_start", _I),  # range of groups
     ("group_stop", _I),
-    ("shared", _I),  # speeds that all of them share
-    ("factor", _I),  # where its matrix begins in `shared_factor`, (shared, shared)
+    ("shared", _I),  # number of speeds that the groups share
+    ("factor", _I),  # start index of its matrix in `shared_factor`, (shared, shared)
 )
 ROW = _record(
     ("closure", _I),
@@ -66,16 +66,16 @@ ROW = _record(
 
 @bundle
 class ClosureConstants:
-    """What does not change in a run."""
+    """Constants of a run."""
 
     side: Record  # (C,2) SIDE, A then B
     closure: Record  # (C,) CLOSURE
     row: Record  # (G,) ROW
-    path: Index  # bodies that a load on a closure passes on its way to the ground, tips first
+    path: Index  # bodies between a closure and the ground, outermost first
     group: Record  # (K,) GROUP
     column: Index  # by group, the speeds of the bodies on its paths
     cluster: Record  # (L,) CLUSTER
-    weight: Real  # (G,) what makes rows comparable: 1 for translations, `length` for rotations
+    weight: Real  # (G,) to compare rows: 1 for translations, `length` for rotations
     length: Real  # (1,) m, a length of the scene
 
 
@@ -84,21 +84,21 @@ ROW_STATE = _record(
     ("value", _F),  # g: 0 where the closure is closed (m, or sine of an angle)
     ("rate", _F),  # J u
     ("acceleration", _F),  # J udot + Jdot u
-    ("load", _F),  # what the closure exerts along `direction`
+    ("load", _F),  # constraint load along `direction`
 )
 CLOSURE_STATE = _record(
     ("rotation", _F, (9,)),  # R_A_B
     ("position", _F, (3,)),  # of B in A
     ("world", _F, (9,)),  # R_World_A
-    ("size", _F),  # m, what a row's value is compared with: the scene's length and the distance from the origin
-    ("speed", _F),  # m/s, what its rate is compared with: speeds of the ports, and the fastest of the scene
-    ("former_speed", _F),  # of the last state that a run has accepted, `flexmb.closure.branch`
+    ("size", _F),  # m, scale of row values: the scene's length and the distance from the origin
+    ("speed", _F),  # m/s, scale of row rates: speeds of the ports, and the fastest of the scene
+    ("former_speed", _F),  # `speed` at the last accepted state, `flexmb.closure.branch`
 )
 
 
 @bundle
 class ClosureWorkspace:
-    """What one evaluation writes. One workspace per thread."""
+    """Workspace of an evaluation. One per thread."""
 
     closure: Record  # (C,) CLOSURE_STATE
     row: Record  # (G,) ROW_STATE
@@ -106,42 +106,41 @@ class ClosureWorkspace:
     basis: Real  # likewise, chosen rows: orthonormal in a group's own columns, beside R'^-1 times the shared ones
     factor: Real  # by group (rows, rows) R, upper: B P = Q R in a group's own columns
     shared_factor: Real  # by cluster (shared, shared) C, upper, of `flexmb.closure.clusters`
-    shared: Real  # as many numbers as a cluster has shared speeds at most
+    shared: Real  # scratch, as long as the largest number of shared speeds of a cluster
     chosen: Index  # (G,) by group, rows by pivot; the first `rank` of each are independent
     rank: Index  # (K,) independent rows; -1 until they are counted
-    scratch: Real  # (G,) right sides by place in `chosen`
-    size: Real  # (G,) response of the ports of a row's closure by themselves, `flexmb.closure.sizes`
-    response: Response  # loads on their way inward, and what they move
+    scratch: Real  # (G,) right-hand sides in the order of `chosen`
+    size: Real  # (G,) response of the separate ports of a row's closure, `flexmb.closure.sizes`
+    response: Response  # loads in the inward sweep, and the response to them
     coefficient: Real  # (nu,)
     step: Real  # (nu,) a displacement or a change of speeds
-    former: Real  # `basis` of the last state that a run has accepted, `flexmb.closure.branch`
+    former: Real  # `basis` at the last accepted state, `flexmb.closure.branch`
     former_pivot: Real  # (G,) diagonal of `factor` there
     former_rows: Index  # (G,) `chosen` there
     state: Real  # (nq+nu+1,) that state
-    resolved: Real  # (1,) of the distance to a singular position that a step may cover; 0 where errors choose steps
-    notices: Index  # (1,) what is looked at of steps that are not to be shortened, `flexmb.closure.branch`
-    noticed: Real  # (3,) of the worst that is twice too long: how many times, its end (s), the closure; -1 for none
-    closer: Index  # (1,) whether steps may come closer to where a pivot vanishes than leaps start from
-    vanishing: Real  # (G,) s, by place in `chosen`: when pivots vanish, `flexmb.closure.leap`
-    demand: Real  # (4,G) m/s^2 over sqrt(kg) of rows' responses, likewise: accelerations along rows of Q, by node
-    time: Real  # (2,) of that state, -inf before the first; and from which on `failure` holds
+    resolved: Real  # (1,) part of the distance to a singular position that a step may cover; 0 with error control
+    notices: Index  # (1,) what is recorded of steps that must not be shortened, `flexmb.closure.branch`
+    noticed: Real  # (3,) worst step that is at least twice too long: ratio, its end (s), the closure; -1 for none
+    closer: Index  # (1,) whether steps may come closer to a singular position than leaps start from
+    vanishing: Real  # (G,) s, in the order of `chosen`: when pivots vanish, `flexmb.closure.leap`
+    demand: Real  # (4,G) m/s^2 over sqrt(kg) of row responses, same order: accelerations along rows of Q, by node
+    time: Real  # (2,) time of `state`, -inf before the first; time from which on `failure` holds
     gain: Real  # (2,) stabilisation: g'' + gain[0] g' + gain[1] g = 0
-    failure: Index  # (2,) status of the last projection, and where
+    failure: Index  # (2,) status of the last projection, and the body or closure at fault
 
 
 @bundle
 class Recursion:
-    """No arrays: the articulated quantities in the tree's workspace are all that unit loads need."""
+    """No arrays: unit loads need only the articulated-body quantities in the tree's workspace."""
 
 
 @bundle
 class Closed:
-    """A closed chain as kernels see it: constants and workspaces of its tree (c, w) and its closures (cc, cw).
+    """A closed chain for kernels: constants and workspaces of its tree (c, w) and its closures (cc, cw).
 
-    route: what factorises the mass matrix. Recursion: unit loads are passed through the articulated quantities, and
-    `seen` is w itself. Response or Matrices: closures act as generalised forces J'f, solved for by the innovations of
-    the recursion or by the Cholesky factor of composite bodies, and `seen` is a workspace of its own, in which all
-    bodies have their true shape.
+    route: how the mass matrix is factorised. Recursion: unit loads pass through the articulated-body quantities, and
+    `seen` is w itself. Response or Matrices: closures act as generalised forces J'f, solved by the innovations of the
+    recursion or the Cholesky factor of composite bodies, and `seen` is a separate workspace with deformed bodies.
     """
 
     c: Constants
@@ -158,7 +157,7 @@ class Closed:
 
 
 def workspace(c: ClosureConstants, tree: Constants, coordinates: int) -> ClosureWorkspace:
-    """A workspace of the right sizes for closures on a tree with so many coordinates."""
+    """A workspace for closures on a tree with `coordinates` coordinates."""
     rows, nu = len(c.row), len(tree.speed)
     heights, widths = (c.group[f"{side}_stop"] - c.group[f"{side}_start"] for side in ("row", "column"))
     size = int(heights @ widths)

@@ -1,15 +1,16 @@
-"""Derivatives of a closed chain at given closure loads, exact to round-off: eight columns in one evaluation.
+"""Derivatives of a closed chain at given constraint loads, exact to round-off: eight columns in one evaluation.
 
     w = tangent_workspace(c, nq, nu)
     cw = closure_tangent_workspace(cc)
     status = closed_jacobian(t, y, load, J, c, w, cc, cw)
 
-The loads f of the rows stay as they are, while the directions along which they act turn with the bodies: what is
-differentiated are the tree's accelerations under J(q)'f, and the rates and accelerations of the rows. How the loads
-change, so that the rows' accelerations stay zero, then is a matter of matrices (`flexmb.linear.closed_variations`), or
-of another evaluation (`flexmb.closure.jacobian`).
+The row loads f are constant, while their directions turn with the bodies: the tree's accelerations under J(q)'f are
+differentiated, and the rates and accelerations of the rows. The change of the loads that keeps the row accelerations
+zero then follows by linear algebra (`flexmb.linear.closed_variations`) or by another evaluation
+(`flexmb.closure.jacobian`).
 
-As in `flexmb.entry.tangent` the kernels are compiled once more for duals; of the closures they need no pivots.
+As in `flexmb.entry.tangent`, the kernels are compiled once more for dual numbers. They do not need the pivots of the
+closures.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from flexmb.typing import Record
 
 @bundle
 class ClosureTangentWorkspace:
-    """What rows need, in duals."""
+    """Workspace of the rows, in dual numbers."""
 
     numbers = DUAL
 
@@ -46,7 +47,7 @@ class ClosureTangentWorkspace:
 
 
 def closure_tangent_workspace(cc: ClosureConstants) -> ClosureTangentWorkspace:
-    """What `closed_jacobian` writes; one per thread."""
+    """Make the workspace of `closed_jacobian`; one per thread."""
     return ClosureTangentWorkspace(
         closure=as_duals(np.zeros(len(cc.closure), CLOSURE_STATE)), row=as_duals(np.zeros(len(cc.row), ROW_STATE))
     )
@@ -56,8 +57,8 @@ def closure_tangent_workspace(cc: ClosureConstants) -> ClosureTangentWorkspace:
 def closed_jacobian(t, y, load, J, c, w, cc, cw):
     """J (n+2G,n+1) = d[dy/dt; rows' rates; rows' accelerations]/d[y, t], at y (n,) = [q, u, work] and loads (G,).
 
-    Row by row as `flexmb.entry.tangent.jacobian` orders them; the values themselves are left
-    in w.slope and cw.row. Returns a status code. Columns of prescribed coordinates and speeds vanish.
+    Rows are ordered as in `flexmb.entry.tangent.jacobian`; the values themselves are stored in w.slope and cw.row.
+    Returns a status code. Columns of prescribed coordinates and speeds vanish.
     """
     n, rows, columns = y.shape[0], cc.row.shape[0], w.column.shape[0]
     w.time[0] = t
@@ -98,7 +99,7 @@ def _read_column(J, j, lane, w, cw):
 
 @sweep
 def evaluate(c, w, cc, cw):
-    """Slope of the tree under the rows' loads, and what the rows make of it; a status code."""
+    """Slope of the tree under the row loads, and the resulting row accelerations; returns a status code."""
     load_state(w.time[0], w.state, c, w)
     status = bodies(c, w)
     if status != OK:
@@ -119,7 +120,7 @@ def evaluate(c, w, cc, cw):
 
 @helper
 def _apply(c, w, cc, cw, i):
-    """The loads of closure i on B, and taken from A, added to what their bodies feel."""
+    """Add the loads of closure i to the body of B, and the opposite ones to that of A."""
     F = load_on_b(cc, cw, i)
     _add_load(c, w, cc.side[i, 1], times6_t(mat3(cw.closure[i].rotation, 0), F))
     _add_load(c, w, cc.side[i, 0], scale6(-1.0, shift_force(F, vec3(cw.closure[i].position, 0))))
@@ -127,7 +128,7 @@ def _apply(c, w, cc, cw, i):
 
 @helper
 def _add_load(c, w, side, F):
-    """A load about a port, in port axes, on its body and modes."""
+    """Add a load about a port, in port axes, to its body and modes."""
     if side.body != ON_GROUND:
         on_body = times6(mat3(w.port[side.port].R, 0), F)
         add_port_force(c, w, w, side.body, side.port, scale6(-1.0, on_body))

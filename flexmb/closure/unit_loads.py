@@ -1,9 +1,9 @@
 """Loads on closures as forces on the tree, and the response of the tree to a unit load of every row.
 
-With M = (1 + H Phi K) D (1 + H Phi K)', the loads f of closures on a tree at rest give the rates M^-1 J'f. The
-innovations of J'f are x = D^-1/2 (1 - H Psi K) J'f, Jain & Rodriguez (55), body by body, with the factors that
-`forward_dynamics` leaves in its workspace; x gives the rates by the outward half of (56). Hence J M^-1 J' = B'B of unit
-loads, without M, and a load only passes the bodies between its node and the ground.
+With M = (1 + H Phi K) D (1 + H Phi K)', constraint loads f on a tree at rest cause the accelerations M^-1 J'f. The
+innovations of J'f are x = D^-1/2 (1 - H Psi K) J'f, Jain & Rodriguez (55), found body by body with the factors that
+`forward_dynamics` leaves in its workspace; the accelerations follow from x by the outward sweep (56). Hence
+J M^-1 J' = B'B from unit loads, without M, and a load passes only the bodies between its node and the ground.
 """
 
 from flexmb.closure.factor import row_place
@@ -17,7 +17,7 @@ from flexmb.spatial.vector import mat3, vec3
 
 @helper
 def half_solve(c, w, cc, cw):
-    """x of a unit load of every row into cw.half."""
+    """Write x of a unit load of every row to cw.half."""
     for i in range(cc.closure.shape[0]):
         for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
             apply_unit_load(c, w, cc, cw, i, r)
@@ -26,7 +26,7 @@ def half_solve(c, w, cc, cw):
 
 @sweep
 def pass_inward(c, w, cc, cw, i, x, at):
-    """x of the forces in cw.response on the bodies that loads on closure i pass; from x[at] on, by column."""
+    """x of the forces in cw.response on the path of closure i; by column, from x[at] on."""
     for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
         innovate(c, w, cw.response, cc.path[j])
     write_columns(cc, i, cw.response, x, at)
@@ -34,7 +34,7 @@ def pass_inward(c, w, cc, cw, i, x, at):
 
 @helper
 def write_columns(cc, i, response, x, at):
-    """Speeds of a response, as far as loads on closure i change them, from x[at] on."""
+    """Write the speeds of a response in the columns of closure i to x, from x[at] on."""
     g = cc.closure[i].group
     for j in range(cc.group[g].column_start, cc.group[g].column_stop):
         x[at + j - cc.group[g].column_start] = response.speed[cc.column[j]]
@@ -42,7 +42,7 @@ def write_columns(cc, i, response, x, at):
 
 @helper
 def clear_path(c, cc, cw, i):
-    """No forces in cw.response, as far as loads on closure i change them."""
+    """Set the forces in cw.response to zero on the path of closure i."""
     for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
         clear_body(c, cw.response, cc.path[j])
     g = cc.closure[i].group
@@ -52,7 +52,7 @@ def clear_path(c, cc, cw, i):
 
 @helper
 def apply_unit_load(c, w, cc, cw, i, r):
-    """The unit load of row r of closure i, and no other forces."""
+    """Set the forces to the unit load of row r of closure i alone."""
     clear_path(c, cc, cw, i)
     direction, zero = vec3(cw.row[r].direction, 0), (0.0, 0.0, 0.0)
     apply_load(c, w, cc, cw, i, (direction, zero) if cc.row[r].type == ROTATION else (zero, direction))
@@ -69,6 +69,6 @@ def apply_load(c, w, cc, cw, i, F):
 
 @helper
 def at_port(c, w, cw, side, F):
-    """A load about a port in port axes, as a force on its body and modes."""
+    """Add a load about a port, in port axes, to the forces on its body and modes."""
     if side.body != ON_GROUND:
         push(c, w, cw.response, side.body, side.port, times6(mat3(w.port[side.port].R, 0), F))

@@ -1,1 +1,1 @@
-"""Feedback: sensors, controllers and what they drive, in the same compiled loop as the motion."""
+"""Feedback control: sensors, controllers and actuated loads, in the same compiled loop as the motion."""

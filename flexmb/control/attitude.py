@@ -1,6 +1,6 @@
-"""Laws for the attitude of spacecraft, ready to be named in a scene, as in "flexmb.control.attitude:eigenaxis_slew".
+"""Attitude control laws of spacecraft, to be named in a scene, for example "flexmb.control.attitude:eigenaxis_slew".
 
-They are kernels, not functions of the user's (`flexmb.control.user`): what they reach is known, and they are kept.
+They are kernels and not user functions (`flexmb.control.user`): their dependencies are known, so they can be cached.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from flexmb.jit.kernel import kernel
 
 @kernel
 def eigenaxis_slew(t, inputs, state, parameters, outputs, change):
-    """Three torques in body axes that turn a body about a fixed axis as a profile says, and hold it there.
+    """Three torques in body axes that make a body follow a rotation profile about a fixed axis.
 
     inputs: its orientation to World (4, scalar first), its angular velocity in body axes (3), angle and rate of the
     profile (2). parameters: the axis (3, unit, body axes), stiffness k (3, N m/rad) and damping d (3, N m s/rad) about
@@ -20,7 +20,7 @@ def eigenaxis_slew(t, inputs, state, parameters, outputs, change):
 
         torque = -2 k sign(q_e0) (q_e1, q_e2, q_e3) - d (w - rate axis)
 
-    The motor of a wheel takes it with a gain of -1: its torque on the wheel is the opposite of that on the body.
+    A wheel motor uses the output with a gain of -1, since its torque on the wheel is opposite to that on the body.
     """
     w, x, y, z = inputs[0], inputs[1], inputs[2], inputs[3]
     angle, rate = inputs[7], inputs[8]

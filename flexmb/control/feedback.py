@@ -1,4 +1,4 @@
-"""The feedback of a scene in its runs: the closed loop that integrators see, and what its signals were."""
+"""The feedback of a scene in a run: the closed loop for the integrators, and its signals afterwards."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Index, Real
 
-NEAR = 1e-6  # m, rad: a way by which rates of signals are found where nothing is integrated yet
-SLOWEST = 1e-100  # m/s, rad/s: what is slower is at rest, and its way would take longer than numbers are large
-NOISE = 1e-8  # of that way: what moves by less, while other things move, is at rest
+NEAR = 1e-6  # m, rad: displacement of the finite difference for signal rates before integration starts
+SLOWEST = 1e-100  # m/s, rad/s: slower motion counts as rest, since NEAR over the speed would overflow
+NOISE = 1e-8  # relative to NEAR: a smaller change of a signal counts as zero
 
 
 class Begun(NamedTuple):
-    """What an integrator is given for a run of a closed loop: y = [q, u, x, work] instead of [q, u, work]."""
+    """The initial value problem of a closed loop: y = [q, u, x, work] instead of [q, u, work]."""
 
     problem: Problem | StiffProblem
     y: Real
@@ -39,7 +39,8 @@ class Begun(NamedTuple):
 
 
 class Starting(Protocol):
-    """state: of the motion, with its time; y = [q, u, work], or with the memory of controllers [q, u, x, work]."""
+    """Start of a run. state: of the motion, with its time; y: [q, u, work], or [q, u, x, work] with the memory of
+    controllers."""
 
     @property
     def state(self) -> State: ...
@@ -50,9 +51,9 @@ class Starting(Protocol):
 
 
 class Feedback:
-    """Controllers around a system that is theirs alone: its functions of time are written to.
+    """The controllers of a system. The system must not be shared, since its functions of time are written to.
 
-    `tables`: constants and workspace of the route. Raises SceneError for a function of the user's that cannot be had.
+    `tables`: constants and workspace of the route. Raises SceneError for a user function that cannot be loaded.
     """
 
     def __init__(self, plant: System, algorithm: DynamicsAlgorithm, route: Route, tables: tuple[Any, Any]) -> None:
@@ -85,27 +86,27 @@ class Feedback:
             self._loads = np.zeros((len(plant.observation.names.hinges) + len(plant.scene.closures), 6))
             self._called.append(Called(self._find_loads, ()))
             where[a.ASKING] = self._called[-1].address
-        self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # that of others is for Python to ask for
+        self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # else set by Python
         self._run: a.Loop | None = None
         self._instants, self._end = instants((), 0.0, 0.0, ()), 0.0
-        """Of the last run: all up to its end, which is kept with them."""
+        """Instants of the last run up to its end."""
 
     def with_retraction(self, move: Any) -> None:
-        """For methods on Lie groups too: see `flexmb.integrate.problem.StiffProblem`."""
+        """Add the retraction for Lie-group methods, see `flexmb.integrate.problem.StiffProblem`."""
         self._where[a.RETRACTION], _ = addresses(move, NOTHING, VECTOR, VECTOR, VECTOR, self._tables[0])
 
     def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: Linear | None) -> Begun:
-        """A run, whose controllers start as the scene says, or as they were where a run ended.
+        """Begin a run. Controllers start from their initial states in the scene, or from those at the end of a run.
 
-        linear: of the motion alone, for a method that linearises. Instants that were due before the start are gone:
-        what they put out is remembered, or zero.
+        linear: Jacobian of the motion alone, for methods that linearise. Sampling instants before the start are not
+        executed again: their outputs are taken from the memory, or zero.
         """
         start, t_end, known = begin.state.t, float(clock.times[-1]), begin.controllers
         ends, apart = clock.segment_ends, slack(start, t_end)
         table = instants(self._plant.scene.controllers, start, t_end, ends[np.isfinite(ends)])
         happened = 0 if known is None else int(known.instants[0])
         self._instants, self._end = table, t_end
-        due = table[: max(happened, np.searchsorted(table["time"], t_end))]  # those of the end act after it
+        due = table[: max(happened, np.searchsorted(table["time"], t_end))]  # instants at t_end act after the run
         held = self._rows_for(due)
         for values in self._held.values():
             values[:] = 0.0
@@ -136,16 +137,17 @@ class Feedback:
         return Begun(posed, y, Clock(clock.times, ends, farthest), controlled)
 
     def _start_after_samples(self, t: float, y: Real, made: a.Loop) -> None:
-        """What sampled controllers say from the first instant on is there when continuous ones start."""
+        """Start continuous controllers after the first outputs of sampled controllers are known."""
         loop.project(t, y, made)
         loop.hold(t, y, made)
         loop.start(t, y, made)
         self.raise_trouble()
 
     def conclude(self, t: float, y: Real, anew: bool = False) -> bool:
-        """Let sampled controllers act that are due where a run ends, at y (n,) there: whether there are any.
+        """Execute the sampled controllers that are due at the end of a run, at y (n,); returns whether there are any.
 
-        Integrators evaluate nothing there, unless a run goes on. anew: integration would begin there, after an event.
+        Integrators do not evaluate instants at the end unless the run continues. anew: a new integration would start
+        there, after an event.
         """
         before, table = self.running, self._instants
         if t != self._end or not np.any(table["time"][before.following[0] :] == t):
@@ -154,22 +156,25 @@ class Feedback:
         held[: len(before.held)] = before.held
         self._run = made = self._loop(table, held, float(before.slack[0]))
         made.following[0] = before.following[0]
-        loop.project(t, there, made)  # by which closures learn where they are
+        loop.project(t, there, made)  # also sets the state of the closures
         loop.hold(t, there if anew else y, made)
         self.raise_trouble()
         return True
 
     def _rows_for(self, table: Any) -> Real:
-        """Where what is sampled waits."""
+        """The array in which sampled outputs are held until they are applied."""
         return np.zeros((max(int(np.sum(table["kind"] == a.SAMPLE)), 1), widest(self._wiring.controller)))
 
     def is_sampled(self, signal: str) -> bool:
-        """Whether a signal is what a sampled controller says."""
+        """Whether a signal is an output of a sampled controller."""
         place = self.place_of(signal)
         return any(row["sampled"] and 0 <= place - row["signal"] < row["outputs"] for row in self._wiring.controller)
 
     def look(self, begin: Starting, acts: bool, anew: bool = False) -> LoopMemory:
-        """At one state, as at the only sample of a run that is over; acts: after who is due there, see `conclude`."""
+        """Evaluate the loop at one state, as at the only output time of a finished run.
+
+        acts: after the controllers that are due there have acted, see `conclude`.
+        """
         y = self._only_at(begin)
         if acts:
             self.running.replaying[0] = 0
@@ -179,7 +184,7 @@ class Feedback:
         return known
 
     def signals(self, begin: Starting) -> Real:
-        """(S,) at one state, before who is due there acts."""
+        """(S,) signals at one state, before the sampled controllers that are due there act."""
         y = self._only_at(begin)
         found = np.zeros(len(self.running.signal))
         loop.project(begin.state.t, y.copy(), self.running)
@@ -188,7 +193,8 @@ class Feedback:
         return found
 
     def signal_rates(self, begin: Starting) -> Real:
-        """(S,) per second of what is not sampled, likewise, by a difference over a way of NEAR (m, rad); 0 at rest."""
+        """(S,) rates (1/s) of the signals that are not sampled, by a finite difference over NEAR (m, rad); 0 at rest.
+        """
         t, y = begin.state.t, self._only_at(begin)
         slope, there, ahead = np.zeros(len(y)), np.zeros(len(self.running.signal)), np.zeros(len(self.running.signal))
         loop.project(t, y.copy(), self.running)
@@ -205,10 +211,10 @@ class Feedback:
         return rates
 
     def accelerations(self, begin: Starting) -> Real:
-        """(nu,) at one state, under what controllers say there; DynamicsError where there are none."""
+        """(nu,) accelerations at one state under the controllers; DynamicsError where they do not exist."""
         y, nq, nu = self._only_at(begin), self._plant.nq, self._plant.nu
         slope = np.empty(len(y))
-        loop.project(begin.state.t, y, self.running)  # by which closures learn where they are
+        loop.project(begin.state.t, y, self.running)  # also sets the state of the closures
         status = loop.rhs(begin.state.t, y, slope, self.running, self.running)
         self.raise_trouble()
         self._plant.check_status(status, int(self._tables[1].fault[0]))
@@ -222,26 +228,26 @@ class Feedback:
         return y
 
     def place_of(self, signal: str) -> int:
-        """The number of a signal, "gyro[2]", among all of them."""
+        """The index of a signal, for example "gyro[2]", among all signals."""
         return numbers_of(self._wiring.names, signal)[0]
 
     def watching(self, watch: Watch) -> Watch:
-        """The same that finds these signals: of a run that was begun."""
+        """The same watch with access to the signals of this run, which must have begun."""
         look = pointer(loop.look, STATUS, REAL, VECTOR, VECTOR, self.running)
         return watch._replace(signal=np.zeros(len(self.running.signal)), look=look)
 
     def remember(self) -> LoopMemory:
-        """At the end of a run, before it is replayed."""
+        """The memory of the controllers at the end of a run, before it is replayed."""
         s = self.running
         return LoopMemory(s.signal.copy(), s.state.copy(), s.held.copy(), s.following.astype(float))
 
     def heed(self, stop: Index) -> None:
-        """Let what a Python law raises end the run, by stop[0] = 1."""
+        """Let an exception in a Python law end the run, by stop[0] = 1."""
         for each in self._called:
             each.stop = stop
 
     def raise_trouble(self) -> None:
-        """What a Python law raised, unharmed."""
+        """Raise the original exception of a Python law again."""
         for each in self._called:
             if each.trouble is not None:
                 trouble, each.trouble = each.trouble, None
@@ -249,19 +255,19 @@ class Feedback:
 
     @property
     def continuous_states(self) -> list[int]:
-        """Places in `Loop.state` of the continuous controllers' states x, in their order."""
+        """Indices in `Loop.state` of the continuous controllers' states x, in their order."""
         rows = [row for row in self._wiring.controller if not row["sampled"]]
         return [int(row["state"]) + j for row in rows for j in range(int(row["states"]))]
 
     @property
     def driven(self) -> list[int]:
-        """Numbers of the functions of time that controllers drive."""
+        """Indices of the functions of time that controllers drive."""
         found: list[int] = self._wiring.drive["function"].tolist()
         return found
 
     @property
     def state_names(self) -> list[str]:
-        """Of the continuous controllers' states x, in their order."""
+        """Names of the continuous controllers' states x, in their order."""
         named = zip(self._wiring.controller, self._plant.scene.controllers, strict=True)
         return [
             f"{controller.name}.state[{i}]"
@@ -272,8 +278,8 @@ class Feedback:
 
     @property
     def running(self) -> a.Loop:
-        """Of the last run."""
-        assert self._run is not None  # asked of a run only
+        """The loop of the last run."""
+        assert self._run is not None  # callers have begun a run
         return self._run
 
     @property
@@ -282,17 +288,17 @@ class Feedback:
         return loop.rhs, self.running, self.running
 
     observing = loop.observe
-    """What observes where that was evaluated, by an algorithm that does so in compiled code."""
+    """The kernel that observes the motion where the loop was evaluated, for algorithms that have a compiled one."""
 
     def replay(self) -> None:
-        """From now on the loop shows the run that is over: what sampled controllers put out is read, not found."""
+        """Replay the finished run from now on: outputs of sampled controllers are read back, not computed."""
         self.running.replaying[0] = 1
         self.running.now[0] = np.inf
 
     def course(self, times: Real, states: Real) -> tuple[dict[str, Real], dict[str, Real]]:
-        """Signals by sensor and controller, (T,k), and the power of controllers' outputs (W), likewise.
+        """Signals by sensor and controller, (T,k), and likewise the power of controllers' outputs (W).
 
-        At the states (T,n) of the run that is replayed.
+        They are evaluated at the states (T,n) of the replayed run.
         """
         times, found = times[: len(states)], np.empty((len(states), len(self.running.signal)))
         done = loop.retrace(times, states, self.running, found)
@@ -308,11 +314,11 @@ class Feedback:
 
     @property
     def observation(self) -> Any:
-        """As of the system: what is observed has the same names."""
+        """The observation of the system: names are the same."""
         return self._plant.observation
 
     def observe_row(self, t: float, y: Real, algorithm: Any, row: Real) -> None:
-        """As of the system, with what the controllers said at t."""
+        """Observe one row as the system does, with the controller outputs at t."""
         loop.hold(t, y, self.running)
         self.raise_trouble()
         self._plant.observe_row(t, self.running.y.copy(), algorithm, row)
@@ -324,7 +330,7 @@ class Feedback:
         return bool(np.any(seen | ((kinds >= a.ACCELERATION) & (kinds < a.LOAD))))
 
     def _find_loads(self, t: float) -> None:
-        """Loads at s.y as outputs have them; NaN where there are none, which ends a run that uses them."""
+        """Loads at s.y as in the outputs; NaN where they do not exist, which ends a run that uses them."""
         observation = self._plant.observation
         row = np.zeros((1, observation.width))
         try:
@@ -336,7 +342,7 @@ class Feedback:
         self._drives[:] = found["drives"][0]
 
     def _buffers(self) -> dict[str, Real]:
-        """The arrays that laws read and write, which stay where they are."""
+        """The arrays that laws read and write; their addresses do not change during a run."""
         w = self._wiring
         signals = max((place.stop for place in w.names.values()), default=0)
         return {
@@ -345,7 +351,7 @@ class Feedback:
         }  # fmt: skip
 
     def _callbacks(self) -> list[Called]:
-        """Plain Python laws, their addresses put into the controllers' table."""
+        """Wrap the plain Python laws, and write their addresses to the controllers' table."""
         found, held = list[Called](), self._held
         for i, law in self._wiring.laws.items():
             row = self._wiring.controller[i]
@@ -362,7 +368,7 @@ class Feedback:
         return found
 
     def _tangent(self, linear: Linear, n: int) -> a.LoopTangent:
-        """For the Jacobian of y (n,) = [q, u, x, work], from that of the motion."""
+        """The tables for the Jacobian of y (n,) = [q, u, x, work], from those of the motion."""
         motion, drives = self._plant.nq + self._plant.nu, len(self._wiring.drive)
         read = np.zeros(n - 1, bool)
         read[motion:] = True
@@ -397,7 +403,7 @@ class Feedback:
 
 
 def _with_instants(ends: Real, times: Real, t_end: float) -> Real:
-    """Ends of segments as `Clock` has them, with instants up to t_end (s) among them."""
+    """Ends of segments for `Clock`, merged with the sampling instants up to t_end (s)."""
     equal_steps, inner = not np.isfinite(ends[-1]), times[times < t_end]
     is_end = len(inner) < len(times) or np.sum(ends == t_end) > (0 if equal_steps else 1)
     before = np.union1d(ends[ends < t_end], inner)

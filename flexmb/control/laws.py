@@ -1,6 +1,6 @@
-"""Laws of controllers: outputs, and changes of states, from inputs and states. One helper for each kind.
+"""Control laws: outputs, and changes of states, from inputs and states. One helper for each kind of controller.
 
-A change is the rate of a state, or of a sampled controller its next value.
+A change is the rate of a state; for a sampled controller it is the next value of the state.
 """
 
 import math
@@ -10,14 +10,14 @@ from flexmb.jit.direct import nothing_at, status_at
 from flexmb.jit.kernel import helper, sweep
 from flexmb.tables.status import OK
 
-# Numbers of a PID controller.
+# Indices of the parameters of a PID controller.
 KP, KI, KD, FILTER, LOWER, UPPER, TRACKING, SETPOINT, PERIOD, PID_NUMBERS = range(10)
-INTEGRAL, FILTERED, BEGUN = range(3)  # its states; of a sampled one whether it has acted, too
+INTEGRAL, FILTERED, BEGUN = range(3)  # states; BEGUN, whether it has acted, only of a sampled one
 
 
 @sweep
 def act(t, i, s):
-    """Controller i on s.input and s.state: s.output and s.change; returns a status code."""
+    """Evaluate controller i at s.input and s.state, into s.output and s.change; returns a status code."""
     law = s.controller[i].law
     if law == LINEAR:
         _linear(i, s)
@@ -66,7 +66,7 @@ def _pid(i, s):
     e, filtered = pid_error(i, s), s.state[o.state + FILTERED]
     filter_s, period = s.number[p + FILTER], s.number[p + PERIOD]
     if o.sampled and s.state[o.state + BEGUN] == 0.0:
-        filtered = e  # before its first instant there is no error to differ from
+        filtered = e  # no previous error exists before the first instant
     slope = (e - filtered) / filter_s if filter_s > 0.0 else 0.0
     if filter_s == 0.0 and o.sampled:
         slope = (e - filtered) / period
@@ -93,7 +93,7 @@ def _clamp(i, s):
 
 @helper
 def _lookup(i, s):
-    """Points, then values, are the numbers."""
+    """Linear interpolation; the parameters are the points, then the values."""
     o = s.controller[i]
     n, p = o.numbers // 2, o.number
     x = min(max(s.input[o.input], s.number[p]), s.number[p + n - 1])
@@ -112,7 +112,7 @@ def _lookup(i, s):
 
 @helper
 def _compiled(t, i, s):
-    """A function of the user's, by address."""
+    """Call a user function by its address."""
     o = s.controller[i]
     nothing_at(
         o.function,

@@ -1,14 +1,14 @@
-"""The closed loop across a singular position of a closed chain: the motion leaps (`flexmb.closure.leap`), and with it
-what controllers know.
+"""Leaps of the closed loop over a singular position of a closed chain: motion (`flexmb.closure.leap`) and controllers.
 
-The motion leaps under what is driven before the leap. Then, in turn, states of controllers are integrated in small
-parts along the cubic between both ends, and the motion once more by Lobatto's rule under what is driven there, until
-speeds are known. At the inner nodes that is not what is driven at these instants but what has the same average
-over the leap and the same first moment: they move speeds and coordinates alike, also where a controller comes to a
-limit within the leap or swings faster than the rule resolves.
+The motion first leaps under the drive values at the start of the leap. Then two computations alternate until the
+speeds have converged: the states of controllers are integrated in small substeps along the cubic between both ends,
+and the motion is integrated again by Lobatto's rule under the resulting drives. The drive values at the inner nodes are
+not those at these instants; they are chosen to reproduce the average and first moment over the leap. These have the
+same effect on speeds and coordinates, also where a controller saturates within the leap or oscillates faster than the
+rule resolves.
 
-Where controllers are too fast for this, by themselves or through the motion, or read accelerations, nothing of the leap
-is used, and the run ends before the singular position with the status of one.
+If controllers are too fast for this, alone or in feedback with the motion, or read accelerations, the leap is discarded
+and the run ends before the singular position with the status of a singular position.
 """
 
 from math import inf, nan, sqrt
@@ -24,27 +24,29 @@ from flexmb.jit.direct import real_at, status_at
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import OK
 
-# What is wanted of speeds and of controllers' states, relative: less than the tightest usual tolerance, 1e-10.
+# Relative accuracy of speeds and controller states: below the tightest usual tolerance, 1e-10.
 WANTED = 2.0**-34
-# The longest leap takes 2^-9 of the time in which a mechanism moves as far as it is large. Drives that change as fast
-# as it moves are then wrong by as much at first, and speeds by 2^-18: `FED_BACK` so often makes `WANTED` of it.
+# The longest leap takes 2^-9 of the time in which a mechanism moves by its own size. Drives that change as fast as the
+# mechanism moves have an initial error of this order, and speeds one of 2^-18; `TURNS` iterations with the contraction
+# factor `FED_BACK` reduce it to `WANTED`.
 TURNS = 4
 FED_BACK = 2.0**-4
-# What rounding makes of speeds across the branch, relative: a gap of 2^-50 is 2^-37 of the position across it at a
-# distance of 2^-13, and as much over 2^-13 of its speed, 2^-24, times a few for long chains. Controllers see it.
+# Relative rounding error of speeds normal to the branch, which controllers measure: at a distance of 2^-13 a gap of
+# 2^-50 is a position error of 2^-37, and divided by 2^-13 a speed error of 2^-24; a few times more for long chains.
 ACROSS = 2.0**-20
-# Parts of a leap in which states are integrated at first. A limit that is reached within one spoils the average of a
-# drive by 2^-15 of its change, which is 2^-33 of speeds at most.
+# Initial number of substeps of a leap for controller states. A limit that is reached within a substep changes the
+# average of a drive by 2^-15 of its change, and speeds by 2^-33 at most.
 PARTS = 32
-# And at last: not for accuracy, but so that there is an end. Others only change which controllers end a run.
+# Largest number of substeps, so that the refinement ends; it decides only which fast controllers end a run.
 FINEST = 2048
-# A part of z time constants of a controller corrects its rates by z/2 each time, and errs by z^4/120 of what dies out.
+# A substep of z time constants of a controller corrects its rates by a factor of z/2 in each stage, and has an error of
+# z^4/120 relative to the decaying part.
 SLOW = 0.5 * (120.0 * WANTED) ** 0.25
 
 
 @kernel
 def back(y, s):
-    """Put the last good state of the run into y; returns its time (s), -inf where there is none."""
+    """Copy the last accepted state of the run to y; returns its time (s), -inf if there is none."""
     t = real_at(s.address[a.BACK], (s.y, s.address[a.CONSTANTS]))
     if t > -inf:
         give(s.y, s.good, s, y)
@@ -53,7 +55,7 @@ def back(y, s):
 
 @kernel
 def leap(end, y, dy, y_new, dy_new, s):
-    """Leap as the motion does: see `flexmb.closure.leap.leap`; y, dy, y_new and dy_new = [q, u, x, work] (n,)."""
+    """Leap with controllers; as `flexmb.closure.leap.leap`, but y, dy, y_new and dy_new = [q, u, x, work] (n,)."""
     t = real_at(s.address[a.BACK], (s.before, s.address[a.CONSTANTS]))
     if s.stuck[0] or not t > -inf or _slope(t, y, dy, s) != OK:
         return 0.0
@@ -73,7 +75,7 @@ def leap(end, y, dy, y_new, dy_new, s):
 
 @helper
 def _slope(t, y, dy, s):
-    """dy at y, under what continuous controllers say there; returns a status code."""
+    """dy at y under the outputs of the continuous controllers there; returns a status code."""
     take(y, s)
     status = OK
     if s.continuous[0]:
@@ -86,7 +88,7 @@ def _slope(t, y, dy, s):
 
 @helper
 def _put(of_motion, y):
-    """[q, u, work] into y = [q, u, x, work]."""
+    """Copy [q, u, work] into y = [q, u, x, work]."""
     m = of_motion.shape[0] - 1
     for i in range(m):
         y[i] = of_motion[i]
@@ -95,7 +97,7 @@ def _put(of_motion, y):
 
 @helper
 def _follow(step, y, dy, y_new, dy_new, s):
-    """y_new and dy_new with controllers, from those of the motion under what was driven before; whether they settle."""
+    """Iterate y_new and dy_new with controllers, from those under the drives before the leap; whether they converge."""
     effect, former = inf, np.empty(s.drive.shape[0])
     for i in range(s.y.shape[0] - 1, y.shape[0] - 1):
         y_new[i], dy_new[i] = y[i], dy[i]
@@ -117,7 +119,7 @@ def _follow(step, y, dy, y_new, dy_new, s):
 
 @helper
 def _carry(step, y, dy, y_new, dy_new, s):
-    """x along the leap into y_new, and what is driven into s.driven; whether parts are short enough."""
+    """Integrate x along the leap into y_new, and the drives into s.driven; whether the substeps are short enough."""
     parts = PARTS
     while parts <= FINEST:
         if _carry_in(parts, step, y, dy, y_new, dy_new, s):
@@ -129,7 +131,8 @@ def _carry(step, y, dy, y_new, dy_new, s):
 
 @helper
 def _carry_in(parts, step, y, dy, y_new, dy_new, s):
-    """The same by the classical rule in so many parts; s.driven has average and first moment at the inner nodes."""
+    """As `_carry`, by the classical Runge-Kutta rule in `parts` substeps; rows 1 and 2 of s.driven get the average and
+    the first moment."""
     n, m = y.shape[0], s.y.shape[0] - 1
     trial, k, x, part = np.empty(n), np.zeros((4, n)), np.empty(n), (step.end - step.start) / parts
     for i in range(m, n - 1):
@@ -167,7 +170,7 @@ def _carry_in(parts, step, y, dy, y_new, dy_new, s):
 
 @helper
 def _is_slow(k, x, part, h, m, s):
-    """Whether the second and third rates in a part are close: of each controller, they differ by its states alone."""
+    """Whether the second and third stage rates of a substep are close: they differ only by the controller's states."""
     for i in range(s.controller.shape[0]):
         o = s.controller[i]
         if not o.sampled:
@@ -183,7 +186,7 @@ def _is_slow(k, x, part, h, m, s):
 
 @helper
 def _place_drives(s):
-    """Rows 1 and 2 of s.driven: values at the inner nodes by which Lobatto's rule has this average, first moment."""
+    """Replace average and first moment in rows 1 and 2 of s.driven by equivalent values at Lobatto's inner nodes."""
     for d in range(s.drive.shape[0]):
         inner = (s.driven[1, d] - EDGE_WEIGHT * (s.driven[0, d] + s.driven[3, d])) / INNER_WEIGHT
         moment = (s.driven[2, d] - EDGE_WEIGHT * s.driven[3, d]) / INNER_WEIGHT
@@ -193,7 +196,7 @@ def _place_drives(s):
 
 @helper
 def _arrive(t, y, dy, s):
-    """dy at the end of the leap, y, once that is closed; returns a status code."""
+    """dy at the end of the leap, y, after projection; returns a status code."""
     take(y, s)
     status = steer(t, s)
     if status == OK:
@@ -205,7 +208,7 @@ def _arrive(t, y, dy, s):
 
 @helper
 def _effect(step, former, dy, s):
-    """What the change of drives does to speeds in the leap, relative to them: at its end, where dy is the slope."""
+    """Relative effect of the change of drives on the speeds at the end of the leap, where dy is the slope."""
     for d in range(former.shape[0]):
         s.function[s.drive[d].function].data[0] = former[d]
     if _slope_beside(step.end, s) != OK:
@@ -219,13 +222,13 @@ def _effect(step, former, dy, s):
 
 @helper
 def _slope_beside(t, s):
-    """s.dy on whichever side of the singular position; s.y is closed to rounding."""
+    """s.dy on either side of the singular position, after s.y is projected to round-off."""
     return status_at(s.address[a.BESIDE], (t, s.y, s.dy, s.address[a.CONSTANTS]))
 
 
 @helper
 def _move(step, y, dy, y_new, dy_new, s):
-    """q, u and work of y_new by Lobatto's rule, under what is driven at its nodes; returns a status code."""
+    """q, u and work of y_new by Lobatto's rule under the drives at its nodes; returns a status code."""
     h, n, m = step.end - step.start, y.shape[0], s.y.shape[0] - 1
     inner, total = np.empty(n), np.empty(n)
     for i in range(n):

@@ -1,7 +1,7 @@
-"""What a law "module:function" is, found in the text of its module: to import a module is to run it.
+"""Static check of a law "module:function" in the source of its module, since importing a module executes it.
 
-Only what the text says plainly is decided here. A module without text (compiled, built in), and names that are made
-otherwise than by `def`, are left to the import.
+Only definite faults are reported. Modules without source (compiled, built in), and names that are bound otherwise than
+by `def`, are left to the import.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from collections.abc import Iterator, Sequence
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
-BOUND_BY_HAND = ("globals", "exec", "setattr", "vars", "locals")  # what makes names that no text shows
-DEEPEST = 8  # modules in a row that import the name from one another
+BOUND_BY_HAND = ("globals", "exec", "setattr", "vars", "locals")  # calls that bind names dynamically
+DEEPEST = 8  # limit of successive re-exports of a name
 
 
 def fault(module: str, name: str, arguments: int, depth: int = 0) -> str | None:
-    """Why "module:name" can be no function of so many arguments, by the text alone; None where that cannot be told."""
+    """Why "module:name" cannot be a function of that many arguments, by its source; None if that cannot be told."""
     if module in sys.modules:
-        return None  # what it runs, it has run
+        return None  # already imported: another import executes nothing
     found = _spec(module)
     if found is None:
         return f"No module named {module!r}"
@@ -45,7 +45,7 @@ def fault(module: str, name: str, arguments: int, depth: int = 0) -> str | None:
 
 
 def _spec(module: str) -> ModuleSpec | None:
-    """As Python's own search along sys.path, but for the parents, which that would import."""
+    """Search along sys.path as Python does, but without importing parent packages."""
     path: Sequence[str] | None = None
     parts, found = module.split("."), None
     for count in range(1, len(parts) + 1):
@@ -73,11 +73,11 @@ def _parsed(spec: ModuleSpec) -> ast.Module | None:
     try:
         return ast.parse(Path(spec.origin).read_bytes())
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
-        return None  # the import says it better
+        return None  # the import gives a better message
 
 
 def _makes_names(tree: ast.Module) -> bool:
-    """Whether names may come from elsewhere: `from m import *`, `__getattr__`, `globals()`."""
+    """Whether names may be bound dynamically: `from m import *`, `__getattr__`, `globals()`."""
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and any(each.name == "*" for each in node.names):
             return True
@@ -89,7 +89,7 @@ def _makes_names(tree: ast.Module) -> bool:
 
 
 def _bindings(body: Sequence[ast.stmt], name: str) -> Iterator[ast.stmt]:
-    """The statements at the top of a module, those in its branches and blocks among them, that bind a name."""
+    """The statements at module level, also inside branches and blocks, that bind a name."""
     for statement in body:
         match statement:
             case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
@@ -113,7 +113,7 @@ def _binds(node: ast.AST, name: str) -> bool:
 
 
 def _replaced(function: ast.FunctionDef) -> bool:
-    """Whether a decorator may make something else of it; that of flexmb does not change its arguments."""
+    """Whether a decorator may replace the function; flexmb's own decorator keeps the arguments."""
     names = {ast.unparse(each).rpartition(".")[2] for each in function.decorator_list}
     return bool(names - {"user_function"})
 

@@ -1,11 +1,12 @@
-"""The closed loop: the mechanics' right-hand side with controllers around it, as integrators see it.
+"""The right-hand side of the closed loop for integrators: the equations of motion with controllers.
 
-What controllers say is the value of functions of time of the mechanics, `Loop.drive`: any right-hand side takes it as a
-torque or force, and knows of no controllers. Sampled controllers act where an integrator evaluates the right-hand side
-at their instant for the first time. Instants are ends of segments (`flexmb.integrate.problem.Clock`), before which
-integrators evaluate nothing at or after them: that first evaluation is at the state that the run has reached there.
+Controller outputs are the values of functions of time of the mechanics, `Loop.drive`: every right-hand side uses them
+as torques or forces and needs no knowledge of controllers. Sampled controllers act at the first evaluation of the
+right-hand side at their instant. Instants are ends of segments (`flexmb.integrate.problem.Clock`), and integrators
+evaluate nothing at or beyond the end of a segment before they have reached it: the first evaluation at an instant is at
+the state of the run there.
 
-A loop is passed as constants and as workspace: `s`, and the `same` once more.
+A loop holds constants and workspace; it is passed for both arguments, as `s` and `same`.
 """
 
 from flexmb.control import tables as a
@@ -33,28 +34,28 @@ def rhs(t, y, dy, s, same):
 
 @kernel
 def project(t, y, s):
-    """Put the mechanics' part of y on its manifold."""
+    """Project the mechanical part of y on its manifold."""
     settle(t, y, s)
 
 
 @kernel
 def move(y, increment, result, s):
-    """Coordinates of result = q o exp(increment), as of the mechanics alone; increments of x move none."""
+    """Coordinates of result = q o exp(increment), as for the mechanics alone; increments of x have no effect."""
     nothing_at(s.address[a.RETRACTION], (y, increment, result, s.address[a.CONSTANTS]))
 
 
 @kernel
 def observe(s, same, out):
-    """What the mechanics' kernel observes where `rhs` was just evaluated."""
+    """Observe with the mechanics' kernel where `rhs` was just evaluated."""
     nothing_at(s.address[a.OBSERVING], (s.address[a.CONSTANTS], s.address[a.WORKSPACE], out))
 
 
 @kernel
 def start(t, y, s):
-    """Begin a run at t and y: filters of continuous PID controllers stand at the first error, that of what those before
-    them say there. Those of sampled ones stand at the error of their first instant (`flexmb.control.laws`).
+    """Begin a run at t and y, and write the continuous controllers' states to y.
 
-    Puts the continuous controllers' states into y.
+    Derivative filters of continuous PID controllers start at the initial error, which may depend on the outputs of
+    controllers listed before. Those of sampled ones start at the error of their first instant (`flexmb.control.laws`).
     """
     take(y, s)
     measure_motion(t, s)
@@ -65,7 +66,7 @@ def start(t, y, s):
             if o.law == a.PID:
                 s.state[o.state + FILTERED] = pid_error(i, s)
             if act(t, i, s) != OK:
-                break  # so it does in the first evaluation, which says it
+                break  # the first evaluation fails too, and reports it
             for j in range(o.outputs):
                 s.signal[o.signal + j] = s.output[o.output + j]
     give(s.y, s.state, s, y)
@@ -73,7 +74,7 @@ def start(t, y, s):
 
 @kernel
 def retrace(times, states, s, course):
-    """Signals (T,S) at the output times (T,) of a run that is over, from its states (T,n); how many could be found."""
+    """Signals (T,S) of a finished run at its output times (T,), from its states (T,n); returns how many were found."""
     for sample in range(times.shape[0]):
         t = times[sample]
         take(states[sample], s)
@@ -90,14 +91,14 @@ def retrace(times, states, s, course):
 
 @kernel
 def hold(t, y, s):
-    """Have the functions of the mechanics say what the controllers say at t, at y; returns a status code."""
+    """Set the functions of the mechanics to the controller outputs at t and y; returns a status code."""
     take(y, s)
     return _set(t, s)
 
 
 @kernel
 def look(t, y, signal, s):
-    """All signals (S,) at t and y, between instants; a status code."""
+    """All signals (S,) at t and y, between instants; returns a status code."""
     take(y, s)
     status = _look(t, s)
     for i in range(signal.shape[0]):
@@ -107,7 +108,7 @@ def look(t, y, signal, s):
 
 @kernel
 def respond(t, s):
-    """What continuous controllers make of the signals of sensors and of their states, as they are; a status code."""
+    """Evaluate continuous controllers for the present sensor signals and states; returns a status code."""
     status = _act_continuously(t, s)
     _drive(s)
     return status
@@ -115,7 +116,7 @@ def respond(t, s):
 
 @helper
 def settle(t, y, s):
-    """Put the mechanics' part of y on its manifold; states of controllers are kept beside the last good state there."""
+    """Project the mechanical part of y on its manifold, and keep the controller states with the last accepted state."""
     take(y, s)
     nothing_at(s.address[a.MANIFOLD], (t, s.y, s.address[a.CONSTANTS]))
     if s.address[a.BACK] and real_at(s.address[a.BACK], (s.before, s.address[a.CONSTANTS])) == t:
@@ -125,14 +126,14 @@ def settle(t, y, s):
 
 @helper
 def keep_good(s):
-    """States of controllers, for those beside the last good state of the motion."""
+    """Store the controller states with the last accepted state of the motion."""
     for i in range(s.state.shape[0]):
         s.good[i] = s.state[i]
 
 
 @helper
 def _set(t, s):
-    """What controllers drive, as it is at t; returns a status code. Without continuous ones nobody looks at sensors."""
+    """Set the drive values at t; returns a status code. Sensors are evaluated only for continuous controllers."""
     status = _keep_time(t, s)
     if status == OK and s.continuous[0]:
         return steer(t, s)
@@ -142,7 +143,7 @@ def _set(t, s):
 
 @sweep
 def take(y, s):
-    """s.y = [q, u, work] and the continuous controllers' states from y = [q, u, x, work]."""
+    """Split y = [q, u, x, work] into s.y = [q, u, work] and the continuous controllers' states."""
     n = s.y.shape[0] - 1
     for i in range(n):
         s.y[i] = y[i]
@@ -156,7 +157,7 @@ def take(y, s):
 
 @sweep
 def give(of_mechanics, of_controllers, s, y):
-    """The other way round, for states or their rates."""
+    """Join states of mechanics and controllers, or their rates, to y = [q, u, x, work]."""
     n = s.y.shape[0] - 1
     for i in range(n):
         y[i] = of_mechanics[i]
@@ -170,7 +171,7 @@ def give(of_mechanics, of_controllers, s, y):
 
 @helper
 def _keep_time(t, s):
-    """All instants up to t that have not been; returns a status code."""
+    """Execute all pending instants up to t; returns a status code."""
     reached = t
     if s.replaying[0]:
         if t < s.now[0]:
@@ -199,7 +200,7 @@ def _keep_time(t, s):
 
 @helper
 def _rewind(s):
-    """To before the first instant."""
+    """Go back to before the first instant."""
     s.following[0] = 0
     for i in range(s.controller.shape[0]):
         if s.controller[i].sampled:
@@ -209,7 +210,7 @@ def _rewind(s):
 
 @helper
 def _look(t, s):
-    """Everything that a sampled controller may read at t: sensors of all kinds, and continuous controllers."""
+    """Evaluate everything that a sampled controller may read at t: all sensors and the continuous controllers."""
     status = steer(t, s)
     if status == OK and s.has_at_once[0]:
         status = accelerate(t, s)
@@ -220,7 +221,7 @@ def _look(t, s):
 
 @helper
 def _sample(t, i, row, s):
-    """Let controller i act; its outputs wait in a row of s.held."""
+    """Execute controller i; its outputs are held in a row of s.held."""
     o = s.controller[i]
     _gather(i, s)
     status = act(t, i, s)
@@ -233,14 +234,14 @@ def _sample(t, i, row, s):
 
 @helper
 def _put_out(i, row, s):
-    """What waits there is what controller i says from now on."""
+    """Apply the held outputs in this row as those of controller i."""
     for j in range(s.controller[i].outputs):
         s.signal[s.controller[i].signal + j] = s.held[row, j]
 
 
 @helper
 def _gather(i, s):
-    """Inputs of controller i from the signals."""
+    """Copy the inputs of controller i from the signals."""
     o = s.controller[i]
     for j in range(o.inputs):
         s.input[o.input + j] = s.signal[s.wire[o.input + j]]
@@ -248,9 +249,10 @@ def _gather(i, s):
 
 @sweep
 def steer(t, s):
-    """Sensors, continuous controllers, and what they drive; returns a status code.
+    """Evaluate sensors, continuous controllers and drives; returns a status code.
 
-    What depends on forces at once is not known yet: it reaches outputs through states only, and is zero here.
+    Signals that depend directly on the forces are not known yet and are zero here; they reach outputs only through
+    controller states.
     """
     measure_motion(t, s)
     if s.follows[0]:
@@ -262,7 +264,7 @@ def steer(t, s):
 
 @helper
 def _drive(s):
-    """Functions of time of the mechanics, whose values are signals."""
+    """Set the functions of time of the mechanics that are driven by signals."""
     for i in range(s.drive.shape[0]):
         s.function[s.drive[i].function].data[0] = s.drive[i].gain * s.signal[s.drive[i].signal]
 
@@ -291,12 +293,12 @@ def _act_continuously(t, s):
 
 @helper
 def accelerate(t, s):
-    """The mechanics' right-hand side: s.dy."""
+    """Evaluate the mechanics' right-hand side into s.dy."""
     return status_at(s.address[a.MOTION], (t, s.y, s.dy, s.address[a.CONSTANTS], s.address[a.WORKSPACE]))
 
 
 @helper
 def follow(t, s):
-    """Rates of controllers that read what depends on forces at once, now that it is known."""
+    """Evaluate the rates of controllers that read signals with direct dependence on the forces."""
     measure_at_once(t, s)
     return _act_continuously(t, s)

@@ -1,4 +1,4 @@
-"""What sensors measure at y = [q, u, work] in s.y, into s.signal."""
+"""Evaluation of sensors at y = [q, u, work] in s.y, into s.signal."""
 
 from flexmb.control import tables as a
 from flexmb.jit.direct import nothing_at, status_at
@@ -7,12 +7,12 @@ from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.vector import dot, mat3, store3, sub, times_t, vec3
 from flexmb.tables.functions import evaluate
 
-_R, _VELOCITY, _ACCELERATION = 3, 12, 18  # places in the row of a marker
+_R, _VELOCITY, _ACCELERATION = 3, 12, 18  # indices in the row of a marker
 
 
 @helper
 def measure_motion(t, s):
-    """All sensors that follow from coordinates, speeds and time."""
+    """Evaluate all sensors that depend only on coordinates, speeds and time."""
     if s.has_markers[0]:
         see_markers(t, s)
     for i in range(s.sensor.shape[0]):
@@ -22,14 +22,14 @@ def measure_motion(t, s):
 
 @sweep
 def measure_at_once(t, s):
-    """All others, where the equations of motion were just evaluated: s.dy, and the mechanics' workspace."""
+    """Evaluate all other sensors, where the equations of motion were just evaluated: s.dy, the mechanics' workspace."""
     first = s.y.shape[0] - 1 - s.rates.shape[0]
     for j in range(s.rates.shape[0]):
         s.rates[j] = s.dy[first + j]
     if s.address[a.OBSERVING]:
         nothing_at(s.address[a.OBSERVING], (s.address[a.CONSTANTS], s.address[a.WORKSPACE], s.address[a.OUTPUTS]))
     if s.address[a.ASKING]:
-        status_at(s.address[a.ASKING], (t,))  # what Python raises ends the run by itself
+        status_at(s.address[a.ASKING], (t,))  # an exception in Python ends the run by itself
     if s.has_markers[0]:
         see_markers(t, s)
     for i in range(s.sensor.shape[0]):
@@ -39,7 +39,7 @@ def measure_at_once(t, s):
 
 @helper
 def see_markers(t, s):
-    """Rows of all markers into s.markers, with the accelerations in s.rates."""
+    """Evaluate the rows of all markers into s.markers, with the accelerations in s.rates."""
     nothing_at(
         s.address[a.MARKERS],
         (t, s.y, s.address[a.TREE], s.address[a.TREE_WORKSPACE], s.address[a.OUTPUTS]),
@@ -75,7 +75,7 @@ def _measure(t, i, s):
 
 @helper
 def _distance(row_a, row_b):
-    """Of two markers, and its rate; where they are at one place the rate is that of a distance that grows."""
+    """Distance of two markers, and its rate; where they coincide, the rate is the relative speed."""
     along, moving = sub(vec3(row_b, 0), vec3(row_a, 0)), sub(vec3(row_b, _VELOCITY + 3), vec3(row_a, _VELOCITY + 3))
     length = sqrt(dot(along, along))
     return length, dot(along, moving) / length if length > 0.0 else sqrt(dot(moving, moving))
@@ -83,7 +83,7 @@ def _distance(row_a, row_b):
 
 @helper
 def _store_vector(kind, axes, row, s, first):
-    """A vector of a marker, World axes or its own."""
+    """Store a vector of a marker, in World axes or its own."""
     v = vec3(row, 0)
     if kind == a.ANGULAR_VELOCITY:
         v = vec3(row, _VELOCITY)
@@ -102,7 +102,7 @@ def _store_vector(kind, axes, row, s, first):
 
 @helper
 def _store_quaternion(row, signal, first):
-    """Of R_World_marker, by the largest of its four components, then the scalar one not negative."""
+    """Store the quaternion of R_World_marker, found by its largest component, with a nonnegative scalar part."""
     xx, xy, xz = row[_R], row[_R + 1], row[_R + 2]
     yx, yy, yz = row[_R + 3], row[_R + 4], row[_R + 5]
     zx, zy, zz = row[_R + 6], row[_R + 7], row[_R + 8]

@@ -1,4 +1,4 @@
-"""What controllers know at the end of a run, so that it can be taken up there."""
+"""The memory of controllers at the end of a run, so that the run can be resumed there."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from flexmb.typing import Real
 
 
 class LoopMemory(NamedTuple):
-    """signal (S,) and state of all controllers as `flexmb.control.tables.Loop` has them; held (rows,m): what sampled
-    ones put out since t = 0; instants (1,): how many there have been."""
+    """signal (S,) and state of all controllers, laid out as in `flexmb.control.tables.Loop`; held (rows,m): outputs of
+    sampled controllers since t = 0; instants (1,): number of executed instants."""
 
     signal: Real
     state: Real

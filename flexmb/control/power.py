@@ -1,4 +1,4 @@
-"""The power of what controllers drive: of each of their outputs, wherever it acts."""
+"""The power of controller outputs: of each output, summed over everything that it drives."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexmb.typing import Index, Real, Record
 
 
 def powers(system: System, times: Real, states: Real, drives: Record, signals: Real) -> Real:
-    """(T,S) W that goes into the motion by each of the signals (T,S), at times (T,) and states (T,n) = [q, u, ...]."""
+    """(T,S) power (W) of each of the signals (T,S) on the motion, at times (T,) and states (T,n) = [q, u, ...]."""
     c, found = system.constants, np.zeros_like(signals)
     loads = np.flatnonzero(np.isin(c.load["function"], drives["function"]))
     connectors = np.flatnonzero(np.isin(c.connector["function"], drives["function"]))
@@ -32,7 +32,7 @@ def powers(system: System, times: Real, states: Real, drives: Record, signals: R
 
 
 def _motion(system: System, times: Real, states: Real, ports: Index) -> Real:
-    """(T,P,24) rows of ports as of markers; zeros for those on the ground."""
+    """(T,P,24) rows of ports, laid out as those of markers; zeros for ports on the ground."""
     c, found = system.constants, np.zeros((len(times), len(ports), 24))
     moving = np.flatnonzero(ports >= 0)
     if not len(moving):

@@ -1,4 +1,4 @@
-"""When sampled controllers act: their instants in one order, as a table."""
+"""The schedule of sampled controllers: a table of their instants in order of time."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from flexmb.scene.control import Controller
 from flexmb.typing import Real, Record
 
 MOST = 10_000_000
-"""Instants of a run, at most: their table takes 0.4 GB."""
-TOGETHER = 1e-12  # of the run's time: instants this close are one, for they differ by the rounding of k * period
+"""Largest number of instants in a run: their table takes 0.4 GB."""
+TOGETHER = 1e-12  # relative to the run's time: closer instants are merged, since k * period is rounded
 
 
 def slack(t_start: float, t_end: float) -> float:
-    """Instants this close (s) are one."""
+    """Largest difference (s) of instants that are merged."""
     return TOGETHER * max(abs(t_start), abs(t_end))
 
 
 def instants(controllers: Sequence[Controller], t_start: float, t_end: float, fixed: Sequence[float]) -> Record:
-    """INSTANT records up to t_end (s), in time; where one comes together with a `fixed` time (s) it is that.
+    """INSTANT records up to t_end (s), in order of time; one that coincides with a `fixed` time (s) takes that value.
 
-    They are counted from t = 0, those before t_start (s) included, so that a run can be taken up. Of one time, what was
-    waiting is applied first, then controllers act in the order of the scene. Samples have rows from 0 in the order in
-    which they are taken, so that a run that goes on farther finds the same ones. ValueError for more than MOST.
+    They are counted from t = 0, those before t_start (s) included, so that a run can be resumed. At equal times, held
+    outputs are applied first, then controllers act in the order of the scene. Samples have rows from 0 in the order in
+    which they are taken, so that a longer run has the same rows. ValueError for more than MOST.
     """
     parts = [_of_one(i, controller, t_end) for i, controller in enumerate(controllers) if controller.period_s]
     if not parts:
@@ -39,7 +39,7 @@ def instants(controllers: Sequence[Controller], t_start: float, t_end: float, fi
 
 
 def _number(table: Record) -> None:
-    """Rows of samples as they come, in place of those counted for each controller; outputs have their samples'."""
+    """Number the samples of all controllers in order of time; an output takes the row of its sample."""
     sampled = table["kind"] == SAMPLE
     rows = np.cumsum(sampled) - 1
     for controller in np.unique(table["controller"]):
@@ -52,8 +52,8 @@ def _of_one(i: int, controller: Controller, t_end: float) -> Record:
     number = max(0, int(np.floor((t_end - controller.offset_s) / period * (1.0 + TOGETHER))) + 1)
     if number > MOST:
         raise ValueError(
-            f'controller "{controller.name}" would act {number} times in {t_end:g} s, and {MOST} are allowed: run the '
-            "time in pieces, or make it continuous"
+            f'controller "{controller.name}" would act {number} times in {t_end:g} s, and {MOST} are allowed: divide '
+            "the run, give a longer period, or make the controller continuous"
         )
     table = np.zeros(number, INSTANT)
     table["time"], table["controller"] = controller.offset_s + period * np.arange(number), i
@@ -67,7 +67,7 @@ def _of_one(i: int, controller: Controller, t_end: float) -> Record:
 
 
 def _together(times: Real, fixed: Real, gap: float) -> Real:
-    """Times of which those that differ by a gap are the same: a fixed one where there is one, else the first."""
+    """Times in which those closer than a gap are merged: into a fixed time if there is one, else into the first."""
     every = np.concatenate([fixed, times])
     order = np.argsort(every, kind="stable")
     ascending, is_fixed = every[order], order < len(fixed)

@@ -2,9 +2,9 @@
 
     J = df/dy with the drives s held  +  df/ds ds/dy,     dx'/dy the rates of the controllers' states
 
-The motion's own part is exact (`flexmb.entry.tangent`), and so is df/ds but for rounding, as forces are linear in what
-is driven. What sensors and laws make of y is differenced: a law of the user's takes nothing but numbers. Iterations end
-where the equations are fulfilled, so that they end at the same place as with an exact Jacobian.
+The part of the motion is exact (`flexmb.entry.tangent`), and so is df/ds up to rounding, since forces are linear in the
+drives. Sensors and laws are differentiated by finite differences, since user laws accept only plain numbers. Newton
+iterations converge to the same solution as with an exact Jacobian, since they end when the equations are fulfilled.
 """
 
 from flexmb.control import tables as a
@@ -13,8 +13,8 @@ from flexmb.jit.direct import status_at
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import OK
 
-STEP = 2.0**-17  # of central differences, in SI units or relative: its square and rounding over it are below 1e-10
-LARGE = 2.0**20  # change of a drive, whose effect is linear: beside it the rounding of all others is nothing
+STEP = 2.0**-17  # of central differences, in SI units or relative: its square and 2^-53 / STEP are below 1e-10
+LARGE = 2.0**20  # change of a drive, whose effect is linear: large, so that rounding of other loads is negligible
 
 
 @kernel
@@ -51,7 +51,7 @@ def jacobian(t, y, J, s, w):
 
 @helper
 def _effects(t, s, w):
-    """Rows of w.effect: d[q, u, work]'/ds of each drive s; returns a status code."""
+    """Compute the rows of w.effect: d[q, u, work]'/ds of each drive s; returns a status code."""
     status = accelerate(t, s)
     for i in range(s.dy.shape[0]):
         w.slope[i] = s.dy[i]
@@ -69,7 +69,7 @@ def _effects(t, s, w):
 
 @helper
 def _spread(of_motion, J):
-    """J of the motion, in which nothing depends on work, with rows and columns of zeros for x."""
+    """Copy the motion's Jacobian to J with zero rows and columns for x; nothing depends on work."""
     m, n = of_motion.shape[0] - 1, J.shape[0]
     for i in range(n):
         for j in range(n):
@@ -82,7 +82,7 @@ def _spread(of_motion, J):
 
 @helper
 def _see(t, y, s, seen):
-    """What is driven at y, then the rates of x, into `seen`; returns a status code."""
+    """Write the drive values at y, then the rates of x, to `seen`; returns a status code."""
     take(y, s)
     status = steer(t, s)
     if status == OK and s.follows[0]:
@@ -102,7 +102,7 @@ def _see(t, y, s, seen):
 
 @helper
 def _add_column(place, factor, J, s, w):
-    """The effects of y[place] by way of the controllers."""
+    """Add the effects of y[place] through the controllers to J."""
     drives, m, n = s.drive.shape[0], s.y.shape[0] - 1, J.shape[0]
     for d in range(drives):
         change = factor * (w.ahead[d] - w.behind[d])

@@ -1,11 +1,11 @@
-"""Laws of the user's own: functions by name, compiled or plain.
+"""User-defined control laws: functions by name, compiled or plain Python.
 
     @fm.user_function
     def damper(t, inputs, state, parameters, outputs, change):
         outputs[0] = -parameters[0] * inputs[0]
 
-A compiled one is called from the compiled loop, at the cost of a call; the mechanics is not compiled anew. A plain
-Python function is called from there too, which takes some microseconds, and what it raises ends the run and is raised
+A compiled law is called from the compiled loop at the cost of a function call; the mechanics is not recompiled. A plain
+Python function is called from there too, which takes some microseconds; an exception in it ends the run and is raised
 again.
 """
 
@@ -34,17 +34,18 @@ _callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_double)
 def user_function(law: Callable[..., None]) -> Any:
     """Mark law(t, inputs, state, parameters, outputs, change) to be compiled; a decorator.
 
-    t (s) and five arrays of floats: the inputs of its controller, its state, the numbers `parameters`; it writes
-    `outputs` and `change`, the rates of the state, or where it has a period the next state. It uses what numba
-    compiles, and returns nothing. Errors are not raised in compiled code: a number that is not finite ends the run.
+    t is the time (s); the other arguments are arrays of floats: the inputs of the controller, its state, `parameters`,
+    and `outputs` and `change`, which the law writes. `change` holds the rates of the state or, if the controller has a
+    period, the next state. The law must be compilable by numba and returns nothing. Errors are not raised in compiled
+    code: a number that is not finite ends the run.
     """
     return foreign(law)
 
 
 def found(address: str, scene: str, place: Place) -> Any:
-    """The function "module:name"; SceneError where it cannot be imported, takes other arguments, or is forbidden.
+    """The function "module:name"; SceneError if it cannot be imported, takes other arguments, or is forbidden.
 
-    To import a module is to run it: what its text says to be no such function is refused before.
+    Since importing a module executes it, faults that its source shows are reported before the import.
     """
     if forbidden := refusal(address):
         raise SceneError(scene, [Defect(str(place), *forbidden)])
@@ -57,7 +58,7 @@ def found(address: str, scene: str, place: Place) -> Any:
         law = reduce(getattr, name.split("."), import_module(module))
     except (KeyboardInterrupt, SceneError):
         raise
-    except BaseException as error:  # modules of others may raise anything, and end the process too
+    except BaseException as error:  # imported modules may raise anything, SystemExit included
         what = f'the function "{address}" cannot be imported: {type(error).__name__}: {error}'
         raise SceneError(scene, [Defect(str(place), what, remedy)]) from error
     plain = as_python(law)
@@ -76,7 +77,7 @@ def _takes_six(function: Callable[..., Any]) -> bool:
 
 
 def compiled_address(law: Any, scene: str, place: Place) -> int:
-    """The address of a compiled law; SceneError with numba's message where it cannot be compiled."""
+    """The address of a compiled law; SceneError with numba's message if it cannot be compiled."""
     try:
         return address_of(law, NOTHING, REAL, *[VECTOR] * 5)
     except Uncompilable as error:
@@ -86,7 +87,7 @@ def compiled_address(law: Any, scene: str, place: Place) -> int:
 
 
 class Called:
-    """A plain Python law as a function that compiled code calls; `trouble` is what it raised."""
+    """A plain Python law that compiled code can call; `trouble` is the exception that it raised."""
 
     def __init__(self, law: Callable[..., None], arrays: tuple[Real, ...]) -> None:
         self._law, self._arrays = law, arrays
@@ -97,7 +98,7 @@ class Called:
 
     @property
     def address(self) -> int:
-        """For compiled code; it lives as long as this object."""
+        """The address for compiled code, valid as long as this object exists."""
         return ctypes.cast(self._entry, ctypes.c_void_p).value or 0
 
     def _call(self, t: float) -> int:

@@ -1,4 +1,4 @@
-"""From a scene to the tables of its closed loop: which signal is whose, and what leads where."""
+"""From a scene to the tables of its closed loop: indices of signals, and connections of inputs and outputs."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ _LAWS = {StateSpace: a.LINEAR, Pid: a.PID, Saturation: a.CLAMP, GainTable: a.LOO
 
 
 class Wiring(NamedTuple):
-    """What of a `Loop` is known before a run. `names`: signals by sensor and controller; laws: the plain Python
-    functions by controller."""
+    """The parts of a `Loop` that are known before a run. names: signals by sensor and controller; laws: the plain
+    Python functions by controller."""
 
     sensor: Record
     controller: Record
@@ -63,10 +63,10 @@ class Wiring(NamedTuple):
 
 
 def wired(system: System) -> Wiring:
-    """Of a system whose scene was checked.
+    """The wiring of a system whose scene was checked.
 
-    SceneError for a function of the user's that cannot be had, ValueError for references that only compiled bodies
-    could refuse.
+    SceneError for a user function that cannot be loaded, ValueError for references that can be checked only with
+    compiled bodies.
     """
     scene = system.scene
     sensor, course, piece, names = _sensors(system)
@@ -155,14 +155,14 @@ def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
 
 
 def driven_speed(system: System, coordinate: str) -> int:
-    """The number of a scalar coordinate's speed, -1 where it is free."""
+    """The index of a scalar coordinate's prescribed speed, -1 where it is free."""
     rate = rate_name(coordinate, scalar_paths(system.scene)[coordinate])
     number = [name for name, _ in system.state_names[1]].index(rate)
     return number if system.constants.speed["prescribed"][number] >= 0 else -1
 
 
 def numbers_of(names: dict[str, slice], reference: str) -> list[int]:
-    """Numbers of the signals that a reference names; ValueError for a number that there is not."""
+    """Indices of the signals that a reference names; ValueError for an index that does not exist."""
     at = named(reference)
     assert at is not None  # the scene was checked
     every = list(range(names[at.name].start, names[at.name].stop))
@@ -174,7 +174,7 @@ def numbers_of(names: dict[str, slice], reference: str) -> list[int]:
 
 
 def _states(controller: Controller) -> list[float]:
-    """Where they start."""
+    """Initial values of the states."""
     match controller:
         case StateSpace(A=A, initial=initial):
             return list(initial) or [0.0] * len(A)
@@ -189,7 +189,7 @@ def _states(controller: Controller) -> list[float]:
 
 
 def _numbers(controller: Controller, inputs: int) -> list[float]:
-    """As the laws take them; ValueError where matrices do not fit inputs that only compiled bodies know."""
+    """Parameters in the layout of the laws; ValueError if matrices do not fit inputs known only after compilation."""
     match controller:
         case StateSpace():
             return _matrices(controller, inputs).ravel().tolist()
@@ -212,7 +212,7 @@ def _numbers(controller: Controller, inputs: int) -> list[float]:
 
 
 def _tracking(pid: Pid) -> float:
-    """Time in which a limit takes back the integral: not below the period, in which nothing changes."""
+    """Time constant of the anti-windup tracking, at least the period of a sampled controller."""
     if pid.tracking_s is not None:
         return pid.tracking_s
     if not pid.ki:
@@ -235,6 +235,6 @@ def _matrices(controller: StateSpace, inputs: int) -> Any:
 
 
 def widest(record: Record) -> int:
-    """The most outputs of a controller."""
+    """The largest number of outputs of a controller."""
     return max(chain([1], record["outputs"].tolist()))
 

@@ -1,4 +1,4 @@
-"""Campbell diagrams: eigenvalues of steady spins against the rate, modes followed from rate to rate by their shapes."""
+"""Campbell diagrams: eigenvalues of steady spins against the spin rate, with modes tracked by their shapes."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True, eq=False)
 class Campbell:
-    """The modes of a system whose `hinge` spins steadily, as seen from the turning bodies.
+    """The modes of a system whose `hinge` spins steadily, in the frame of the rotating bodies.
 
-    rates (R,) rad/s; eigenvalues (R,n) rad/s, column j one mode followed along the rates; mac (R,n): how alike its
-    shape is to that at the rate before, 1 for equal ones; names (n,): the displacement that dominates it at the first
-    rate; stability: one verdict per rate.
+    rates (R,) rad/s; eigenvalues (R,n) rad/s, column j is one mode tracked along the rates; mac (R,n): modal assurance
+    criterion of its shape with that at the previous rate, 1 for equal shapes; names (n,): its dominant displacement at
+    the first rate; stability: one verdict per rate.
     """
 
     scene: str
@@ -39,7 +39,7 @@ class Campbell:
     stability: tuple[Stability, ...]
 
     def __post_init__(self) -> None:
-        """TypeError or ValueError for parts that do not belong together; asked once more by what works with them."""
+        """TypeError or ValueError for parts that do not fit together."""
         self._refuse_torn()
 
     def _refuse_torn(self) -> None:
@@ -85,7 +85,7 @@ class Campbell:
 def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
     """Eigenvalues against the spin rate (rad/s) of a revolute hinge or wheel, in the order of `rates`.
 
-    Every steady state is sought from that of the rate before. Raises what `steady_spin` raises.
+    The initial guess of every steady state is that of the previous rate. Raises what `steady_spin` raises.
     """
     if isinstance(system, Scene):
         system = compile(system)
@@ -106,7 +106,7 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
             names = tuple(_dominant(model, shape) for shape in current.T)
             macs.append(np.ones(len(found)))
         else:
-            shapes = before[0].displacements_by(model.displacements) @ before[1]  # others may be independent here
+            shapes = before[0].displacements_by(model.displacements) @ before[1]  # independent ones may differ
             alike = _mac(model.mass, shapes, current)
             order = _followed(alike, values[-1], found)
             macs.append(alike[np.arange(len(order)), order])
@@ -120,7 +120,7 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
 
 
 def _spectrum(model: LinearModel) -> tuple[Complex, Complex]:
-    """n eigenvalues, one of each pair (above, or on the right), and shapes (n,n)."""
+    """n eigenvalues, one of each pair (with the larger imaginary, or else real part), and shapes (n,n)."""
     modes = [mode for mode in model.modes if mode.eigenvalue.imag > 0.0]
     real = sorted(
         (mode for mode in model.modes if mode.eigenvalue.imag == 0.0), key=lambda mode: -mode.eigenvalue.real
@@ -142,7 +142,8 @@ def _mac(mass: Real, before: Complex, after: Complex) -> Real:
 
 
 def _followed(alike: Real, before: Sequence[complex] | Complex, after: Complex) -> NDArray[np.int64]:
-    """For each mode before its number after, one to one: by likeness of shape, and by frequency where shapes mix."""
+    """For each mode at the previous rate its index at this one, one to one: by shape, and by frequency if shapes mix.
+    """
     a, b = np.asarray(before)[:, None], after[None]
     apart = np.abs(a - b) / np.maximum(np.abs(a) + np.abs(b), np.finfo(float).tiny)
     return linear_sum_assignment(1.0 - alike + apart)[1]

@@ -1,13 +1,12 @@
-"""The linear model of a scene with continuous controllers: their states behind those of the motion.
+"""The linear model of a scene with continuous controllers: their states follow those of the motion.
 
-With y = C z + D v + E f what sensors say by the motion z, by what is driven, v, and by other forces f, and the laws
+Let y = C z + D v + E f be the sensor signals, with the motion z, the drives v and other forces f, and let the laws be
 
     v = G y + G_x x,    x' = L y + L_x x
 
-G knows nothing of loads and accelerations (or the scene was refused, for its torques would depend on themselves). So
-G D = G E = 0, and the laws close the loop. C and E are exact, and D but for rounding, as loads are linear in what is
-driven. The laws, which take nothing but numbers, are differenced to fourth order: exact but for rounding where they are
-linear.
+G does not depend on loads and accelerations (scenes with such algebraic loops are refused). So G D = G E = 0, and the
+laws close the loop. C and E are exact, and D is exact up to rounding, since loads are linear in the drives. The laws
+accept only plain numbers and are differentiated by differences of fourth order: exact up to rounding for linear laws.
 """
 
 from __future__ import annotations
@@ -36,16 +35,16 @@ from flexmb.tables.status import OK, Status
 from flexmb.typing import Real
 
 LARGE = 2.0**20
-"""Change of what is driven, whose effect is linear: beside it the rounding of all else is nothing."""
+"""Change of a drive, whose effect is linear: large, so that the rounding of other loads is negligible."""
 REMEDY = "linearise flexmb.open_loop(scene), and close the loop on that model"
 STEP = 1e-3
-"""Of differences, in SI units or relative: its fourth power and rounding over it are both 1e-13."""
+"""Step of differences, in SI units or relative: its fourth power and the rounding divided by it are both 1e-13."""
 
 
 def closed_loop(system: System, state: State, model: Callable[[Equations, State], LinearModel]) -> LinearModel:
-    """About a state, and the controllers' initial states; `model` makes the linear model of a motion.
+    """The linear model about a state and the controllers' initial states; `model` makes that of the motion alone.
 
-    NotImplementedError for controllers that are sampled.
+    NotImplementedError for sampled controllers.
     """
     if isinstance(system, ClosedSystem):
         state = system.admissible(state, "state")
@@ -69,7 +68,7 @@ class AtState(NamedTuple):
 
 
 class ClosedLoop:
-    """A system with its controllers, continuous ones, at any of their states."""
+    """A system with continuous controllers, which can be linearised about any state."""
 
     def __init__(self, system: System, start: State) -> None:
         _refuse(system)
@@ -79,12 +78,12 @@ class ClosedLoop:
         clock = Clock(np.array([start.t, start.t + 1.0]), np.array([start.t + 1.0]))
         y = feedback.begin(_Start(start), clock, Accuracy(0.0, 0.0, 0, 0), None).y
         self.initial: Real = y[plant.nq + plant.nu : -1]
-        """(X,) states of controllers at the start."""
+        """(X,) initial states of the controllers."""
         self.state_names = feedback.state_names
-        project(start.t, y, feedback.running)  # which finds the independent rows of closures
+        project(start.t, y, feedback.running)  # also finds the independent rows of closures
 
     def at(self, state: State, x: Real, model: Callable[[Equations, State], LinearModel]) -> AtState:
-        """Linearised about a state of the motion and x (X,) of the controllers."""
+        """The linearisation about a state of the motion and the states x (X,) of the controllers."""
         plant, feedback = self._plant, self._feedback
         laws = _Laws(feedback, state.t, np.concatenate([state.q, state.u, x, [0.0]]))
         equations = equations_of(plant)
@@ -103,7 +102,7 @@ class ClosedLoop:
 
 
 class _Start(NamedTuple):
-    """A state, at which controllers begin."""
+    """The state at which controllers start."""
 
     state: State
     controllers: None = None
@@ -114,9 +113,9 @@ class _Start(NamedTuple):
 
 
 class _Laws:
-    """Continuous controllers at y = [q, u, x, work]: what is driven and the rates of x, with their derivatives.
+    """Continuous controllers at y = [q, u, x, work]: drive values and rates of x, with their derivatives.
 
-    `derivative` (drives+X,S+X) is by what sensors say and by x. DynamicsError where there are no accelerations.
+    `derivative` (drives+X,S+X) is by sensor signals and x. DynamicsError where accelerations do not exist.
     """
 
     def __init__(self, feedback: Feedback, t: float, y: Real) -> None:
@@ -128,7 +127,7 @@ class _Laws:
         columns = [self._difference(signals, i) for i in range(self.sensors)]
         columns += [self._difference(self._loop.state, i) for i in places]
         self.derivative = np.column_stack(columns) if columns else np.zeros((len(feedback.driven) + len(places), 0))
-        self._respond()  # and the controllers say again what they say at the state
+        self._respond()  # restore the controller outputs at the state
 
     def _difference(self, array: Real, i: int) -> Real:
         value, h = array[i], STEP * max(1.0, abs(array[i]))
@@ -140,7 +139,7 @@ class _Laws:
         return np.asarray((found[0] - found[3] + 8.0 * (found[2] - found[1])) / (12.0 * h), float)
 
     def _respond(self) -> Real:
-        """What is driven, then the rates of x."""
+        """Drive values, then the rates of x."""
         self._raise(respond(self._t, self._loop))
         driven = [self._loop.function["data"][f, 0] for f in self._feedback.driven]
         return np.array([*driven, *self._loop.change[self._feedback.continuous_states]])
@@ -161,7 +160,7 @@ def _refuse(system: System) -> None:
 
 
 def _effect(equations: Equations, state: State, driven: Sequence[int]) -> tuple[Real, Real]:
-    """Accelerations (n,D) of the free speeds and what sensors say (S,D), by each value that is driven: linear in it."""
+    """Derivatives of free accelerations (n,D) and sensor signals (S,D) by each drive value; both are linear in it."""
     held, system, now = equations.constant_functions(state.t), equations.system, values(equations, state)
     by_drive = np.zeros((len(now), len(driven)))
     for i, f in enumerate(driven):

@@ -1,19 +1,18 @@
 """First variations of closed chains, in independent coordinates.
 
-Of the tree under the closure loads f, and of the rows, the derivatives are exact at fixed f (`flexmb.closure.tangent`).
-With J the rows' rates by the n free speeds and L L' = M the mass matrix of these, J L'^-1 = U S V' has as many singular
-values as rows are independent. With V_0 its null space,
+The derivatives of the tree under constraint loads f, and those of the rows, are exact at fixed f
+(`flexmb.closure.tangent`). Let J be the Jacobian of the rows by the n free speeds, and L L' = M their mass matrix. Then
+J L'^-1 = U S V' has as many nonzero singular values as there are independent rows. With its null space V_0,
 
-    P = L'^-1 V S^-1 U'     the least change of speeds, by kinetic energy, that gives rows their rates
-    N_0 = L'^-1 V_0         motions that the closures leave
+    P = L'^-1 V S^-1 U'     smallest change of speeds, in kinetic energy, with given row rates
+    N_0 = L'^-1 V_0         motions that the closures allow
 
-The loads change so that the rows' accelerations g'' stay zero, which adds M^-1 J' df = -P dg'':
+The loads change so that the row accelerations g'' stay zero, which adds M^-1 J' df = -P dg'':
 
     dudot = d(udot)|f - P d(g'')|f
 
-E picks independent coordinates: as many as there are motions, and of all free ones those that move most, measured by
-the root of their own inertia, one after the other (pivots of a QR decomposition). Closures stay closed, and what is
-closed stays so, under
+E selects as many independent coordinates as there are allowed motions: those free coordinates that move most, weighted
+with the root of their own inertia (pivots of a QR decomposition). Closures remain fulfilled to first order under
 
     xi_all = N xi,    du_all = N du + T xi,    N = N_0 (E N_0)^-1,    T = -(1 - N E) P d(J u)/dxi N
 """
@@ -56,20 +55,20 @@ class _Slopes(NamedTuple):
 
 
 class _Freedom(NamedTuple):
-    """What the closures leave of n speeds with a mass matrix (n,n): N_0 (n,f), and P (n,G)."""
+    """The motions that closures allow, of n speeds with a mass matrix (n,n): N_0 (n,f), and P (n,G)."""
 
     mass: Real
     null: Real
     lever: Real
 
     def independent(self) -> Index:
-        """Places (f,) of the independent coordinates."""
+        """Indices (f,) of the independent coordinates."""
         weighed = np.sqrt(np.diag(self.mass))[:, None] * self.null
         order: Index = qr(weighed.T, mode="r", pivoting=True)[1]
         return np.sort(order[: self.null.shape[1]])
 
     def basis(self, chosen: Index) -> Real:
-        """N (n,f) for these independent coordinates; LinAlgError where they are not independent."""
+        """N (n,f) for the chosen coordinates; LinAlgError if they are not independent."""
         return cast(Real, np.linalg.solve(self.null[chosen].T, self.null.T).T)
 
 
@@ -86,7 +85,7 @@ class ClosedEquations(Equations):
         c = self.constants
         self._closures = system.closures.on_tree(c, lambda: workspace(c, system.nq, system.nu))
         self.rank = system.rank
-        """How many rows of the closures are independent."""
+        """Number of independent rows of the closures."""
         self._rows_w = closure_tangent_workspace(self._closures.constants[1])
 
     @property
@@ -94,7 +93,7 @@ class ClosedEquations(Equations):
         return len(self.free) - self.rank
 
     def closure_loads(self, state: State) -> tuple[Real, Real]:
-        """The rows' loads (G,), and those of closures (C,6) that they make, on body_b about frame B, World axes."""
+        """The row loads (G,), and the resulting loads of closures (C,6) on body_b about frame B, World axes."""
         found = self._closures.motion(state.t, pack(state))
         return self._closures.row_loads, found.closures
 
@@ -125,11 +124,11 @@ class ClosedEquations(Equations):
         by_displacement, by_speed, by_time = (free - P @ stopped for free, stopped in pairs)
 
         def dependent(x: Real) -> Real:
-            """x (n,...) without what the independent coordinates move."""
+            """x (n,...) minus the part that the independent coordinates determine."""
             return x - N @ x[chosen]
 
         T = dependent(-P @ rows.by_displacement @ N)
-        carried = dependent(P @ rows.by_speed @ state.u[self.free])  # displacement by what is prescribed, per second
+        carried = dependent(P @ rows.by_speed @ state.u[self.free])  # displacement per second by prescribed motions
         hurried = dependent(-P @ (rows.by_time + rows.by_displacement @ carried))
         return Variations(
             state, slopes.rates[chosen],
@@ -140,14 +139,14 @@ class ClosedEquations(Equations):
         )  # fmt: skip
 
     def moved(self, at: Variations, xi: Real) -> State:
-        """Closed again; DynamicsError where no closed state is near too."""
+        """As for a tree, then projected on the closures; DynamicsError also if no closed state is near."""
         try:
             return super().moved(at, xi)
         except ClosureError as error:
             raise DynamicsError(str(error)) from None
 
     def on_functions(self, state: State) -> State:
-        """Closed too, with speeds that keep it so; ClosureError where there is no such state."""
+        """As for a tree, with coordinates and speeds that fulfil the closures; ClosureError if there are none."""
         y = consistent(self._closures, state.t, pack(super().on_functions(state)))
         return State(y[: self.system.nq], y[self.system.nq : -1], state.t, self.system.layout)
 
@@ -169,7 +168,7 @@ class ClosedEquations(Equations):
     def _freedom(self, state: State, J: Real) -> _Freedom:
         """DynamicsError at a singular position."""
         mass, rank = self.mass(state), self.rank
-        weight = self._closures.constants[1].weight  # rotations beside translations
+        weight = self._closures.constants[1].weight  # of rotations against translations
         root = np.linalg.cholesky(mass)
         U, S, Vt = np.linalg.svd(weight[:, None] * solve_triangular(root, J.T, lower=True).T)
         if rank and not S[rank - 1] > DEPENDENT * S[0]:

@@ -1,7 +1,8 @@
-"""Where a closed loop rests: neither the motion accelerates nor do states of controllers change.
+"""Equilibria of a closed loop: accelerations and rates of controller states are zero.
 
-Newton's method over displacements xi and states x of controllers together, by the linear model of the closed loop, for
-an integrator has no state of its own that belongs to a displacement. Damping is that of `flexmb.linear.newton`.
+Newton's method is applied to displacements xi and controller states x together, with the linear model of the closed
+loop: the state of an integrating controller is not determined by the displacements. Damping as in
+`flexmb.linear.newton`.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
 CONVERGED = 1e-10  # last correction (rad, m, units of x), of derivatives that are exact to 1e-12
-RANK = 1e-12  # directions of less stiffness, in part of the largest, are free to move and are left alone
+RANK = 1e-12  # stiffness relative to the largest; directions with less are free to move and are not corrected
 
 
 class _Place(NamedTuple):
-    """A state of the motion and x (X,); what is left there, accelerations and rates of x (f+X,), and its derivative."""
+    """A state of the motion and x (X,); the residual there, accelerations and rates of x (f+X,), and its derivative."""
 
     state: State
     x: Real
@@ -70,7 +71,9 @@ def _look(loop: ClosedLoop, state: State, x: Real) -> _Place:
 
 
 def _damped(loop: ClosedLoop, equations: Equations, here: _Place, inverse: Real, step: Real) -> _Place:
-    """After the longest of the steps 1, 1/2, 1/4 ... whose simplified correction is shorter; EquilibriumError without.
+    """The result of the longest of the steps 1, 1/2, 1/4 ... whose simplified correction is shorter.
+
+    EquilibriumError if there is none.
     """
     at, n = equations.variations(here.state), equations.freedom
     factor = longest = min(1.0, LONGEST / max(np.abs(step[:n]).max(initial=0.0), LONGEST))
@@ -86,7 +89,7 @@ def _damped(loop: ClosedLoop, equations: Equations, here: _Place, inverse: Real,
 
 
 def _if_nothing_is_left(system: System, here: _Place) -> State:
-    """The state; EquilibriumError where forces are left that no displacement removes, as at a limit of a controller."""
+    """The state; EquilibriumError if no displacement removes the residual, as when a controller saturates."""
     size = np.linalg.norm(here.derivative) if here.derivative.size else 0.0
     if np.linalg.norm(here.left) > 1e3 * CONVERGED * max(size, 1.0):
         raise EquilibriumError(

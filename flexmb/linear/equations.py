@@ -15,7 +15,7 @@ def equations_of(system: System) -> Equations:
     """The equations of a tree or a closed chain; NotImplementedError for closures on bodies of level "ruthless"."""
     if not isinstance(system, ClosedSystem):
         return Equations(system)
-    from flexmb.linear.closed_variations import ClosedEquations  # few scenes need it
+    from flexmb.linear.closed_variations import ClosedEquations  # imported only for scenes with closures
 
     return ClosedEquations(system)
 

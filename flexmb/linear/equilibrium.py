@@ -1,4 +1,4 @@
-"""Equilibria of scenes: states in which neither bodies nor controllers change."""
+"""Equilibria of scenes: states of rest, in which controller states are constant too."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> State:
     if isinstance(system, Scene) and system.controllers:
         system = compile(system)
     if isinstance(system, System) and system.scene.controllers:
-        from flexmb.linear.controlled_equilibrium import resting  # few scenes need it
+        from flexmb.linear.controlled_equilibrium import resting  # imported only for scenes with controllers
 
         return resting(system, system.initial_state if guess is None else guess)
     equations, guess = entering(system, guess)

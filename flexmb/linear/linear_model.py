@@ -19,7 +19,7 @@ from flexmb.typing import Real
 
 Complex = NDArray[np.complex128]
 ROUNDOFF = 2.0**-53
-NOT_ANOTHER = 1e-4  # shapes of a double eigenvalue differ by the root of rounding; two motions by far more
+NOT_ANOTHER = 1e-4  # shapes of a defective double eigenvalue agree to about the root of rounding; others do not
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class Mode:
 
     @property
     def is_rigid_body(self) -> bool:
-        """Whether the eigenvalue cannot be told from zero: a motion that nothing holds, drives or damps."""
+        """Whether the eigenvalue is zero within its tolerance: no stiffness, drive or damping acts on the motion."""
         return abs(self.eigenvalue) <= self.tolerance
 
     @property
@@ -73,8 +73,8 @@ class Mode:
 class Stability:
     """Verdict of the eigenvalues, up to rounding; `eigenvalue` is the one that decides, known to `tolerance` (rad/s).
 
-    "neutral": no eigenvalue has a positive real part beyond rounding, but some have none at all; then terms that a
-    linear model leaves out decide.
+    "neutral": no eigenvalue has a positive real part beyond rounding, but some real parts are zero; then nonlinear
+    terms decide.
     """
 
     verdict: Literal["asymptotically stable", "neutral", "unstable"]
@@ -95,11 +95,11 @@ class LinearModel:
     matrix. motion (nq,n): dq = motion xi. rates (n,): udot at `state`, zero in an equilibrium; drift (n,): its explicit
     derivative by time.
 
-    Of a closed chain the states are independent coordinates and their speeds, as many as the closures leave. Those that
-    depend on them follow the states among the outputs, and `motion` moves all.
+    For a closed chain the states are the independent coordinates and their speeds. The dependent ones follow the states
+    among the outputs, and `motion` includes both.
 
-    Arrays are copied and cannot be written to, for eigenvalues are found once: `dataclasses.replace(model, A=...)` is
-    another model. TypeError or ValueError for parts that do not belong together.
+    Arrays are copied and read-only, because eigenvalues are computed once: use `dataclasses.replace(model, A=...)` for
+    a changed model. TypeError or ValueError for parts that do not fit together.
     """
 
     scene: str
@@ -126,7 +126,7 @@ class LinearModel:
 
     @property
     def _shapes(self) -> dict[str, tuple[int, ...]]:
-        """Of all arrays."""
+        """The shapes of all arrays."""
         x, f, y = len(self.states), len(self.inputs), len(self.outputs)
         n, nq = len(self.rates), len(self.state.q)
         return {
@@ -135,7 +135,7 @@ class LinearModel:
         }  # fmt: skip
 
     def _refuse_torn(self) -> None:
-        """TypeError or ValueError where the parts do not belong together."""
+        """TypeError or ValueError if the parts do not fit together."""
         if not isinstance(self.state, State):
             raise TypeError(f"state is a {type(self.state).__name__}: give a State")
         arguments.held("rates", self.rates, (None,))
@@ -148,18 +148,18 @@ class LinearModel:
         return tuple(name for name, _ in self.states[: len(self.rates)])
 
     def displacements_by(self, names: Sequence[str]) -> Real:
-        """(len(names), n) of x[:n]: displacements with these names, dependent ones of closed chains too; KeyError."""
+        """(len(names), n) displacements with these names, also dependent ones, by x[:n]; KeyError for other names."""
         self._refuse_torn()
         return self.C[[_place(self.outputs, name, "output") for name in names], : len(self.rates)]
 
     @cached_property
     def eigenvalues(self) -> Complex:
-        """All 2n (rad/s), by modulus."""
+        """All 2n eigenvalues (rad/s), by modulus."""
         return self._decomposition[0]
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
-        """One for each conjugate pair and for each real eigenvalue, by modulus."""
+        """One mode for each conjugate pair and for each real eigenvalue, by modulus."""
         values, vectors, tolerances = self._decomposition
         n, found = len(self.rates), []
         for value, vector, tolerance in zip(values, vectors.T, tolerances, strict=True):
@@ -171,9 +171,9 @@ class LinearModel:
 
     @cached_property
     def rigid_body_shapes(self) -> Real:
-        """(n,r) displacements that nothing holds, orthonormal: those of all eigenvalues that are zero.
+        """(n,r) orthonormal displacements of all zero eigenvalues, on which no stiffness acts.
 
-        A motion that may also begin with any speed has two of them, one that a damper stops has one.
+        A motion without damping has two zero eigenvalues, one that a damper stops has one.
         """
         shapes = [mode.shape for mode in self.modes if mode.is_rigid_body]
         if not shapes:

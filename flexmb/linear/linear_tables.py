@@ -19,9 +19,9 @@ _RIGID_BODY = 8  # displacements named of all rigid-body motions together
 
 
 def modes_table(model: LinearModel, cut: Truncation | None = None) -> RenderableType:
-    """Frequency, damping and dominant displacements of every mode, and what truncation leaves open, if that is known.
+    """Frequency, damping, dominant displacements and, if known, truncation error of every mode.
 
-    Then stability, and accelerations that are not balanced.
+    Below the table: stability, and remaining accelerations if the state is no equilibrium.
     """
     numbers = figures("mode", "Hz", "rad/s", "damping ratio", "Re (1/s)", *([] if cut is None else ["truncation"]))
     shapes = prose("dominant displacements")
@@ -55,7 +55,7 @@ def _caption(cut: Truncation | None) -> str:
 
 
 def _rigid_body_row(model: LinearModel, cut: Truncation | None) -> list[str]:
-    """All motions that nothing holds, together: which of them an eigenvector mixes means nothing."""
+    """One row for all rigid-body motions: an eigenvector is an arbitrary combination of them."""
     shapes, count = model.rigid_body_shapes, sum(mode.is_rigid_body for mode in model.modes)
     which = np.flatnonzero(np.max(np.abs(shapes), axis=1) > _PART)
     named = ", ".join(model.displacements[i] for i in which[:_RIGID_BODY])

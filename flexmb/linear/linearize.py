@@ -21,19 +21,19 @@ _FORCE = {"rad/s": "N m", "m/s": "N", "1/s": "1"}
 def linearize(system: System | Scene, state: State | None = None, *, held: bool = False) -> LinearModel:
     """The linear model about a state (default: the initial one), by exact derivatives.
 
-    Prescribed coordinates follow their functions of time; with `held`, all functions stand still at their values at the
-    state's time, as in `equilibrium`. Where the state is no equilibrium, `LinearModel.rates` has its accelerations.
-    Of a closed chain it is that of as many independent coordinates as the closures leave; those that depend on them are
-    among the outputs. Of a scene with controllers it is that of the closed loop: their states come last, and start
-    where the scene says. What sensors say is among the outputs: "gyro[0]", or "angle" of one number; loads and
-    accelerations depend on the inputs at once, by D. Raises DynamicsError where the accelerations do not exist,
-    NotImplementedError for sampled controllers and closures on bodies of level "ruthless", ValueError or TypeError for
-    what is not a state of this system or leaves closures open.
+    Prescribed coordinates follow their functions of time; with `held`, all functions keep their values at the state's
+    time, as in `equilibrium`. If the state is no equilibrium, `LinearModel.rates` has its accelerations. For a closed
+    chain the states are the independent coordinates; the dependent ones are among the outputs. For a scene with
+    controllers it is the model of the closed loop about the controllers' initial states, which come last in x. Sensor
+    signals are among the outputs: "gyro[0]", or "angle" for a single number; loads and accelerations have direct
+    feedthrough, D. Raises DynamicsError where the accelerations do not exist, NotImplementedError for sampled
+    controllers and closures on bodies of level "ruthless", ValueError or TypeError for a state that does not belong to
+    this system or leaves closures open.
     """
     if isinstance(system, Scene) and system.controllers:
         system = compile(system)
     if isinstance(system, System) and system.scene.controllers:
-        from flexmb.linear.closed_loop import closed_loop  # few scenes need it
+        from flexmb.linear.closed_loop import closed_loop  # imported only for scenes with controllers
 
         state = system.initial_state if state is None else state
         system.layout.entering(state)
@@ -65,7 +65,7 @@ def linear_model(equations: Equations, state: State) -> LinearModel:
     C = np.vstack([np.eye(2 * n), at.by_chosen[dependent], seen])
     D = np.zeros((len(C), len(driven)))
     if system.scene.sensors:
-        from flexmb.linear.sensed import of_sensors  # few scenes need it
+        from flexmb.linear.sensed import of_sensors  # imported only for scenes with sensors
 
         sensors = of_sensors(equations, at)
         C, D = np.vstack([C, sensors.by_state]), np.vstack([D, sensors.by_force[:, driven]])
@@ -102,7 +102,7 @@ def displacement_names(equations: Equations) -> tuple[list[str], list[str]]:
 
 
 def _driven(equations: Equations) -> list[int]:
-    """Places among the free speeds of those that a motor can drive: all but the modal ones."""
+    """Indices among the free speeds of those that a motor can drive: all but the modal ones."""
     modal = np.zeros(equations.system.nu, bool)
     for body in equations.constants.body:
         modal[int(body["etad_index"]) : int(body["etad_index"] + body["modes"])] = True

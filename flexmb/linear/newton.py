@@ -1,9 +1,9 @@
-"""States in which nothing accelerates: Newton's method with the exact derivative of the accelerations.
+"""States without acceleration: Newton's method with the exact derivative of the accelerations.
 
 Steps and errors are measured in the metric of kinetic energy, sqrt(xi' M xi) in m sqrt(kg), in which the method does
 not depend on units or scales of modes. Damping follows Deuflhard, Newton Methods for Nonlinear Problems (2004), sec.
-3.3: a step is accepted if the next, simplified correction is shorter. Where this fails from the guess, overdamped
-motion brings the state closer first.
+3.3: a step is accepted if the next, simplified correction is shorter. If this fails from the guess, pseudo-transient
+continuation (overdamped motion) provides a better guess.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
 CONVERGED = 1e-12  # last correction, as part of a displacement of all free coordinates by 1 (rad, m, unit of a mode)
-RESIDUAL = 1e-9  # acceleration left, as part of that at the start
+RESIDUAL = 1e-9  # remaining acceleration, relative to that at the start
 ROUNDING = 2.0**-46  # the same, as part of the stiffness times a displacement of 1: 128 roundings
 STEPS = 100
 SMALLEST = 2.0**-12  # damping factor
 SHORTENINGS = 20  # by 4, of a step of overdamped motion
 RELAXATIONS = 200  # steps of overdamped motion
 FIRST, LONGEST = 0.1, 0.5  # lengths of steps, parts of a displacement of all free coordinates by 1
-RANK = 1e-14  # directions with less than this part of the largest stiffness are free to move and are left alone
+RANK = 1e-14  # stiffness relative to the largest; directions with less are free to move and are not corrected
 
 
 class EquilibriumError(ArithmeticError):
-    """No state without acceleration was found; the message says what is left and where."""
+    """No state without acceleration was found; the message says which acceleration remains and where."""
 
 
 def balanced(equations: Equations, guess: State) -> State:
@@ -49,8 +49,8 @@ def _relaxed(equations: Equations, start: State) -> State:
     """Overdamped motion, M xi' = load, by implicit steps tau that grow as they succeed, then Newton's method.
 
     Pseudo-transient continuation (Kelley & Keyes 1998), with steps chosen as in a trust region (Nocedal & Wright 2006,
-    alg. 4.1): the loads do work in every step. Newton's method is tried only where no displacement grows by itself, so
-    that it does not end in an unstable equilibrium.
+    alg. 4.1): the loads do work in every step. Newton's method is tried only where the loads oppose every displacement,
+    so that it does not converge to an unstable equilibrium.
     """
     here = _Loads(equations, equations.variations(start))
     tau = FIRST * here.scale / here.size
@@ -85,7 +85,8 @@ class _Loads:
 
 
 def _downhill(equations: Equations, here: _Loads, tau: float) -> tuple[Variations, float] | None:
-    """After the longest of the steps tau, tau/4, tau/16 ... that does a quarter of the promised work; the next tau."""
+    """The result of the longest of the steps tau, tau/4, tau/16 ... that does at least a quarter of the predicted work,
+    and the next tau."""
     moving, step = here.at.movable, np.zeros(len(here.at.rates))
     for _ in range(SHORTENINGS):
         flow = here.inertia / tau - here.derivative
@@ -155,7 +156,8 @@ class _Linearised:
 
 
 def _damped(equations: Equations, now: _Linearised) -> State | None:
-    """After the longest of the steps 1, 1/2, 1/4 ..., LONGEST at most, whose simplified correction is shorter."""
+    """The result of the longest of the steps 1, 1/2, 1/4 ..., LONGEST at most, whose simplified correction is shorter.
+    """
     factor = longest = min(1.0, LONGEST * now.scale / now.length)
     while factor >= SMALLEST * longest:
         try:
@@ -169,7 +171,7 @@ def _damped(equations: Equations, now: _Linearised) -> State | None:
 
 
 def _report(equations: Equations, at: Variations) -> str:
-    """The error: which acceleration is left, where, and what to do."""
+    """The error message: which acceleration remains, where, and the remedy."""
     left = at.mass @ at.rates
     names, _ = displacement_names(equations)
     worst = int(np.argmax(np.abs(left)))

@@ -1,12 +1,12 @@
-"""Exact derivatives of what sensors read, along the coordinates of a linear model and by generalised forces.
+"""Exact derivatives of observed quantities by the states of a linear model and by generalised forces.
 
-At given closure loads f of a closed chain they come from dual numbers, and so do those by f (of trees there are none).
-With Y the change of [q, u] by [xi; du] and g'' = K f + c the rows' accelerations, which stay zero,
+At given constraint loads f (none in a tree), and by f, they are found with dual numbers. Let Y be the change of [q, u]
+by [xi; du], and g'' = K f + c the row accelerations, which stay zero. Then
 
     df = -K^+ d(g'')|f Y + (1 - K^+ K) dK K^+ f Y
 
-for loads are the least that do what they do. A generalised force t along the free speeds changes the accelerations by
-M^-1 t at given f, hence what hinges transmit by inverse dynamics, and f by -K^+ J M^-1 t.
+since f is the minimum-norm solution. A generalised force t along the free speeds changes the accelerations by M^-1 t at
+given f, which changes the hinge loads by inverse dynamics, and it changes f by -K^+ J M^-1 t.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from flexmb.tables.state import State, pack
 from flexmb.typing import Real
 
 LARGE = 2.0**20
-"""Change of an acceleration whose effect is linear: beside it the rounding of all others is nothing."""
+"""Change of an acceleration, whose effect is linear: large, so that the rounding of others is negligible."""
 
 
 class ObservedTangent(NamedTuple):
-    """A row (E,) of what sensors read, laid out as `Observation.columns`, and its derivatives: by the state
+    """A row (E,) of observed quantities, laid out as `Observation.columns`, and its derivatives: by the state
     [xi; du] (E,2f) of a linear model, by generalised forces along the n free speeds (E,n)."""
 
     value: Real
@@ -37,7 +37,7 @@ class ObservedTangent(NamedTuple):
 
 
 class _Raw(NamedTuple):
-    """The row (E,), with the rows' accelerations behind it its derivatives by [q, u] and by the rows' loads."""
+    """The row (E,), and the derivatives of it and the row accelerations by [q, u] and by the row loads."""
 
     value: Real
     by_y: Real
@@ -45,7 +45,7 @@ class _Raw(NamedTuple):
 
 
 def observed(equations: Equations, at: Variations) -> ObservedTangent:
-    """At the state of these variations; DynamicsError where there are no accelerations."""
+    """The observed row and its derivatives at the state of `at`; DynamicsError where accelerations do not exist."""
     state, found = at.state, _free(equations, at.state)
     Y, by_force = moving(equations, at), _by_force(equations, state)
     by_state = found.by_y @ Y
@@ -65,19 +65,19 @@ def observed(equations: Equations, at: Variations) -> ObservedTangent:
 
 
 def values(equations: Equations, state: State) -> Real:
-    """The row (E,) of what sensors read at a state; DynamicsError where there are no accelerations."""
+    """The row (E,) of observed quantities at a state; DynamicsError where accelerations do not exist."""
     return _free(equations, state).value
 
 
 def _free(equations: Equations, state: State) -> _Raw:
-    """At a state, under the closure loads that there are."""
+    """The row and its derivatives at a state, under its own constraint loads."""
     if not isinstance(equations, ClosedEquations):
         return _raw(equations, state, np.zeros(0), np.zeros(0))
     return _raw(equations, state, *equations.closure_loads(state))
 
 
 def _raw(equations: Equations, state: State, load: Real, closures: Real) -> _Raw:
-    """At a state under loads of the rows (G,), with the loads of closures (C,6) that are theirs."""
+    """The row and its derivatives at a state under row loads (G,) and the corresponding loads of closures (C,6)."""
     system, y, rows = equations.system, pack(state), len(load)
     observation: Observation = system.observation
     out, E = outputs_tangent(observation.out), observation.width
@@ -101,7 +101,7 @@ def moving(equations: Equations, at: Variations) -> Real:
 
 
 def _by_force(equations: Equations, state: State) -> Real:
-    """(E,n) by generalised forces along the free speeds, at given closure loads."""
+    """(E,n) derivatives by generalised forces along the free speeds, at given constraint loads."""
     system, free = equations.system, equations.free
     places = system.observation.columns
     whole = system.mass_matrix(state)
@@ -118,7 +118,7 @@ def _by_force(equations: Equations, state: State) -> Real:
 
 
 def _of_rates(equations: Equations, state: State, rates: Real) -> dict[str, Real]:
-    """What changes with accelerations (nu,): hinge loads by inverse dynamics, markers."""
+    """The quantities that depend on accelerations (nu,): hinge loads by inverse dynamics, markers."""
     system, y = equations.system, pack(state)
     system.observe_rates(state.t, y, rates)
     out = system.observation.out

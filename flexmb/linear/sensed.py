@@ -1,4 +1,4 @@
-"""What sensors say in a linear model: their derivatives, exact, from those of what they read."""
+"""Sensor signals in a linear model: their exact derivatives, from those of the observed quantities."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _UNITS = {
 
 
 class ChangedRow(NamedTuple):
-    """A row of what sensors read, its change (E,k) along k directions, and that of [q, u] (nq+nu,k)."""
+    """A row of observed quantities, its change (E,k) along k directions, and that of [q, u] (nq+nu,k)."""
 
     value: Real
     change: Real
@@ -44,13 +44,13 @@ class ChangedRow(NamedTuple):
 
 
 def sensed(system: System, at: ChangedRow) -> Real:
-    """(S,k) change of what all sensors say, in the order of the scene."""
+    """(S,k) change of all sensor signals, in the order of the scene."""
     rows = [np.zeros((0, at.change.shape[1])), *(_change(system, each, at) for each in system.scene.sensors)]
     return np.concatenate(rows)
 
 
 def sensor_names(system: System) -> Iterator[tuple[str, str]]:
-    """Names, "gyro[0]" or of one number "angle", and units."""
+    """Names ("gyro[0]", or "angle" for a sensor with one number) and units."""
     for sensor in system.scene.sensors:
         units = _units(system, sensor)
         for n, unit in enumerate(units):
@@ -80,7 +80,7 @@ def _units(system: System, sensor: Sensor) -> list[str]:
 
 
 def _change(system: System, sensor: Sensor, at: ChangedRow) -> Real:
-    """(width,k) of one sensor."""
+    """(width,k) change of one sensor's signals."""
     names, k = system.observation.names, at.change.shape[1]
     match sensor:
         case CoordinateSensor(of=of, quantity="value"):
@@ -114,7 +114,7 @@ def _part(system: System, at: ChangedRow, name: str, i: int) -> tuple[Real, Real
 
 
 def _of_marker(sensor: MarkerSensor, value: Real, change: Real, gravity: Real) -> Real:
-    """From a marker's row (24,) and its change (24,k)."""
+    """Change of a marker sensor, from the marker's row (24,) and its change (24,k)."""
     R, dR = value[3:12].reshape(3, 3), change[3:12].reshape(3, 3, -1)
     if sensor.quantity == "orientation":
         turn = np.einsum("ijk,lj->ilk", dR, R)  # R' = turn R
@@ -127,13 +127,13 @@ def _of_marker(sensor: MarkerSensor, value: Real, change: Real, gravity: Real) -
 
 
 def _of_quaternion(R: Real, turn: Real) -> Real:
-    """(4,k) of the quaternion of R, its scalar part not negative, by small rotations (3,k), World axes."""
+    """(4,k) change of the quaternion of R (nonnegative scalar part) by small rotations (3,k), World axes."""
     q = Rotation.from_matrix(R).as_quat(canonical=True, scalar_first=True)
     return 0.5 * np.vstack([-q[1:] @ turn, q[0] * turn + np.cross(turn.T, q[1:]).T])
 
 
 def _of_distance(sensor: DistanceSensor, a: tuple[Real, Real], b: tuple[Real, Real]) -> Real:
-    """(2,k); DynamicsError where both markers are at one place."""
+    """(2,k) change of a distance and its rate; DynamicsError where both markers coincide."""
     value, change = b[0] - a[0], b[1] - a[1]
     position, velocity = _PLACES["position"], _PLACES["velocity"]
     length = float(np.linalg.norm(value[position]))
@@ -150,7 +150,7 @@ def _of_distance(sensor: DistanceSensor, a: tuple[Real, Real], b: tuple[Real, Re
 
 
 class OfSensors(NamedTuple):
-    """Names and units of what all sensors say (S), and its derivatives: by the state [xi; du] (S,2f) of a linear model,
+    """Names and units of all sensor signals (S), and their derivatives: by the state [xi; du] (S,2f) of a linear model,
     by generalised forces along the n free speeds (S,n)."""
 
     names: list[tuple[str, str]]

@@ -1,4 +1,4 @@
-"""Steady spins: one hinge or wheel turns at a constant rate, and nothing else accelerates."""
+"""Steady spins: relative equilibria in which one hinge or wheel turns at a constant rate."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CLOSED = "look at the eigenvalues of the closed loop about a state: flexmb.linea
 
 @dataclass(frozen=True, eq=False)
 class SteadySpin:
-    """A relative equilibrium: `state` with `hinge` at `rate` (rad/s), which is driven, other wheels at their speeds."""
+    """A relative equilibrium: `state` with `hinge` driven at `rate` (rad/s), and other wheels at their speeds."""
 
     hinge: str
     rate: float
@@ -32,7 +32,7 @@ class SteadySpin:
     equations: Equations
 
     def linearize(self) -> LinearModel:
-        """The linear model about it: displacements seen from the turning bodies. Its coefficients are constant."""
+        """The linear model about it, with displacements in the rotating frame and constant coefficients."""
         if not isinstance(self.equations, Equations):
             raise TypeError(f"equations is a {type(self.equations).__name__}: give those of steady_spin")
         self.equations.system.layout.entering(self.state)
@@ -75,7 +75,7 @@ def steady_spin(system: System | Scene, hinge: str, rate: float, guess: State | 
 
 
 def _turning(system: System, hinge: str) -> int:
-    """Number of the speed of a hinge or wheel with one angle; ValueError for others."""
+    """Index of the speed of a hinge or wheel with one angle; ValueError for others."""
     angles = [found.name for found in system.scene.hinges if isinstance(found, Revolute)]
     angles += [wheel.name for wheel in system.scene.wheels]
     if hinge not in angles:

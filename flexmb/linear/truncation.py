@@ -1,8 +1,8 @@
-"""What the modes left out of beams change in the eigenvalues of a linear model: seen from a model with twice as many.
+"""Effect of modal truncation of beams on the eigenvalues of a linear model, by a model with twice as many modes.
 
-By Rayleigh and Ritz, modes that are left out make an undamped structure stiffer: its frequencies fall towards their
-limit when modes are added. So the change by the next modes shows the size of what is missing. It leaves out what
-those beyond would change: for eigenmodes of a beam with a heavy body at its tip, about as much again.
+By the Rayleigh-Ritz principle, truncation makes an undamped structure stiffer: its frequencies decrease towards their
+limit when modes are added. So the change by the next modes estimates the truncation error. The effect of still higher
+modes is not included: for eigenmodes of a beam with a heavy body at its tip it is of about the same size.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from flexmb.system.tree_system import System
 from flexmb.typing import Real
 
 MORE = 2  # times the modes, and the elements that they need
-ALIKE = 0.5  # modal assurance: with less, a mode of the finer model is another one
-NEARNESS = 0.1  # weight of the eigenvalues' distance: growth and decay of one motion have one shape
-SEEN_AT = 4  # positions along a beam for each mode that is looked for there
+ALIKE = 0.5  # modal assurance criterion: with less, a mode of the finer model is a different one
+NEARNESS = 0.1  # weight of the eigenvalues' distance, since growth and decay of a motion have the same shape
+SEEN_AT = 4  # sample positions along a beam, for each mode
 
 
 @dataclass(frozen=True, eq=False)

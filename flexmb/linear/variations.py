@@ -1,4 +1,4 @@
-"""The equations of motion and their exact first variations, in minimal coordinates: of trees all free ones.
+"""The equations of motion and their exact first variations in minimal coordinates (for trees, all free coordinates).
 
 Closed chains: `flexmb.linear.closed_variations`.
 
@@ -33,11 +33,11 @@ from flexmb.typing import Index, Real, Record
 
 @dataclass(frozen=True, eq=False)
 class Variations:
-    """Derivatives at one state, over the f independent ones of n free speeds; of a tree these are all.
+    """Derivatives at one state by the f independent ones of n free speeds; in a tree f = n.
 
     rates (f,): udot; by_displacement, by_speed (f,f): its derivatives; drift (f,): its explicit derivative by time;
-    transport (f,f): xi' = du + transport xi; motion (nq,f): N; mass (f,f): mass matrix. chosen (f,): places of the
-    independent speeds among the free ones; movable: places among these of those on whose displacement anything depends.
+    transport (f,f): xi' = du + transport xi; motion (nq,f): N; mass (f,f): mass matrix. chosen (f,): indices of the
+    independent speeds among the free ones; movable: indices among these of coordinates that are not cyclic.
     by_chosen (2n,2f): displacements and changes of all free speeds by those of the independent ones.
     """
 
@@ -60,12 +60,12 @@ class Variations:
 
     @property
     def A(self) -> Real:
-        """(2n,2n) of d[xi; du]/dt."""
+        """(2n,2n) matrix of d[xi; du]/dt."""
         return np.block([[self.transport, np.eye(len(self.rates))], [self.by_displacement, self.by_speed]])
 
 
 class Equations:
-    """A system with its functions of time as they are, held, or replaced (`held`, `spinning`); one per thread."""
+    """A system with its functions of time, which can be held or replaced (`held`, `spinning`); one per thread."""
 
     def __init__(self, system: System, constants: Constants | None = None) -> None:
         self.system = system
@@ -78,12 +78,12 @@ class Equations:
 
     @property
     def freedom(self) -> int:
-        """How many speeds are independent."""
+        """Number of independent speeds."""
         return len(self.free)
 
     @property
     def tangent_tables(self) -> tuple[Any, ...]:
-        """Constants and workspaces of kernels whose numbers are duals."""
+        """Constants and workspaces of kernels for dual numbers."""
         return self.constants, self._w
 
     def check(self, status: int) -> None:
@@ -115,21 +115,21 @@ class Equations:
         return [Constant(value=float(value)) for value in w.function[:, 0]]
 
     def rates(self, state: State) -> Real:
-        """udot (n,) of the free speeds; DynamicsError where it does not exist."""
+        """udot (n,) of the free speeds; DynamicsError where they do not exist."""
         status = articulated.accelerations(state.t, pack(state), self.constants, self._real_w)
         self.system.check_status(status, int(self._real_w.fault[0]))
         return self._real_w.speed["acceleration"][self.free]
 
     def mass(self, state: State) -> Real:
-        """Mass matrix (n,n) of the free speeds, closures aside."""
+        """Mass matrix (n,n) of the free speeds, without closures."""
         return self.system.mass_matrix(state)[np.ix_(self.free, self.free)]
 
     def loads(self, state: State, at: Variations) -> Real:
-        """What accelerates the coordinates (f,) that are independent at another state, N (N m)."""
+        """Generalised loads, N (N m), on the coordinates (f,) that are independent at another state."""
         return self.mass(state) @ self.rates(state)
 
     def movable(self, chosen: Index) -> Index:
-        """Places among these free speeds of those on whose displacement anything depends: no unsprung wheels."""
+        """Indices among these free speeds of those whose coordinate is not cyclic: all but wheels without springs."""
         return np.flatnonzero(~np.isin(self.free[chosen], self._indifferent))
 
     def variations(self, state: State) -> Variations:
@@ -139,8 +139,8 @@ class Equations:
         J, drift = np.empty((len(y), len(y))), np.empty(len(y))
         self.system.check_status(jacobian(state.t, y, J, self.constants, self._w), int(self._w.fault[0]))
         if self._w.doubt[0]:
-            self.system.digits_left(state)  # raises if pivots are only rounding
-        rates = self._w.slope[nq + self.free, 0]  # the numbers themselves, before their derivatives
+            self.system.digits_left(state)  # raises if pivots are at rounding level
+        rates = self._w.slope[nq + self.free, 0]  # the values, which precede their derivatives
         self.system.check_status(time_derivative(state.t, y, drift, self.constants, self._w), int(self._w.fault[0]))
         rows, motion = J[nq + self.free], J[:nq, nq + self.free]
         return Variations(

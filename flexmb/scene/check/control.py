@@ -1,4 +1,4 @@
-"""Feedback: signals that exist, sizes that fit, instants that come, no torque that depends on itself at once."""
+"""Checks of feedback: existing signals, matching sizes, valid sampling instants, and no algebraic loops."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ADDRESS = re.compile(r"[\w.]+:\w[\w.]*")
 
 
 class Named(NamedTuple):
-    """What a reference to a signal names: a sensor or controller, and which of its numbers, None for all."""
+    """A parsed signal reference: a sensor or controller, and the index of one of its numbers, None for all."""
 
     name: str
     number: int | None
@@ -51,7 +51,7 @@ def named(reference: str) -> Named | None:
 
 
 def sensor_width(scene: Scene, sensor: Sensor) -> int | None:
-    """How many numbers a sensor has; None where only compiled bodies know it, or nothing has that name."""
+    """Number of values of a sensor; None if it is known only after compilation, or the name does not exist."""
     match sensor:
         case CoordinateSensor(of=of, quantity=quantity):
             return _coordinates(scene, of, quantity == "rate")
@@ -79,7 +79,7 @@ def _coordinates(scene: Scene, of: str, rates: bool) -> int | None:
 
 
 def depends_at_once(sensor: Sensor) -> bool:
-    """Whether forces change what it measures without delay: accelerations and loads."""
+    """Whether the signal depends directly on forces: accelerations and loads."""
     match sensor:
         case MarkerSensor():
             return sensor.quantity in AT_ONCE
@@ -92,7 +92,7 @@ def depends_at_once(sensor: Sensor) -> bool:
 
 
 def output_width(controller: Controller, inputs: int | None) -> int | None:
-    """How many outputs a controller of so many inputs has."""
+    """Number of outputs of a controller with this number of inputs."""
     match controller:
         case StateSpace(C=C, D=D):
             return len(C) or len(D)
@@ -109,7 +109,7 @@ def output_width(controller: Controller, inputs: int | None) -> int | None:
 
 
 def widths_of(scene: Scene) -> dict[str, int | None]:
-    """How many numbers every sensor and controller has; None where only compiled bodies know it."""
+    """Number of values of every sensor and controller; None if it is known only after compilation."""
     widths = {sensor.name: sensor_width(scene, sensor) for sensor in scene.sensors}
     for controller in scene.controllers:
         each = [_width(reference, widths) for reference in controller.inputs]
@@ -276,7 +276,7 @@ def _pid(place: Place, pid: Pid, inputs: int | None) -> Iterator[Defect]:
 def _at_once(
     place: Place, controller: Controller, immediate: set[str], widths: dict[str, int | None]
 ) -> Iterator[Defect]:
-    """A continuous output must not depend at once on what it changes at once itself."""
+    """No algebraic loops: a continuous output must not depend directly on a signal that it changes directly."""
     if controller.period_s is not None:
         return
     column = 0
@@ -290,7 +290,7 @@ def _at_once(
 
 
 def _delays(controller: Controller, column: int, width: int | None) -> bool:
-    """Whether inputs from this one on reach the outputs through states alone."""
+    """Whether this input and the next ones affect the outputs only through states (no direct feedthrough)."""
     if not isinstance(controller, StateSpace) or width is None:
         return False
     return not any(any(row[column : column + width]) for row in controller.D)

@@ -1,4 +1,4 @@
-"""Events: something to watch that there is, and actions that can be done."""
+"""Checks of events: the watched signal exists, and the actions are possible."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flexmb.scene.values import PathError, with_values
 
 
 def events(scene: Scene) -> Iterator[Defect]:
-    """Every event watches something, and does something that can be done."""
+    """Every event watches an existing signal, and its actions are possible."""
     if not scene.events:
         return
     paths = scalar_paths(scene)
@@ -35,7 +35,7 @@ def events(scene: Scene) -> Iterator[Defect]:
 
 
 def _names_of_stops(scene: Scene) -> Iterator[Defect]:
-    """What a run calls the loads of stops, and leaving them, means nothing else; a run that is taken up has them."""
+    """The names that a run gives to the loads of stops and to release events are not used otherwise in the scene."""
     loads = {load_of(event): (event, stop_sensor(event, action)) for event, action in resting(scene)}
     for collection in ("sensors", "controllers") if loads else ():
         for place, item in entries(scene, collection):
@@ -56,7 +56,7 @@ def _names_of_stops(scene: Scene) -> Iterator[Defect]:
 def _signal(
     place: Place, reference: str, signals: dict[str, int | None], others: dict[str, str]
 ) -> Iterator[Defect]:
-    """What is no time, coordinate or rate is one number of a sensor or controller."""
+    """A reference that is no time, coordinate or rate names one number of a sensor or controller."""
     found = named(reference)
     if found is None or found.name not in signals:
         yield Defect(str(place), f'there is no "{reference}"', closest(reference, {**others, **signals}))

@@ -1,8 +1,8 @@
-"""Inertia beyond hinges: a freedom that moves nothing has no acceleration.
+"""Outboard inertia of hinges: a freedom that moves no inertia has no defined acceleration.
 
-A gimbal with aligned axes has a freedom that moves nothing, whatever the gimbal carries. Everything else is checked
-where no kinematics is needed: for the child and everything welded to it, unless more mass hangs from these by moving
-hinges.
+A gimbal with aligned axes has such a freedom, whatever the gimbal carries. All other hinges are checked only where no
+kinematics is needed: for the child and everything welded to it, unless further massive bodies are connected to these by
+moving hinges.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class _Nodes:
 
 
 def _beside(node: NodeFrame, R: Real, p: Real) -> tuple[Real, Real]:
-    """What is at R, p from a node, seen from its body."""
+    """Pose in the body frame of a frame at R, p relative to a node."""
     turn = rotation_matrix(node.quaternion)
     return turn @ R, node.position + turn @ p
 
@@ -212,7 +212,7 @@ def _lumps(mass: Real, com: Real, inertia: Real) -> Real:
 
 
 def _lump(mass: float, com: Vector | Real, inertia: ArrayLike) -> Real:
-    """The same of one lump."""
+    """Spatial inertia (6,6) of one lump."""
     found: Real = _lumps(np.array([mass]), np.array([com], float), np.array([inertia], float))[0]
     return found
 
