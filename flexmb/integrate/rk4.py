@@ -112,22 +112,22 @@ def detour(problem, watch, trouble, step, ends, k, samples, run):
 
 @handed_in
 def accept(k):
-    """Nothing is known of the step before."""
+    """See `FixedMethod`: a step needs nothing of the steps before it."""
 
 
 @handed_in
 def enter(known):
-    """Likewise."""
+    """See `FixedMethod`: a step needs nothing of the steps before it."""
 
 
 @handed_in
 def recall(memory, k, known, accuracy, counts):
-    """Likewise."""
+    """See `FixedMethod`: a step needs nothing of the steps before it."""
 
 
 @handed_in
 def keep(memory, k):
-    """Likewise."""
+    """See `FixedMethod`: a step needs nothing of the steps before it."""
 
 
 @kernel

@@ -103,8 +103,9 @@ class Segments:
             return Segment(SegmentEnd.FAILURE, raw, levels, part, [], early)
         if found:
             return Segment(SegmentEnd.EVENT, raw, levels, part, found, early)
-        end = SegmentEnd.TIME if raw.t == self._times[-1] else SegmentEnd.LEAP
-        return Segment(end, raw, levels, part, found, early)
+        is_over = raw.t == self._times[-1]
+        assert is_over or raw.t == self._agenda.until  # nothing else stops a segment
+        return Segment(SegmentEnd.TIME if is_over else SegmentEnd.LEAP, raw, levels, part, found, early)
 
     def _output(self, begin: Beginning, stop: float) -> tuple[Real, Flags]:
         """Times (K,) s from the start of a segment to its stop, and which of them are output times of the run."""

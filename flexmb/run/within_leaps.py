@@ -43,7 +43,7 @@ def too_near(situation: Situation, raw: Raw, t_start: float, due: float, further
     t_start (s): start of the segment, before which the event cannot happen.
     """
     longest = _longest_leap(situation.system, raw)
-    if longest >= due - t_start:
+    if not longest < due - t_start:  # NaN is no length either
         return 0.0
     if raw.status is Status.OK:
         is_near = raw.t == due and not _goes_on(situation, raw, longest, further)

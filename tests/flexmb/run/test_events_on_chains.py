@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.run import within_leaps
 from tests.flexmb.closure.mechanisms import windows
 
 Z = (0.0, 0.0, 1.0)
@@ -198,3 +200,10 @@ def test_a_run_goes_on_from_events_beside_a_singular_position(level):
     run = fm.simulate(msgspec.structs.replace(scene, events=(event,)), 1.0, samples=11)
     assert run.finished and len(run.events) == 1
     assert np.abs(run.q[:, 0] - 0.5 * np.pi + np.pi * run.t).max() < 1e-8
+
+
+def test_a_leap_of_unknown_length_moves_no_event(monkeypatch: pytest.MonkeyPatch) -> None:
+    """NaN is neither shorter nor longer than the segment: the event happens when it is due, and nothing is tried."""
+    monkeypatch.setattr(within_leaps, "_longest_leap", lambda *given: np.nan)
+    situation, raw = SimpleNamespace(system=None), SimpleNamespace(status=fm.Status.OK, t=1.0)
+    assert within_leaps.too_near(situation, raw, 0.0, 1.0, None) == 0.0  # type: ignore[arg-type]
