@@ -51,6 +51,7 @@ GOOD = Trajectory(
     loads={"pivot": numbers(6), "loop": -numbers(6), "bob": 2.0 * numbers(6)},
     wheel_loads={"wheel": 3.0 * numbers(6)},
     drives={"pivot": numbers(2), "wheel": numbers(1)},
+    hinge_forces={"spring": 4.0 * numbers(1)},
     energy={kind: place + numbers() for place, kind in enumerate(("kinetic", "strain", "spring", "gravity"))},
     momentum=5.0 * numbers(6),
     work=7.0 * numbers(),
@@ -69,7 +70,7 @@ def test_a_sound_run_passes_whole_in_arrays_of_its_own() -> None:
     run = checked_run(GOOD, TIMES, SCENE)
     assert (run.status, run.message, run.wall_s, run.evaluations) == ("finished", "fine", 0.25, 123)
     given, found = arrays(GOOD), arrays(run)
-    assert found.keys() == given.keys() and len(found) == 23
+    assert found.keys() == given.keys() and len(found) == 24
     for name, values in given.items():
         assert np.array_equal(found[name], values)
         assert not np.shares_memory(found[name], values)
@@ -175,6 +176,8 @@ BREACHES: list[tuple[dict[str, Any], str]] = [
     ({"drives": {"pivot": numbers(0)}}, "drives['pivot'] has shape (11, 0); (11, n) was expected"),
     ({"drives": {"pivot": np.array(1.0)}}, "drives['pivot'] has shape (); (11, n) was expected"),
     ({"drives": {"pivot": spoilt(numbers(2))}}, f"drives['pivot'] {FINITE}"),
+    ({"connectors": {"spring": numbers(6)}}, "connectors has 'spring', and the scene has none"),
+    ({"hinge_forces": {"pivot": numbers(1)}}, "hinge_forces has 'pivot', and the scene has spring"),
     ({"energy": None}, "energy is None, not a mapping"),
     ({"energy": {"heat": numbers()}}, "energy has 'heat', and the scene has gravity, kinetic, spring, strain"),
     ({"energy": {"spring": numbers(1)}}, "energy['spring'] has shape (11, 1); (11,) was expected"),
@@ -188,6 +191,7 @@ BREACHES: list[tuple[dict[str, Any], str]] = [
     ({"work": "much"}, "work is a str, not an array"),
     ({"work": numbers(1)}, "work has shape (11, 1); (11,) was expected"),
     ({"work": spoilt(numbers(), 10)}, "work is not finite at t = 1 s, and the status is finished"),
+    ({"undetermined": ["load:pivot.force"]}, "undetermined returned a list, not a tuple"),
     ({"wall_s": None}, "wall_s is None, not a number"),
     ({"wall_s": True}, "wall_s is a bool, not a number"),
     ({"wall_s": -1.0}, "wall_s is -1: a finite number from 0 is expected"),
@@ -197,6 +201,23 @@ BREACHES: list[tuple[dict[str, Any], str]] = [
     ({"evaluations": True}, "evaluations is True: a whole number from 0 is expected"),
     ({"evaluations": LARGEST_COUNT + 1}, "evaluations is 9223372036854775808: a whole number from 0 is expected"),
 ]
+
+
+def test_numbers_that_nothing_determines_need_not_be_finite() -> None:
+    """Only those that are named: neither the drive beside them nor another part of the same load."""
+    open_drive = {"drives": GOOD.drives | {"pivot": spoilt(numbers(2))}, "undetermined": ("drive:pivot",)}
+    assert checked_run(replace(GOOD, **open_drive), TIMES, SCENE).undetermined == ("drive:pivot",)
+    both = GOOD.drives | {"pivot": spoilt(numbers(2)), "wheel": spoilt(numbers(1))}
+    with pytest.raises(BrokenContract, match=r"drives\['wheel'\] is not finite"):
+        checked_run(replace(GOOD, drives=both, undetermined=("drive:pivot",)), TIMES, SCENE)
+    with pytest.raises(BrokenContract, match=r"drives\['pivot'\] is not finite"):
+        checked_run(replace(GOOD, drives=open_drive["drives"], undetermined=("drive:wheel",)), TIMES, SCENE)
+    torque = numbers(6)
+    torque[3, :3] = np.nan
+    half = {"loads": GOOD.loads | {"pivot": torque}}
+    assert checked_run(replace(GOOD, **half, undetermined=("load:pivot.torque",)), TIMES, SCENE).status == "finished"
+    with pytest.raises(BrokenContract, match=r"loads\['pivot'\] is not finite"):
+        checked_run(replace(GOOD, **half, undetermined=("load:pivot.force",)), TIMES, SCENE)
 
 
 @pytest.mark.parametrize(("change", "text"), BREACHES)

@@ -93,6 +93,41 @@ def test_tolerances_bound_the_error_by_how_far_it_falls(
     assert "x the difference of the two finest tolerances" in found.how
 
 
+@pytest.mark.parametrize("work", [(1000, 1778, 0), (1000, 1030, 2000), (562, 1000, 1778, 1800)])
+def test_efforts_that_another_limit_determines_say_so(work: tuple[int, ...]) -> None:
+    differences = (8000.0, 100.0, 1.0)[-len(work) + 1 :]
+    found = estimate(FORCE, "tolerance", tolerances(differences, work, 100.0), 0.0)
+    assert found.how == (
+        "15 x the difference of the two finest tolerances, as a finer one took hardly more evaluations"
+    )
+    assert np.isclose(found.value, 15.0) and found.order is None
+
+
+def test_only_the_growth_of_the_last_two_efforts_shows_another_limit() -> None:
+    """A coarse pair of efforts that took the same steps is no limit of the fine ones."""
+    found = estimate(FORCE, "tolerance", tolerances((8000.0, 100.0, 1.0), (1000, 1000, 1778, 3162), 100.0), 0.0)
+    assert np.isclose(found.value, 1.0)
+
+
+def test_the_larger_difference_is_one_of_the_last_two() -> None:
+    """Also where one before them was larger still, and where the later of them is the larger."""
+    for differences, larger in (((50.0, 1.5, 1.0), 1.5), ((50.0, 1.0, 1.5), 1.5)):
+        found = estimate(FORCE, "tolerance", tolerances(differences, (0, 0, 0, 0), 100.0), 0.0)
+        assert np.isclose(found.value, 3.0 * larger)
+
+
+def test_a_fall_without_growth_is_no_order() -> None:
+    """Differences that grow, or a first pair of efforts with fewer evaluations, give no order: U is at least d_23."""
+    for differences, work in (
+        ((50.0, 100.0, 1.0), (562, *EIGHTH)),
+        ((100.0, 100.0, 1.0), (562, *EIGHTH)),
+        ((150.0, 100.0, 1.0), (562, *EIGHTH)),
+        ((8000.0, 100.0, 1.0), (1778, 1000, 1778, 3162)),
+        ((8000.0, 100.0, 1.0), (1000, 1000, 1778, 3162)),
+    ):
+        assert np.isclose(estimate(FORCE, "tolerance", tolerances(differences, work, 100.0), 0.0).value, 1.0)
+
+
 def test_evaluations_foretell_how_far_errors_fall() -> None:
     """Order 6.64 of the fall by 100 at twice the evaluations leaves one by 64 at 1.87 times as many."""
     found = estimate(FORCE, "tolerance", tolerances((10000.0, 100.0, 1.0), (500, 1000, 2000, 3740), 100.0), 0.0)
@@ -175,6 +210,9 @@ def counted(*evaluations: float) -> list[RungSignal]:
         ("tolerance", counted(-1, 1), 2.0, "-1 evaluations of a signal of size 2 leave no round-off"),
         ("step", counted(1, np.inf), 2.0, "inf evaluations of a signal of size 2 leave no"),
         ("step", counted(1, 1), np.inf, "1 evaluations of a signal of size inf leave no"),
+        ("step", counted(0, -3), 2.0, "-3 evaluations of a signal of size 2 leave no"),
+        ("step", counted(np.inf, 7), 2.0, "inf evaluations of a signal of size 2 leave no"),
+        ("step", counted(3, 2, 1), np.inf, "1 evaluations of a signal of size inf leave no"),
     ],
 )
 def test_each_fault_of_a_ladder_is_named(kind: str, given: list[RungSignal], size: float, why: str) -> None:

@@ -46,9 +46,38 @@ def test_nobody_is_compared_in_what_one_says_is_open(tmp_path):
     assert {(each.engine, each.channel) for each in outcome.inapplicable} == {
         (engine, TORQUE) for engine in ("one", "two", "three")
     }
-    assert all("not determined, as one says" in each.reason for each in outcome.inapplicable)
+    said = "not determined, as one says: closures are redundant, and infinitely many loads go with the same motion"
+    assert all(each.reason == said for each in outcome.inapplicable)
     write_summary(outcome, tmp_path / "summary.md")
     assert "not determined" in (tmp_path / "summary.md").read_text(encoding="utf-8")
+
+
+ACROSS = """
+[[variant]]
+name = "rigid"
+engines = ["one"]
+
+[[variant]]
+name = "other"
+engines = ["two"]
+
+[[comparison]]
+name = "both"
+a = { variant = "rigid", engine = "one" }
+b = { variant = "other", engine = "two" }
+goals = { "marker:tip.position" = 1e-3, load = 1e-3 }
+"""
+
+
+@pytest.mark.parametrize("silent", ["one", "two"])
+def test_across_variants_either_side_may_say_so(silent):
+    both = {TIP: way(), FORCE: way(), TORQUE: way()}
+    runs = {"one": ladder("one", both), "two": ladder("two", both, variant="other")}
+    assert {each.channel for each in judged(ACROSS, [*runs["one"], *runs["two"]]).all} == {TIP, FORCE, TORQUE}
+    said = [run for name, each in runs.items() for run in (each if name == silent else without_torque(each))]
+    outcome = judged(ACROSS, said)
+    assert {verdict.channel for verdict in outcome.all} == {TIP, FORCE}
+    assert {each.channel for each in outcome.inapplicable} == {TORQUE}
 
 
 def test_an_engine_that_leaves_it_out_without_a_word_refuses_it():

@@ -229,6 +229,24 @@ def test_a_refusal_is_recorded_and_nothing_is_compiled() -> None:
     assert actor.heard == ["version", "supports"]
 
 
+def test_what_an_engine_leaves_undetermined_is_recorded_and_its_numbers_are_not() -> None:
+    open_load = "load:pivot.torque"
+    (found,) = records(Actor(play=lambda run, count: replace(run, undetermined=(open_load,))), finest_only=True)
+    assert found.undetermined == (open_load,) and open_load not in found.channels
+    assert "load:pivot.force" in found.channels
+
+
+def test_an_engine_is_asked_about_the_start_and_the_duration_of_the_job() -> None:
+    actor = Actor()
+    (found,) = emitted(actor, times=TIMES + 3.0)
+    assert (found.status, found.message) == ("refused", "the adapter of engine actor begins all runs at t = 0")
+    asked: list[float] = []
+    actor.takes = ("t_start",)
+    actor.efforts_for = lambda scene, duration_s: asked.append(duration_s) or LADDER[:1]
+    emitted(actor, times=TIMES + 3.0)
+    assert asked == [pytest.approx(0.2)]
+
+
 def test_a_run_is_recorded_in_every_field(monkeypatch: pytest.MonkeyPatch) -> None:
     on_a_clock(monkeypatch, 2.5)
     actor = Actor(play=lambda run, count: replace(run, wall_s=0.5 + count, evaluations=40 + count, message="fine"))
