@@ -18,8 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.closure.asked import NO_HOLD, NOTHING_ASKED, AskedFor, KeptValues, Value, Wishes
-from flexmb.closure.closures import ClosureError, Closures, GroupResponse
+from flexmb.closure.closures import ClosureError, Closures
 from flexmb.closure.factor import DEPENDENT
+from flexmb.closure.null_loads import GroupResponse
 from flexmb.closure.projection import CLOSED, MOVING_APART, OPEN
 from flexmb.tables.status import OK
 from flexmb.typing import Real

@@ -53,7 +53,7 @@ NEARBY = 2.0
 # Part of the distance that no step may exceed, however far its mechanism moves: the row could vanish within two steps.
 HALF = 0.5
 # What is recorded of steps that must not be shortened: the gaps of closures, and also the lengths of the steps.
-NOTHING, GAPS, GAPS_AND_LENGTHS = range(3)
+UNRECORDED, GAPS, GAPS_AND_LENGTHS = range(3)
 # Square root of the gap of a stabilised closure over the distance to a singular position: the gap between branches is
 # the square of the distance, and the sum of the ports' speeds overestimates the distance several times.
 CLEAR = 2.0**-5
@@ -198,7 +198,7 @@ def notice(t, cc, cw):
 
     Also recorded are gaps of stabilised closures there that are so large that the branch is ambiguous.
     """
-    if cw.notices[0] == NOTHING:
+    if cw.notices[0] == UNRECORDED:
         return
     gap = largest_gap(cc, cw)[0]
     for g in range(cc.group.shape[0]):

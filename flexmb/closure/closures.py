@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.closure import dynamics
-from flexmb.closure.branch import GAPS, NOTHING
+from flexmb.closure.branch import GAPS, UNRECORDED
 from flexmb.closure.factor import DEPENDENT
+from flexmb.closure.null_loads import GroupResponse, blocks, null_loads
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.response import Response, response
@@ -58,15 +59,6 @@ class ClosedMotion(NamedTuple):
     hinges: Real
     closures: Real
     spread: Spread | None = None
-
-
-class GroupResponse(NamedTuple):
-    """One group: its rows; its columns (indices of speeds, the first `own` are not shared); B' (rows,columns)."""
-
-    rows: slice
-    columns: Index
-    half: Real
-    own: int
 
 
 class _Counted(NamedTuple):
@@ -127,7 +119,7 @@ class Closures:
         w, route = self._tree(), self._route(algorithm)
         own = workspace(cc, c, len(w.q))
         (own.rank[:], own.size[:]), own.gain[:] = self._counted[0], (2.0 * rate, rate * rate)
-        own.notices[0] = GAPS if rate > 0.0 else NOTHING
+        own.notices[0] = GAPS if rate > 0.0 else UNRECORDED
         return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)
 
     def _route(self, algorithm: str) -> Recursion | Response | Matrices:
@@ -282,17 +274,17 @@ class Closures:
         still[place] = 0.0
         for j, x in enumerate(np.eye(len(c.speed))):
             found[:, j] = self.pushed(t, still, x)[place]
-        dynamics.move(t, y, np.zeros(0), dynamics.NOTHING, self._chain)
+        dynamics.move(t, y, np.zeros(0), dynamics.UNCHANGED, self._chain)
         return found
 
     def gaps(self, t: float, y: Real) -> dict[str, tuple[float, float]]:
         """Gap of every closure: distance, and sine of the angle."""
-        dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.NOTHING, self._chain)
+        dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.UNCHANGED, self._chain)
         return {closure.name: self._gap(i, "value") for i, closure in enumerate(self.scene)}
 
     def passing_time(self, t: float, y: Real) -> float:
         """The least time (s) in which a closure moves by its own size; inf at rest."""
-        dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.NOTHING, self._chain)
+        dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.UNCHANGED, self._chain)
         moving = self._own.closure[self._own.closure["speed"] > 0.0]
         return float(np.min(moving["size"] / moving["speed"], initial=np.inf))
 
@@ -387,28 +379,3 @@ class Closures:
             out[rows, first : first + null.shape[1]] = null
             first += null.shape[1]
         return out
-
-
-def blocks(cc: ClosureConstants, cw: ClosureWorkspace) -> Iterator[GroupResponse]:
-    """B' of every group."""
-    for group in cc.group:
-        rows = slice(int(group["row_start"]), int(group["row_stop"]))
-        columns = cc.column[group["column_start"] : group["column_stop"]]
-        shape = rows.stop - rows.start, len(columns)
-        half = cw.half[group["half"] : group["half"] + shape[0] * shape[1]].reshape(shape)
-        yield GroupResponse(rows, columns, half, int(group["own_stop"] - group["column_start"]))
-
-
-def null_loads(cc: ClosureConstants, cw: ClosureWorkspace) -> list[tuple[slice, Real]]:
-    """Slice of the rows and orthonormal null loads (rows,k), for each group that has null loads."""
-    found = []
-    for (rows, _, whole, own), rank in zip(blocks(cc, cw), cw.rank.tolist(), strict=True):
-        half = whole[:, :own]
-        if rank < len(half):
-            order = cw.chosen[rows] - rows.start
-            chosen, rest = order[:rank], order[rank:]
-            null = np.zeros((len(half), len(rest)))
-            null[rest] = np.eye(len(rest))
-            null[chosen] = -np.linalg.lstsq(half[chosen].T, half[rest].T, rcond=None)[0]
-            found.append((rows, np.linalg.qr(null)[0]))
-    return found

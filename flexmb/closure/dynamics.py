@@ -12,7 +12,7 @@ from flexmb.motion.coordinates import load_state, store_slope
 from flexmb.spatial.vector import mat3, store3, times
 from flexmb.tables.status import OK
 
-NOTHING, COORDINATES, SPEEDS = range(3)
+UNCHANGED, COORDINATES, SPEEDS = range(3)
 
 
 @kernel
@@ -75,9 +75,9 @@ def move(t, y, x, what, s):
     """Change y by M^-1 J'f and evaluate the rows' values and rates there; x (nu,) are the innovations of J'f at the
     state linearised last.
 
-    what: COORDINATES displaces y, SPEEDS adds to the speeds, NOTHING leaves y unchanged.
+    what: COORDINATES displaces y, SPEEDS adds to the speeds, UNCHANGED leaves y unchanged.
     """
-    if what != NOTHING:
+    if what != UNCHANGED:
         respond(s.route, s, x, s.cw.step)
     if what == COORDINATES:
         displace(t, y, s)

@@ -28,7 +28,7 @@ class RowMotion:
         for j in range(nu):
             moving = np.concatenate([y[:nq], nothing, y[-1:]])
             moving[nq + j] = 1.0
-            dynamics.move(t, moving, nothing, dynamics.NOTHING, chain)
+            dynamics.move(t, moving, nothing, dynamics.UNCHANGED, chain)
             self.jacobian[:, j] = chain.cw.row["rate"]
         self._row, self._world = chain.cw.row.copy(), chain.cw.closure["world"].reshape(-1, 3, 3).copy()
 

@@ -57,7 +57,7 @@ BEYOND = 0.25
 # Constant c of a hyperbola x y = c that cannot be told from the gaps of closures: `TIGHT` times 2^8, which allows for
 # port speeds that are sums over several bodies and for closures far from the origin. Smooth accelerations differ by
 # the cube of the leap, far less. tests/flexmb/closure/test_near_singular.py measures the admissible range.
-UNSEEN = 2.0**-42
+UNRESOLVED = 2.0**-42
 # Evaluations by which the trapezoidal rule converges: one Euler step, then two iterations of the rule.
 APPROACHES = 3
 
@@ -261,7 +261,7 @@ def _same_branch(h, cc, cw):
                 usual = closure.speed**2 / closure.size + cw.size[r] * least
                 moment = passing_time(cc, cw, g)
                 nearest = min(ahead, abs(h - ahead), abs(INNER * h - ahead), abs((1.0 - INNER) * h - ahead)) / moment
-                if not cw.size[r] * abs(_jump(cw, place)) * nearest**3 <= 8.0 * UNSEEN * usual:
+                if not cw.size[r] * abs(_jump(cw, place)) * nearest**3 <= 8.0 * UNRESOLVED * usual:
                     return False
     return True
 

@@ -10,7 +10,7 @@ from flexmb.control import leaping, loop
 from flexmb.control import tables as a
 from flexmb.control.memory import LoopMemory
 from flexmb.control.power import powers
-from flexmb.control.schedule import instants, slack
+from flexmb.control.schedule import instants, slack, with_instants
 from flexmb.control.tangent import jacobian
 from flexmb.control.user import Called
 from flexmb.control.wiring import numbers_of, widest, wired
@@ -18,15 +18,15 @@ from flexmb.entry.observation import sense_markers
 from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, StiffProblem, problem, stiff_problem
 from flexmb.integrate.watch import Watch
 from flexmb.jit.direct import address, addresses
-from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR, pointer
+from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID, pointer
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Index, Real
 
-NEAR = 1e-6  # m, rad: displacement of the finite difference for signal rates before integration starts
-SLOWEST = 1e-100  # m/s, rad/s: slower motion counts as rest, since NEAR over the speed would overflow
-NOISE = 1e-8  # relative to NEAR: a smaller change of a signal counts as zero
+DISPLACEMENT = 1e-6  # m, rad: displacement of the finite difference for signal rates before integration starts
+SLOWEST = 1e-100  # m/s, rad/s: slower motion counts as rest, since DISPLACEMENT over the speed would overflow
+NOISE = 1e-8  # relative to DISPLACEMENT: a smaller change of a signal counts as zero
 
 
 class Begun(NamedTuple):
@@ -66,14 +66,14 @@ class Feedback:
         where[a.MOTION], where[a.CONSTANTS], where[a.WORKSPACE] = addresses(
             route.rhs, STATUS, REAL, VECTOR, VECTOR, constants, workspace
         )
-        where[a.MANIFOLD], _ = addresses(route.project, NOTHING, REAL, VECTOR, constants)
+        where[a.MANIFOLD], _ = addresses(route.project, VOID, REAL, VECTOR, constants)
         where[a.OUTPUTS] = address(self._outputs)
         if self._has_markers:
             where[a.MARKERS], where[a.TREE], where[a.TREE_WORKSPACE], _ = addresses(
-                sense_markers, NOTHING, REAL, VECTOR, self._tree, self._tree_workspace, self._outputs
+                sense_markers, VOID, REAL, VECTOR, self._tree, self._tree_workspace, self._outputs
             )
         if algorithm.observing is not None and not plant.scene.closures:
-            where[a.OBSERVING], *_ = addresses(algorithm.observing, NOTHING, constants, workspace, self._outputs)
+            where[a.OBSERVING], *_ = addresses(algorithm.observing, VOID, constants, workspace, self._outputs)
         self._leaping = route.leaping
         if route.leaping is not None:
             where[a.BACK], _ = addresses(route.leaping.back, REAL, VECTOR, constants)
@@ -93,7 +93,7 @@ class Feedback:
 
     def with_retraction(self, move: Any) -> None:
         """Add the retraction for Lie-group methods, see `flexmb.integrate.problem.StiffProblem`."""
-        self._where[a.RETRACTION], _ = addresses(move, NOTHING, VECTOR, VECTOR, VECTOR, self._tables[0])
+        self._where[a.RETRACTION], _ = addresses(move, VOID, VECTOR, VECTOR, VECTOR, self._tables[0])
 
     def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: Linear | None) -> Begun:
         """Begin a run. Controllers start from their initial states in the scene, or from those at the end of a run.
@@ -132,7 +132,7 @@ class Feedback:
         else:
             posed = problem(*kernels, leaps)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
-        ends = _with_instants(ends, table["time"][table["time"] > start], t_end)
+        ends = with_instants(ends, table["time"][table["time"] > start], t_end)
         farthest = clock.farthest if len(table) == 0 else t_end  # a leap crosses no instant
         return Begun(posed, y, Clock(clock.times, ends, farthest), controlled)
 
@@ -193,8 +193,7 @@ class Feedback:
         return found
 
     def signal_rates(self, begin: Starting) -> Real:
-        """(S,) rates (1/s) of the signals that are not sampled, by a finite difference over NEAR (m, rad); 0 at rest.
-        """
+        """(S,) rates (1/s) of the signals that are not sampled, by a finite difference; 0 at rest."""
         t, y = begin.state.t, self._only_at(begin)
         slope, there, ahead = np.zeros(len(y)), np.zeros(len(self.running.signal)), np.zeros(len(self.running.signal))
         loop.project(t, y.copy(), self.running)
@@ -203,11 +202,11 @@ class Feedback:
         if not SLOWEST < fastest < np.inf:
             return there
         loop.look(t, y, there, self.running)
-        loop.look(t + NEAR / fastest, y + NEAR / fastest * slope, ahead, self.running)
+        loop.look(t + DISPLACEMENT / fastest, y + DISPLACEMENT / fastest * slope, ahead, self.running)
         self.raise_trouble()
         change = ahead - there
-        change[np.abs(change) <= NOISE * NEAR + 64.0 * np.spacing(np.abs(ahead) + np.abs(there))] = 0.0
-        rates: Real = change * (fastest / NEAR)
+        change[np.abs(change) <= NOISE * DISPLACEMENT + 64.0 * np.spacing(np.abs(ahead) + np.abs(there))] = 0.0
+        rates: Real = change * (fastest / DISPLACEMENT)
         return rates
 
     def accelerations(self, begin: Starting) -> Real:
@@ -400,12 +399,3 @@ class Feedback:
             rates=out.rates, markers=out.markers, loads=self._loads, drives=self._drives, doubt=self._doubt,
             **self._held,
         )  # fmt: skip
-
-
-def _with_instants(ends: Real, times: Real, t_end: float) -> Real:
-    """Ends of segments for `Clock`, merged with the sampling instants up to t_end (s)."""
-    equal_steps, inner = not np.isfinite(ends[-1]), times[times < t_end]
-    is_end = len(inner) < len(times) or np.sum(ends == t_end) > (0 if equal_steps else 1)
-    before = np.union1d(ends[ends < t_end], inner)
-    last = [t_end] * bool(is_end) + [np.inf] if equal_steps else [t_end] + [t_end] * bool(is_end)
-    return np.array([*before, *last])

@@ -27,13 +27,13 @@ from flexmb.tables.status import OK
 # Relative accuracy of speeds and controller states: below the tightest usual tolerance, 1e-10.
 WANTED = 2.0**-34
 # The longest leap takes 2^-9 of the time in which a mechanism moves by its own size. Drives that change as fast as the
-# mechanism moves have an initial error of this order, and speeds one of 2^-18; `TURNS` iterations with the contraction
-# factor `FED_BACK` reduce it to `WANTED`.
-TURNS = 4
-FED_BACK = 2.0**-4
+# mechanism moves have an initial error of this order, and speeds one of 2^-18; `ITERATIONS` iterations with the
+# contraction factor `CONTRACTION` reduce it to `WANTED`.
+ITERATIONS = 4
+CONTRACTION = 2.0**-4
 # Relative rounding error of speeds normal to the branch, which controllers measure: at a distance of 2^-13 a gap of
 # 2^-50 is a position error of 2^-37, and divided by 2^-13 a speed error of 2^-24; a few times more for long chains.
-ACROSS = 2.0**-20
+NORMAL_ROUNDING = 2.0**-20
 # Initial number of substeps of a leap for controller states. A limit that is reached within a substep changes the
 # average of a drive by 2^-15 of its change, and speeds by 2^-33 at most.
 PARTS = 32
@@ -103,16 +103,16 @@ def _follow(step, y, dy, y_new, dy_new, s):
         y_new[i], dy_new[i] = y[i], dy[i]
     for d in range(former.shape[0]):
         s.driven[3, d] = s.function[s.drive[d].function].data[0]
-    for turn in range(TURNS + 1):
+    for iteration in range(ITERATIONS + 1):
         copy(s.driven[3], former)
         if not _carry(step, y, dy, y_new, dy_new, s) or _arrive(step.end, y_new, dy_new, s) != OK:
             return False
         effect, last = _effect(step, former, dy_new, s), effect
-        if not effect <= FED_BACK * (last + ACROSS):
+        if not effect <= CONTRACTION * (last + NORMAL_ROUNDING):
             return False
         if effect <= WANTED:
             break
-        if turn < TURNS and _move(step, y, dy, y_new, dy_new, s) != OK:
+        if iteration < ITERATIONS and _move(step, y, dy, y_new, dy_new, s) != OK:
             return False
     return True
 

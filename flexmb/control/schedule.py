@@ -77,3 +77,12 @@ def _together(times: Real, fixed: Real, gap: float) -> Real:
     result = np.empty(len(every))
     result[order] = chosen[group]
     return result[len(fixed) :]
+
+
+def with_instants(ends: Real, times: Real, t_end: float) -> Real:
+    """Ends of segments for `Clock`, merged with the sampling instants up to t_end (s)."""
+    equal_steps, inner = not np.isfinite(ends[-1]), times[times < t_end]
+    is_end = len(inner) < len(times) or np.sum(ends == t_end) > (0 if equal_steps else 1)
+    before = np.union1d(ends[ends < t_end], inner)
+    last = [t_end] * bool(is_end) + [np.inf] if equal_steps else [t_end] + [t_end] * bool(is_end)
+    return np.array([*before, *last])

@@ -20,7 +20,7 @@ from typing import Any
 
 from flexmb.control.lookup import fault
 from flexmb.jit.foreign import Uncompilable, address_of, as_python, foreign
-from flexmb.jit.pointer import NOTHING, REAL, VECTOR
+from flexmb.jit.pointer import REAL, VECTOR, VOID
 from flexmb.scene.problems import Defect, Place, SceneError
 from flexmb.scene.user_code import refusal
 from flexmb.tables.status import INTERRUPTED, OK
@@ -79,7 +79,7 @@ def _takes_six(function: Callable[..., Any]) -> bool:
 def compiled_address(law: Any, scene: str, place: Place) -> int:
     """The address of a compiled law; SceneError with numba's message if it cannot be compiled."""
     try:
-        return address_of(law, NOTHING, REAL, *[VECTOR] * 5)
+        return address_of(law, VOID, REAL, *[VECTOR] * 5)
     except Uncompilable as error:
         remedy = "take numba's advice, or leave the decorator out: a plain function runs, slower"
         what = f'"{as_python(law).__name__}" cannot be compiled: {error}'

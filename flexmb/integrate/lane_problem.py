@@ -17,7 +17,7 @@ from flexmb.integrate.dop853_tableau import STAGES_DENSE
 from flexmb.jit.bundle import AnyBundle, bundle
 from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.jit.lanes import LANE, LANES, select
-from flexmb.jit.pointer import NOTHING, STATUS, Pointer, pointer
+from flexmb.jit.pointer import STATUS, VOID, Pointer, pointer
 from flexmb.jit.wide_arrays import wide_zeros
 from flexmb.typing import Index, Real
 
@@ -89,7 +89,7 @@ def lane_problem(rhs: Any, project: Any, stages: LaneStages, constants: Any, wor
     """A `LaneProblem` from kernels and bundles."""
     return LaneProblem(
         pointer(rhs, STATUS, stages, constants, workspace),
-        pointer(project, NOTHING, stages, constants),
+        pointer(project, VOID, stages, constants),
         AnyBundle(stages),
         AnyBundle(constants),
         AnyBundle(workspace),

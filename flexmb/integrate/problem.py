@@ -13,7 +13,7 @@ import numpy as np
 
 from flexmb.jit.bundle import AnyBundle
 from flexmb.jit.kernel import kernel
-from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR, Pointer, pointer
+from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID, Pointer, pointer
 
 
 class Problem(NamedTuple):
@@ -133,7 +133,7 @@ def problem(rhs: Any, project: Any, constants: Any, workspace: Any, leaping: Lea
     known = constants if leaping else anything
     return Problem(
         pointer(rhs, STATUS, REAL, VECTOR, VECTOR, constants, workspace),
-        pointer(project, NOTHING, REAL, VECTOR, constants),
+        pointer(project, VOID, REAL, VECTOR, constants),
         AnyBundle(constants),
         AnyBundle(workspace),
         pointer(back, REAL, VECTOR, known),
@@ -149,7 +149,7 @@ def stiff_problem(
     return StiffProblem(
         *problem(rhs, project, constants, workspace, leaping),
         pointer(jacobian, STATUS, REAL, VECTOR, MATRIX, exact, tangent),
-        pointer(move, NOTHING, VECTOR, VECTOR, VECTOR, constants),
+        pointer(move, VOID, VECTOR, VECTOR, VECTOR, constants),
         AnyBundle(exact),
         AnyBundle(tangent),
         settles,

@@ -45,8 +45,8 @@ class Watch(NamedTuple):
     at the time at which a run paused, and rate (k,) per second there, of signals. value, after, reach (k,): scratch:
     above its level, its side at the end of a step, and what becomes of it there. signal (S,): scratch; empty where only
     entries are watched. leap (2,): start and end (s) of the leap in which a level is reached, NaN if it is none; before
-    (n,): y at its start. kept (1,): 1 where the run can be taken up from before a step that its end cut short, and
-    kept_side, kept_came (k,) as they were there.
+    (n,): y at its start. kept (1,): 1 where the run can be resumed from before a step that its end shortened;
+    kept_side, kept_came (k,): as they were there.
     look(t, y, signal, constants) finds all signals and returns a status code.
     """
 

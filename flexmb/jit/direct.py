@@ -20,7 +20,7 @@ from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import populate_array
 
 from flexmb.jit.kernel import kernel
-from flexmb.jit.pointer import NOTHING, REAL, STATUS, pointer
+from flexmb.jit.pointer import REAL, STATUS, VOID, pointer
 from flexmb.jit.tables import TableType
 
 ADDRESS = types.int64
@@ -97,7 +97,7 @@ def _entry(returned: Any, is_given: tuple[bool, ...]) -> Any:
     """
     names = [f"{'a' if given else 'b'}{i}" for i, given in enumerate(is_given)]
     ordered = sorted(names, key=lambda name: name[0] == "a")
-    by = "nothing" if returned == NOTHING else "status"
+    by = "nothing" if returned == VOID else "status"
     name = f"{by}_of_{''.join(each[0] for each in names)}"
     text = f"def {name}(function, {', '.join(ordered)}):\n    return {by}_at(function, ({', '.join(names)},))"
     space: dict[str, Any] = {"status_at": status_at, "nothing_at": nothing_at, "__name__": __name__}
@@ -151,7 +151,7 @@ def _type_of_status(context):
 
 @type_callable(nothing_at)
 def _type_of_nothing(context):
-    return lambda function, arguments: NOTHING
+    return lambda function, arguments: VOID
 
 
 @lower_builtin(real_at, types.Integer, types.BaseTuple)

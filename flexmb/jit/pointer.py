@@ -18,7 +18,7 @@ from flexmb.jit.bundle import AnyBundle, BundleType
 from flexmb.jit.hooks import HOOKS
 
 REAL, VECTOR, MATRIX, INDEX = types.float64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
-STATUS, WHOLE, NOTHING = types.int64, types.int64, types.none
+STATUS, WHOLE, VOID = types.int64, types.int64, types.none
 
 
 class Pointer(WrapperAddressProtocol):  # type: ignore[misc]

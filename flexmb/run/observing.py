@@ -10,7 +10,7 @@ import numpy as np
 
 from flexmb.entry.sampling import observe_samples
 from flexmb.jit.direct import addresses, bound, settled
-from flexmb.jit.pointer import INDEX, MATRIX, NOTHING, REAL, STATUS, VECTOR
+from flexmb.jit.pointer import INDEX, MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.observables import Observation
 from flexmb.tables.state import DynamicsError
@@ -47,7 +47,7 @@ def batch(observed: Observed, motion: tuple[Any, ...], observing: Any, n: int) -
     out, slope = observed.observation.outputs(), np.empty(n)
     entry = settled(observe_samples, INDEX, INDEX, VECTOR, MATRIX, VECTOR, MATRIX)
     moving = addresses(rhs, STATUS, REAL, VECTOR, VECTOR, constants, workspace)
-    found, *_, outputs = addresses(observing, NOTHING, constants, workspace, out)
+    found, *_, outputs = addresses(observing, VOID, constants, workspace, out)
     where = np.array([*moving, found, outputs])
     call = bound(entry, (), constants, workspace, out)
     return lambda times, states, rows: call(where, workspace.doubt, times, states, slope, rows)

@@ -25,7 +25,7 @@ from flexmb.integrate.lane_problem import LaneEntries, LaneStages, lane_entries,
 from flexmb.jit.bundle import broaden
 from flexmb.jit.direct import ADDRESS, address, addresses, settled
 from flexmb.jit.lanes import LANES
-from flexmb.jit.pointer import INDEX, MATRIX, NOTHING, STATUS, VECTOR, WHOLE
+from flexmb.jit.pointer import INDEX, MATRIX, STATUS, VECTOR, VOID, WHOLE
 from flexmb.system.free_motion import FreeMotion
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
@@ -126,7 +126,7 @@ class Batch:
         w, s, c = lane_workspace(self.systems[0].workspace()), lane_stages(self.nq + self.nu + 1), self._constants[0]
         entries = lane_entries(s, w.doubt)
         rhs, stages, _, workspace = addresses(lanes.rhs, STATUS, s, c, w)
-        begin = 0 if self.shares_constants else addresses(lanes.begin, NOTHING, c, w)[0]
+        begin = 0 if self.shares_constants else addresses(lanes.begin, VOID, c, w)[0]
         blocks = [address(each) for each in self._constants]
         return LaneTables(w, s, entries, lanes.lane_gate(s, entries, (rhs, begin, stages, workspace), blocks))
 

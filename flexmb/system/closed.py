@@ -44,9 +44,9 @@ if TYPE_CHECKING:
     from flexmb.frisch.nested_system import NestedSystem
     from flexmb.jain.operators import Operators
 
-# In the size of a closure: a state that is given opens it by less. At a distance of d sizes from where branches cross
-# they differ by d^2 in the gap: beyond a tenth of the size the nearest is the one that is meant. Three digits do.
-FAR = 1e-2
+# Largest gap of a closure, relative to its size, in a state that is given. At a distance of d sizes from a crossing of
+# branches their gaps differ by d^2: from a tenth of the size on, the nearest branch is the one that is meant.
+LARGEST_INITIAL_GAP = 1e-2
 
 
 class ClosedSystem(System):
@@ -109,14 +109,14 @@ class ClosedSystem(System):
         return found
 
     def admissible(self, state: State, given: Given = "guess") -> State:
-        """The nearest state that closes all closures; ClosureError where this one leaves them open by more than `FAR`.
+        """The nearest state that closes all closures, with the prescribed values of a tree.
 
-        As of a tree.
+        ClosureError where the given one leaves them open by more than `LARGEST_INITIAL_GAP`.
         """
         t, rough = self.layout.entering(super().admissible(state))
         self.closures.linearise(t, rough)
         errors = self.closures.errors()
-        if not np.max(np.abs(errors), initial=0.0) <= FAR:
+        if not np.max(np.abs(errors), initial=0.0) <= LARGEST_INITIAL_GAP:
             raise ClosureError(
                 f"{self.closures.worst(errors)}: the state that is given leaves this open: give coordinates that close "
                 "it at least roughly, or leave those out that the closures determine"

@@ -17,7 +17,7 @@ from flexmb.jain.elimination import Elimination
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
 from flexmb.jit.direct import Direct, direct
-from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR
+from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.scene import schema as s
 from flexmb.system.factors import MassMatrixFactors
 from flexmb.system.observables import Observation
@@ -268,17 +268,17 @@ class Mechanics(SceneArrays):
     @per_thread
     def _observe_recursion(self) -> Direct:
         """(): everything observable where `_recur` was just evaluated."""
-        return direct(observe, NOTHING, self.recursion_constants, self.own_recursion_workspace, self.observation.out)
+        return direct(observe, VOID, self.recursion_constants, self.own_recursion_workspace, self.observation.out)
 
     @per_thread
     def _transmit(self) -> Direct:
         """(loads): those of all hinges where `_recur` was just evaluated."""
-        return direct(transmitted, NOTHING, self.recursion_constants, self.own_recursion_workspace, MATRIX)
+        return direct(transmitted, VOID, self.recursion_constants, self.own_recursion_workspace, MATRIX)
 
     @per_thread
     def _observe_motion(self) -> Direct:
         """(t, y): markers, wheel loads, energy and momentum of out.rates, accelerations found elsewhere."""
-        return direct(observe_motion, NOTHING, REAL, VECTOR, self.constants, self.own_workspace, self.observation.out)
+        return direct(observe_motion, VOID, REAL, VECTOR, self.constants, self.own_workspace, self.observation.out)
 
     @per_thread
     def _accelerate(self) -> Direct:
@@ -289,13 +289,13 @@ class Mechanics(SceneArrays):
     def _invert(self) -> Direct:
         """(t, y, rates, tau, loads)."""
         tables = self.constants, self.own_workspace
-        return direct(articulated.inverse_dynamics, NOTHING, REAL, VECTOR, VECTOR, *tables, VECTOR, MATRIX)
+        return direct(articulated.inverse_dynamics, VOID, REAL, VECTOR, VECTOR, *tables, VECTOR, MATRIX)
 
     @per_thread
     def _fill_mass_matrix(self) -> Direct:
         """(t, y, M)."""
         tables = self.constants, self.own_workspace, self.own_matrices
-        return direct(composite.mass_matrix, NOTHING, REAL, VECTOR, *tables, MATRIX)
+        return direct(composite.mass_matrix, VOID, REAL, VECTOR, *tables, MATRIX)
 
     @per_thread
     def _held(self) -> Direct:

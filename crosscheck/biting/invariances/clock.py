@@ -23,7 +23,7 @@ from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ram
 from flexmb.scene.schema import Scene
 
 SHIFT_S = 2.0
-TURNS = 1
+WHOLE_TURNS = 1
 
 
 def _rewritten(scene: Scene) -> Counterpart:
@@ -38,7 +38,7 @@ def _rewritten(scene: Scene) -> Counterpart:
                 start = function.start_s + SHIFT_S
                 return msgspec.structs.replace(function, start_s=start, value=function.value + function.rate * SHIFT_S)
             case Sine():
-                return msgspec.structs.replace(function, phase_rad=function.phase_rad + TURNS * 2.0 * math.pi)
+                return msgspec.structs.replace(function, phase_rad=function.phase_rad + WHOLE_TURNS * 2.0 * math.pi)
             case Constant():
                 return function
             case SmoothStep() | SpinUp() | Pulse() | Table() | ControlSignal():

@@ -104,8 +104,8 @@ def test_random_mechanisms_are_right_or_lost(of, count):
     In 156 rows (of seeds 0 to 198) with a reference that is trusted, all runs were right but two: one of "looser"
     (CLOSURE_OPEN), one of "stabilised" (CLOSURE_SINGULAR). Of "stabilised rk4" one in thirty said BRANCH_UNKNOWN. In 24
     linkages of Bennett's all were right. Thresholds, by what became of 33 rows when they were moved either way:
-    `UNSEEN` / 16 lost five runs of 99, times 16 made two wrong; crossings feign up to 2 of it, near misses have 0.2 and
-    more. `FASTEST` / 8 lost one, times 512 none; pivots of crossings fall by 0.5 at most.
+    `UNRESOLVED` / 16 lost five runs of 99, times 16 made two wrong; crossings feign up to 2 of it, near misses have 0.2
+    and more. `FASTEST` / 8 lost one, times 512 none; pivots of crossings fall by 0.5 at most.
     """
     counts: dict[str, dict[str, int]] = {each: {} for each in SETTINGS}
     wrong = []

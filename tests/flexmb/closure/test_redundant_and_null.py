@@ -9,7 +9,7 @@ import pytest
 
 import flexmb
 from flexmb.closure import closures as closure_system
-from flexmb.closure.closures import blocks
+from flexmb.closure.null_loads import blocks
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.shapes import beam_section

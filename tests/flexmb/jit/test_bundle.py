@@ -8,7 +8,7 @@ import pytest
 from flexmb.jit.bundle import AnyBundle, bundle
 from flexmb.jit.counting import count
 from flexmb.jit.kernel import by_bundle, helper, kernel
-from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR, pointer
+from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID, pointer
 
 
 @bundle
@@ -105,7 +105,7 @@ def test_a_kernel_that_calls_by_address_is_compiled_once_for_all_bundles():
 
 def test_an_address_refuses_a_kernel_that_returns_something_else():
     with pytest.raises(TypeError, match="trebled returns int64, not none"):
-        pointer(trebled, NOTHING, REAL, VECTOR, VECTOR, pair(), pair())
+        pointer(trebled, VOID, REAL, VECTOR, VECTOR, pair(), pair())
 
 
 def test_a_pickled_bundle_has_its_own_arrays():

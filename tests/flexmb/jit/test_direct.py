@@ -9,7 +9,7 @@ import pytest
 from flexmb.jit.bundle import bundle
 from flexmb.jit.direct import at_address, direct, nothing_at, status_at
 from flexmb.jit.kernel import kernel
-from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR
+from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from tests.flexmb.jit.test_bundle import Other, pair
 
 
@@ -46,7 +46,7 @@ def test_a_direct_call_does_what_the_kernel_does():
 
 def test_a_kernel_that_returns_nothing():
     values, source = np.zeros((2, 3)), pair()
-    assert direct(filled, NOTHING, source, MATRIX)(values) is None
+    assert direct(filled, VOID, source, MATRIX)(values) is None
     assert np.array_equal(values, source.values[:2])
 
 
@@ -80,7 +80,7 @@ def test_arguments_of_other_types_are_refused_and_nothing_is_compiled_for_them(w
 
 def test_a_kernel_that_returns_something_else_is_refused():
     with pytest.raises(TypeError, match="weighed returns int64, not none"):
-        direct(weighed, NOTHING, REAL, VECTOR, pair(), VECTOR, pair())
+        direct(weighed, VOID, REAL, VECTOR, pair(), VECTOR, pair())
 
 
 def test_bundles_are_held():
@@ -137,7 +137,7 @@ def through(function, other, address):
 def test_kernels_call_by_address_with_the_tables_of_a_bundle():
     inner = Inner(np.arange(3.0), np.ones((2, 3)))
     scaling, clearing = (
-        direct(each, *given).args[0] for each, given in ((scaled, (STATUS, REAL, VECTOR)), (cleared, (NOTHING, MATRIX)))
+        direct(each, *given).args[0] for each, given in ((scaled, (STATUS, REAL, VECTOR)), (cleared, (VOID, MATRIX)))
     )
     assert through(scaling, clearing, inner.kernel_address) == 3
     assert inner.y.tolist() == [0.0, 2.0, 4.0]
