@@ -16,13 +16,12 @@ from scipy.spatial.transform import Rotation
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.records.drawing import CarriedPoint, Drawing, DrawnWheel, Line
 from flexmb.scene.bodies import ZERO, BeamBody, Body, ModalBody, RigidBody, SidBody, Vector
-from flexmb.scene.connectors import BetweenNodes, Bushing, HingeSpring, SpringDamper
+from flexmb.scene.connectors import BetweenNodes, HingeSpring
 from flexmb.scene.schema import Marker, Scene, Wheel
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
 LARGEST_ASPECT = 12.0
-DRAWN_AS = {SpringDamper: "spring", Bushing: "mount"}
 THINNEST_WHEEL = 0.1  # least drawn width of a wheel over its radius
 
 
@@ -85,7 +84,7 @@ def _connectors(scene: Scene) -> list[Line]:
     for each in scene.connectors:
         kind, points = "mount", []
         if isinstance(each, BetweenNodes):
-            kind = DRAWN_AS[type(each)]
+            kind = "mount" if hasattr(each, "quaternion_a") else "spring"  # between frames or between points
             points = [
                 _carried(scene, each.body_a, each.node_a, each.position_a_m),
                 _carried(scene, each.body_b, each.node_b, each.position_b_m),

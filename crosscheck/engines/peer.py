@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from importlib import import_module
+from importlib.metadata import version
 
 import numpy as np
 
-from crosscheck.engines.contract import Model, Support
+from crosscheck.engines.contract import EngineMissing, Model, Support
 from crosscheck.engines.links import Link
 from flexmb.scene.schema import Scene
 
@@ -38,6 +40,15 @@ class PeerEngine:
         if reason := self.obstacle(scene):
             raise ValueError(f'scene "{scene.name}": {reason}')
         return self.model(scene)
+
+
+def installed_version(title: str, module: str, distribution: str, extra: str) -> str:
+    """Version of a library that can be imported; EngineMissing says which extra of flexmb installs it."""
+    try:
+        import_module(module)
+    except ImportError as error:
+        raise EngineMissing(f"{title} is not installed: pip install flexmb[{extra}]") from error
+    return version(distribution)
 
 
 def inertia_obstacle(links: Iterable[Link], engine: str) -> str:

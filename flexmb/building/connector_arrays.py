@@ -1,15 +1,15 @@
-"""From connectors to the arrays of flexmb.tables.arrays: ends, laws, bushings, springs and laws along hinges."""
+"""From connectors to the arrays of flexmb.tables.arrays: ends, springs, and the numbers of all other laws."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, assert_never
+from typing import Any
 
 import numpy as np
 
 from flexmb.building.links import BodyLink, Port, port
 from flexmb.building.numbering import Numbering
-from flexmb.connectors.catalogue import law_of
+from flexmb.connectors.catalogue import frame_law_of, law_of
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.connectors import AlongHinge, BetweenNodes, HingeSpring, actuator, by_stem
@@ -66,8 +66,7 @@ def connector_arrays(
     laws: Rows = []
     connectors = between_nodes(scene)
     records, sides = np.zeros(len(connectors), a.CONNECTOR), np.zeros((len(connectors), 2), a.END)
-    bushings = [each for each in connectors if isinstance(each, s.Bushing)]
-    matrices = np.zeros(len(bushings), a.BUSHING_MATRIX)
+    frame_laws: list[tuple[float, ...]] = []
     for i, connector in enumerate(connectors):
         record = records[i]
         record["function"] = record["row"] = -1
@@ -76,30 +75,34 @@ def connector_arrays(
             if sides[i, j]["body"] == a.ON_GROUND:
                 offset, quaternion = _offset(connector, side)
                 sides[i, j]["position"], sides[i, j]["rotation"] = offset, rotation_matrix(quaternion).ravel()
-        match connector:
-            case s.Bushing():
-                record["kind"], row = a.BUSHING, bushings.index(connector)
-                record["row"] = row
-                matrices[row]["stiffness"], matrices[row]["damping"] = connector.stiffness, connector.damping
-            case s.SpringDamper():
-                record["kind"], record["acts"] = a.ALONG_LINE, ACTS[connector.acts]
-                record["free_length"], record["damping"] = connector.free_length_m, connector.damping_Ns_m
-                record["smoothing"] = max(SMOOTHING * connector.free_length_m, SHORTEST)
-                record["function"] = number(connector.force_N)
-                record["start"], record["stop"] = _add(laws, _pieces(by_stem(connector), connector.acts))
-            case _:
-                assert_never(connector)
+        record["kind"], parameters = frame_law_of(connector)
+        if parameters:
+            record["row"] = len(frame_laws)
+            frame_laws.append(parameters)
+        if isinstance(connector, s.SpringDamper):
+            record["acts"] = ACTS[connector.acts]
+            record["free_length"], record["damping"] = connector.free_length_m, connector.damping_Ns_m
+            record["smoothing"] = max(SMOOTHING * connector.free_length_m, SHORTEST)
+            record["function"] = number(connector.force_N)
+            record["start"], record["stop"] = _add(laws, _pieces(by_stem(connector), connector.acts))
     springs = [each for each in scene.connectors if isinstance(each, HingeSpring)]
     along = [each for each in scene.connectors if isinstance(each, AlongHinge)]
     others = [each for each in along if not isinstance(each, HingeSpring)]
     return {
         "connector": records,
         "end": sides,
-        "bushing": matrices,
+        "frame_law": _frame_laws(frame_laws),
         "hinge_spring": _hinge_springs(scene, springs, numbering, laws, number),
         "coordinate_law": _coordinate_laws(scene, others, numbering),
         "law": np.array(laws, float).reshape(-1, 8),
     }
+
+
+def _frame_laws(parameters: Sequence[tuple[float, ...]]) -> a.Record:
+    out = np.zeros(len(parameters), a.FRAME_LAW)
+    for row, numbers in zip(out, parameters, strict=True):
+        row["parameters"][: len(numbers)] = numbers
+    return out
 
 
 def _offset(connector: BetweenNodes, side: str) -> tuple[s.Vector, s.Quaternion]:

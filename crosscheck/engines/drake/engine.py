@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
-
 from crosscheck.engines.connections import KNOWN
-from crosscheck.engines.contract import Effort, EngineMissing, Model
+from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.links import links, obstacle
-from crosscheck.engines.peer import PeerEngine, inertia_obstacle
+from crosscheck.engines.peer import PeerEngine, inertia_obstacle, installed_version
 from flexmb.scene.schema import Scene
 
 
@@ -19,11 +17,7 @@ class DrakeEngine(PeerEngine):
     summary = "rigid trees in minimal coordinates, error-controlled Runge-Kutta 5"
 
     def version(self) -> str:
-        try:
-            import pydrake  # noqa: F401
-        except ImportError as error:
-            raise EngineMissing("Drake is not installed: pip install flexmb[more-peers]") from error
-        return version("drake")
+        return installed_version("Drake", "pydrake", "drake", "more-peers")
 
     def obstacle(self, scene: Scene) -> str:
         reason = _open_loops_only(scene) or obstacle(scene, "Drake", (), KNOWN)
