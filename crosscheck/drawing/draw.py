@@ -17,6 +17,7 @@ from crosscheck.engines.functions_of_time import profile
 from crosscheck.records.drawing import CarriedPoint, Drawing, DrawnWheel, Line
 from flexmb.scene.bodies import ZERO, BeamBody, Body, ModalBody, RigidBody, SidBody, Vector
 from flexmb.scene.connectors import BetweenNodes, HingeSpring
+from flexmb.scene.ends import ends
 from flexmb.scene.schema import Marker, Scene, Wheel
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
@@ -85,10 +86,7 @@ def _connectors(scene: Scene) -> list[Line]:
         kind, points = "mount", []
         if isinstance(each, BetweenNodes):
             kind = "mount" if hasattr(each, "quaternion_a") else "spring"  # between frames or between points
-            points = [
-                _carried(scene, each.body_a, each.node_a, each.position_a_m),
-                _carried(scene, each.body_b, each.node_b, each.position_b_m),
-            ]
+            points = [_carried(scene, end.body, end.node, end.position_m) for end in ends(each)]
         elif isinstance(each, HingeSpring):
             hinges = [hinge for hinge in scene.hinges if hinge.name == each.hinge]
             points = [_carried(scene, hinge.child, hinge.child_node, hinge.child_position_m) for hinge in hinges]

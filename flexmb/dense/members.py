@@ -19,6 +19,7 @@ from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, Vector
 from flexmb.scene.connectors import BetweenNodes
+from flexmb.scene.ends import ends
 from flexmb.scene.tree import GROUND, Coordinate, coordinates, ordered, rest_frames
 from flexmb.typing import Real
 
@@ -125,10 +126,9 @@ def build(scene: s.Scene, folder: Path | None = None) -> DenseTree:
         sites[f"marker:{x.name}"] = tree.index(x.body), _seat(models[x.body], x.node, x.offset_m)
     for each in scene.connectors:
         if isinstance(each, BetweenNodes):
-            for side in "ab":
-                at, node = getattr(each, f"body_{side}"), getattr(each, f"node_{side}")
-                offset = getattr(each, f"position_{side}_m"), getattr(each, f"quaternion_{side}", IDENTITY)
-                sites[f"connector {side}:{each.name}"] = tree.index(at), _seat(models[at], node, *offset)
+            for side, end in zip("ab", ends(each), strict=True):
+                seat = _seat(models[end.body], end.node, end.position_m, end.quaternion)
+                sites[f"connector {side}:{each.name}"] = tree.index(end.body), seat
     return replace(tree, sites=sites)
 
 

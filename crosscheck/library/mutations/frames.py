@@ -20,6 +20,7 @@ from crosscheck.library.mutations.edits import (
 from crosscheck.library.mutations.mutation import LESS, Mutation
 from flexmb.scene.bodies import BeamNode, Quaternion
 from flexmb.scene.connectors import BetweenNodes
+from flexmb.scene.ends import ends
 from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.schema import Load, Marker, PointMass, Scene, Wheel
 
@@ -68,7 +69,7 @@ def _node_idle(scene: Scene, target: str) -> str:
     used = [(item.body, item.node) for item in mounted]
     used += [end for each in scene.hinges for end in ((each.parent, each.parent_node), (each.child, each.child_node))]
     between = [*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))]
-    used += [end for each in between for end in ((each.body_a, each.node_a), (each.body_b, each.node_b))]
+    used += [(end.body, end.node) for each in between for end in ends(each)]
     return "" if (body, node) in used else "nothing is mounted at the node, and no marker shows it"
 
 
