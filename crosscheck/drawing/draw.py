@@ -166,10 +166,8 @@ def _joints(scene: Scene, body: RigidBody) -> list[Real]:
         elif hinge.parent == body.name:
             points.append(_node_point(body, hinge.parent_node, hinge.parent_position_m))
     for each in (*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))):
-        if each.body_a == body.name:
-            points.append(_node_point(body, each.node_a, each.position_a_m))
-        elif each.body_b == body.name:
-            points.append(_node_point(body, each.node_b, each.position_b_m))
+        own = [_node_point(body, end.node, end.position_m) for end in ends(each) if end.body == body.name]
+        points += own[:1]  # both ends may be on one body
     return points
 
 
