@@ -167,7 +167,7 @@ def _joints(scene: Scene, body: RigidBody) -> list[Real]:
             points.append(_node_point(body, hinge.parent_node, hinge.parent_position_m))
     for each in (*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))):
         own = [_node_point(body, end.node, end.position_m) for end in ends(each) if end.body == body.name]
-        points += own[:1]  # both ends may be on one body
+        points += own[:1]  # what joins two points of the body counts at its first
     return points
 
 
