@@ -21,7 +21,7 @@ from crosscheck.engines.conventions import (
 )
 from flexmb.scene.bodies import ZERO
 from flexmb.scene.connectors import BetweenNodes, Connector
-from flexmb.scene.ends import End, ends
+from flexmb.scene.ends import EndFrame, ends
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.schema import (
@@ -181,7 +181,7 @@ def closed_frames(
     return _closed_frame(scene, chain, a), _closed_frame(scene, chain, b)
 
 
-def _closed_frame(scene: Scene, chain: tuple[Link, ...], end: End) -> Attachment:
+def _closed_frame(scene: Scene, chain: tuple[Link, ...], end: EndFrame) -> Attachment:
     offset = frame(end.position_m, end.quaternion)
     if end.body == GROUND:
         return Attachment(-1, offset)

@@ -9,7 +9,7 @@ from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.hinges import Closure
 
 
-class End(NamedTuple):
+class EndFrame(NamedTuple):
     """A frame with fixed offsets from a node of a body, in node axes, or from World where `body` is the ground."""
 
     body: str
@@ -18,13 +18,13 @@ class End(NamedTuple):
     quaternion: Quaternion
 
 
-def ends(item: Closure | BetweenNodes) -> tuple[End, End]:
+def ends(item: Closure | BetweenNodes) -> tuple[EndFrame, EndFrame]:
     """Frames A and B; where the item joins points only, the frames have the axes of their nodes."""
     return _end(item, "a"), _end(item, "b")
 
 
-def _end(item: Closure | BetweenNodes, side: str) -> End:
-    return End(
+def _end(item: Closure | BetweenNodes, side: str) -> EndFrame:
+    return EndFrame(
         getattr(item, f"body_{side}"),
         getattr(item, f"node_{side}"),
         getattr(item, f"position_{side}_m"),

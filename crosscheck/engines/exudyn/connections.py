@@ -14,7 +14,7 @@ from crosscheck.engines.exudyn.balance import coordinate, coordinate_rate
 from crosscheck.engines.exudyn.markers import marker_path
 from crosscheck.engines.exudyn.state import CarrierPath, States
 from flexmb.scene.connectors import BetweenNodes
-from flexmb.scene.ends import End, ends
+from flexmb.scene.ends import EndFrame, ends
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
 
@@ -63,7 +63,7 @@ def _along(assembly: Assembly, times: list[float], paths: Paths) -> dict[str, li
     return found
 
 
-def _moving(assembly: Assembly, end: End, paths: Paths, count: int) -> list[Moving]:
+def _moving(assembly: Assembly, end: EndFrame, paths: Paths, count: int) -> list[Moving]:
     own = frame(end.position_m, end.quaternion)
     if end.body == GROUND:
         return [Moving(own.position, own.rotation, np.zeros(3), np.zeros(3))] * count
