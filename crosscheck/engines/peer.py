@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from importlib import import_module
-from importlib.metadata import version
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -42,13 +41,13 @@ class PeerEngine:
         return self.model(scene)
 
 
-def installed_version(title: str, module: str, distribution: str, extra: str) -> str:
-    """Version of a library that can be imported; EngineMissing says which extra of flexmb installs it."""
+@contextmanager
+def needed(library: str, extra: str) -> Iterator[None]:
+    """Around the import of a library: if it fails, EngineMissing says which extra of flexmb installs it."""
     try:
-        import_module(module)
+        yield
     except ImportError as error:
-        raise EngineMissing(f"{title} is not installed: pip install flexmb[{extra}]") from error
-    return version(distribution)
+        raise EngineMissing(f"{library} is not installed: pip install flexmb[{extra}]") from error
 
 
 def inertia_obstacle(links: Iterable[Link], engine: str) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
+
 from crosscheck.engines.basilisk.craft import NoCraft, craft_of
 from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.links import obstacle
-from crosscheck.engines.peer import PeerEngine, installed_version
+from crosscheck.engines.peer import PeerEngine, needed
 from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
 from flexmb.scene.schema import Scene
 
@@ -23,7 +25,9 @@ class BasiliskEngine(PeerEngine):
     )
 
     def version(self) -> str:
-        return installed_version("Basilisk", "Basilisk", "bsk", "more-peers")
+        with needed("Basilisk", "more-peers"):
+            import Basilisk  # noqa: F401
+        return version("bsk")
 
     def obstacle(self, scene: Scene) -> str:
         if reason := obstacle(scene, "Basilisk", ()):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
+
 from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.links import links, obstacle
-from crosscheck.engines.peer import PeerEngine, installed_version
+from crosscheck.engines.peer import PeerEngine, needed
 from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
 from flexmb.scene.schema import Scene
 
@@ -23,7 +25,9 @@ class DartEngine(PeerEngine):
     )
 
     def version(self) -> str:
-        return installed_version("DART", "dartpy", "dartpy", "more-peers")
+        with needed("DART", "more-peers"):
+            import dartpy  # noqa: F401
+        return version("dartpy")
 
     def obstacle(self, scene: Scene) -> str:
         return _open_loops_only(scene) or obstacle(scene, "DART", ())

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
+
 from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.links import links, obstacle
-from crosscheck.engines.peer import PeerEngine, inertia_obstacle, installed_version
+from crosscheck.engines.peer import PeerEngine, inertia_obstacle, needed
 from flexmb.scene.schema import Scene
 
 
@@ -17,7 +19,9 @@ class DrakeEngine(PeerEngine):
     summary = "rigid trees in minimal coordinates, error-controlled Runge-Kutta 5"
 
     def version(self) -> str:
-        return installed_version("Drake", "pydrake", "drake", "more-peers")
+        with needed("Drake", "more-peers"):
+            import pydrake  # noqa: F401
+        return version("drake")
 
     def obstacle(self, scene: Scene) -> str:
         reason = _open_loops_only(scene) or obstacle(scene, "Drake", (), KNOWN)

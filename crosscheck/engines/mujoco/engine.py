@@ -6,7 +6,7 @@ from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, Model, Support
 from crosscheck.engines.links import links, obstacle
 from crosscheck.engines.pace import pace
-from crosscheck.engines.peer import PeerEngine, inertia_obstacle, installed_version
+from crosscheck.engines.peer import PeerEngine, inertia_obstacle, needed
 from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.scene.schema import Scene
 
@@ -28,7 +28,9 @@ class MujocoEngine(PeerEngine):
     )
 
     def version(self) -> str:
-        return installed_version("MuJoCo", "mujoco", "mujoco", "peers")
+        with needed("MuJoCo", "peers"):
+            import mujoco
+        return mujoco.__version__
 
     def obstacle(self, scene: Scene) -> str:
         reason = obstacle(scene, "MuJoCo", ("spherical",), KNOWN)
