@@ -18,9 +18,9 @@ from flexmb.scene.tree import GROUND, coordinate_of
 from flexmb.tables import arrays as a
 from flexmb.typing import Real
 
-SMOOTHING = 1e-8  # of the free length
-SHORTEST = 1e-12  # m, the smoothing of a spring without free length
-NO_STOP = 1e300  # no coordinate is ever beyond it
+SMOOTHING = 1e-8  # the smoothing length of a spring, relative to its free length
+SMALLEST_SMOOTHING = 1e-12  # m, for springs without free length
+NO_STOP = 1e300  # a limit that no coordinate reaches
 ACTS = {"both": a.BOTH, "tension": a.TENSION, "compression": a.COMPRESSION}
 
 Rows = list[tuple[float, ...]]
@@ -47,9 +47,9 @@ def end_ports(scene: s.Scene, chain: list[BodyLink], index: dict[str, int]) -> l
             at = port(link.node(node), *_offset(connector, side), np.eye(3))
             if link.level.at_rest and at.deforms:
                 raise NotImplementedError(
-                    f'connector "{connector.name}": body "{body}" of level "{link.level.name}" shows its rest shape to '
-                    f'all that acts on it, and a spring at its node "{node}" would not feel it bend; use level '
-                    '"linear" or "full"'
+                    f'connector "{connector.name}": loads act on body "{body}" of level "{link.level.name}" in its '
+                    f'undeformed shape, so a spring at its node "{node}" would not respond to its deformation; use '
+                    'level "linear" or "full"'
                 )
             found.append((index[body], at))
     return found
@@ -60,8 +60,8 @@ def connector_arrays(
 ) -> dict[str, Any]:
     """The tables of connectors by their names in Constants.
 
-    ends: (body, port) of sides A and B of the first between two nodes, of the second ..., (-1, -1) on the ground;
-    `number` gives the number of a function of time.
+    ends: (body, port) of sides A and B of each connector between two nodes, (-1, -1) on the ground; `number` gives the
+    number of a function of time.
     """
     laws: Rows = []
     connectors = between_nodes(scene)
@@ -84,7 +84,7 @@ def connector_arrays(
             case s.SpringDamper():
                 record["kind"], record["acts"] = a.ALONG_LINE, ACTS[connector.acts]
                 record["free_length"], record["damping"] = connector.free_length_m, connector.damping_Ns_m
-                record["smoothing"] = max(SMOOTHING * connector.free_length_m, SHORTEST)
+                record["smoothing"] = max(SMOOTHING * connector.free_length_m, SMALLEST_SMOOTHING)
                 record["function"] = number(connector.force_N)
                 record["start"], record["stop"] = _add(laws, _pieces(by_stem(connector), connector.acts))
             case _:
@@ -103,7 +103,7 @@ def connector_arrays(
 
 
 def _offset(connector: BetweenNodes, side: str) -> tuple[s.Vector, s.Quaternion]:
-    """Fixed offsets of frame A or B from its node."""
+    """Position and orientation of frame A or B relative to its node."""
     return getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY)
 
 
@@ -140,7 +140,7 @@ def _coordinate_laws(scene: s.Scene, connectors: Sequence[AlongHinge], numbering
 
 
 def _add(laws: Rows, pieces: Rows) -> tuple[int, int]:
-    """Where in the table of all laws these pieces are."""
+    """Append the pieces of a law to the table of all laws, and return the range of their rows."""
     start = len(laws)
     laws += pieces
     return start, len(laws)
@@ -174,6 +174,6 @@ def _through(x: Real, loads: Real) -> Rows:
 
 
 def _energy_at(rows: Real, x: float) -> float:
-    """Of a law."""
+    """Energy at x of a law that is given by its rows."""
     row = rows[max(0, int(np.searchsorted(rows[:, 0], x, side="right")) - 1)]
     return float(row[1] + np.polyval(np.polyint(row[2:]), x - row[0]))
