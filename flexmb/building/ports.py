@@ -127,7 +127,7 @@ def _on_rigid_bodies(chain: list[BodyLink], parent: list[int]) -> Frames:
 
 
 def _on_flexible_bodies(chain: list[BodyLink], parent: list[int]) -> dict[int, Port]:
-    """By number of the link, inboard hinge frames in the frames of their parents' links where the parent is flexible."""
+    """Inboard hinge frames in the frames of their parents' links, by number of the link, for flexible parents."""
     return {
         k: _moved(link.inboard, chain[p])
         for k, (link, p) in enumerate(zip(chain, parent, strict=True))

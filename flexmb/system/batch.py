@@ -48,7 +48,7 @@ class Copies(NamedTuple):
 
 
 class LaneTables(NamedTuple):
-    """The arrays that one thread writes: a workspace, and stages, in lanes and as floats; and the gate that uses them."""
+    """The arrays that one thread writes: a workspace, stages in lanes and as floats; and the gate that uses them."""
 
     workspace: LaneWorkspace
     stages: LaneStages

@@ -283,8 +283,8 @@ class ClosedSystem(System):
 
     def _for_trees(self, what: str) -> NotImplementedError:
         return NotImplementedError(
-            f'scene "{self.scene.name}" has closures, and {what} are for trees only: closure_operators(state) gives the '
-            "terms that closures add, and flexmb.System(scene) is the tree without closures, which moves differently"
+            f'scene "{self.scene.name}" has closures, and {what} are for trees only: closure_operators(state) gives '
+            "the terms that closures add, and flexmb.System(scene) is the tree alone, which moves differently"
         )
 
     def closure_gaps(self, state: State) -> dict[str, tuple[float, float]]:

@@ -62,7 +62,7 @@ def fresh_evaluator(system: Mechanics, algorithm: str) -> Evaluator:
 
 
 class _Careful:
-    """The same evaluation in Python, for arguments that need conversion, for other threads, and for errors and warnings.
+    """The same evaluation in Python, for arguments that need conversion, for other threads, for errors and warnings.
 
     The evaluator belongs to the thread that calls it first. When that thread has ended, a new one may get its number
     and thereby the evaluator; no two living threads have the same number.
