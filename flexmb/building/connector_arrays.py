@@ -24,6 +24,8 @@ NO_STOP = 1e300  # a limit that no coordinate reaches
 ACTS = {"both": a.BOTH, "tension": a.TENSION, "compression": a.COMPRESSION}
 
 Rows = list[tuple[float, ...]]
+Number = Callable[[s.Function | None], int]
+"""Returns the number of a function of time, -1 for None."""
 
 
 def between_nodes(scene: s.Scene) -> list[BetweenNodes]:
@@ -56,12 +58,11 @@ def end_ports(scene: s.Scene, chain: list[BodyLink], index: dict[str, int]) -> l
 
 
 def connector_arrays(
-    scene: s.Scene, ends: list[tuple[int, int]], numbering: Numbering, number: Callable[[s.Function | None], int]
+    scene: s.Scene, ends: list[tuple[int, int]], numbering: Numbering, number: Number
 ) -> dict[str, Any]:
     """The tables of connectors by their names in Constants.
 
-    ends: (body, port) of sides A and B of each connector between two nodes, (-1, -1) on the ground; `number` gives the
-    number of a function of time.
+    ends: (body, port) of sides A and B of each connector between two nodes, (-1, -1) on the ground.
     """
     laws: Rows = []
     connectors = between_nodes(scene)
@@ -113,11 +114,7 @@ def _speed(scene: s.Scene, connector: AlongHinge, numbering: Numbering) -> int:
 
 
 def _hinge_springs(
-    scene: s.Scene,
-    springs: list[HingeSpring],
-    numbering: Numbering,
-    laws: Rows,
-    number: Callable[[s.Function | None], int],
+    scene: s.Scene, springs: list[HingeSpring], numbering: Numbering, laws: Rows, number: Number
 ) -> a.Record:
     out = np.zeros(len(springs), a.HINGE_SPRING)
     for row, spring in zip(out, springs, strict=True):
@@ -169,11 +166,6 @@ def _through(x: Real, loads: Real) -> Rows:
     (before, *_, after) = ([at, stored, 0.0, 0.0, 0.0, 0.0, slope, load] for at, stored, load, slope in ends)
     cubics = [[left, energy(left), 0.0, 0.0, *spline.c[:, i]] for i, left in enumerate(x[:-1])]
     rows = np.array([before, *cubics, after], float)
-    rows[:, 1] -= _energy_at(rows, 0.0)
+    at_zero = rows[max(0, int(np.searchsorted(rows[:, 0], 0.0, side="right")) - 1)]  # the piece that contains x = 0
+    rows[:, 1] -= at_zero[1] + np.polyval(np.polyint(at_zero[2:]), -at_zero[0])
     return [tuple(row) for row in rows.tolist()]
-
-
-def _energy_at(rows: Real, x: float) -> float:
-    """Energy at x of a law that is given by its rows."""
-    row = rows[max(0, int(np.searchsorted(rows[:, 0], x, side="right")) - 1)]
-    return float(row[1] + np.polyval(np.polyint(row[2:]), x - row[0]))

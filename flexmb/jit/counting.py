@@ -159,10 +159,9 @@ class Interpreter:
         function = getattr(thing, "py_func", None)
         if isinstance(function, FunctionType):
             return self._function(function)
-        if isinstance(thing, FunctionType) and thing.__closure__ and thing.__module__ in _CHOOSERS:
-            return self._function(thing)
-        if isinstance(thing, FunctionType) and thing.__module__ == _LANES:
-            return self._function(thing)
+        if isinstance(thing, FunctionType):
+            chooses = thing.__closure__ and thing.__module__ in _CHOOSERS
+            return self._function(thing) if chooses or thing.__module__ == _LANES else thing
         if isinstance(thing, tuple):
             return tuple(map(self, thing)) if all(callable(each) for each in thing) else thing
         if isinstance(thing, ModuleType) and thing.__name__.startswith(_OF_THE_PACKAGE):

@@ -111,7 +111,7 @@ class _KernelLowering(NativeLowering):
 
 
 class KernelCompiler(Compiler):
-    """Numba's compiler, but features of bundles are known before type inference, and a `KernelLibrary` links helpers."""
+    """Numba's compiler, with features of bundles known before type inference, and a `KernelLibrary` for linking."""
 
     _lowering: type[NativeLowering] = _KernelLowering
     _left_out: frozenset[type] = frozenset()

@@ -140,12 +140,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time; nodes and offsets as for
         every hinge (`flexmb.scene.options.Placement`).
         """
-        o.refuse_others("a Revolute", options, o.TurningHinge)
-        angle, placement = _divided(options, o.Angle)
-        rotation = make(s.AngularCoordinate, **angle)
-        return self._append(
-            s.Revolute, name=name, parent=parent, child=child, axis=axis, rotation=rotation, **placement
-        )
+        return self._turning(s.Revolute, options, name=name, parent=parent, child=child, axis=axis)
 
     def prismatic(
         self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, **options: Unpack[o.SlidingHinge]
@@ -172,12 +167,13 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         A screw that advances by h (m) a turn has the pitch h / (2 pi), a left-handed one a negative pitch. The angle is
         as of a `revolute`.
         """
-        o.refuse_others("a Screw", options, o.TurningHinge)
+        return self._turning(s.Screw, options, name=name, parent=parent, child=child, axis=axis, pitch=pitch)
+
+    def _turning(self, kind: type[s.Revolute | s.Screw], options: Mapping[str, Any], **hinge: Any) -> Self:
+        """A hinge with one angle, whose arguments are among the `options`."""
+        o.refuse_others(f"a {kind.__name__}", options, o.TurningHinge)
         angle, placement = _divided(options, o.Angle)
-        rotation = make(s.AngularCoordinate, **angle)
-        return self._append(
-            s.Screw, name=name, parent=parent, child=child, axis=axis, pitch=pitch, rotation=rotation, **placement
-        )
+        return self._append(kind, **hinge, rotation=make(s.AngularCoordinate, **angle), **placement)
 
     def cylindrical(
         self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, rotation: s.AngularCoordinate = AT_REST,

@@ -142,15 +142,9 @@ class ModalState(SceneStruct, frozen=True, kw_only=True):
 
 
 Waiver = Literal[
-    "wave_speed",
-    "thick_section",
-    "shear_stiffness",
-    "many_elements",
-    "modal_frequency",
-    "negative_stiffness",
-    "negative_damping",
-    "friction_peak",
-]
+    "wave_speed", "thick_section", "shear_stiffness", "many_elements", "modal_frequency", "negative_stiffness",
+    "negative_damping", "friction_peak",
+]  # fmt: skip
 
 
 class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):

@@ -118,12 +118,8 @@ class Batch:
         self._spare.append(found)
 
     def _free_tables(self) -> LaneTables:
-        try:
+        with suppress(IndexError):
             return self._spare.pop()
-        except IndexError:
-            return self._fresh_tables()
-
-    def _fresh_tables(self) -> LaneTables:
         w, s, c = lane_workspace(self.systems[0].workspace()), lane_stages(self.nq + self.nu + 1), self._constants[0]
         entries = lane_entries(s, w.doubt)
         rhs, stages, _, workspace = addresses(lanes.rhs, STATUS, s, c, w)

@@ -249,13 +249,8 @@ class ClosedSystem(System):
         articulated.rhs(t, y, slope, self.constants, self.workspace())
         sides = [self.closures.beside(t, y, slope[: self.nq], side) for side in (-1, 1)]
         before, after = (self._motion(*each, algorithm) for each in sides)
-        return ClosedMotion(
-            0.5 * (before.accelerations + after.accelerations),
-            0.5 * (before.drives + after.drives),
-            0.5 * (before.hinges + after.hinges),
-            0.5 * (before.closures + after.closures),
-            _of_both(before.spread, after.spread),
-        )
+        means = (0.5 * (one + other) for one, other in zip(before[:-1], after[:-1], strict=True))
+        return ClosedMotion._make((*means, _of_both(before.spread, after.spread)))
 
     def determined_loads(self, state: State) -> dict[str, NDArray[np.bool_]]:
         """Which components (6,) of the loads of hinges and closures are determined by the motion; World axes.
@@ -347,9 +342,5 @@ def _of_both(one: Spread | None, other: Spread | None) -> Spread | None:
     """The null loads of two motions together."""
     if one is None or other is None:
         return one or other
-    return Spread(
-        np.concatenate([one.drives, other.drives]),
-        np.concatenate([one.hinges, other.hinges]),
-        np.concatenate([one.closures, other.closures]),
-        max(one.rounding, other.rounding),
-    )
+    changes = map(np.concatenate, zip(one[:-1], other[:-1], strict=True))
+    return Spread._make((*changes, max(one.rounding, other.rounding)))

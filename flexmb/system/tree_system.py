@@ -141,11 +141,13 @@ class System(FreeMotion):
         """
         t, y = self.layout.entering(state)
         if accelerations is None:
-            loads, w = finite_result(self._free_loads(t, y), t), self.own_recursion_workspace
+            loads, w = np.zeros((len(self.links), 6)), self.own_recursion_workspace
+            self._follow_recursion(t, y)
+            self._transmit(loads)
         else:
             rates = self.layout.rates("accelerations", accelerations)
-            loads, w = finite_result(self._inverse(t, y, rates)[1], t), self.own_workspace
-        return referred(self, w, self._by_hinge(loads), axes, about)
+            loads, w = self._inverse(t, y, rates)[1], self.own_workspace
+        return referred(self, w, self._by_hinge(finite_result(loads, t)), axes, about)
 
     def referred_loads(
         self, state: State, loads: dict[str, Real], axes: Axes = "world", about: tuple[str, str] | None = None
@@ -187,13 +189,6 @@ class System(FreeMotion):
         if any(link.level.at_rest for link in self.links):
             self._inverse(t, y, rates)  # for the poses in the workspace, which have ruthless bodies undeformed
         return mass_properties(self, self.own_workspace, inertias, body)
-
-    def _free_loads(self, t: float, y: Real) -> Real:
-        """Hinge loads (N,6) of the free motion, World axes."""
-        loads = np.zeros((len(self.links), 6))
-        self._follow_recursion(t, y)
-        self._transmit(loads)
-        return loads
 
     def _by_hinge(self, loads: Real) -> dict[str, Real]:
         return {link.hinge.name: loads[k] for k, link in enumerate(self.links)}

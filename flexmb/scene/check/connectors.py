@@ -1,4 +1,4 @@
-"""Connectors: laws that are laws, matrices that store or dissipate, ends and coordinates that can move."""
+"""Checks of connectors: laws, matrices that are symmetric and not negative, ends and coordinates that can move."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from flexmb.scene.connectors import AlongHinge, HingeFriction, HingeSpring, by_s
 from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.tree import GROUND, coordinate_of
 
-HIGHEST = 4  # coefficients beside the stiffness: a law is a polynomial of degree five at most
-SYMMETRIC = 1e-9  # of the largest entry: matrices printed to ten digits are symmetric, and not negative, this well
-LOST = 0.01  # of static friction, to its smoothing
+HIGHEST = 4  # coefficients of `stiffening`: a law is a polynomial of degree five at most
+SYMMETRIC = 1e-9  # tolerance of matrices printed to ten digits, relative to the largest element
+LOST = 0.01  # fraction of static friction that may be lost by smoothing without a doubt
 NOT_NEGATIVE = ("free_length", "damping", "stop_stiffness", "stop_dissipation", "sliding", "static")
 
 
@@ -132,7 +132,7 @@ def _friction(place: Place, connector: HingeFriction) -> Iterator[Defect]:
 
 
 def _peak(place: Place, law: Mapping[str, float]) -> Iterator[Doubt]:
-    """Smoothing takes away from static friction what the fall to sliding friction does not wait for."""
+    """Smoothing reduces the peak of friction, because friction falls to its sliding value before it has built up."""
     static, sliding, stribeck = law["static"], law["sliding"], law["stribeck"]
     at, peak = friction_peak(sliding, static, stribeck, law["smoothing"])
     if peak < (1.0 - LOST) * static:

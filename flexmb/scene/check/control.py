@@ -8,8 +8,7 @@ from typing import Any, NamedTuple, assert_never
 
 from flexmb.scene import schema as s
 from flexmb.scene.check.profiles import MOTIONS
-from flexmb.scene.check.walk import entries, suspicious
-from flexmb.scene.columns import alike
+from flexmb.scene.check.walk import entries, holding, suspicious
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.tree import coordinates, scalar_paths
 from flexmb.scene.user_code import refusal
@@ -27,7 +26,7 @@ class Named(NamedTuple):
 
 
 def named(reference: str) -> Named | None:
-    """"gyro" or "gyro[2]" taken apart; None for what is neither."""
+    """A reference such as "gyro" or "gyro[2]" in its parts; None if it is neither."""
     found = REFERENCE.fullmatch(reference)
     return None if found is None else Named(found["name"], None if found["number"] is None else int(found["number"]))
 
@@ -52,7 +51,7 @@ def sensor_width(scene: s.Scene, sensor: s.Sensor) -> int | None:
 def _coordinates(scene: s.Scene, of: str, rates: bool) -> int | None:
     for hinge in scene.hinges:
         if hinge.name == of:
-            # a gimbal whose sequence does not fit its rotations has no freedoms yet, and is told so elsewhere
+            # the freedoms of a gimbal whose sequence does not fit its rotations are undefined; `hinges` reports that
             return len(coordinates(hinge)) or sum(freedom.sizes[rates] for freedom in hinge.freedoms)
     for mass in scene.point_masses:
         if mass.name == of:
@@ -101,7 +100,7 @@ def widths_of(scene: s.Scene) -> dict[str, int | None]:
 
 
 def one_number(place: Place, reference: str, widths: dict[str, int | None]) -> Iterator[Defect]:
-    """A signal that is one number."""
+    """A reference is known, and to one number."""
     yield from _reference(place, reference, widths, set())
     found = named(reference)
     width = None if found is None or found.number is not None else widths.get(found.name)
@@ -160,7 +159,7 @@ def _width(reference: str, widths: dict[str, int | None]) -> int | None:
 
 
 def _reference(place: Place, reference: str, widths: dict[str, int | None], later: set[str]) -> Iterator[Defect]:
-    """A signal that is known here, with such a number."""
+    """A referenced signal exists, is computed before, and has a number of this index."""
     found = named(reference)
     if found is None:
         yield Defect(str(place), f'"{reference}" is no signal', 'write "name", or "name[0]" for one of its numbers')
@@ -280,7 +279,7 @@ def _delays(controller: s.Controller, column: int, width: int | None) -> bool:
 
 def _signals(scene: s.Scene, widths: dict[str, int | None]) -> Iterator[Defect]:
     """Signals name one output of a controller, and drive loads: no motion can follow what jumps."""
-    for place, key, value in suspicious(scene, _with_signals):
+    for place, key, value in suspicious(scene, holding(s.ControlSignal)):
         if not isinstance(value, s.ControlSignal) or key == "function" and place.path.startswith("$.sensors"):
             continue
         yield from _reference(place.key("source"), value.source, widths, set())
@@ -291,8 +290,4 @@ def _signals(scene: s.Scene, widths: dict[str, int | None]) -> Iterator[Defect]:
         if key in MOTIONS:
             remedy = "give it as torque_Nm or force_N"
             yield Defect(str(place), "a controller cannot prescribe a motion", remedy)
-
-
-def _with_signals(items: Any) -> set[int]:
-    return {owner for group in alike(items) if group.kind is s.ControlSignal for owner in group.owners}
 
