@@ -167,7 +167,7 @@ class KernelCache(NullCache):
             else:
                 file.unlink(missing_ok=True)
         except OSError:
-            pass  # where the new one cannot be put in its place either, `save_overload` says so
+            pass  # if it cannot be replaced either, `save_overload` warns
         warn_once(f"damaged files in {self._folder}: they were deleted, and their kernels are compiled anew")
 
 

@@ -41,16 +41,16 @@ def cache_directory() -> Path | None:
         directory.mkdir(mode=_MINE_ALONE, parents=True, exist_ok=True)
         if stranger := _stranger(directory.resolve()):
             warn_once(
-                f"compiled kernels in {directory} are not used, and every process compiles them again, for {stranger}, "
-                "and they are run as code: remove the folder, which is made anew, or set NUMBA_CACHE_DIR to a folder "
-                "where nobody else may write"
+                f"compiled kernels in {directory} are not used, and every process compiles them again, because "
+                f"{stranger}, and kernels are run as code: remove the folder, which is then made anew, or set "
+                "NUMBA_CACHE_DIR to a folder where nobody else may write"
             )
             return None
         tempfile.TemporaryFile(dir=directory).close()
     except OSError as problem:
         warn_once(
             f"compiled kernels cannot be kept in {root} ({problem.strerror}), and every process compiles them again: "
-            "permit writing there, or set NUMBA_CACHE_DIR to a folder where it is"
+            "permit writing there, or set NUMBA_CACHE_DIR to a folder that is writable"
         )
         return None
     return directory

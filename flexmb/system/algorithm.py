@@ -1,4 +1,4 @@
-"""The declaration of an algorithm, which stands in the last lines of its file. `algorithms` lists all of them."""
+"""The declaration of an algorithm. Each is declared at the end of its own file; `algorithms` lists all of them."""
 
 from __future__ import annotations
 
