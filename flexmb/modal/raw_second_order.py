@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.modal.first_order import symmetric
 from flexmb.modal.flexible_model import SecondOrder
 from flexmb.scene.bodies import ModalNode
 from flexmb.scene.modal_data import ModalArrays, node_arrays
@@ -27,10 +26,10 @@ def second_order(arrays: ModalArrays) -> SecondOrder | None:
     """
     if arrays.second_translation is not None:
         G, H = arrays.second_translation, arrays.second_rotation
-        return SecondOrder(G, np.zeros_like(G) if H is None else H).map(symmetric)
+        return SecondOrder(G, np.zeros_like(G) if H is None else H).map(_symmetric)
     if arrays.gravity_stiffness is None or arrays.gradient_stiffness is None:
         return None
-    G = _affine(arrays, symmetric(-arrays.gravity_stiffness), symmetric(-arrays.gradient_stiffness))
+    G = _affine(arrays, _symmetric(-arrays.gravity_stiffness), _symmetric(-arrays.gradient_stiffness))
     return SecondOrder(G, np.zeros_like(G))
 
 
@@ -41,7 +40,7 @@ def node_second_order(node: ModalNode) -> SecondOrder | None:
         return None
     m = len(node.translation_modes)
     translation = given.get("second_translation", -given.get("force_stiffness", np.zeros((3, m, m))))
-    return SecondOrder(translation, given.get("second_rotation", np.zeros((3, m, m)))).map(symmetric)
+    return SecondOrder(translation, given.get("second_rotation", np.zeros((3, m, m)))).map(_symmetric)
 
 
 def _affine(arrays: ModalArrays, Z: Real, X: Real) -> Real:
@@ -62,3 +61,8 @@ def _affine(arrays: ModalArrays, Z: Real, X: Real) -> Real:
             f"have no extent along {axis}; correct the matrices, or the points"
         )
     return np.einsum("pb,abnk->pank", rows, parameters)
+
+
+def _symmetric(G: Real) -> Real:
+    """The symmetric part; the other one has no effect."""
+    return 0.5 * (G + np.swapaxes(G, -1, -2))
