@@ -20,7 +20,7 @@ from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, Vector
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.ends import ends
-from flexmb.scene.tree import GROUND, Coordinate, coordinates, ordered, rest_frames
+from flexmb.scene.tree import GROUND, coordinates, ordered, rest_frames
 from flexmb.typing import Real
 
 LEVELS = ("rigid", "ruthless", "linear", "full", "stiffened")
@@ -142,7 +142,10 @@ def _append(
         name, tree.index(parent), hinge, inboard, outboard, model, level,
         slice(q, q + nq), slice(u, u + nu), slice(q + nq, q + nq + m), slice(u + nu, u + nu + m),
     )  # fmt: skip
-    scalars = [_scalar(hinge.name, q + n, u + n, c) for n, (_, c) in enumerate(coordinates(hinge))]
+    scalars = [
+        ScalarSpeed(hinge.name, q + n, u + n, *c.spring, c.effort, c.prescribed)
+        for n, (_, c) in enumerate(coordinates(hinge))
+    ]
     return replace(
         tree, members=[*tree.members, member], scalars=tree.scalars + scalars, nq=q + nq + m, nu=u + nu + m
     )
@@ -155,10 +158,6 @@ def _append_wheel(tree: DenseTree, wheel: s.Wheel, seat: Seat) -> DenseTree:
     return replace(
         tree, rotors=[*tree.rotors, rotor], scalars=[*tree.scalars, scalar], nq=tree.nq + 1, nu=tree.nu + 1
     )
-
-
-def _scalar(owner: str, q: int, u: int, c: Coordinate) -> ScalarSpeed:
-    return ScalarSpeed(owner, q, u, *c.spring, c.effort, c.prescribed)
 
 
 def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY) -> Seat:

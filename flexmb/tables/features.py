@@ -59,7 +59,7 @@ MODAL_DAMPING = "modal damping"
 
 
 class SceneTables(Protocol):
-    """What of `flexmb.tables.arrays.Constants` says what a scene contains; this module stands below that one."""
+    """The tables of `flexmb.tables.arrays.Constants` from which features follow; that module imports this one."""
 
     kernels: Index
     body: Record
