@@ -16,7 +16,8 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The reference of `variant`: channels (T, k) at `times` (T,), their `uncertainties` (SI), and the engines that are
-    compared with it (`asked`). If the stored files cannot be used, `fault` says why, and there are no arrays.
+    compared with it (`asked`). `routes` say how its numbers were made; older records have none. If the stored files
+    cannot be used, `fault` says why, and there are no arrays.
     """
 
     variant: str
@@ -24,6 +25,7 @@ class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     times: Packed | None = None
     channels: dict[str, Packed] = {}
     uncertainties: dict[str, float] = {}
+    routes: tuple[str, ...] = ()
     fault: str = ""
 
     @property

@@ -26,6 +26,7 @@ def templates() -> Environment:
     )
     found.filters["code"] = code
     found.filters["breakable"] = _breakable
+    found.filters["power"] = _power
     return found
 
 
@@ -46,6 +47,11 @@ def embedded(data: Any) -> Markup:
 def code(text: str) -> Markup:
     """Text of a README or a note with `words in backticks` set as code."""
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(printable(text)))))
+
+
+def _power(number: float) -> str:
+    """A power of ten in short: 1e-6, not 1e-06."""
+    return re.sub(r"e([+-])0", r"e\1", f"{number:.0e}")
 
 
 def _shown(value: Any) -> Any:

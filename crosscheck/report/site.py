@@ -23,6 +23,7 @@ from crosscheck.report.html import embedded, source, templates
 from crosscheck.report.mutations import Scores
 from crosscheck.report.overview import findings, matrix
 from crosscheck.report.places import INDEX, CasePlace, places
+from crosscheck.report.speed import LEVELS, speed_view
 from flexmb.output.whole import write_whole
 from flexmb.output.writing import folder
 
@@ -30,7 +31,7 @@ FOLDER = "report"
 SINGLE = "report.html"
 ASSETS = "assets"
 LISTING = f"{ASSETS}/pages.json"  # the files of the report, which the next report removes
-SCRIPTS = ("data.js", "charts.js", "scene.js", "page.js", "index.js")
+SCRIPTS = ("data.js", "charts.js", "scene.js", "page.js", "index.js", "speed.js")
 LIBRARIES = ("plotly/plotly-basic.min.js", "three/three.iife.min.js")  # of the folder vendor, loaded when first needed
 
 
@@ -108,7 +109,11 @@ def _page(name: str, material: Material, **more: Any) -> str:
 
 def _overview(material: Material, where: dict[str, CasePlace]) -> dict[str, Any]:
     session, outcome = material.session, material.outcome
+    speed = speed_view(session, where)
     return {
+        "speed": speed,
+        "speed_data": embedded(speed.data),
+        "levels": LEVELS,
         "counts": outcome.counts(),
         "statuses": STATUSES,
         "controls": outcome.controls(),

@@ -35,4 +35,5 @@ def held_reference(case: Case, run: RunFile) -> RecordedReference | None:
         times=pack(stored.times),
         channels={name: pack(rows) for name, rows in stored.channels.items()},
         uncertainties={name: known.uncertainty for name, known in stored.knowledge.channels.items()},
+        routes=stored.knowledge.routes,
     )

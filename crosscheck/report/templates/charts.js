@@ -1,11 +1,15 @@
 // Charts of the report: overlays with distances and uncertainties, drifts, work-precision. Data: see charts.py.
 // Curves have colours of medium lightness, which are visible on a white and on a dark page.
 "use strict";
-const COLOURS = { native: "#1d69b1", "native-frisch": "#2c9adb", "native-frisch-as-printed": "#6b7785",
-  pinocchio: "#d1495b", mujoco: "#2a9d6f", exudyn: "#c38600", "exudyn-beam": "#7c52b6" };
+// They are those of Okabe and Ito, darker where these are pale, so that readers with any colour vision tell them apart;
+// the shapes say the same once more. What is ours is blue.
+const COLOURS = { native: "#0072b2", "native-composite": "#3aa0d8", "native-frisch": "#56a8e0", "native-frisch-as-printed": "#7c8794",
+  "native-radau5": "#2b5fa8", "native-exponential": "#4b8fc0", "native-generalised-alpha": "#1f86a8",
+  pinocchio: "#d55e00", mujoco: "#009e73", exudyn: "#c28800", "exudyn-beam": "#b8609a", drake: "#8c4a2f", dart: "#6a7f00", basilisk: "#a33a5e" };
 const SHIPPED = Object.keys(COLOURS).length;
 const SPARE = ["#0f8b8d", "#a74b40", "#5d6877", "#b917a1", "#497215"];
 const SYMBOLS = ["circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "star", "hexagon"];
+const SHAPES = ["circle", "diamond", "triangle-up", "square", "triangle-down", "cross", "star", "hexagon", "pentagon", "x", "hourglass", "bowtie"];
 const DASHES = ["solid", "dash", "dot"];
 const PAIRS = ["#556984", "#c2410c", "#7f42de", "#0e7490", "#c61d61", "#4d7c0f", "#aa4b10", "#345cdc"];
 const CONFIG = { displayModeBar: false, responsive: true, scrollZoom: false };
@@ -18,6 +22,25 @@ function colour(name) {
 
 // Plotly interprets text as markup and as a template, so names are written with character references.
 const plain = text => String(text).replace(/[&<>%${}]/g, c => "&#" + c.charCodeAt(0) + ";");
+
+// A text broken into lines that fit a width in pixels, at 6.6 pixels for a letter of 12 pixels.
+function fitted(text, width) {
+  const lines = [""], most = Math.max(16, Math.floor(width / 6.6));
+  for (const word of text.split(" ")) {
+    const line = lines[lines.length - 1];
+    if (line && line.length + word.length + 1 > most) lines.push(word);
+    else lines[lines.length - 1] = line ? line + " " + word : word;
+  }
+  return lines.join("<br>");
+}
+
+// Height of a legend below a chart, in pixels: plotly gives each entry the width of the longest one, with 48 for its line.
+function legendHeight(traces, width) {
+  const names = traces.filter(trace => trace.showlegend !== false).map(trace => trace.name.replace(/&#\d+;/g, "x").length);
+  const columns = Math.max(1, Math.floor(width / (Math.max(...names) * 6.4 + 48)));
+  return 19 * Math.ceil(names.length / columns) + 8;
+}
+const BELOW = { orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: 11 } }; // a legend at the lower edge
 
 const column = (series, j) => Array.from(series[j]);
 
@@ -59,14 +82,17 @@ function distances(channel, series) {
 }
 
 function drawChannel(node, channel, series) {
-  const letters = channel.components.length > 1 ? " (" + channel.components.map((c, j) => c + " " + DASHES[j % 3]).join(", ") + ")" : "";
+  const letters = channel.components.length > 1 ? channel.components.map((c, j) => c + " " + DASHES[j % 3]).join(", ") : "";
   const judged = channel.pairs.length > 0;
-  node.style.height = 355 + 25 * Math.ceil((channel.sides.length + channel.pairs.length) / 3) + "px"; // room for the legend
+  const traces = [...sides(channel, series), ...distances(channel, series)], legend = legendHeight(traces, node.clientWidth - 76);
+  node.style.height = 365 + legend + "px";
   const below = !judged ? {} : { yaxis2: { domain: [0, 0.38], type: "log", exponentformat: "power", nticks: 5,
     title: { text: "E, and U dotted" + (channel.unit ? ", " + channel.unit : ""), font: { size: 10.5 } } } };
-  Plotly.react(node, [...sides(channel, series), ...distances(channel, series)], layout({
-    xaxis: { title: { text: "time, s", standoff: 4 }, anchor: judged ? "y2" : "y" },
-    yaxis: { domain: judged ? [0.46, 1] : [0, 1], title: { text: channel.unit + letters, font: { size: 10.5 } }, exponentformat: "power",
+  Plotly.react(node, traces, layout({
+    margin: { l: 64, r: 12, t: 20, b: 44 + legend }, legend: BELOW,
+    annotations: letters ? [{ xref: "paper", yref: "paper", x: 0, xanchor: "left", y: 1, yanchor: "bottom", showarrow: false, text: letters, font: { size: 10.5, color: tone("soft") } }] : [],
+    xaxis: { title: { text: "time, s", standoff: 4, font: { size: 12 } }, anchor: judged ? "y2" : "y" },
+    yaxis: { domain: judged ? [0.46, 1] : [0, 1], title: { text: channel.unit, font: { size: 10.5 } }, exponentformat: "power",
       range: channel.range || undefined },
     ...below,
   }), CONFIG);
@@ -77,11 +103,13 @@ function drawDrift(node, drift, series) {
     x: column(series[curve.times], 0), y: positive(column(series[curve.values], 0)), type: "scatter", mode: "lines", name: plain(curve.engine),
     line: { color: colour(curve.engine), width: 1.6 }, hovertemplate: "%{y:.2e}",
   }));
+  const legend = legendHeight(traces, node.clientWidth - 76);
+  node.style.height = 220 + legend + "px";
   Plotly.react(node, traces, layout({
-    xaxis: { title: { text: "time, s", standoff: 4 } }, yaxis: { type: "log", exponentformat: "power", title: { text: "relative drift" } },
+    margin: { l: 64, r: 12, t: 8, b: 44 + legend }, legend: BELOW,
+    xaxis: { title: { text: "time, s", standoff: 4, font: { size: 12 } } }, yaxis: { type: "log", exponentformat: "power", nticks: 6, title: { text: "relative drift", font: { size: 12 } } },
     shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: drift.limit, y1: drift.limit, line: { color: tone("bad"), width: 1, dash: "dash" } }],
     annotations: [{ xref: "paper", x: 1, xanchor: "right", y: Math.log10(drift.limit), yanchor: "bottom", showarrow: false, text: "limit", font: { color: tone("bad"), size: 10.5 } }],
-    legend: { orientation: "h", y: -0.24, yanchor: "top" },
   }), CONFIG);
 }
 
@@ -108,17 +136,20 @@ function drawWork(node, work) {
   }
   const front = work.points.filter(p => p.best && p.error > 0);
   traces.unshift({ x: front.map(wall), y: front.map(p => p.error), name: "Pareto front", type: "scatter", mode: "lines",
-    line: { color: tone("edge"), width: 7, shape: "hv" }, hoverinfo: "skip" });
+    line: { color: tone("band"), width: 9, shape: "hv" }, hoverinfo: "skip" });
+  const width = node.clientWidth, narrow = width < 600, left = narrow ? 90 : 100, legend = legendHeight(traces, width - left - 12);
+  node.style.height = 430 + legend + "px";
   Plotly.react(node, traces, layout({
-    hovermode: "closest", margin: { l: 70, r: 12, t: 26, b: 44 },
-    xaxis: { type: "log", title: { text: "wall time of the solve, s (compile time apart)", standoff: 4 }, exponentformat: "power" },
-    yaxis: { type: "log", title: { text: "error of " + plain(work.observable) + ", relative to " + work.scale.toPrecision(3) + " " + work.unit }, exponentformat: "power",
-      range: [low, Math.log10(margin) + 0.4], dtick: Math.ceil((Math.log10(margin) - low) / 12) },
+    hovermode: "closest", margin: { l: left, r: 12, t: 26, b: 56 + legend },
+    xaxis: { type: "log", exponentformat: "power", nticks: narrow ? 5 : 12,
+      title: { font: { size: 12 }, standoff: 4, text: fitted("wall time of the solve, s (compile time apart)", width - left - 12) } },
+    yaxis: { type: "log", exponentformat: "power", range: [low, Math.log10(margin) + 0.4], dtick: Math.ceil((Math.log10(margin) - low) / 9),
+      title: { font: { size: 12 }, text: fitted(`error of ${plain(work.observable)}, relative to ${work.scale.toPrecision(3)} ${work.unit}, against ${plain(work.reference)}`, 360) } },
     shapes: [{ type: "rect", xref: "paper", x0: 0, x1: 1, y0: 1e-18, y1: work.doubt, fillcolor: tone("wash"), line: { width: 0 }, layer: "below" }],
     annotations: [
       { xref: "paper", x: 0.01, xanchor: "left", y: Math.log10(work.doubt), yanchor: "top", showarrow: false, font: { size: 10.5, color: tone("soft") },
-        text: "below the reference's own uncertainty (" + plain(work.reference) + ")" },
-      { xref: "paper", x: 0, xanchor: "left", yref: "paper", y: 1.06, showarrow: false, font: { size: 10.5, color: tone("soft") }, text: "× at the top: failed runs" }],
-    legend: { orientation: "h", y: -0.19, yanchor: "top", font: { size: 11 } },
+        text: "below the uncertainty of the reference" },
+      { xref: "paper", x: 0, xanchor: "left", yref: "paper", y: 1, yanchor: "bottom", showarrow: false, font: { size: 10.5, color: tone("soft") }, text: "× at the top: failed runs" }],
+    legend: BELOW,
   }), CONFIG);
 }

@@ -33,7 +33,19 @@ function chart(host, id, title, choices, draw, words, first = 0) {
   }
   host.append(box);
   later(plot, redraw);
-  dark.addEventListener("change", () => { if (plot.classList.contains("drawn")) redraw(); });
+  redrawn(plot, redraw);
+}
+
+// Draw a chart again when the reader's colours change, or the width by so much that titles and legend break otherwise.
+function redrawn(plot, redraw) {
+  let width = 0;
+  const again = () => { if (plot.classList.contains("drawn")) redraw(); };
+  dark.addEventListener("change", again);
+  new ResizeObserver(() => {
+    if (!plot.clientWidth) return; // it is not shown
+    if (width && Math.abs(plot.clientWidth - width) > 40) again();
+    width = plot.clientWidth;
+  }).observe(plot);
 }
 
 const listed = names => [...new Set(names)].join(", ");

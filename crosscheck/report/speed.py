@@ -1,0 +1,144 @@
+"""Speed against accuracy of a whole session, for the first page of the report: all charts of all cases in one.
+
+Times of different cases can be laid over each other once they are relative to their chart's unit of time: the fastest
+run whose error is at most `REACHED`, or, where none is as accurate, the most accurate one. `templates/speed.js` draws it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+from crosscheck.judging.results import Session
+from crosscheck.report.places import CasePlace
+from crosscheck.report.workprecision import WorkPrecision, work_precision
+
+REACHED = 1e-6
+LEVELS = (1e-3, REACHED, 1e-9)  # errors at which engines are compared in the table
+
+
+@dataclass(frozen=True)
+class ChartOfCase:
+    """A chart with its case: `link` leads from the index to it, `unit_s` is the time that others are relative to."""
+
+    family: str
+    case: str
+    link: str
+    chart: WorkPrecision
+    unit_s: float
+
+    @property
+    def name(self) -> str:
+        return f"{self.case}: {self.chart.title}"
+
+
+@dataclass(frozen=True)
+class Standing:
+    """An engine at one level of error: its median time relative to the fastest engine of each chart (None if it never
+    was as accurate), the charts in which it was, and in how many of them it was the fastest."""
+
+    ratio: float | None
+    reached: int
+    first: int
+
+
+@dataclass(frozen=True)
+class EngineRow:
+    engine: str
+    charts: int
+    standings: tuple[Standing, ...]  # one for each of `LEVELS`
+
+
+@dataclass(frozen=True)
+class SpeedView:
+    charts: tuple[ChartOfCase, ...]
+    rows: tuple[EngineRow, ...]
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(each.family for each in self.charts))
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """What the script needs."""
+        engines = [row.engine for row in self.rows]
+        return {"reached": REACHED, "engines": engines, "charts": [_drawn(each) for each in self.charts]}
+
+
+def speed_view(session: Session, places: Mapping[str, CasePlace]) -> SpeedView:
+    """All charts of a session in which something can be drawn, and how the engines stand in them."""
+    charts = []
+    for case in session.cases:
+        for asked in case.case.run.charts:
+            chart = work_precision(case, asked)
+            unit = None if chart is None else unit_of_time(chart)
+            if chart is not None and unit is not None:
+                family = case.case.case.rpartition("/")[0].rpartition("/")[2].replace("_", " ") or "cases"
+                link = places[case.case.case].link("speed")
+                charts.append(ChartOfCase(family.capitalize(), case.case.run.title, link, chart, unit))
+    return SpeedView(tuple(charts), tuple(_rows([each.chart for each in charts])))
+
+
+def unit_of_time(chart: WorkPrecision) -> float | None:
+    """Wall time of the fastest run with an error of at most `REACHED`, else of the most accurate one; None if no run
+    with an error took any time."""
+    drawn = [(point.error, point.wall_s) for point in chart.points if point.error is not None and point.wall_s > 0.0]
+    if not drawn:
+        return None
+    enough = max(REACHED, min(error for error, _ in drawn))
+    return min(seconds for error, seconds in drawn if error <= enough)
+
+
+def _drawn(each: ChartOfCase) -> dict[str, Any]:
+    """A chart for the script: what is below the uncertainty of the reference is shown there, and runs without an error
+    only on the page of their case."""
+    chart = each.chart
+    points = [
+        {
+            "engine": point.engine,
+            "variant": point.variant,
+            "method": point.method,
+            "effort": point.effort,
+            "wall_s": point.wall_s,
+            "error": max(point.error, chart.reference_uncertainty),
+            "best": point.best,
+        }
+        for point in chart.points
+        if point.error is not None and max(point.error, chart.reference_uncertainty) > 0.0 and point.wall_s > 0.0
+    ]
+    about = {"family": each.family, "name": each.name, "link": each.link, "unit_s": each.unit_s}
+    return {**about, "reference": chart.reference, "doubt": chart.reference_uncertainty, "points": points}
+
+
+def _rows(charts: Iterable[WorkPrecision]) -> list[EngineRow]:
+    """Engines by the number of their charts, the most first."""
+    found: dict[str, list[WorkPrecision]] = {}
+    for chart in charts:
+        for engine in dict.fromkeys(point.engine for point in chart.points):
+            found.setdefault(engine, []).append(chart)
+    rows = [
+        EngineRow(engine, len(group), tuple(standing(group, engine, error) for error in LEVELS))
+        for engine, group in found.items()
+    ]
+    return sorted(rows, key=lambda row: -row.charts)
+
+
+def standing(charts: Iterable[WorkPrecision], engine: str, error: float) -> Standing:
+    """How an engine stands at one level of error."""
+    ratios = []
+    for chart in charts:
+        times = fastest(chart, error)
+        if engine in times:
+            ratios.append(times[engine] / min(times.values()))
+    return Standing(median(ratios) if ratios else None, len(ratios), sum(ratio == 1.0 for ratio in ratios))
+
+
+def fastest(chart: WorkPrecision, error: float) -> dict[str, float]:
+    """For each engine the wall time (s) of its fastest run whose error is at most `error`."""
+    found: dict[str, float] = {}
+    for point in chart.points:
+        if point.error is not None and point.error <= error and point.wall_s > 0.0:
+            found[point.engine] = min(found.get(point.engine, point.wall_s), point.wall_s)
+    return found
