@@ -35,8 +35,8 @@ class SessionOutcome:
 
     `strict`: figures worse than recorded or missing, and references that were never made, are not as expected.
     `inapplicable`: what engines that joined a case cannot represent of it. `asked`: the engines asked for by name.
-    `unreferenced`: the cases with a recipe of a reference but no reference. `unfinished`: the session has not ended, so
-    nothing is judged.
+    `unreferenced`: the cases with a recipe of a reference but no reference. `made_with`: versions and processor of the
+    last session in the records. `unfinished`: the session has not ended, so nothing is judged.
     """
 
     verdicts: dict[str, list[Verdict]]
@@ -46,6 +46,7 @@ class SessionOutcome:
     inapplicable: tuple[Inapplicable, ...] = ()
     asked: tuple[str, ...] = ()
     unreferenced: tuple[str, ...] = ()
+    made_with: str = ""
     unfinished: bool = False
 
     @property
@@ -198,7 +199,15 @@ def conclude(session: Session, strict: bool = False) -> SessionOutcome:
         inapplicable=inapplicable,
         asked=tuple(dict.fromkeys(engine for case in session.cases for engine in case.case.asked)),
         unreferenced=tuple(case.case.case for case in session.cases if case.case.unreferenced),
+        made_with=_made_with(session),
     )
+
+
+def _made_with(session: Session) -> str:
+    if not session.environments:
+        return ""
+    last = session.environments[-1]
+    return ", ".join([*(f"{name} {version}" for name, version in last.packages.items()), last.processor])
 
 
 def _absences(case: CaseResults) -> list[Absence]:

@@ -38,7 +38,7 @@ class LiveProgress:
 
     def __init__(self, console: Console, verbosity: Verbosity = Verbosity.VERBOSE) -> None:
         self._lasting = verbosity is Verbosity.VERBOSE
-        self._progress = bars(console, TimeLeft(), quiet=verbosity is Verbosity.QUIET)
+        self.bars = bars(console, TimeLeft(), quiet=verbosity is Verbosity.QUIET)
         self._overall: TaskID | None = None
         self._remaining = Remaining()
         self._begin = 0.0
@@ -47,35 +47,36 @@ class LiveProgress:
         self._started: dict[int, float] = {}
 
     def __enter__(self) -> LiveProgress:
-        self._progress.start()
+        self.bars.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._progress.stop()
+        self.bars.stop()
 
     def hear(self, jobs: Sequence[Job], event: Event) -> None:
         """Show one event."""
         if self._overall is None:
-            self._overall = self._progress.add_task("all runs", total=len(jobs))
-            self._remaining.expect((number, job.expected_s) for number, job in enumerate(jobs))
+            self._overall = self.bars.add_task("all runs", total=len(jobs))
+            self._remaining.expect((number, job.engine, job.expected_s) for number, job in enumerate(jobs))
             self._begin = time.monotonic()
         title = printable(jobs[event.job].title)
         if event.kind == "started":
             self._started[event.job] = time.perf_counter()
+            self._remaining.started(event.job, time.monotonic() - self._begin)
             self._records[event.job] = []
-            self._lines[event.job] = self._progress.add_task(f"{title}: starting", total=None)
+            self._lines[event.job] = self.bars.add_task(f"{title}: starting", total=None, running=True)
         elif event.kind == "emitted" and isinstance(event.content, RunRecord):
             self._records[event.job].append(event.content)
         elif event.kind == "emitted" and isinstance(event.content, str):
-            self._progress.update(self._lines[event.job], description=f"{title}: {printable(event.content)}")
+            self.bars.update(self._lines[event.job], description=f"{title}: {printable(event.content)}")
         elif event.kind != "emitted":
-            self._progress.remove_task(self._lines.pop(event.job))
-            self._remaining.ended(event.job)
+            self.bars.remove_task(self._lines.pop(event.job))
             now = time.monotonic()
+            self._remaining.ended(event.job, now - self._begin)
             seconds = self._remaining.seconds(now - self._begin)
-            self._progress.update(self._overall, advance=1, ends_at=None if seconds is None else now + seconds)
+            self.bars.update(self._overall, advance=1, ends_at=None if seconds is None else now + seconds)
             if self._lasting:
-                self._progress.console.print(self._ending(title, event))
+                self.bars.console.print(self._ending(title, event))
 
     def _ending(self, title: str, event: Event) -> Text:
         """The lasting line of a job."""

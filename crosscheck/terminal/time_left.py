@@ -7,15 +7,17 @@ import time
 from rich.progress import ProgressColumn, Task
 from rich.text import Text
 
+NONE = "no estimate yet"
+
 
 class TimeLeft(ProgressColumn):
-    """The time until a task's field `ends_at` (s, of `time.monotonic`); empty if it has none."""
+    """The time until a task's field `ends_at` (s, of `time.monotonic`), as far as it can be estimated."""
 
     max_refresh = 0.5
 
     def render(self, task: Task) -> Text:
         ends_at: float | None = task.fields.get("ends_at")
-        return Text("" if ends_at is None else f"about {in_words(ends_at - time.monotonic())} left", "cyan")
+        return Text(NONE if ends_at is None else f"about {in_words(ends_at - time.monotonic())} left", "cyan")
 
 
 def in_words(seconds: float) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 from rich.console import Console
 from rich.text import Text
 
+from crosscheck.judging.figures import GROWTH
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.verdict import STATUSES, Verdict
 from crosscheck.terminal.text import marked, words
@@ -39,6 +41,8 @@ def print_outcome(console: Console, outcome: SessionOutcome, verbosity: Verbosit
             console.print(words(f"... and {len(lines) - len(shown)} lines more: --verbose shows all", "dim"))
     colour = "green" if outcome.ok else "red"
     console.print(words(outcome.headline, f"bold {colour}"), soft_wrap=True)
+    if outcome.worse and verbosity is not Verbosity.QUIET:
+        console.print(words(_why_worse(outcome)), soft_wrap=True)
     return 0 if outcome.ok else 1
 
 
@@ -78,11 +82,36 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         yield marked("!", "yellow", f"{_place(verdict)} {verdict.grown}")
     for verdict in outcome.outgrown:
         yield marked("!", "yellow", f"{_place(verdict)}: {verdict.grown}")
-    for (case, why), count in Counter((verdict.case, verdict.stale) for verdict in outcome.stale).items():
-        figures = "1 accepted figure is" if count == 1 else f"{count} accepted figures are"
-        yield marked("!", "yellow", f"{case}: {figures} stale ({why}): accept anew by crosscheck run {case} --accept")
+    if outcome.stale:
+        yield marked("!", "yellow", _stale(outcome.stale))
     for verdict in outcome.unrecorded if outcome.strict else ():
         yield marked("!", "yellow", f"{_place(verdict)} has no accepted figures")
+
+
+def _stale(verdicts: Sequence[Verdict]) -> str:
+    """All stale figures, by what has changed since, and one command that accepts them anew."""
+    figures = "1 accepted figure" if len(verdicts) == 1 else f"{len(verdicts)} accepted figures"
+    cases = list(dict.fromkeys(verdict.case for verdict in verdicts))
+    of = f" of {len(cases)} cases" if len(cases) > 1 else ""
+    reasons = Counter(verdict.stale for verdict in verdicts)
+    why = "; ".join(f"{reason}: {count}" if len(reasons) > 1 else reason for reason, count in reasons.most_common())
+    are = "is" if len(verdicts) == 1 else "are"
+    return f"{figures}{of} {are} stale ({why}) and held against nothing; accept anew: {_accept(cases)}"
+
+
+def _why_worse(outcome: SessionOutcome) -> str:
+    """What may have made figures worse, and what to do about it."""
+    cases = list(dict.fromkeys(verdict.case for verdict in outcome.worse))
+    here = f" ({outcome.made_with})" if outcome.made_with else ""
+    return (
+        f"Worse: E or U is more than {GROWTH:g} times what was accepted for the same scenes, efforts and engines, so what "
+        f"differs is our code, the libraries or the processor{here}. If it is none of your changes, tell us; if it is "
+        f"meant: {_accept(cases)}"
+    )
+
+
+def _accept(cases: Sequence[str]) -> str:
+    return f"crosscheck run {shlex.join(cases)} --accept"
 
 
 def _first_reason(outcome: SessionOutcome, engine: str) -> str:

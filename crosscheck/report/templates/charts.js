@@ -38,9 +38,9 @@ function fitted(text, width) {
 function legendHeight(traces, width) {
   const names = traces.filter(trace => trace.showlegend !== false).map(trace => trace.name.replace(/&#\d+;/g, "x").length);
   const columns = Math.max(1, Math.floor(width / (Math.max(...names) * 6.4 + 48)));
-  return 19 * Math.ceil(names.length / columns) + 8;
+  return 20 * Math.ceil(names.length / columns) + 10;
 }
-const BELOW = { orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: 11 } }; // a legend at the lower edge
+const BELOW = { orientation: "h", yref: "container", y: 0, yanchor: "bottom", tracegroupgap: 0, font: { size: 11 } }; // a legend at the lower edge
 
 const column = (series, j) => Array.from(series[j]);
 

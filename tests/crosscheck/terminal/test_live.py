@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import time
 
 import numpy as np
 import pytest
@@ -39,6 +40,27 @@ def test_what_runs_is_named_in_full_on_every_terminal(columns: int) -> None:
     shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
     assert "…" not in shown and "finest" in shown
     assert ("━" in shown) is (columns == 100)
+
+
+@pytest.mark.parametrize("columns", [40, 60, 80, 120])
+@pytest.mark.parametrize("seconds", [None, 1.0, 2340.0, 36000.0])
+def test_the_count_and_the_time_left_are_shown_on_one_line(columns: int, seconds: float | None) -> None:
+    """However long the names of jobs are, of which many run and some have ended."""
+    name = "spinning_beam/beam_k_subcritical_with_a_long_name"
+    job = Job(name, "segments", MAIN, "native-frisch-as-printed", None, "", np.zeros(2), "module:engines", "")
+    page = Console(file=io.StringIO(), width=columns)
+    with LiveProgress(Console(file=io.StringIO(), width=columns, force_terminal=True)) as live:
+        for number in range(120):
+            live.hear([job] * 305, Event(number, "started"))
+            live.hear([job] * 305, Event(number, "ended"))
+        live.hear([job] * 305, Event(120, "started"))
+        (task, *_) = live.bars.tasks
+        live.bars.update(task.id, ends_at=None if seconds is None else time.monotonic() + seconds)
+        page.print(*live.bars.get_renderables(), sep="\n")
+    (first, *rest) = page.file.getvalue().splitlines()
+    assert "120/305" in first and ("no estimate yet" if seconds is None else "left") in first
+    assert ("━" in first) is (columns >= 60)
+    assert "…" not in "".join((first, *rest)) and all(len(line.rstrip()) <= columns for line in (first, *rest))
 
 
 def test_brackets_in_a_remedy_are_text_not_markup() -> None:
