@@ -78,7 +78,7 @@ def run(
         _run(chosen, asked, records, shown, fresh, Limits(jobs, time_limit), scheduler_at(scheduler))
         done = not accept or _accept(chosen, records, partial=bool(asked))
         outcome, page = write_all(records, out, strict, last_session, single_file)
-    _conclude(outcome, page, shown, out if as_json else None, open_report, failed=not done)
+    _conclude(outcome, page, records, shown, out if as_json else None, open_report, failed=not done)
 
 
 @common.app.command()
@@ -105,7 +105,7 @@ def report(
     shown = common.verbosity(quiet, verbose)
     with common.sole_writer(out):
         outcome, page = write_all(records, out, strict, standing, single_file)
-    _conclude(outcome, page, shown, out if as_json else None, open_report)
+    _conclude(outcome, page, records, shown, out if as_json else None, open_report)
 
 
 def _chosen(cases: list[str], engines: list[str] | None, alone: bool) -> tuple[Case, ...]:
@@ -159,9 +159,16 @@ def _accept(cases: tuple[Case, ...], records: Path, partial: bool) -> bool:
     return True
 
 
+def _kept(records: Path) -> str:
+    """How much the records take, what they are for, and that they may go."""
+    size = records.stat().st_size / 1e6
+    return f"Records: {records}, {size:.3g} MB; runs in it are not repeated; to drop them all, delete the file"
+
+
 def _conclude(
-    outcome: SessionOutcome, page: Path, shown: Verbosity, json_of: Path | None, open_report: bool, failed: bool = False
-) -> None:
+    outcome: SessionOutcome, page: Path, records: Path, shown: Verbosity, json_of: Path | None, open_report: bool,
+    failed: bool = False,
+) -> None:  # fmt: skip
     """Show the outcome, with the results of the folder `json_of` as JSON, and exit; with code 1 if it `failed`."""
     from crosscheck.sealed.seal import FILE
     from crosscheck.terminal.verdicts import print_outcome
@@ -169,6 +176,7 @@ def _conclude(
     code = print_outcome(common.console, outcome, shown)
     if shown is not Verbosity.QUIET:
         common.console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
+        common.console.print(words(_kept(records), "dim"), soft_wrap=True)
     if json_of is not None:
         typer.echo((json_of / FILE).read_text(encoding="ascii"), nl=False)
     if open_report:

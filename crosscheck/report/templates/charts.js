@@ -34,11 +34,17 @@ function fitted(text, width) {
   return lines.join("<br>");
 }
 
-// Height of a legend below a chart, in pixels: plotly gives each entry the width of the longest one, with 48 for its line.
+// Height of a legend below a chart, in pixels: plotly sets entries one after the other where traces form groups, and else
+// gives each the width of the longest; 48 pixels are for its line.
 function legendHeight(traces, width) {
-  const names = traces.filter(trace => trace.showlegend !== false).map(trace => trace.name.replace(/&#\d+;/g, "x").length);
-  const columns = Math.max(1, Math.floor(width / (Math.max(...names) * 6.4 + 48)));
-  return 20 * Math.ceil(names.length / columns) + 10;
+  const shown = traces.filter(trace => trace.showlegend !== false), wide = shown.map(trace => trace.name.replace(/&#\d+;/g, "x").length * 6.2 + 48);
+  const grouped = shown.some(trace => trace.legendgroup), widest = Math.max(...wide);
+  let rows = 1, used = 0;
+  for (const each of wide.map(own => (grouped ? own : widest))) {
+    if (used && used + each > width) { rows++; used = 0; }
+    used += each;
+  }
+  return 19 * rows + 12;
 }
 const BELOW = { orientation: "h", yref: "container", y: 0, yanchor: "bottom", tracegroupgap: 0, font: { size: 11 } }; // a legend at the lower edge
 
@@ -137,14 +143,15 @@ function drawWork(node, work) {
   const front = work.points.filter(p => p.best && p.error > 0);
   traces.unshift({ x: front.map(wall), y: front.map(p => p.error), name: "Pareto front", type: "scatter", mode: "lines",
     line: { color: tone("band"), width: 9, shape: "hv" }, hoverinfo: "skip" });
-  const width = node.clientWidth, narrow = width < 600, left = narrow ? 90 : 100, legend = legendHeight(traces, width - left - 12);
-  node.style.height = 430 + legend + "px";
+  const width = node.clientWidth, narrow = width < 600, left = narrow ? 90 : 100;
+  const times = fitted("wall time of the solve, s (compile time apart)", width - left - 12), below = legendHeight(traces, width - left - 12) + 40 + 16 * times.split("<br>").length;
+  node.style.height = 374 + below + "px";
   Plotly.react(node, traces, layout({
-    hovermode: "closest", margin: { l: left, r: 12, t: 26, b: 56 + legend },
+    hovermode: "closest", margin: { l: left, r: 12, t: 26, b: below },
     xaxis: { type: "log", exponentformat: "power", nticks: narrow ? 5 : 12,
-      title: { font: { size: 12 }, standoff: 4, text: fitted("wall time of the solve, s (compile time apart)", width - left - 12) } },
+      title: { font: { size: 12 }, standoff: 4, text: times } },
     yaxis: { type: "log", exponentformat: "power", range: [low, Math.log10(margin) + 0.4], dtick: Math.ceil((Math.log10(margin) - low) / 9),
-      title: { font: { size: 12 }, text: fitted(`error of ${plain(work.observable)}, relative to ${work.scale.toPrecision(3)} ${work.unit}, against ${plain(work.reference)}`, 360) } },
+      title: { font: { size: 12 }, text: fitted(`error of ${plain(work.observable)}, relative to ${work.scale.toPrecision(3)} ${work.unit}, against ${plain(work.reference)}`, 330) } },
     shapes: [{ type: "rect", xref: "paper", x0: 0, x1: 1, y0: 1e-18, y1: work.doubt, fillcolor: tone("wash"), line: { width: 0 }, layer: "below" }],
     annotations: [
       { xref: "paper", x: 0.01, xanchor: "left", y: Math.log10(work.doubt), yanchor: "top", showarrow: false, font: { size: 10.5, color: tone("soft") },

@@ -74,12 +74,14 @@ function drawSpeed(node, data) {
   const low = Math.floor(Math.log10(Math.min(...errors))), high = Math.ceil(Math.log10(Math.max(...errors)));
   const against = references.size === 1 ? [...references][0] : "the best known reference of each case";
   const left = narrow ? 78 : 84, across = width - left - 12;
-  const traces = curves(charts, engines, relative, data.engines), legend = legendHeight(traces, across);
-  node.style.height = 510 + legend + "px";
+  const traces = curves(charts, engines, relative, data.engines);
+  const times = fitted(relative ? "wall time of the solve, relative to the fastest run of the chart with an error of 1e-6" : "wall time of the solve, s", across);
+  const below = legendHeight(traces, across) + 44 + 16 * times.split("<br>").length;
+  node.style.height = 450 + below + "px";
   Plotly.react(node, traces, layout({
-    hovermode: "closest", margin: { l: left, r: 12, t: 10, b: 58 + legend },
+    hovermode: "closest", margin: { l: left, r: 12, t: 10, b: below },
     xaxis: { type: "log", exponentformat: "power", nticks: narrow ? 6 : 12, title: { font: { size: 12 }, standoff: 6,
-      text: fitted(relative ? "wall time of the solve, relative to the fastest run of the chart with an error of 1e-6" : "wall time of the solve, s", across) } },
+      text: times } },
     yaxis: { type: "log", exponentformat: "power", range: [low - 0.3, high + 0.3], dtick: Math.max(1, Math.round((high - low) / 8)),
       title: { font: { size: 12 }, text: fitted("error, relative to the range, against " + plain(against), 400) } },
     shapes: relative ? [["x", 1], ["y", data.reached]].map(([axis, at]) => ({ type: "line", layer: "below", line: { color: tone("edge"), width: 1, dash: "dot" },
