@@ -1,7 +1,8 @@
 """Speed against accuracy of a whole session, for the first page of the report: all charts of all cases in one.
 
 Times of different cases can be laid over each other once they are relative to their chart's unit of time: the fastest
-run whose error is at most `REACHED`, or, where none is as accurate, the most accurate one. `templates/speed.js` draws it.
+run whose error is at most `REACHED`, or, where none is as accurate, the most accurate one. It is drawn by
+`templates/speed.js`.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ class WorkPrecision:
 
 @dataclass(frozen=True)
 class _Reference:
-    """What errors refer to: `values` (T, k) at `times` (T,), with their uncertainty (SI); `run` if it is one of ours."""
+    """What errors refer to: `values` (T, k) at `times` (T,), with their uncertainty (SI); the `run`, if it is one."""
 
     name: str
     times: Real

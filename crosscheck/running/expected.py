@@ -10,7 +10,9 @@ from crosscheck.running.rung import repeats_of
 
 BESIDES_S = 0.05  # of a job besides its runs: reading it, packing and sending its results
 LIKE = 2  # ended jobs of an engine from which the time of its others is estimated: the first one also loads it
-OTHER_CODES = 6.0  # times as long as ours a job of another code takes; 4.9 s and 0.8 s on average in the canonical cases
+OTHER_CODES = (
+    6.0  # times as long as ours a job of another code takes; 4.9 s and 0.8 s on average in the canonical cases
+)
 SEEN = 0.1  # share of the work that must be done before an estimate, and that counts as "as long as last time"
 
 
@@ -30,7 +32,7 @@ class Remaining:
     """An estimate of the remaining time: the work of the open jobs, at the pace at which work has been done so far.
 
     A job counts with the seconds that it took last time, scaled by how much longer the ended jobs took than theirs. One
-    that was never recorded counts as the mean of the ended jobs of its engine, for engines differ more than cases do. As
+    never recorded counts as the mean of the ended jobs of its engine, for engines differ more than cases do. As
     long as nothing is known of an engine, it counts as `OTHER_CODES` of our own jobs, or as one if it is our own. There
     is no estimate before the share `SEEN` of the work is done: it would tell how long it takes to start.
     """
@@ -62,9 +64,7 @@ class Remaining:
 
     def seconds(self, at_s: float) -> float | None:
         """Seconds to the end; None as long as they cannot be estimated."""
-        left = sum(
-            max(self._whole(*job) - self._running_s(number, at_s), 0.0) for number, job in self._open.items()
-        )
+        left = sum(max(self._whole(*job) - self._running_s(number, at_s), 0.0) for number, job in self._open.items())
         done = sum(map(sum, self._took.values()))
         if not self._took or done < SEEN * (done + left):
             return None

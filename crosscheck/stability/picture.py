@@ -11,6 +11,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from crosscheck.stability.boundary import label
 from crosscheck.stability.map import Axis, StabilityMap
@@ -20,6 +21,7 @@ from flexmb.output.whole import save_figure
 STATUSES = {"failed": "#756bb1", "did not finish": "#fdd835", "did not run": "#969696"}
 LINE_POINTS = 400
 FEW_DECADES = 60.0  # ratio of an axis's ends below which its ticks are plain numbers
+NUMBERED = (1.0, 2.0, 5.0)  # of a decade: more would be printed over each other
 STYLE = {"svg.hashsalt": "crosscheck", "svg.fonttype": "none", "font.size": 9}
 
 
@@ -79,8 +81,10 @@ def _frame(axes: Axes, what: StabilityMap) -> None:
         if axis.log:
             scale("log")
             if axis.high / axis.low < FEW_DECADES:
-                (axes.xaxis if axis is what.x else axes.yaxis).set_major_formatter("{x:g}")
-                (axes.xaxis if axis is what.x else axes.yaxis).set_minor_formatter("{x:g}")
+                ticks = axes.xaxis if axis is what.x else axes.yaxis
+                ticks.set_major_locator(LogLocator(subs=NUMBERED))
+                ticks.set_major_formatter("{x:g}")
+                ticks.set_minor_formatter(NullFormatter())
         limits(axis.low, axis.high)
         title(axis.label)
     if what.y.categories:

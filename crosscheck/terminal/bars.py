@@ -1,4 +1,4 @@
-"""Progress bars: a line for the whole with its bar, count, elapsed time and time left, and a line for each running job."""
+"""Progress bars: a line for the whole with bar, count, elapsed time and time left, and a line for each running job."""
 
 from __future__ import annotations
 
@@ -30,7 +30,9 @@ class Bars(Progress):
     def __init__(self, console: Console, time_left: ProgressColumn, quiet: bool) -> None:
         wide = console.width >= WIDE
         bar = BarColumn(bar_width=min(LONGEST, max(console.width - BESIDES, 1)))
-        rest = (bar, MofNCompleteColumn(), TimeElapsedColumn(), time_left) if wide else (MofNCompleteColumn(), time_left)
+        rest = (
+            (bar, MofNCompleteColumn(), TimeElapsedColumn(), time_left) if wide else (MofNCompleteColumn(), time_left)
+        )
         described = SpinnerColumn(), TextColumn("{task.description}", markup=False)  # a description contains names
         self._running: Sequence[ProgressColumn] = (*described, TimeElapsedColumn())
         super().__init__(*described, *rest, console=console, transient=True, disable=quiet)

@@ -1,6 +1,6 @@
 """docs/architecture.md against the tree and the import contracts, and its picture, which is drawn from them by
 
-    python -m tests.repo.architecture
+python -m tests.repo.architecture
 """
 
 from __future__ import annotations
@@ -110,6 +110,7 @@ def _compiles(decorator: ast.expr) -> bool:
 # ---- The picture
 
 WIDTH, ROW, GAP, MARGIN = 260, 26, 6, 16
+ABREAST = 3  # rooms in a row: names of more would be printed over each other
 STYLE = (
     "text{font:13px sans-serif;fill:#222}.h{font-weight:bold}.s{font-size:11px;fill:#666}"
     "rect{fill:#e8eef7;stroke:#8aa3c8}path{stroke:#555;fill:none}"
@@ -117,9 +118,10 @@ STYLE = (
 
 
 def picture() -> str:
-    """Rooms in layers, as SVG: a room imports only from lower layers."""
+    """Rooms in layers, as SVG: a room imports only from lower layers; a large layer has several rows."""
     ordered = {package: layers(package) for package in PACKAGES}
-    height = MARGIN * 2 + 2 * ROW + max(map(len, ordered.values())) * (ROW + GAP)
+    lines = (sum(map(len, map(_abreast, order))) for order in ordered.values())
+    height = MARGIN * 2 + 2 * ROW + max(lines) * (ROW + GAP)
     pitch = WIDTH + 2 * MARGIN
     width = MARGIN + len(ordered) * pitch
     columns = enumerate(ordered.items())
@@ -131,14 +133,22 @@ def picture() -> str:
 def _column(package: str, order: Layers, x: int) -> list[str]:
     y = MARGIN + 2 * ROW
     lines = [_text(x, MARGIN + 12, package, "h"), _text(x, MARGIN + 28, "imports go down only", "s")]
-    for number, names in enumerate(order):
-        top, each = y + number * (ROW + GAP), (WIDTH - GAP * (len(names) - 1)) / len(names)
-        for place, name in enumerate(names):
-            left = x + place * (each + GAP)
-            lines.append(f'<rect x="{left:g}" y="{top}" width="{each:g}" height="{ROW}" rx="4"/>')
-            lines.append(_text(left + 8, top + 17, name, ""))
-    end = y + len(order) * (ROW + GAP) - GAP
-    return [*lines, f'<path d="M{x + WIDTH + 10} {y} V{end} m-4 -8 l4 8 l4 -8"/>']
+    for layer in order:
+        for names in _abreast(layer):
+            each = (WIDTH - GAP * (len(names) - 1)) / len(names)
+            for place, name in enumerate(names):
+                left = x + place * (each + GAP)
+                lines.append(f'<rect x="{left:g}" y="{y}" width="{each:g}" height="{ROW}" rx="4"/>')
+                lines.append(_text(left + 8, y + 17, name, ""))
+            y += ROW + GAP
+    end = y - GAP
+    return [*lines, f'<path d="M{x + WIDTH + 10} {MARGIN + 2 * ROW} V{end} m-4 -8 l4 8 l4 -8"/>']
+
+
+def _abreast(layer: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """The rooms of a layer in rows of at most `ABREAST`, as equal as can be."""
+    count = -(-len(layer) // ABREAST)
+    return [layer[len(layer) * row // count : len(layer) * (row + 1) // count] for row in range(count)]
 
 
 def _text(x: float, y: int, text: str, kind: str) -> str:

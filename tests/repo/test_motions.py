@@ -1,0 +1,69 @@
+"""docs/motions.md and its moving pictures: all there, small, and really moving; and the first picture of the pages."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import msgspec
+import numpy as np
+import pytest
+
+import flexmb as fm
+from crosscheck.records.drawing import CarriedPoint, Drawing, Line
+from tests.repo import front, motions
+from tests.repo.project import ROOT
+
+LARGEST = 200_000  # bytes
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def frames(picture: str) -> list[list[str]]:
+    """The frames of every path of a picture."""
+    paths = ElementTree.fromstring(picture).iter(f"{SVG}animate")
+    return [path.get("values", "").split(";") for path in paths]
+
+
+def test_the_page_is_what_the_generator_writes() -> None:
+    assert motions.PAGE.read_text(encoding="utf-8") == motions.page(), "run `python -m tests.repo.motions`"
+    assert {file.stem for file in motions.PICTURES.iterdir()} == {each.name for each in motions.MOTIONS}
+
+
+@pytest.mark.parametrize("motion", motions.MOTIONS, ids=lambda each: each.name)
+def test_a_picture_moves_and_is_small(motion: motions.Motion) -> None:
+    file = motions.PICTURES / f"{motion.name}.svg"
+    assert file.stat().st_size < LARGEST
+    text = file.read_text(encoding="utf-8")
+    drawn = frames(text)
+    assert all(len(path) == motions.FRAMES for path in drawn) and any(len(set(path)) > 10 for path in drawn)
+    inside = np.array(re.findall(r"(-?\d+) (-?\d+)(?=[ML;\"])", text), dtype=float)
+    assert inside.min() >= 0.0 and (inside <= [motions.WIDTH, motions.HEIGHT]).all()
+
+
+def test_what_is_drawn_is_where_the_motion_is() -> None:
+    """A rod that turns by a quarter within the picture's time: seen along its axis, from level to upright."""
+    scene = (
+        fm.SceneBuilder("rod", gravity=(0, 0, 0))
+        .rigid_body("rod", mass=1.0, inertia=(0.1, 0.1, 0.1), nodes={"end": (1.0, 0.0, 0.0)})
+        .revolute("pivot", "ground", "rod", axis=(0, -1, 0), rate=0.5 * np.pi)
+        .marker("end", "rod", node="end")
+        .scene()
+    )
+    seen = motions.Motion("rod", "", "A rod", 1.0, azimuth=0.0, elevation=0.0)
+    trajectory = fm.simulate(scene, t_end=1.0, samples=motions.FRAMES, rtol=1e-9, atol=1e-11)
+    line = Line(body="rod", kind="arm", points=(CarriedPoint("end", (-1.0, 0.0, 0.0)), CarriedPoint("end", (0.0,) * 3)))
+    (arm,) = frames(motions.picture(trajectory, Drawing(lines=(line,), trails=()), seen))
+    tips = [tuple(map(int, re.findall(r"\d+", frame)[-2:])) for frame in arm]
+    feet = [tuple(map(int, re.findall(r"\d+", frame)[:2])) for frame in arm]
+    (first, last), foot = (tips[0], tips[-1]), feet[0]
+    assert len(set(feet)) == 1
+    assert first[1] == foot[1] and first[0] > foot[0] + 100
+    assert last[0] == foot[0] and foot[1] - last[1] == first[0] - foot[0]
+
+
+def test_the_first_picture_is_what_the_generator_draws_of_its_figures() -> None:
+    kept = msgspec.json.decode(front.KEPT.read_bytes(), type=front.Front)
+    assert front.PICTURE.read_text(encoding="utf-8") == front.picture(kept), "run `python -m tests.repo.front`"
+    assert {"native", "pinocchio", "mujoco", "exudyn"} <= {curve.engine for curve in kept.curves}
+    for page, address in front.PLACES.items():
+        assert f"]({address})" in (ROOT / page).read_text(encoding="utf-8")
