@@ -104,9 +104,9 @@ def _why_worse(outcome: SessionOutcome) -> str:
     cases = list(dict.fromkeys(verdict.case for verdict in outcome.worse))
     here = f" ({outcome.made_with})" if outcome.made_with else ""
     return (
-        f"Worse: E or U is more than {GROWTH:g} times what was accepted for the same scenes, efforts and engines, so "
-        f"what differs is our code, the libraries or the processor{here}. If you changed none of them, tell us; if it is meant: "
-        f"{_accept(cases)}"
+        f"Worse: E or U is more than {GROWTH:g} times what was accepted for the same scenes, efforts and engines. "
+        f"What differs is our code, the libraries or the processor{here}. If you changed nothing, tell us; "
+        f"if it is meant: {_accept(cases)}"
     )
 
 

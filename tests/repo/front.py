@@ -108,7 +108,8 @@ def picture(front: Front) -> str:
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}">',
         "<title>Speed against accuracy in the canonical cases</title>",
-        "<style>text{font:13px sans-serif;fill:#1c2430}.t{font-weight:bold;font-size:15px}.s{font-size:11px;fill:#525d6b}"
+        "<style>text{font:13px sans-serif;fill:#1c2430}.t{font-weight:bold;font-size:15px}"
+        ".s{font-size:11px;fill:#525d6b}"
         ".n{font-weight:bold;font-size:14px;paint-order:stroke;stroke:#fff;stroke-width:4px}"
         "path{fill:none}.g{stroke:#dde2e8}</style>",
         f'<rect width="{WIDTH}" height="{HEIGHT}" rx="8" fill="#fff"/>',

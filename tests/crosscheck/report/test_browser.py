@@ -26,10 +26,7 @@ from tests.crosscheck.report.sessions import MANY, session
 webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed: the extra `browser` has it")
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 DRIVER = shutil.which("chromedriver")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not (BROWSER and DRIVER), reason="there is no Chromium with chromedriver on the path"),
-]
+pytestmark = pytest.mark.skipif(not (BROWSER and DRIVER), reason="there is no Chromium with chromedriver on the path")
 
 WIDE, NARROW = (1400, 900), (390, 800)
 PATIENCE_S = 30.0
@@ -44,6 +41,10 @@ DISTANCE = f"return {VIEW}.camera.position.distanceTo({VIEW}.controls.target)"
 MIDDLE = """
 const box = document.querySelector(arguments[0]).getBoundingClientRect();
 return [box.x + box.width / 2, box.y + box.height / 2];
+"""
+BOX = """
+const box = document.querySelector(arguments[0]).getBoundingClientRect();
+return [box.left, box.top, box.right, box.bottom];
 """
 FIND = """
 const search = document.getElementById("search"), filter = document.getElementById("filter");
@@ -170,6 +171,29 @@ def test_charts_are_drawn(reader: Reader, page: Path, size) -> None:
         assert len(hues(seen)) >= colours, kind
         assert np.mean(seen.min(axis=2) < 0.75) > 0.004, kind
         assert reader.run("return document.querySelector(arguments[0]).ariaLabel", plot).startswith("Chart: ")
+    assert reader.errors() == []
+
+
+@pytest.mark.parametrize("size", [WIDE, NARROW])
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_the_index_shows_speed_against_accuracy_and_leads_to_the_case(
+    reader: Reader, many: tuple[SessionOutcome, Path], size, dark: bool
+) -> None:
+    reader.open(many[1], size, dark=dark)
+    reader.run("document.querySelector('.overall').scrollIntoView()")
+    reader.wait("return document.querySelector('.overall .plot.drawn') !== null")
+    assert len(hues(reader.picture(".overall .plot"))) >= 2
+    assert "1 charts, by fine" in reader.run("return document.querySelector('.overall .plot').ariaLabel")
+    reader.run("const c = document.getElementById('speed-cases'); c.value = '0'; c.onchange()")
+    reader.wait("return document.querySelector('.overall .xtitle').textContent.endsWith('solve, s')")
+    for title in (".xtitle", ".ytitle"):  # whole, and not over the numbers of the axis
+        left, top, right, bottom = reader.run(BOX, f".overall {title}")
+        ticks = [reader.run(BOX, f".overall .{title[1]}axislayer-above")]
+        assert left >= 0 and right <= size[0] and bottom > top
+        assert not any(left < r and l < right and top < b and t < bottom for l, t, r, b in ticks)
+    reader.run("document.querySelector('.overall .plot').emit('plotly_click', {points: [{customdata: arguments[0]}]})",
+               "pendulum/single.html#case-0-speed")  # fmt: skip
+    reader.wait("return location.hash === '#case-0-speed' && document.readyState === 'complete'")
     assert reader.errors() == []
 
 
