@@ -114,7 +114,7 @@ def _drawn(each: ChartOfCase) -> dict[str, Any]:
 
 
 def _rows(charts: Iterable[WorkPrecision]) -> list[EngineRow]:
-    """Engines by the number of their charts, the most first."""
+    """Engines by the number of charts in which they reach `REACHED`, the most first."""
     found: dict[str, list[WorkPrecision]] = {}
     for chart in charts:
         for engine in dict.fromkeys(point.engine for point in chart.points):
@@ -123,7 +123,7 @@ def _rows(charts: Iterable[WorkPrecision]) -> list[EngineRow]:
         EngineRow(engine, len(group), tuple(standing(group, engine, error) for error in LEVELS))
         for engine, group in found.items()
     ]
-    return sorted(rows, key=lambda row: -row.charts)
+    return sorted(rows, key=lambda row: (-row.standings[LEVELS.index(REACHED)].reached, -row.charts))
 
 
 def standing(charts: Iterable[WorkPrecision], engine: str, error: float) -> Standing:

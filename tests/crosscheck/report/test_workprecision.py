@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
 from crosscheck.judging.results import collect
 from crosscheck.library.find import load_case
 from crosscheck.records.archive import read
-from crosscheck.records.kinds import Record, RunRecord
+from crosscheck.records.held import Asked, RecordedReference
+from crosscheck.records.kinds import CaseRecord, Record, RunRecord
+from crosscheck.records.packing import pack, unpack
+from crosscheck.report import workprecision
 from crosscheck.report.workprecision import WorkPrecision, work_precision
 from tests.crosscheck.sessions import copy_case, sweep_here
 
+TIP = "marker:tip.position"
 RUN_FILE = """
 [[variant]]
 name = "rigid"
@@ -71,6 +76,58 @@ def test_an_approximation_is_no_reference_however_certain_it_is(records: list[Re
         return record
 
     assert not drawn([approximate(record) for record in records]).reference.startswith(certain)
+
+
+def with_stored(records: list[Record], uncertainty: float, shift: float = 0.0, **changes: object) -> list[Record]:
+    """The records with a stored reference: every second sample of the finest run of "fine", all shifted alike."""
+    fine = max(
+        (each for each in records if isinstance(each, RunRecord) and each.engine == "fine"), key=lambda run: run.rung
+    )
+    stored = RecordedReference(
+        variant="rigid",
+        asked={"fine": Asked(goals={"marker": 1e-6})},
+        times=pack(unpack(fine.times)[::2]),
+        channels={TIP: pack(unpack(fine.channels[TIP])[::2] + shift)},
+        uncertainties={TIP: uncertainty},
+        routes=("exact.py, a closed form", "fine, rk4 h=0.1, rk4 h=0.05"),
+    )
+    stored = replace(stored, **changes)
+    return [replace(each, reference=stored) if isinstance(each, CaseRecord) else each for each in records]
+
+
+def test_a_certain_stored_reference_judges_all_runs_the_most_certain_too(records: list[Record]) -> None:
+    """A run that was the reference has no error that it could be shown with; the stored reference finds it."""
+    found = drawn(with_stored(records, 1e-12, shift=1e-4))
+    assert found.reference == "the stored reference (closed form, fine)"
+    assert found.reference_uncertainty == pytest.approx(1e-12 / found.scale)
+    shift = float(np.sqrt(3.0)) * 1e-4 / found.scale
+    assert min(errors(found, "fine")) == pytest.approx(shift, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    "changes", [{"uncertainties": {TIP: 1e-2}}, {"uncertainties": {}}, {"uncertainties": {TIP: float("nan")}},
+                {"fault": "it was edited", "times": None, "channels": {}}, {"variant": "another"}, {"channels": {}}],
+)  # fmt: skip
+def test_a_stored_reference_that_says_less_than_the_runs_is_not_taken(
+    records: list[Record], chart: WorkPrecision, changes: dict[str, object]
+) -> None:
+    assert drawn(with_stored(records, 1e-12, **changes)) == chart
+
+
+def test_runs_at_other_times_than_the_reference_have_no_error(records: list[Record]) -> None:
+    shifted = pack(np.linspace(0.01, 0.02, 3))
+    found = drawn(with_stored(records, 1e-12, times=shifted, channels={TIP: pack(np.ones((3, 3)).cumsum(axis=0))}))
+    assert all(point.error is None for point in found.points)
+    assert any("times of the reference" in point.message for point in found.points)
+
+
+def test_of_equally_certain_results_another_code_is_the_reference(
+    records: list[Record], chart: WorkPrecision, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workprecision, "RESOLVED", float("inf"))
+    assert drawn(records).reference.startswith("fine on")
+    monkeypatch.setattr(workprecision, "OWN_CODE", ("fine",))
+    assert drawn(records).reference.startswith("stepper on")
 
 
 def test_below_the_doubt_of_the_reference_nothing_is_more_accurate(chart: WorkPrecision) -> None:
