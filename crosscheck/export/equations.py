@@ -32,7 +32,8 @@ def rebuilt(file: str, rtol: float) -> Callable[[Real], dict[str, Real]]:
         variant = case.run.variant(case.run.reference.variant)
         data, modal = model_data(variant_scene(case.scene(variant), variant))
         with TemporaryDirectory() as place:
-            for name, content in {"model.json": data} | {modal_file(body): each for body, each in modal.items()}.items():
+            texts = {"model.json": data} | {modal_file(body): each for body, each in modal.items()}
+            for name, content in texts.items():
                 target = Path(place) / name
                 target.parent.mkdir(exist_ok=True)
                 target.write_text(json.dumps(content), encoding="utf-8")

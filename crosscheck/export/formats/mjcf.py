@@ -19,6 +19,8 @@ from crosscheck.export.formats.written import Written, beside_the_tree, chain_of
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
+DEEPEST = 400
+"""Bodies are nested, and MuJoCo's XML parser gives up at a depth of 500 elements."""
 LEAST = 1e-14
 """MuJoCo refuses masses and principal moments of inertia of moving bodies below 1e-15 (kg, kg m^2)."""
 
@@ -26,7 +28,7 @@ LEAST = 1e-14
 def mjcf(scene: Scene, name: str) -> Written:
     """The scene as MJCF, if it is a rigid tree without screws whose bodies MuJoCo takes."""
     chain, why = chain_of(scene, "MJCF")
-    why = why or _too_small(chain)
+    why = why or _too_small(chain) or _too_deep(chain)
     if why:
         return Written(refused=why)
     root = ElementTree.Element("mujoco", model=name)
@@ -58,6 +60,15 @@ def _too_small(chain: tuple[Link, ...]) -> str:
         if moves[-1] and least < LEAST:
             return f'{link.kind} "{link.name}" has no mass, or no inertia about one of its axes, which MuJoCo refuses'
     return ""
+
+
+def _too_deep(chain: tuple[Link, ...]) -> str:
+    """Why MuJoCo could not read the nested elements."""
+    depths: list[int] = []
+    for link in chain:
+        depths.append(1 if link.parent < 0 else depths[link.parent] + 1)
+    deepest = max(depths, default=0)
+    return f"{deepest} bodies hang on each other, and MuJoCo's reader takes no {DEEPEST}" if deepest >= DEEPEST else ""
 
 
 def _body(parent: ElementTree.Element, link: Link) -> ElementTree.Element:
