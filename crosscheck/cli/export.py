@@ -22,7 +22,7 @@ def export(
     `cases` and `all` are every shipped case, a pattern such as `'pendulums/*'` those that it matches. **Writes** for
     each case `model.json`, the data of its equations of motion, with `modal/BODY.json` for flexible bodies; URDF, MJCF
     and an Exudyn script where these hold the mechanism exactly; `reference.csv` and `uncertainty.csv`, the motion with
-    its error bars; and a README. Beside them `rebuild.py`, which reads a case by NumPy and SciPy alone, JSON schemas,
+    its error bars; and a README. Beside them `rebuild/`, which reads a case by NumPy and SciPy alone, JSON schemas,
     licence, citation, metadata for archives and `SHA256SUMS`. The same cases give the same bytes. `docs/export.md`
     explains every key.
 

@@ -34,13 +34,16 @@ from flexmb.scene.problems import SceneError
 from flexmb.scene.reading import Unreadable, read_text
 
 SUMS = "SHA256SUMS"
-PROGRAM = "rebuild.py"
+PROGRAM = "rebuild"
 OTHERS = {"urdf": (urdf, "model.urdf"), "mjcf": (mjcf, "model.mjcf.xml"), "exudyn": (exudyn_script, "model_exudyn.py")}
 """Formats of other programs: the writer and the file."""
 
 
 def archive(cases: Sequence[Case]) -> dict[str, str]:
-    """The text of every file of a release by its path, with "/" on every system; CaseError names what cannot be exported."""
+    """The text of every file of a release by its path, with "/" on every system.
+
+    CaseError names what cannot be exported.
+    """
     found: dict[str, str] = {}
     rows = []
     for case in cases:
@@ -54,8 +57,10 @@ def archive(cases: Sequence[Case]) -> dict[str, str]:
         "CITATION.cff": citation_cff(),
         "datacite.json": datacite(cases),
         ".zenodo.json": zenodo(cases),
-        PROGRAM: files("crosscheck.export").joinpath(PROGRAM).read_text(encoding="utf-8"),
     }
+    for each in files("crosscheck.export").joinpath(PROGRAM).iterdir():
+        if each.name.endswith(".py"):
+            found[f"{PROGRAM}/{each.name}"] = each.read_text(encoding="utf-8")
     return dict(sorted(found.items())) | {SUMS: checksums(found)}
 
 

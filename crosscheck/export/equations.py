@@ -1,7 +1,7 @@
 """Equations of motion rebuilt from exported data, as a route to the reference of a case.
 
 A case's file calls it: `exact = rebuilt(__file__, rtol=1e-9)`. The route shares with flexmb the data that are exported,
-for flexible bodies their modes and inertia points, and nothing of the dynamics (`crosscheck/export/rebuild.py`).
+for flexible bodies their modes and inertia points, and nothing of the dynamics (`crosscheck/export/rebuild`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from crosscheck.export import rebuild
 from crosscheck.export.model import modal_file, model_data
+from crosscheck.export.rebuild import Case
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.find import load_case
 from crosscheck.running.plan import variant_scene
@@ -37,7 +37,7 @@ def rebuilt(file: str, rtol: float) -> Callable[[Real], dict[str, Real]]:
                 target = Path(place) / name
                 target.parent.mkdir(exist_ok=True)
                 target.write_text(json.dumps(content), encoding="utf-8")
-            model = rebuild.Case(place)
+            model = Case(place)
         channels = model.channels(times, model.integrate(times, rtol))
         return {name: np.asarray(values) for name, values in channels.items()}
 

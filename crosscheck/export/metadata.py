@@ -1,4 +1,4 @@
-"""What archives and citation managers read of a release: CITATION.cff, DataCite, Zenodo. No DOI: the archive gives one."""
+"""What archives and citation managers read of a release: CITATION.cff, DataCite, Zenodo; the DOI is theirs."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ ABOUT = (
 def citation_cff() -> str:
     """CITATION.cff of the data."""
     lines = [
-        "cff-version: 1.2.0", "message: Cite the data as below, and each case by its own line.", f"title: '{COLLECTION}'",
-        "type: dataset", f"version: {version_of('flexmb')}", f"license: {LICENCE}", "authors:", f"  - name: {AUTHORS}",
+        "cff-version: 1.2.0", "message: Cite the data as below, and each case by its own line.",
+        f"title: '{COLLECTION}'", "type: dataset",
+        f"version: {version_of('flexmb')}", f"license: {LICENCE}", "authors:", f"  - name: {AUTHORS}",
         f"date-released: '{YEAR}-01-01'", f"abstract: '{ABOUT}'", "keywords:", *(f"  - {word}" for word in KEYWORDS),
     ]  # fmt: skip
     return "\n".join(lines) + "\n"

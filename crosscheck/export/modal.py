@@ -1,4 +1,4 @@
-"""A flexible body as numbers: inertia points, modes, stiffness, damping, nodes, and the modal integrals of all points."""
+"""A flexible body as numbers: inertia points, modes, stiffness, damping, nodes, and the modal integrals."""
 
 from __future__ import annotations
 

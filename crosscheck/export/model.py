@@ -2,7 +2,7 @@
 
 Everything is by name and in SI. What a scene leaves to the reader of its schema is written out here: every joint is a
 list of turns, slides, ball joints and free flights between two frames, wheels and point masses are bodies with a joint
-of their own, and a beam is its modes and inertia points (`crosscheck.export.modal`). `docs/export.md` explains each key.
+of their own, and a beam is its modes and inertia points (`crosscheck.export.modal`). docs/export.md explains each key.
 """
 
 from __future__ import annotations
@@ -58,7 +58,9 @@ def model_data(scene: Scene) -> tuple[Data, dict[str, Data]]:
         "gravity_m_s2": scene.gravity_m_s2,
         "bodies": bodies,
         "joints": joints,
-        "modal_states": {state.body: {"coordinates": state.coordinates, "rates": state.rates} for state in scene.modal_states},
+        "modal_states": {
+            state.body: {"coordinates": state.coordinates, "rates": state.rates} for state in scene.modal_states
+        },
         "loads": _plain(scene.loads),
         "markers": _plain(scene.markers),
     }

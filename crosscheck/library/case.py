@@ -328,7 +328,8 @@ class Provenance(_CasePart, frozen=True, kw_only=True):
     `reference` is the kind of the case's reference: a published number; a closed form; the agreement of independent
     codes; or two formulations of this library alone, integrated by two methods ("high precision" is another word for
     the last). What the routes that are stored say comes first: `crosscheck.library.basis` finds a word that does not
-    follow from them. `uncertainty` states, in words and numbers, how well it is known. `anchors` are published numbers that the reference must meet.
+    follow from them. `uncertainty` states, in words and numbers, how well it is known.
+    `anchors` are published numbers that the reference must meet.
     """
 
     reference: ReferenceKind

@@ -14,5 +14,6 @@ LICENCE, LICENCE_URL = "CC-BY-4.0", "https://creativecommons.org/licenses/by/4.0
 def cite(case: Case) -> str:
     """The line with which a publication cites the case, and the sources that its data or its reference come from."""
     sources = case.provenance.sources if case.provenance is not None else ()
-    own = f'{AUTHORS} ({YEAR}). {case.run.title} [case {case.name}]. In: {COLLECTION}, version {version_of("flexmb")}. {LICENCE}.'
+    version = version_of("flexmb")
+    own = f"{AUTHORS} ({YEAR}). {case.run.title} [case {case.name}]. In: {COLLECTION}, version {version}. {LICENCE}."
     return f"{own} After: {'; '.join(' '.join(source.split()) for source in sources)}." if sources else own

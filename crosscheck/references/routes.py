@@ -160,9 +160,8 @@ def _of_file(file: Path, route: ReferenceRoute, times: Real) -> RouteSignals:
     exact = _function(file)
     try:
         given = exact(times.copy())
-        channels = {
-            name: np.array(values, float).reshape(len(times), -1) for name, values in given.items() if _given(route, name)
-        }
+        kept = {name: values for name, values in given.items() if _given(route, name)}
+        channels = {name: np.array(values, float).reshape(len(times), -1) for name, values in kept.items()}
     except Exception as error:  # the file is anybody's
         raise CaseError(f"{file}: exact(times) failed: {type(error).__name__}: {error}") from None
     for name, values in channels.items():

@@ -1,6 +1,6 @@
-"""The equations of motion rebuilt from the exported data by NumPy and integrated by SciPy: eight pieces of level stiffened.
+"""The equations of motion rebuilt from the exported data by NumPy, integrated by SciPy: eight stiffened pieces.
 
-They have the points, modes and field of second order of `model.json` and `modal/*.json`, and nothing of flexmb's dynamics.
+They have the points, modes and second-order field of `model.json` and `modal/*.json`, and nothing of flexmb's dynamics.
 """
 
 from crosscheck.export.equations import rebuilt

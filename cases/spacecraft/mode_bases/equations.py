@@ -1,6 +1,6 @@
-"""The equations of motion rebuilt from the exported data by NumPy and integrated by SciPy: a body of level stiffened on a hub.
+"""The equations of motion rebuilt from the exported data by NumPy, integrated by SciPy: a panel on a hub.
 
-They have the points, modes and field of second order of `model.json` and `modal/*.json`, and nothing of flexmb's dynamics.
+They have the points, modes and second-order field of `model.json` and `modal/*.json`, and nothing of flexmb's dynamics.
 """
 
 from crosscheck.export.equations import rebuilt

@@ -1,8 +1,8 @@
-"""A rigid tree as an Exudyn script: one kinematic tree in minimal coordinates, with gravity, springs, dampers and state.
+"""A rigid tree as an Exudyn script: one kinematic tree in minimal coordinates, with gravity, springs and state.
 
 Exudyn's `ObjectKinematicTree` has one turn or slide a link, along a coordinate axis: every elementary joint is a link,
-its frame turned so that z is the joint's axis; links without a joint are part of what carries them. Ball joints and free
-flight it does not know, nor screws: other objects of Exudyn hold them in redundant coordinates only.
+its frame turned so that z is the joint's axis; links without a joint are part of what carries them. Ball joints, free
+flight and screws it does not know: other objects of Exudyn hold them, in redundant coordinates.
 """
 
 from __future__ import annotations
@@ -55,8 +55,9 @@ def build(start=START, rates=RATES):
     ))
     mbs.AddObject(ObjectKinematicTree(
         nodeNumber=node, gravity=GRAVITY, jointTypes=[getattr(exu.JointType, kind) for kind in JOINTS],
-        linkParents=PARENTS, jointTransformations=exu.Matrix3DList(TRANSFORMATIONS), jointOffsets=exu.Vector3DList(OFFSETS),
-        linkInertiasCOM=exu.Matrix3DList(INERTIA), linkCOMs=exu.Vector3DList(MASS_CENTRES), linkMasses=MASSES,
+        linkParents=PARENTS, jointTransformations=exu.Matrix3DList(TRANSFORMATIONS),
+        jointOffsets=exu.Vector3DList(OFFSETS), linkInertiasCOM=exu.Matrix3DList(INERTIA),
+        linkCOMs=exu.Vector3DList(MASS_CENTRES), linkMasses=MASSES,
         jointPControlVector=STIFFNESS, jointDControlVector=DAMPING, jointPositionOffsetVector=REST,
         jointVelocityOffsetVector=[0.0] * n,
     ))
@@ -95,7 +96,8 @@ def exudyn_script(scene: Scene, name: str) -> Written:
     chain, why = chain_of(scene, "Exudyn's kinematic tree")
     for link in chain:
         if any(isinstance(freedom, Ball | Floating) for freedom in link.freedoms):
-            why = why or f'"{link.joint}" is a ball joint or a free flight, which Exudyn\'s kinematic tree does not know'
+            what = "a ball joint or a free flight, which Exudyn's kinematic tree does not know"
+            why = why or f'"{link.joint}" is {what}'
     if not why and not any(link.freedoms for link in chain):
         why = "nothing in it moves"
     return Written(refused=why) if why else Written(_script(_parts(chain), scene, name), left_out=_left_out(scene))

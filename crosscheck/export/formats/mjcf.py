@@ -107,9 +107,8 @@ def _joints(body: ElementTree.Element, freedom: Freedom, name: str) -> None:
         case Scalar():
             raise NotImplementedError("a screw joint, which `chain_of` refuses, has reached the writer")
         case Ball():
-            ElementTree.SubElement(
-                body, "joint", name=name, type="ball", stiffness=number(freedom.stiffness), damping=number(freedom.damping)
-            )
+            joint = ElementTree.SubElement(body, "joint", name=name, type="ball", stiffness=number(freedom.stiffness))
+            joint.set("damping", number(freedom.damping))
         case Floating():
             for axis, letter in zip(np.eye(3), "xyz", strict=True):
                 ElementTree.SubElement(body, "joint", name=f"{name} {letter}", type="slide", axis=vector(axis))

@@ -70,8 +70,11 @@ def springs(chain: tuple[Link, ...]) -> tuple[str, ...]:
 
 def _parts(scene: Scene) -> tuple[tuple[str, tuple[Any, ...]], ...]:
     return (
-        ("connector", scene.connectors), ("load", scene.loads), ("controller", scene.controllers), ("event", scene.events),
-    )  # fmt: skip
+        ("connector", scene.connectors),
+        ("load", scene.loads),
+        ("controller", scene.controllers),
+        ("event", scene.events),
+    )
 
 
 def number(value: float) -> str:

@@ -29,13 +29,14 @@ def cases(*names: str) -> list[Case]:
     return [load_case(shipped_folder() / name) for name in names]
 
 
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
 def test_the_same_cases_give_the_same_bytes_and_their_checksums_hold(tmp_path: Path) -> None:
     for folder in ("one", "two"):
         write_archive(archive(cases(*SOME)), tmp_path / folder)
-    one, two = (
-        {str(file.relative_to(tmp_path / folder)): file.read_bytes() for file in (tmp_path / folder).rglob("*") if file.is_file()}
-        for folder in ("one", "two")
-    )  # fmt: skip
+    one, two = (contents(tmp_path / folder) for folder in ("one", "two"))
     assert one == two
     sums = dict(line.split("  ", 1)[::-1] for line in one.pop(SUMS).decode().splitlines())
     assert sums == {name: hashlib.sha256(content).hexdigest() for name, content in one.items()}
@@ -116,3 +117,41 @@ def test_levels_that_the_data_cannot_say_are_refused() -> None:
     bodies = tuple(replace(body, level="ruthless") if hasattr(body, "points") else body for body in scene.bodies)
     with pytest.raises(CaseError, match="truncated mass matrix"):
         model_data(replace(scene, bodies=bodies))
+
+
+def test_the_page_in_docs_has_the_keys_that_every_release_has() -> None:
+    from importlib.resources import files
+
+    from tests.repo.project import ROOT
+
+    keys = files("crosscheck.export").joinpath("keys.md").read_text(encoding="utf-8")
+    assert keys in (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+
+
+OF_SCENES = ("closures", "connectors", "sensors", "controllers", "events")  # their keys are in the schema of a scene
+BY_NAME = ("nodes", "modal_states")  # their keys are names
+
+
+def keys_in(data: object) -> set[str]:
+    """The keys of exported data, but for those that are names."""
+    match data:
+        case dict():
+            own = {key for key in data if isinstance(key, str)}
+            inner = (keys_in(list(each.values()) if key in BY_NAME else each) for key, each in data.items())
+            return own.union(*inner)
+        case list() | tuple():
+            return set().union(*map(keys_in, data)) if data and isinstance(data[0], dict) else set()
+    return set()
+
+
+def test_every_key_is_explained() -> None:
+    from tests.repo.project import ROOT
+
+    page = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+    found: set[str] = set()
+    for case in shipped():
+        data, modal = model_data(scene_of(case.name))
+        own = {key: each for key, each in data.items() if key not in OF_SCENES}
+        found |= keys_in(own).union(*map(keys_in, modal.values()))
+    assert len(found) > 60
+    assert not sorted(key for key in found if f"`{key}`" not in page and f".{key}`" not in page)

@@ -14,7 +14,7 @@ from crosscheck.export.schemas import FILES, FOLDER, schema_files, schema_text
 from tests.crosscheck.sessions import CASE, run_case, shipped
 from tests.repo.project import ROOT
 
-OF_CASES = {"run.toml": "run", "provenance.toml": "provenance", "reference.toml": "reference", "accepted.toml": "accepted"}
+OF_CASES = {f"{name}.toml": name for name in ("run", "provenance", "reference", "accepted")}
 
 
 def validator(name: str) -> jsonschema.protocols.Validator:

@@ -1,178 +1,14 @@
-"""Rebuild the equations of motion of an exported case, integrate them, and compare with the reference.
+"""The equations of motion of a case, and what is observed."""
 
-    python rebuild.py pendulums/double
-
-This file needs NumPy and SciPy alone; it is an example of how the data are to be read, and a check that they suffice. It
-holds trees of rigid and modal bodies with wheels, point masses, loads and functions of time. Closures, connectors,
-controllers and events it does not: it stops and says so. The equations are formed in the plainest way, from the
-Jacobian J and the bias acceleration a of every inertia point,
-
-    sum (m J'J + W' I W) udot = sum (m J'(g - a) - W'(I alpha + w x I w)) + loads,
-
-so they share nothing with a recursion. All vectors are in World axes unless said otherwise.
-"""
-
-import csv
 import json
-import sys
-from math import factorial
 from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.interpolate import make_interp_spline
 
-
-def skew(a):
-    """The matrix with skew(a) b = a x b, of vectors (..., 3)."""
-    a = np.asarray(a)
-    if a.ndim == 1:
-        x, y, z = a
-        return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    z = np.zeros(a.shape[:-1])
-    rows = [[z, -a[..., 2], a[..., 1]], [a[..., 2], z, -a[..., 0]], [-a[..., 1], a[..., 0], z]]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-
-
-def cross(a, b):
-    """a x b over the last axis; NumPy's own takes ten times as long for a single vector."""
-    return a[..., _NEXT] * b[..., _LAST] - a[..., _LAST] * b[..., _NEXT]
-
-
-_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
-
-
-def turn(axis, angle):
-    """Rotation about a unit vector (Rodrigues)."""
-    k = skew(np.asarray(axis, float))
-    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k
-
-
-def matrix_of(q):
-    """Rotation matrix of a quaternion, scalar first, of any length."""
-    w, *v = np.asarray(q, float) / np.linalg.norm(q)
-    return (w * w - np.dot(v, v)) * np.eye(3) + 2.0 * np.outer(v, v) + 2.0 * w * skew(v)
-
-
-def quaternion_of(R):
-    """Quaternion of a rotation matrix, scalar first and not negative."""
-    Q = R + R.T + (1.0 - np.trace(R)) * np.eye(3)
-    odd = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    four = np.block([[np.array([[1.0 + np.trace(R)]]), odd[None]], [odd[:, None], Q]])
-    row = four[np.argmax(np.diag(four))]
-    row = row / np.linalg.norm(row)
-    return row if row[0] >= 0.0 else -row
-
-
-TERMS = [np.array([(-1.0) ** k / factorial(2 * k + 2 + kind) for k in range(13)]) for kind in (0, 1)]
-SLOPES = [np.array([k * c for k, c in enumerate(terms)][1:]) for terms in TERMS]
-
-
-def series(x, kind):
-    """(1 - cos s) / s^2 (kind 0) or (s - sin s) / s^3 (kind 1), x = s^2 up to (2 pi)^2, and the derivative by x."""
-    return np.polyval(TERMS[kind][::-1], x), np.polyval(SLOPES[kind][::-1], x)
-
-
-def turned_by(theta, theta_rate):
-    """Of rotation vectors (n,3) and their rates: exp(theta~), the left Jacobian J with w = J theta', and its rate."""
-    x, x_rate = np.sum(theta * theta, -1), 2.0 * np.sum(theta * theta_rate, -1)
-    (a, da), (b, db) = series(x, 0), series(x, 1)
-    K, L = skew(theta), skew(theta_rate)
-    KK, KL = K @ K, K @ L + L @ K
-    wide = (..., None, None)
-    jacobian = np.eye(3) + a[wide] * K + b[wide] * KK
-    rate = (da * x_rate)[wide] * K + a[wide] * L + (db * x_rate)[wide] * KK + b[wide] * KL
-    rotation = np.eye(3) + (1.0 - x * b)[wide] * K + a[wide] * KK
-    return rotation, jacobian, rate
-
-
-def function_of(data):
-    """Value, rate and acceleration of a function of time."""
-    if data is None:
-        return lambda t: (0.0, 0.0, 0.0)
-    kind = data["kind"]
-    if kind == "constant":
-        return lambda t: (data["value"], 0.0, 0.0)
-    if kind == "ramp":
-        value, rate, start = data["value"], data["rate"], data["start_s"]
-        return lambda t: (value + rate * (t - start), rate, 0.0)
-    if kind == "sine":
-        A, w, phase, offset = (data[k] for k in ("amplitude", "angular_frequency_rad_s", "phase_rad", "offset"))
-        return lambda t: (
-            offset + A * np.sin(w * t + phase), A * w * np.cos(w * t + phase), -A * w * w * np.sin(w * t + phase)
-        )
-    if kind == "smooth_step":
-        first, height = data["start_value"], data["end_value"] - data["start_value"]
-        start, T = data["start_s"], data["duration_s"]
-
-        def step(t):
-            x = min(max((t - start) / T, 0.0), 1.0)
-            return (
-                first + height * x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3),
-                height / T * 140.0 * x**3 * (1.0 - x) ** 3,
-                height / T**2 * 420.0 * x**2 * (1.0 - x) ** 2 * (1.0 - 2.0 * x),
-            )
-
-        return step
-    if kind == "spin_up":
-        rate, T = data["rate"], data["duration_s"]
-        c = 2.0 * np.pi / T
-        return lambda t: (
-            (rate * (t - T / 2.0), rate, 0.0) if t >= T else
-            (rate / T * (t * t / 2.0 + (np.cos(c * t) - 1.0) / c**2), rate / T * (t - np.sin(c * t) / c),
-             rate / T * (1.0 - np.cos(c * t)))
-        )
-    if kind == "pulse":
-        start, end = data["start_s"], data["start_s"] + data["duration_s"]
-        return lambda t: (data["value"] if start <= t < end else 0.0, 0.0, 0.0)
-    if kind == "table":
-        spline = make_interp_spline(data["times_s"], data["values"], k=5)
-        first, second = spline.derivative(1), spline.derivative(2)
-        return lambda t: (float(spline(t)), float(first(t)), float(second(t)))
-    raise SystemExit(f'a function of time of kind "{kind}" is not rebuilt here')
-
-
-def breaks_of(item):
-    """Times at which functions of time inside the data are not smooth."""
-    found = set()
-    if isinstance(item, dict):
-        if item.get("kind") in ("smooth_step", "pulse"):
-            found |= {item["start_s"], item["start_s"] + item["duration_s"]}
-        if item.get("kind") == "spin_up":
-            found.add(item["duration_s"])
-        item = list(item.values())
-    if isinstance(item, list):
-        for each in item:
-            found |= breaks_of(each)
-    return found
-
-
-class Frame:
-    """A moving frame: rotation R, position r, velocities w, v = W u, V u, accelerations alpha, a for udot = 0."""
-
-    def __init__(self, R, r, W, V, w, v, alpha, a):
-        self.R, self.r, self.W, self.V, self.w, self.v, self.alpha, self.a = R, r, W, V, w, v, alpha, a
-
-    def at(self, offset, rotation):
-        """A frame fixed to this one, `offset` and `rotation` in its axes."""
-        d = self.R @ offset
-        carried = cross(self.alpha, d) + cross(self.w, cross(self.w, d))
-        return Frame(
-            self.R @ rotation, self.r + d, self.W, self.V - skew(d) @ self.W, self.w, self.v + cross(self.w, d),
-            self.alpha, self.a + carried,
-        )
-
-    def moved(self, shift, shift_map, shift_bias, rotation, turn_map, turn_bias, u):
-        """A frame that moves in this one: displacement, its rate shift_map u and what that rate has for udot = 0; the
-        rotation, its angular velocity turn_map u and likewise; all in the axes of this frame."""
-        there = self.at(shift, np.eye(3))
-        Vr, Wr = self.R @ shift_map, self.R @ turn_map
-        vr, wr = Vr @ u, Wr @ u
-        return Frame(
-            self.R @ rotation, there.r, there.W + Wr, there.V + Vr, there.w + wr, there.v + vr,
-            there.alpha + self.R @ turn_bias + cross(self.w, wr),
-            there.a + self.R @ shift_bias + 2.0 * cross(self.w, vr),
-        )
+from .frame import Frame, field
+from .functions import breaks_of, function_of
+from .rotations import cross, matrix_of, quaternion_of, quaternion_rate, rotation_vector, skew, turn, turned_by
 
 
 class Case:
@@ -193,9 +29,11 @@ class Case:
                 modal["points"] = {key: np.array(values) for key, values in modal["points"].items()}
                 for node in modal["nodes"].values():
                     node.update({key: np.array(values) for key, values in node.items()})
-                modal["turning"] = bool(np.any(modal["points"]["inertia_kg_m2"]) or np.any(modal["points"]["mass_centre_offset_m"]))
+                p = modal["points"]
+                modal["turning"] = bool(np.any(p["inertia_kg_m2"]) or np.any(p["mass_centre_offset_m"]))
                 modal["integrals"] = {key: np.array(values) for key, values in modal["integrals"].items()}
-                modal["summed"] = not modal["turning"] and "second_translation" not in modal["points"]
+                first_order = "second_translation" not in p
+                modal["summed"] = bool(modal["integrals"]) and first_order and not modal["turning"]
                 modal["stiffness"], modal["damping"] = np.array(modal["stiffness"]), np.array(modal["damping"])
                 self.modal[name] = modal
         self.joints = self._ordered(data["joints"])
@@ -297,7 +135,8 @@ class Case:
                 bias = cross(R @ u[j : j + 3], R @ u[j + 3 : j + 6])
             return frame.moved(shift, shift_map, bias, R, turn_map, zero, u)
         axis = np.array(freedom["axis"])
-        turns, shifts = {"turn": (1.0, 0.0), "slide": (0.0, 1.0), "screw": (1.0, freedom["pitch_m_rad"])}[freedom["motion"]]
+        by_motion = {"turn": (1.0, 0.0), "slide": (0.0, 1.0), "screw": (1.0, freedom["pitch_m_rad"])}
+        turns, shifts = by_motion[freedom["motion"]]
         shift_map, turn_map = none.copy(), none.copy()
         shift_map[:, j], turn_map[:, j] = shifts * axis, turns * axis
         return frame.moved(shifts * y[i] * axis, shift_map, zero, turn(axis, turns * y[i]), turn_map, zero, u)
@@ -342,7 +181,8 @@ class Case:
             a = frame.a + cross(frame.alpha, d) + cross(frame.w, cross(frame.w, d)) + bias @ frame.R.T
             a = a + 2.0 * cross(frame.w, (Phi @ rate) @ frame.R.T)
             none = np.zeros((len(d), 3, 3))
-            return p["mass_kg"], frame.r + d, V, a, none[:, :, :1] * frame.W[0], none[:, 0], none[:, 0], none
+            W = np.zeros_like(V)
+            return p["mass_kg"], frame.r + d, V, a, W, none[:, 0], none[:, 0], none
         R, jacobian, jacobian_rate = turned_by(theta, Psi @ rate)
         spin = jacobian @ Psi  # angular velocity of the points in the body, by the modes
         spin_rate = (jacobian_rate @ (Psi @ rate)[..., None])[..., 0] + (jacobian @ turning[..., None])[..., 0]
@@ -398,7 +238,7 @@ class Case:
         return M, f
 
     def _by_integrals(self, frame, body, y, M, f):
-        """Add the inertia of a body of point masses to M and f: sums over its points that were taken once, body axes."""
+        """Add the inertia of a body of point masses to M and f, by the sums over its points; body axes."""
         c, (qs, us) = self.modal[body]["integrals"], self.eta[body]
         eta, rate, R = y[qs], y[self.nq :][us], frame.R
         w, alpha, a = frame.w @ R, frame.alpha @ R, (frame.a - self.gravity) @ R
@@ -472,13 +312,14 @@ class Case:
     def channels(self, times, states):
         """The motion of markers, momentum and energies, by the names of the reference."""
         rows = {}
-        for t, y in zip(times, states):
+        for t, y in zip(times, states, strict=True):
             y, _ = self.driven(t, y)
-            for name, value in self._observed(t, y).items():
+            for name, value in self.observed(t, y).items():
                 rows.setdefault(name, []).append(np.atleast_1d(value))
         return {name: np.array(values) for name, values in rows.items()}
 
-    def _observed(self, t, y):
+    def observed(self, t, y):
+        """Channels at one state."""
         u, frames, found = y[self.nq :], self.frames(y), {}
         for marker in self.data["markers"]:
             at = self.node(frames, marker["body"], marker["node"], y).at(np.array(marker["offset_m"]), np.eye(3))
@@ -508,65 +349,3 @@ class Case:
         found |= {f"energy.{kind}": value for kind, value in energies.items()}
         found["energy.total"] = sum(energies.values())
         return found | {"momentum.linear": linear, "momentum.angular": angular}
-
-
-def field(p, eta, rate):
-    """Of points with modes (n,3,m): place, its derivative by eta, the rate of that times `rate`; likewise of the
-    rotation vector. Points of level "stiffened" have a field of second order too."""
-    r, Phi, Psi = p["position_m"], p["translation_modes"], p["rotation_modes"]
-    place, theta = r + Phi @ eta, Psi @ eta
-    none = np.zeros_like(r)
-    if "second_translation" not in p:
-        return place, Phi, none, theta, Psi, none
-    G, H = p["second_translation"] @ eta, p["second_rotation"] @ eta
-    bias, turning = p["second_translation"] @ rate @ rate, p["second_rotation"] @ rate @ rate
-    return place + 0.5 * G @ eta, Phi + G, bias, theta + 0.5 * H @ eta, Psi + H, turning
-
-
-def rotation_vector(q):
-    """The rotation vector of a quaternion, at most pi long."""
-    q = np.asarray(q) / np.linalg.norm(q)
-    q = q if q[0] >= 0.0 else -q
-    s = np.linalg.norm(q[1:])
-    return 2.0 * q[1:] if s == 0.0 else 2.0 * np.arctan2(s, q[0]) / s * q[1:]
-
-
-def quaternion_rate(q, w):
-    """Rate of a quaternion, for the angular velocity in the axes that turn."""
-    return 0.5 * np.concatenate([[-np.dot(q[1:], w)], q[0] * w + cross(q[1:], w)])
-
-
-def distance(channel, a, b):
-    """Distances (T,) of two rows of a channel: of orientations the angle between them."""
-    if channel.endswith(".orientation"):
-        apart = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
-        return 4.0 * np.arcsin(np.minimum(0.5 * apart, 1.0))
-    return np.linalg.norm(a - b, axis=1)
-
-
-def reference(folder):
-    """Times, channels (T, k) by name, and the uncertainty of each, from the two tables of a case."""
-    with open(Path(folder) / "reference.csv", encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))
-    values, places = np.array(rows[1:], float), {}
-    with open(Path(folder) / "uncertainty.csv", encoding="utf-8", newline="") as file:
-        known = {row["channel"]: float(row["uncertainty"]) for row in csv.DictReader(file)}
-    for column, name in enumerate(rows[0][1:], start=1):
-        name = name.rpartition(" [")[0]
-        places.setdefault(name if name in known else name.rpartition(".")[0], []).append(column)
-    return values[:, 0], {name: values[:, columns] for name, columns in places.items()}, known
-
-
-def compare(folder, rtol=1e-13, method="DOP853", until=np.inf):
-    """For each channel of the reference that is rebuilt: the largest distance up to a time, and the stated uncertainty."""
-    case = Case(folder)
-    times, stored, known = reference(folder)
-    here = times <= until
-    times, stored = times[here], {name: values[here] for name, values in stored.items()}
-    ours = case.channels(times, case.integrate(times, rtol, method))
-    return {name: (float(np.max(distance(name, ours[name], stored[name]))), known[name]) for name in stored if name in ours}
-
-
-if __name__ == "__main__":
-    for channel, (off, uncertainty) in compare(sys.argv[1]).items():
-        print(f"{channel:40s} {off:9.1e} {'within' if off <= uncertainty else 'BEYOND'} {uncertainty:9.1e}")
