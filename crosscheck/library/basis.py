@@ -23,12 +23,14 @@ def title(name: str, how: str, witness: bool) -> str:
 
 @dataclass(frozen=True)
 class Basis:
-    """`codes` are those of the engines, without repetition; `formulations` the engines themselves."""
+    """`codes` are those of the engines, without repetition; `formulations` the engines themselves; `witnesses` those codes,
+    or `OWN_EQUATIONS`, that only have to agree."""
 
     closed_form: bool
     own_equations: bool
     codes: tuple[str, ...]
     formulations: tuple[str, ...]
+    witnesses: tuple[str, ...] = ()
 
     @property
     def alone(self) -> bool:
@@ -44,24 +46,26 @@ class Basis:
 
     @property
     def words(self) -> str:
-        """For a table: "closed form, native, pinocchio"; of one code alone also its formulations."""
+        """For a table: "closed form, native, exudyn (witness)"; of one code alone also its formulations."""
         if self.alone:
             return f"{self.codes[0]} alone ({', '.join(self.formulations)})"
-        formulas = ["closed form"] * self.closed_form + ["equations of its own"] * self.own_equations
-        return ", ".join([*formulas, *self.codes])
+        formulas = ["closed form"] * self.closed_form + [OWN_EQUATIONS] * self.own_equations
+        marks = {each: " (witness)" for each in self.witnesses}
+        return ", ".join(f"{each}{marks.get(each, '')}" for each in (*formulas, *self.codes))
 
 
 def basis(routes: Iterable[str]) -> Basis:
     """What the routes of a stored reference consist of."""
-    names, files = [], []
+    names, stands = [], dict[str, bool]()  # engines; and of each code or kind of file, whether it is more than a witness
     for route in routes:
         name, _, how = route.partition(", ")
-        if name.endswith(".py"):
-            files.append(how.removesuffix(f", {WITNESS}"))
-        else:
-            names.append(name)
-    codes = dict.fromkeys(name.partition("-")[0] for name in names)
-    return Basis(CLOSED_FORM in files, OWN_EQUATIONS in files, tuple(codes), tuple(dict.fromkeys(names)))
+        equal = not how.endswith(f", {WITNESS}")
+        what = how.removesuffix(f", {WITNESS}") if name.endswith(".py") else name.partition("-")[0]
+        stands[what] = stands.get(what, False) or equal
+        names += [] if name.endswith(".py") else [name]
+    codes = tuple(each for each in stands if each not in (CLOSED_FORM, OWN_EQUATIONS))
+    witnesses = tuple(each for each, equal in stands.items() if not equal)
+    return Basis(CLOSED_FORM in stands, OWN_EQUATIONS in stands, codes, tuple(dict.fromkeys(names)), witnesses)
 
 
 def contradiction(kind: ReferenceKind, found: Basis) -> str:

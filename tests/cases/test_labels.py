@@ -59,6 +59,13 @@ def test_what_routes_make_a_reference(routes: tuple[str, ...], kind: ReferenceKi
     assert all(contradiction(other, found) for other in others if other != kind)
 
 
+def test_witnesses_are_marked() -> None:
+    exudyn = f"exudyn, TrapezoidalIndex2 h=0.001, {WITNESS}"
+    assert basis((*NATIVE, exudyn)).words == "native, exudyn (witness)"
+    assert basis((*NATIVE, f"e.py, equations of its own, {WITNESS}")).words == "equations of its own (witness), native"
+    assert basis((*NATIVE, exudyn, "exudyn, DOPRI5 rtol=1e-09")).words == "native, exudyn"
+
+
 def test_high_precision_is_another_word_for_native_alone() -> None:
     assert not contradiction("high precision", basis(NATIVE))
     assert "pinocchio" in contradiction("high precision", basis((*NATIVE, "pinocchio, DOP853 rtol=1e-11")))
