@@ -12,7 +12,7 @@ from flexmb.integrate.watch import Watch
 from flexmb.run.event_memory import EventMemory
 from flexmb.run.propagate import Raw
 from flexmb.run.sides import Sides
-from flexmb.scene.schema import Scene, SceneEvent
+from flexmb.scene.schema import SceneEvent
 from flexmb.scene.tree import watchable
 from flexmb.tables.status import Status
 from flexmb.typing import Real
@@ -25,7 +25,7 @@ another e beyond it, and for a margin of e / 2."""
 class Agenda:
     """The events of a scene, with a record of which have happened."""
 
-    def __init__(self, scene: Scene, sides: Sides, times: Real) -> None:
+    def __init__(self, sides: Sides, times: Real) -> None:
         """times (T,) s: output times."""
         self._sides, self._t_end = sides, float(times[-1])
         self._together = slack(float(times[0]), self._t_end)
@@ -34,11 +34,12 @@ class Agenda:
         """Names of events on time that have happened or were due before the start of the run."""
         self._passed, self.until = set[str](), -np.inf
         """Names of events that happened before their instant, and the time (s) until which they are not watched."""
-        self.take(scene)
+        self.take()
 
-    def take(self, scene: Scene) -> None:
-        """Use the events of this scene, which earlier events may have changed. Sensors of coordinates or speeds are
-        replaced by the names of these."""
+    def take(self) -> None:
+        """Use the events of the present scene, which earlier events may have changed. Sensors of coordinates or speeds
+        are replaced by the names of these."""
+        scene = self._sides.situation.system.scene
         names = watchable(scene) if scene.events else {}
         self._events = tuple(structs.replace(each, watch=names.get(each.watch, each.watch)) for each in scene.events)
 
@@ -88,14 +89,17 @@ class Agenda:
         """Watch all events again."""
         self._passed.clear()
 
-    def remember(self, scene: Scene, anew: bool, given: Scene) -> EventMemory:
-        """The present state of all events of `scene`, for a restart; see `EventMemory` for `anew` and `given`."""
-        sides = self._sides
-        side = [1 if event.name in self._done else sides.side.get(event.name, 0) for event in scene.events]
-        came = [sides.came.get(event.name, 0) for event in scene.events]
-        passed = [int(event.name in self._passed) for event in scene.events]
+    def remember(self, anew: bool) -> EventMemory | None:
+        """The present state of all events of the scene, for a restart; see `EventMemory` for `anew`."""
+        sides, situation = self._sides, self._sides.situation
+        names = [event.name for event in situation.system.scene.events]
+        if not names:
+            return None
+        side = [1 if name in self._done else sides.side.get(name, 0) for name in names]
+        came = [sides.came.get(name, 0) for name in names]
+        passed = [int(name in self._passed) for name in names]
         whole = (np.array(each, np.int64) for each in (side, came, passed))
-        return EventMemory(*whole, self.until, anew, 0, given)
+        return EventMemory(*whole, self.until, anew, 0, situation.given)
 
     def recall(self, memory: EventMemory) -> None:
         """Restore the state that the resumed run had saved."""
