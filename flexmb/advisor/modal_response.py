@@ -110,10 +110,9 @@ def modal_response(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody) ->
     w, alpha = _into(turn, path.velocity[:, :3]), _into(turn, path.acceleration[:, :3])
     acceleration = _into(turn, path.acceleration[:, 3:] - np.array(scene.gravity_m_s2))
     loads = tuple(_loads(rigid, scene, body, turn))
-    centre, shapes = model.position + model.com_offset, mass_shapes(model)
-    momentum = np.einsum("p,pim->im", model.mass, shapes)
-    angular = np.einsum("p,pim->im", model.mass, np.cross(centre[:, :, None], shapes, axis=1))
-    spread = np.einsum("p,pim,pj->mij", model.mass, shapes, centre)  # sum m phi_n r'
+    momentum, angular = momenta(model)
+    centre = model.position + model.com_offset
+    spread = np.einsum("p,pim,pj->mij", model.mass, mass_shapes(model), centre)  # sum m phi_n r'
     force = -(acceleration @ momentum + alpha @ angular)
     force -= np.einsum("ti,tj,mij->tm", w, w, spread) - np.sum(w**2, axis=1)[:, None] * np.einsum("mii->m", spread)
     for node, torque, push in loads:
@@ -154,6 +153,13 @@ def _beam(beam: BeamBody) -> FlexibleModel:
 def mass_shapes(model: FlexibleModel) -> Real:
     """Mode shapes (n,3,m) of the points' mass centres."""
     return model.translation + np.cross(model.rotation, model.com_offset[:, :, None], axis=1)
+
+
+def momenta(model: FlexibleModel) -> tuple[Real, Real]:
+    """Linear and angular momenta (3,m) of the modes about the origin, body axes: sum m phi and sum m r x phi."""
+    centre, shapes = model.position + model.com_offset, mass_shapes(model)
+    arms = np.cross(centre[:, :, None], shapes, axis=1)
+    return np.einsum("p,pim->im", model.mass, shapes), np.einsum("p,pim->im", model.mass, arms)
 
 
 def _combined(model: FlexibleModel, X: Real) -> FlexibleModel:

@@ -29,9 +29,8 @@ from flexmb.integrate.adaptive import (
     recall_nothing,
     reject_by_error,
 )
-from flexmb.integrate.control import FACTORISATIONS, copy, derivative, scaled_norm
+from flexmb.integrate.control import FACTORISATIONS, copy, derivative, linearisation, scaled_norm
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.integrate.settling import prepare_settling, settle
 from flexmb.integrate.watch import Ends

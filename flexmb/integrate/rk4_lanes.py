@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flexmb.integrate.control import ACCEPTED, SAMPLES, permitted, stretch
 from flexmb.integrate.lane_problem import any_chosen, lane_copy, lane_derivative, mark_finite, set_all, store_lane
-from flexmb.integrate.rk4_formulas import advance, weigh
+from flexmb.integrate.rk4 import advance, weigh
 from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.jit.lanes import LANES
 from flexmb.tables.status import NONFINITE, OK

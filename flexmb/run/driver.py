@@ -59,9 +59,9 @@ class Driver:
         self._times, self._settings, self._taken_up, self._made_by = times, settings, taken_up, made_by
         given = None if taken_up is None else taken_up.given
         self._situation = Situation(system, settings, algorithm, stabilise, given)
-        self._sides = Sides(self._situation)
-        self._agenda = Agenda(self._sides, times)
-        self._segments = Segments(self._agenda, self._sides, times)
+        self._agenda = Agenda(self._situation, times)
+        self._sides = Sides(self._agenda)
+        self._segments = Segments(self._sides, times)
         self._chattering = Chattering(times[0], times[-1], settings.atol)
         self._happened: list[EventRecord] = []
         self._whole: Trajectory | None = None
@@ -78,7 +78,7 @@ class Driver:
     def __call__(self, begin: Beginning) -> Trajectory:
         """The trajectory of the run."""
         if begin.events is not None:
-            self._agenda.recall(begin.events)
+            self._sides.recall(begin.events)
         elif self._situation.system.scene.events:
             start = unmoved(begin)
             instant = self._at_instant(start, self._agenda.due_at_start(start.t))
@@ -113,11 +113,11 @@ class Driver:
         self._join(segment.part)
         levels = segment.levels
         if levels is not None and levels.kept[0]:
-            self._sides.take(watched, levels.kept_side.tolist(), levels.kept_came.tolist())
+            self._sides.take(watched, levels.kept_side, levels.kept_came)
             if segment.raw.paused:
                 self._keep_cut(segment.raw)
         if levels is not None and (segment.raw.paused or not levels.kept[0]):
-            self._sides.take(watched, levels.side.tolist(), levels.came.tolist())
+            self._sides.take(watched, levels.side, levels.came)
         return segment
 
     def _after_sample(self, segment: Segment) -> Segment:
@@ -132,21 +132,20 @@ class Driver:
         stops. Controllers that are due act later, when the next segment starts or the run ends.
         """
         y, _ = self._situation.apart(raw.y)
-        watched = self._agenda.watched
-        arrived = found if early else self._sides.arriving(watched, raw, found, levels, y)
+        arrived = found if early else self._sides.arriving(raw, found, levels, y)
         for event in arrived:
             records = self._situation.happen(event, raw, y)
             self._happened += [replace(record, early=early) for record in records]
             self._agenda.happened(event)
         raw = self._situation.with_motion(raw, y)
         if self._whole is None:  # this is the start of the run
-            self._sides.start(watched, y)
+            self._sides.start(y)
         else:
-            self._sides.move(watched, raw, found, y)
+            self._sides.move(raw, found, y)
         struck = self._stand(raw, found, y)
         raw = self._situation.with_motion(raw, y)
         self._agenda.take()  # coming to rest on a stop adds an event
-        self._sides.make_known(self._agenda.watched)
+        self._sides.make_known()
         ends = any(isinstance(action, EndRun) for event in (*arrived, *struck) for action in event.actions)
         return AfterEvents(raw, ends)
 
@@ -239,7 +238,7 @@ class Driver:
         return self._restart(raw, memory, anew)
 
     def _restart(self, raw: Raw, memory: Memory, anew: bool) -> Restart:
-        scene, events = self._situation.system.scene, self._agenda.remember(anew)
+        scene, events = self._situation.system.scene, self._sides.remember(anew)
         return Restart(self._settings.method, scene, raw.t, memory, raw.controllers, events)
 
     def _keep_cut(self, raw: Raw) -> None:

@@ -1,4 +1,4 @@
-"""Trajectories for other programs: tables of pandas, Parquet and NumPy, datasets of xarray, recordings of rerun.
+"""Results for other programs: tables of pandas, Parquet, NumPy and CSV, datasets of xarray, recordings of rerun.
 
 These packages are optional, so each is imported where it is used. All formats contain names and units.
 """
@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from flexmb.output.whole import whole_file
+from flexmb.output.whole import whole_file, write_csv
 from flexmb.run.channels import channels_of, unit
 from flexmb.run.run_arrays import RunArrays
+from flexmb.system.section_loads import SectionLoads
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
@@ -23,6 +24,20 @@ if TYPE_CHECKING:
 
 AXES = {3: ("axis", ("x", "y", "z")), 4: ("component", ("w", "x", "y", "z"))}
 """By number of components: name and labels of the last dimension of vectors and quaternions."""
+
+
+SECTIONS = (
+    "t [s]", "x [m]", "axial [N]", "shear_y [N]", "shear_z [N]", "torsion [N m]", "bending_y [N m]", "bending_z [N m]"
+)  # fmt: skip
+"""Columns of section loads."""
+
+
+def write_sections(path: Path, t: Real, loads: SectionLoads) -> None:
+    """Write section loads as CSV, one row per time t (T,) and section."""
+    times, x = np.repeat(t, len(loads.x)), np.tile(loads.x, len(t))
+    parts = (loads.axial[..., None], loads.shear, loads.torsion[..., None], loads.bending)
+    values = np.concatenate(parts, axis=2).reshape(len(times), -1)
+    write_csv(path, SECTIONS, np.column_stack([times, x, values]).tolist())
 
 
 def write_npz(trajectory: RunArrays, path: Path) -> None:

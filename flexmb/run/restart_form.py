@@ -10,27 +10,14 @@ from typing import Any
 import numpy as np
 
 from flexmb.control.memory import LoopMemory
+from flexmb.integrate import memory as places
 from flexmb.integrate.catalogue import integrator
-from flexmb.integrate.memory import (
-    DONE,
-    ERROR_BEFORE,
-    FACTORED,
-    FRESH,
-    NUMBERS,
-    RENEW,
-    RETRIED,
-    STEP,
-    STEP_BEFORE,
-    STRETCH,
-    TAKEN_UP,
-    TIME,
-    Memory,
-)
+from flexmb.integrate.memory import DONE, NUMBERS, STRETCH, TIME, Memory
 from flexmb.tables import arguments
 from flexmb.typing import Real
 
-SWITCHES = {TAKEN_UP: "TAKEN_UP", RETRIED: "RETRIED", RENEW: "RENEW", FRESH: "FRESH"}
-SIZES = {STEP: "STEP", ERROR_BEFORE: "ERROR_BEFORE", DONE: "DONE", FACTORED: "FACTORED", STEP_BEFORE: "STEP_BEFORE"}
+SWITCHES = ("TAKEN_UP", "RETRIED", "RENEW", "FRESH")
+SIZES = ("STEP", "ERROR_BEFORE", "DONE", "FACTORED", "STEP_BEFORE")
 MOST_STEPS = 2**53  # the largest count that a float represents exactly
 
 
@@ -63,12 +50,12 @@ def controllers(given: LoopMemory) -> LoopMemory:
 
 def _refuse_other_numbers(numbers: Real, t: float) -> None:
     """ValueError for values that no integrator leaves at the end t (s) of a run."""
-    for place, name in SWITCHES.items():
-        if numbers[place] not in (0.0, 1.0):
-            raise ValueError(f"numbers[{name}] is {numbers[place]:g}, but must be 0 or 1")
-    for place, name in SIZES.items():
-        if numbers[place] < 0.0:
-            raise ValueError(f"numbers[{name}] is {numbers[place]:g}, but must not be negative")
+    by_name = {name: numbers[getattr(places, name)] for name in (*SWITCHES, *SIZES)}
+    for name, value in by_name.items():
+        if name in SWITCHES and value not in (0.0, 1.0):
+            raise ValueError(f"numbers[{name}] is {value:g}, but must be 0 or 1")
+        if value < 0.0:
+            raise ValueError(f"numbers[{name}] is {value:g}, but must not be negative")
     done = numbers[DONE]
     if done != np.floor(done) or done >= MOST_STEPS:
         raise ValueError(f"numbers[DONE] is {done:g}, but must be a number of steps")

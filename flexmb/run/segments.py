@@ -12,7 +12,6 @@ import numpy as np
 from flexmb.integrate.control import ACCEPTED, REJECTED
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import Watch
-from flexmb.run.agenda import Agenda
 from flexmb.run.origin import Beginning
 from flexmb.run.propagate import Raw, integrate
 from flexmb.run.sides import Sides
@@ -57,9 +56,9 @@ class Segment(NamedTuple):
 class Segments:
     """Integrates the system of a run segment by segment, and evaluates the outputs of the run."""
 
-    def __init__(self, agenda: Agenda, sides: Sides, times: Real) -> None:
+    def __init__(self, sides: Sides, times: Real) -> None:
         """times (T,) s: output times of the run."""
-        self._agenda, self._sides, self._situation, self._times = agenda, sides, sides.situation, times
+        self._sides, self._agenda, self._situation, self._times = sides, sides.agenda, sides.situation, times
         self._steps = 0
         """Number of steps of earlier segments, accepted or rejected."""
 
@@ -85,7 +84,7 @@ class Segments:
         times, shown = self._output(begin, stop)
         early, is_last = 0.0, stop == self._times[-1]
         with self._situation.integration() as solve:
-            levels = self._sides.watching(self._agenda.watched, solve)
+            levels = self._sides.watching(solve)
             goes_on = not is_last or bool(due)
             raw = integrate(solve, begin, times, self._left, levels, breaks=goes_on, goes_on=goes_on)
             found = self._agenda.found(raw, levels, due, stop)

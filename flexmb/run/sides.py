@@ -7,36 +7,60 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexmb.integrate.watch import UNKNOWN, Watch, watch
+from flexmb.run.agenda import Agenda
+from flexmb.run.event_memory import EventMemory
 from flexmb.run.propagate import Integration, Raw
-from flexmb.run.situation import Situation
 from flexmb.scene.schema import SceneEvent
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 DIRECTIONS = {"rising": 1, "falling": -1, "either": 0}
 
 
 class Sides:
-    """`side` and `came` as in `Watch`, by name of event."""
+    """`side` and `came` as in `Watch`, by name of the event."""
 
-    def __init__(self, situation: Situation) -> None:
+    def __init__(self, agenda: Agenda) -> None:
         self.side, self.came = dict[str, int](), dict[str, int]()
-        self.situation = situation
+        self.agenda, self.situation = agenda, agenda.situation
 
-    def start(self, watched: Sequence[SceneEvent], y: Real) -> None:
+    def start(self, y: Real) -> None:
         """Set the sides at the start of a run."""
-        self.side = {event.name: self._first_side(event, y) for event in watched}
+        self.side = {event.name: self._first_side(event, y) for event in self.agenda.watched}
         self.came = dict.fromkeys(self.side, 0)
 
-    def make_known(self, watched: Sequence[SceneEvent]) -> None:
+    def make_known(self) -> None:
         """Set the sides of events that were not watched before: the side from which they can happen."""
-        for event in watched:
+        for event in self.agenda.watched:
             if event.name not in self.side:
                 self.side[event.name], self.came[event.name] = -DIRECTIONS[event.crossing], 0
 
-    def take(self, watched: Sequence[SceneEvent], side: Sequence[int], came: Sequence[int]) -> None:
+    def take(self, watched: Sequence[SceneEvent], side: Index, came: Index) -> None:
         """Copy sides from a `Watch`, whose entries are in the order of `watched`."""
         names = [event.name for event in watched]
-        self.side, self.came = (dict(zip(names, map(int, each), strict=True)) for each in (side, came))
+        self.side, self.came = (dict(zip(names, each.tolist(), strict=True)) for each in (side, came))
+
+    def remember(self, anew: bool) -> EventMemory | None:
+        """The present state of all events of the scene, for a restart; see `EventMemory` for `anew`."""
+        names, agenda = [event.name for event in self.situation.system.scene.events], self.agenda
+        if not names:
+            return None
+        side = [1 if name in agenda.done else self.side.get(name, 0) for name in names]
+        came = [self.came.get(name, 0) for name in names]
+        passed = [int(name in agenda.passed) for name in names]
+        whole = (np.array(each, np.int64) for each in (side, came, passed))
+        return EventMemory(*whole, agenda.until, anew, 0, self.situation.given)
+
+    def recall(self, memory: EventMemory) -> None:
+        """Restore the state that the resumed run had saved."""
+        agenda = self.agenda
+        agenda.until = memory.until
+        for i, event in enumerate(agenda.events):
+            if memory.passed[i]:
+                agenda.passed.add(event.name)
+            if event.watch != "time":
+                self.side[event.name], self.came[event.name] = int(memory.side[i]), int(memory.came[i])
+            elif memory.side[i]:
+                agenda.done.add(event.name)
 
     def near(self, event: SceneEvent) -> float:
         """Distance within which a quantity counts as being at its level, by the tolerances of the run."""
@@ -72,8 +96,9 @@ class Sides:
             height = solve.feedback.signals(begin)[place] - event.level
             return float(height), float(solve.feedback.signal_rates(begin)[place])
 
-    def watching(self, watched: Sequence[SceneEvent], solve: Integration) -> Watch | None:
+    def watching(self, solve: Integration) -> Watch | None:
         """What an integration has to watch; None if it is nothing."""
+        watched = self.agenda.watched
         if not watched:
             return None
         entries, still = [], []
@@ -90,15 +115,13 @@ class Sides:
         sides, came = [self.side[name] for name in names], [self.came[name] for name in names]
         return watch(entries, levels, directions, sides, came, still, solve.size)
 
-    def arriving(
-        self, watched: Sequence[SceneEvent], raw: Raw, found: Sequence[SceneEvent], levels: Watch | None, y: Real
-    ) -> list[SceneEvent]:
+    def arriving(self, raw: Raw, found: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[SceneEvent]:
         """The events among `found` whose quantities move towards their levels; sets coordinates in y exactly to theirs.
 
         Because of rounding, an event that just happened may be found again while its quantity leaves the level.
         """
         off = []
-        for i, event in enumerate(watched):
+        for i, event in enumerate(self.agenda.watched):
             if levels is not None and event in found:
                 if self.is_signal(event):
                     has_jumped = not levels.found[i] or self.side[event.name] * levels.value[i] < -self.near(event)
@@ -112,12 +135,13 @@ class Sides:
                     off.append(event)
         return [event for event in found if event not in off]
 
-    def move(self, watched: Sequence[SceneEvent], raw: Raw, found: Sequence[SceneEvent], y: Real) -> None:
+    def move(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> None:
         """Update sides after events. A quantity at its level is on the side to which it moves next, or at the level (0)
         if it is at rest; then the next steps decide, and `came` is the side from which it arrived.
 
         Jumps of signals that events cause do not count as reaching a level.
         """
+        watched = self.agenda.watched
         heights = self._heights(raw, y, [event for event in watched if self.is_signal(event)])
         for event in watched:
             is_signal, side, came = self.is_signal(event), self.side.get(event.name, 0), self.came.get(event.name, 0)
