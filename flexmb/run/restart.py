@@ -94,13 +94,11 @@ class Restart:
 
     def _refuse_other_parts(self) -> None:
         """TypeError for parts of another type than runs leave."""
-        for name, part, kind in (("scene", self.scene, Scene), ("memory", self.memory, Memory)):
-            if not isinstance(part, kind):
+        kinds = {"scene": Scene, "memory": Memory, "controllers": LoopMemory, "events": EventMemory}
+        for name, kind in kinds.items():
+            part, is_optional = getattr(self, name), name in ("controllers", "events")
+            if not (isinstance(part, kind) or (is_optional and part is None)):
                 raise TypeError(f"{name} is a {type(part).__name__}: a restart holds the {kind.__name__} of its run")
-        if not isinstance(self.controllers, LoopMemory | None):
-            raise TypeError(f"controllers is a {type(self.controllers).__name__}: a restart holds a LoopMemory")
-        if not isinstance(self.events, EventMemory | None):
-            raise TypeError(f"events is a {type(self.events).__name__}: a restart holds an EventMemory")
 
     def taken_up(self) -> Memory:
         """A copy of the memory, marked for an integrator that resumes from it."""
