@@ -25,6 +25,7 @@ from scipy.spatial.transform import Rotation
 from flexmb.advisor.methods import RunMethod, simulated
 from flexmb.closure.closures import ClosureError
 from flexmb.dense.function_jets import profile
+from flexmb.frisch.normalisation import combined
 from flexmb.modal import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
@@ -132,8 +133,7 @@ def eigenmodes(body: BeamBody | ModalBody) -> FlexibleModel:
         return _beam(replace(body, name="beam", level="full"))
     model = flexible_model(body)
     m = model.mode_count
-    X = eigh(model.stiffness, modal_integrals(model).spatial_mass[:m, :m])[1]
-    return _combined(model, X)
+    return combined(model, eigh(model.stiffness, modal_integrals(model).spatial_mass[:m, :m])[1])
 
 
 @lru_cache(maxsize=64)
@@ -160,17 +160,6 @@ def momenta(model: FlexibleModel) -> tuple[Real, Real]:
     centre, shapes = model.position + model.com_offset, mass_shapes(model)
     arms = np.cross(centre[:, :, None], shapes, axis=1)
     return np.einsum("p,pim->im", model.mass, shapes), np.einsum("p,pim->im", model.mass, arms)
-
-
-def _combined(model: FlexibleModel, X: Real) -> FlexibleModel:
-    nodes = {
-        name: changed(node, translation=node.translation @ X, rotation_modes=node.rotation_modes @ X)
-        for name, node in model.nodes.items()
-    }
-    return changed(
-        model, translation=model.translation @ X, rotation=model.rotation @ X, nodes=nodes,
-        stiffness=X.T @ model.stiffness @ X, damping=X.T @ model.damping @ X,
-    )  # fmt: skip
 
 
 def _families(model: FlexibleModel) -> NDArray[np.intp]:
