@@ -101,10 +101,10 @@ def simulate(
     chosen = Settings(method, **settings).checked(max(abs(t), abs(t_end)))
     times = sample_times(samples, t_end, t)
     system = scene if isinstance(scene, System) else assembled(scene)
-    return run_stages([Stage(system, times)], state, chosen, algorithm, stabilise)
+    return run_stages([RunPart(system, times)], state, chosen, algorithm, stabilise)
 
 
-class Stage(NamedTuple):
+class RunPart(NamedTuple):
     """A part of a run: its system and its output times (T,) s, from its start to its end."""
 
     system: System
@@ -112,7 +112,7 @@ class Stage(NamedTuple):
 
 
 def run_stages(
-    stages: Sequence[Stage], state: Given, settings: Settings, algorithm: Algorithm, stabilise: float
+    stages: Sequence[RunPart], state: Given, settings: Settings, algorithm: Algorithm, stabilise: float
 ) -> Trajectory:
     """The trajectory of stages, each of which starts at the last output of the one before, until one fails.
 
@@ -139,7 +139,7 @@ def run_stages(
 
 
 def _run(
-    stage: Stage, state: Given, settings: Settings, algorithm: Algorithm, stabilise: float
+    stage: RunPart, state: Given, settings: Settings, algorithm: Algorithm, stabilise: float
 ) -> tuple[Trajectory, list[Warning], bool]:
     """The trajectory of one stage, what there is to warn of, and whether Ctrl-C ended it."""
     system, times = stage
@@ -161,7 +161,7 @@ def _run(
     return trajectory, warned, driver.was_interrupted
 
 
-def _again(stage: Stage, state: Given, algorithm: Algorithm, stabilise: float, settings: Settings) -> Trajectory:
+def _again(stage: RunPart, state: Given, algorithm: Algorithm, stabilise: float, settings: Settings) -> Trajectory:
     """The same run with other settings; ValueError for a resumed run, whose restart already contains errors."""
     if isinstance(state, Restart):
         raise ValueError("error_estimate() is not available for a resumed run; rerun from t_start")

@@ -31,7 +31,7 @@ from flexmb.tables.status import Status
 from flexmb.typing import Real
 
 
-class Instant(NamedTuple):
+class EventInstant(NamedTuple):
     """Time (s) and y = [q, u, work] at which actions happen, which change y in place; the state and the work (J) before
     them, and their impulses so far, as in `EventRecord`."""
 
@@ -165,7 +165,7 @@ class Situation:
         place = self.rate_of(watched)
         return place is not None and self.system.constants.speed["prescribed"][place - self.system.nq] >= 0
 
-    def _do(self, action: Action, at: Instant) -> None:
+    def _do(self, action: Action, at: EventInstant) -> None:
         match action:
             case Latch(coordinate=name):
                 self._strike(at, name, 0.0)
@@ -186,7 +186,7 @@ class Situation:
             case _:
                 assert_never(action)
 
-    def _strike(self, at: Instant, name: str, factor: float) -> None:
+    def _strike(self, at: EventInstant, name: str, factor: float) -> None:
         """Apply an impulse that multiplies the speed of a coordinate by `factor`."""
         y, nq = at.y, self.system.nq
         rates = {self._rate_place(each): each for each in self._paths}
@@ -200,7 +200,7 @@ class Situation:
         for closure, wrench in found.closures.items():
             at.closures[closure] = at.closures.get(closure, 0.0) + wrench
 
-    def _hold(self, at: Instant, name: str, leaving_stop: SceneEvent | None = None) -> None:
+    def _hold(self, at: EventInstant, name: str, leaving_stop: SceneEvent | None = None) -> None:
         """Hold a coordinate or wheel where it is; on a stop with its motor, until the event that it leaves the stop."""
 
         def held(item: Coordinate | Wheel) -> Coordinate | Wheel:
@@ -222,7 +222,7 @@ class Situation:
             return scene
         return replace(scene, events=tuple(each for each in scene.events if each.name != event.name))
 
-    def _become(self, scene: Scene, at: Instant) -> None:
+    def _become(self, scene: Scene, at: EventInstant) -> None:
         if scene == self.system.scene:
             return
         for system in self._built:
@@ -239,17 +239,17 @@ class Situation:
             assert isinstance(self.system, ClosedSystem) and isinstance(before, ClosedSystem)
             self.system.closures.begin_at(at.t, at.y, before.closures)
 
-    def _instant(self, t: float, y: Real) -> Instant:
-        return Instant(t, y, self._state(t, y), float(y[-1]), {}, {})
+    def _instant(self, t: float, y: Real) -> EventInstant:
+        return EventInstant(t, y, self._state(t, y), float(y[-1]), {}, {})
 
     def _state(self, t: float, y: Real) -> State:
         return self.system.state(y[: self.system.nq].copy(), y[self.system.nq : -1].copy(), t)
 
-    def _energy(self, at: Instant) -> float:
+    def _energy(self, at: EventInstant) -> float:
         return float(np.sum(list(self.system.energy(self._state(at.t, at.y)).values())))
 
 
-def _recorded(name: str, at: Instant, after: State) -> EventRecord:
+def _recorded(name: str, at: EventInstant, after: State) -> EventRecord:
     return EventRecord(name, at.t, at.impulses, float(at.y[-1]) - at.work, at.before, after, at.closures)
 
 

@@ -10,7 +10,7 @@ from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.origin import Given, start_time
 from flexmb.run.samples import sample_times
-from flexmb.run.simulate import RunSettings, Stage, refuse_unknown, run_stages
+from flexmb.run.simulate import RunPart, RunSettings, refuse_unknown, run_stages
 from flexmb.run.switching import refuse_times
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.schema import Scene
@@ -56,11 +56,11 @@ def simulate_stages(
     """
     refuse_unknown("simulate_stages", settings)
     systems = _systems(scene, stages)
-    t, parts = start_time(t_start, state), list[Stage]()
+    t, parts = start_time(t_start, state), list[RunPart]()
     for stage, system in zip(stages, systems, strict=True):
         start, t = t, t + stage.duration_s
         refuse_times(system, start, t)
-        parts.append(Stage(system, sample_times(stage.samples, t, start)))
+        parts.append(RunPart(system, sample_times(stage.samples, t, start)))
     chosen = Settings(method, **settings).checked(max(abs(parts[0].times[0]), abs(t)))
     return run_stages(parts, state, chosen, algorithm, stabilise)
 
