@@ -23,8 +23,8 @@ def title(name: str, how: str, witness: bool) -> str:
 
 @dataclass(frozen=True)
 class Basis:
-    """`codes` are those of the engines, without repetition; `formulations` the engines themselves; `witnesses` those codes,
-    or `OWN_EQUATIONS`, that only have to agree."""
+    """`codes` are those of the engines, without repetition; `formulations` the engines themselves; `witnesses` those
+    codes, or `OWN_EQUATIONS`, that only have to agree."""
 
     closed_form: bool
     own_equations: bool
@@ -56,7 +56,7 @@ class Basis:
 
 def basis(routes: Iterable[str]) -> Basis:
     """What the routes of a stored reference consist of."""
-    names, stands = [], dict[str, bool]()  # engines; and of each code or kind of file, whether it is more than a witness
+    names, stands = [], dict[str, bool]()  # engines; whether a code or a kind of file is more than a witness
     for route in routes:
         name, _, how = route.partition(", ")
         equal = not how.endswith(f", {WITNESS}")

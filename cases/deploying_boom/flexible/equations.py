@@ -1,4 +1,4 @@
-"""The equations of motion rebuilt from the exported data by NumPy, integrated by SciPy: four members between two bodies.
+"""The equations of motion rebuilt from the exported data by NumPy, integrated by SciPy: four flexible members.
 
 They have the points and modes of `model.json` and `modal/*.json`, and nothing of flexmb's dynamics.
 """

@@ -181,7 +181,8 @@ def test_a_wrong_axis_or_mass_in_a_file_is_noticed(tmp_path: Path) -> None:
     case = bare(scene, tmp_path, springs=False)
     y = state(case)
     ours = case.accelerations(0.0, y)
-    for tag, key, change in (("axis", "xyz", "0.6 0 0.8"), ("mass", "value", "1.001"), ("origin", "rpy", "0.01 0.02 0")):
+    changes = (("axis", "xyz", "0.6 0 0.8"), ("mass", "value", "1.001"), ("origin", "rpy", "0.01 0.02 0"))
+    for tag, key, change in changes:
         robot = ElementTree.fromstring(urdf(scene, "tree").text)
         list(robot.iter(tag))[-1].set(key, change)
         text = ElementTree.tostring(robot, encoding="unicode")

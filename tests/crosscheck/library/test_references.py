@@ -60,7 +60,7 @@ BAD = [
     ('engine = "stepper"', 'engine = "stepper"\nexact = "e.py"', "reference.route[1]", "an engine or a closed form"),
     ('engine = "stepper"', "relative_uncertainty = 1e-9", "reference.route[1]", "an engine or a closed form"),
     ('engine = "stepper"', 'engine = "stepper"\nwitness = true', "reference.route", "take `witness` out"),
-    ('engine = "stepper"', 'engine = "stepper"\nchannels = ["marker.position"]', "reference.route[1].channels", "no chan"),
+    ('engine = "stepper"', 'engine = "stepper"\nchannels = ["m"]', "reference.route[1].channels", "no channel"),
     ('engine = "stepper"', 'equations = "../e.py"', "reference.route[1].equations", "in the case's folder"),
     ('engine = "stepper"', 'exact = "e.py"\nequations = "e.py"', "reference.route[1]", "only one of them"),
     ('engine = "stepper"', 'exact = "../e.py"', "reference.route[1].exact", "in the case's folder"),
