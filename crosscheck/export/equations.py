@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from crosscheck.export.model import modal_file, model_data
-from crosscheck.export.rebuild import Case
+from crosscheck.export.rebuild import RebuiltCase
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.find import load_case
 from crosscheck.running.plan import variant_scene
@@ -37,7 +37,7 @@ def rebuilt(file: str, rtol: float) -> Callable[[Real], dict[str, Real]]:
                 target = Path(place) / name
                 target.parent.mkdir(exist_ok=True)
                 target.write_text(json.dumps(content), encoding="utf-8")
-            model = Case(place)
+            model = RebuiltCase(place)
         channels = model.channels(times, model.integrate(times, rtol))
         return {name: np.asarray(values) for name, values in channels.items()}
 

@@ -80,7 +80,7 @@ if __name__ == "__main__":
 
 
 @dataclass
-class _Part:
+class _TreePart:
     """A link of the kinematic tree; its frame has z along the joint. `inertia` grows by what is welded to it."""
 
     name: str
@@ -107,8 +107,8 @@ def _left_out(scene: Scene) -> tuple[str, ...]:
     return (*(f"marker {marker.name}" for marker in scene.markers), *beside_the_tree(scene))
 
 
-def _parts(chain: tuple[Link, ...]) -> list[_Part]:
-    parts: list[_Part] = []
+def _parts(chain: tuple[Link, ...]) -> list[_TreePart]:
+    parts: list[_TreePart] = []
     places: list[tuple[int, Frame]] = []  # of each link: the part that carries it, and its frame there
     for link in chain:
         carrier, frame = places[link.parent] if link.parent >= 0 else (-1, IDENTITY_FRAME)
@@ -118,7 +118,7 @@ def _parts(chain: tuple[Link, ...]) -> list[_Part]:
                 case Scalar():
                     turned = Frame(np.zeros(3), _upright(freedom.axis))
                     kind = {"turn": "RevoluteZ", "slide": "PrismaticZ"}[freedom.motion]
-                    parts.append(_Part(f"{link.joint} {place}", kind, carrier, frame @ turned, [NOTHING], freedom))
+                    parts.append(_TreePart(f"{link.joint} {place}", kind, carrier, frame @ turned, [NOTHING], freedom))
                     carrier, frame = len(parts) - 1, turned.inverse()
                 case Ball() | Floating():
                     raise NotImplementedError("a ball joint or a free flight, which is refused, has reached the writer")
@@ -130,7 +130,7 @@ def _parts(chain: tuple[Link, ...]) -> list[_Part]:
     return parts
 
 
-def _script(parts: list[_Part], scene: Scene, name: str) -> str:
+def _script(parts: list[_TreePart], scene: Scene, name: str) -> str:
     inertia = [combine(part.inertia) for part in parts]
     joints = [part.joint for part in parts]
     return SCRIPT.format(

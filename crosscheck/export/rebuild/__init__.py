@@ -12,5 +12,5 @@ Jacobian J and the bias acceleration a of every inertia point,
 so they share nothing with a recursion. All vectors are in World axes unless said otherwise.
 """
 
-from .case import Case as Case
+from .case import RebuiltCase as RebuiltCase
 from .comparison import compare as compare

@@ -15,7 +15,7 @@ from crosscheck.export.formats.mjcf import mjcf
 from crosscheck.export.formats.urdf import urdf
 from crosscheck.export.formats.written import Written
 from crosscheck.export.model import model_data
-from crosscheck.export.rebuild import Case
+from crosscheck.export.rebuild import RebuiltCase
 from crosscheck.export.rebuild.rotations import matrix_of
 from crosscheck.library.find import shipped_names
 from flexmb.scene.schema import Scene
@@ -30,7 +30,7 @@ TREES = (
 CLOSE = 1e-9  # relative: MuJoCo's principal axes and the long chain's condition take up to seven digits of sixteen
 
 
-def bare(scene: Scene, place: Path, springs: bool) -> Case:
+def bare(scene: Scene, place: Path, springs: bool) -> RebuiltCase:
     """The tree as `rebuild` has it, without what the format leaves out."""
     data, _ = model_data(scene)
     data |= {"loads": [], "connectors": [], "controllers": [], "events": []}
@@ -40,10 +40,10 @@ def bare(scene: Scene, place: Path, springs: bool) -> Case:
             dropped |= {key: 0.0 for key in freedom if key.startswith(("stiffness", "damping"))}
         freedom |= {key: value for key, value in dropped.items() if key in freedom}
     (place / "model.json").write_text(json.dumps(data), encoding="utf-8")
-    return Case(place)
+    return RebuiltCase(place)
 
 
-def state(case: Case) -> Real:
+def state(case: RebuiltCase) -> Real:
     """A random state near that of the start; quaternions are unit."""
     y = case.start + 0.4 * np.random.default_rng(7).standard_normal(len(case.start))
     for joint, n, freedom in each_freedom(case):
@@ -53,7 +53,7 @@ def state(case: Case) -> Real:
     return y
 
 
-def each_freedom(case: Case):  # noqa: ANN201
+def each_freedom(case: RebuiltCase):  # noqa: ANN201
     for joint in case.joints:
         for n, freedom in enumerate(joint["freedoms"]):
             yield joint, n, freedom
@@ -64,7 +64,7 @@ def joint_name(joint: Data, n: int) -> str:
     return f"{kind} {joint['name']} {n}"
 
 
-def by_pinocchio(text: str, case: Case, y: Real, gravity: Real) -> Real:
+def by_pinocchio(text: str, case: RebuiltCase, y: Real, gravity: Real) -> Real:
     pinocchio = pytest.importorskip("pinocchio")
     model = pinocchio.buildModelFromXML(text)
     model.gravity.linear = gravity
@@ -85,7 +85,7 @@ def by_pinocchio(text: str, case: Case, y: Real, gravity: Real) -> Real:
     return np.array([found[there] for _, there in sorted(places)])
 
 
-def by_mujoco(text: str, case: Case, y: Real) -> Real:
+def by_mujoco(text: str, case: RebuiltCase, y: Real) -> Real:
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(text)
     data, u = mujoco.MjData(model), y[case.nq :]
