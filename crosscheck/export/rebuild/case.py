@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .frame import MovingFrame, field
+from .frame import JacobianFrame, field
 from .functions import breaks_of, function_of
 from .rotations import cross, matrix_of, quaternion_of, quaternion_rate, rotation_vector, skew, turn, turned_by
 
@@ -110,7 +110,7 @@ class RebuiltCase:
     def frames(self, y):
         """The frame of every body, by name; where a node of a body is at its joint, the body's frame follows."""
         zero, none = np.zeros(3), np.zeros((3, self.nu))
-        frames = {"ground": MovingFrame(np.eye(3), zero, none, none, zero, zero, zero, zero)}
+        frames = {"ground": JacobianFrame(np.eye(3), zero, none, none, zero, zero, zero, zero)}
         for joint in self.joints:
             frame = self.node(frames, joint["parent"], joint["parent_node"], y)
             offset = joint["parent_offset"]
@@ -147,10 +147,10 @@ class RebuiltCase:
         R, p = np.array(offset["rotation"]), np.array(offset["position_m"])
         node = outboard.at(-R.T @ p, R.T)
         zero, none = np.zeros(3), np.zeros((3, self.nu))
-        alone = {body: MovingFrame(np.eye(3), zero, none, none, zero, zero, zero, zero)}
+        alone = {body: JacobianFrame(np.eye(3), zero, none, none, zero, zero, zero, zero)}
         seen = self.node(alone, body, joint["child_node"], y)  # the node's motion seen from its body
         # R_body = R_node R_seen', and the same for all rates
-        back = MovingFrame(node.R @ seen.R.T, zero, none, none, zero, zero, zero, zero)
+        back = JacobianFrame(node.R @ seen.R.T, zero, none, none, zero, zero, zero, zero)
         B = back.R
         back.W, back.w = node.W - B @ seen.W, node.w - B @ seen.w
         back.alpha = node.alpha - B @ seen.alpha - cross(back.w, B @ seen.w)

@@ -5,7 +5,7 @@ import numpy as np
 from .rotations import cross, skew
 
 
-class MovingFrame:
+class JacobianFrame:
     """A moving frame: rotation R, position r, velocities w, v = W u, V u, accelerations alpha, a for udot = 0."""
 
     def __init__(self, R, r, W, V, w, v, alpha, a):
@@ -15,7 +15,7 @@ class MovingFrame:
         """A frame fixed to this one, `offset` and `rotation` in its axes."""
         d = self.R @ offset
         carried = cross(self.alpha, d) + cross(self.w, cross(self.w, d))
-        return MovingFrame(
+        return JacobianFrame(
             self.R @ rotation, self.r + d, self.W, self.V - skew(d) @ self.W, self.w, self.v + cross(self.w, d),
             self.alpha, self.a + carried,
         )
@@ -26,7 +26,7 @@ class MovingFrame:
         there = self.at(shift, np.eye(3))
         Vr, Wr = self.R @ shift_map, self.R @ turn_map
         vr, wr = Vr @ u, Wr @ u
-        return MovingFrame(
+        return JacobianFrame(
             self.R @ rotation, there.r, there.W + Wr, there.V + Vr, there.w + wr, there.v + vr,
             there.alpha + self.R @ turn_bias + cross(self.w, wr),
             there.a + self.R @ shift_bias + 2.0 * cross(self.w, vr),
