@@ -183,7 +183,7 @@ def _finding(
         return Finding("did not run", f"the reference has no channel {channel}: check the name")
     if goal is None:
         return Finding("refused", "the case sets no goal for this channel")
-    target = signals[channel]
+    target = signals[channel] if kept is None else _only(signals[channel], kept)
     if asked.rough is not None:
         coarse = asked.rough.channels.get(name)
         assert coarse is not None  # `_coarse` refuses files that lack a channel
@@ -191,9 +191,8 @@ def _finding(
         doubt = estimate(channel, "tolerance", ladder, target.sizes[0])
     else:
         doubt = _claimed(channel, target, goal)
-    if kept is not None:
-        values, target = values[kept], _only(target, kept)
-    return compare(channel, Signal(values, doubt, target.sizes), target, goal)
+    mine = Signal(values if kept is None else values[kept], doubt, target.sizes)
+    return compare(channel, mine, target, goal)
 
 
 def _claimed(channel: str, target: Signal, goal: float) -> Uncertainty:
@@ -205,7 +204,7 @@ def _claimed(channel: str, target: Signal, goal: float) -> Uncertainty:
 
 
 def _allowed(channel: str, target: Signal, goal: float) -> float:
-    """The distance (SI) up to which a file that claims the goal agrees: relative to the signal's size as in verdicts."""
+    """The distance (SI) up to which a file that claims the goal agrees; sizes are those of verdicts."""
     own = 0.0 if family(channel) == "energy" else signal_range(channel, target.values)
     size = size_of(own, target.sizes, target.uncertainty.value)
     return goal * size * (1.0 - 1e-12)
