@@ -16,7 +16,7 @@ from crosscheck.judging.against_reference import CLOCK, shared_times
 from crosscheck.judging.sizes import size_of
 from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare
-from crosscheck.library.case import Variant
+from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Scheduler
@@ -230,7 +230,7 @@ def _jumping(
         return {}
     try:
         found_at = at_jumps(suspects, asked.mine.times, lambda times: _rows(asked.target, times), t_end)
-    except ValueError:  # no route of the reference runs here: nothing is excused
+    except (CaseError, VerifyError):  # no route of the reference runs here: nothing is excused
         return {}
     return {channel: places for channel, places in found_at.items() if len(places)}
 

@@ -13,8 +13,11 @@ from flexmb.run.channels import distance
 from flexmb.typing import Real
 
 UNITS = {"milliseconds": 1e-3, "microseconds": 1e-6, "minutes": 60.0, "hours": 3600.0}  # in s
-ROUNDS = 4  # Newton's iterations for a shift
+ROUNDS = 8  # secants for a shift
+CONVERGING = 0.5  # of the remaining shift, at most, may be left after a secant
 LIKE_A_SHIFT = 0.5  # of the difference, in the root mean square, may remain after the best shift to first order
+DEGREES, ROUGH = (5, 3), 0.1  # of splines, whose derivatives are too rough where they differ by more than this part
+CLOSE = 1e-3  # of the smallest step: at this distance from a sample the reference is differentiated
 MOST = 0.1  # of the reference's duration: the largest shift
 FEWEST = 8  # samples that must remain where both have values
 
@@ -43,11 +46,13 @@ def find_shift(
     It starts from the channel whose difference is most like a shift, and takes the reference at shifted times as it is
     computed there. `reference_at` gives the channels (T,k) at times (s) between 0 and `t_end`.
     """
-    guesses = {channel: guess for channel, seen in differing.items() if (guess := _guess(seen)) is not None}
+    rates = _rates(differing, reference_at, t_end)
+    guesses = {channel: guess for channel, rate in rates.items() if (guess := _guess(differing[channel], rate))}
     if not guesses:
         return None
     leading = min(guesses, key=lambda channel: guesses[channel][1])
     late, seen = guesses[leading][0], differing[leading]
+    before: tuple[float, float] | None = None
     for _ in range(ROUNDS):
         inside = (seen.times - late >= 0.0) & (seen.times - late <= t_end)
         if abs(late) > MOST * t_end or np.sum(inside) < FEWEST:
@@ -58,40 +63,71 @@ def find_shift(
             return Shift(late, agreeing, float(np.median(np.diff(seen.times))))
         if leading not in there:
             return None
-        late += _further(seen, there[leading], inside)
+        left = _shift(seen.channel, seen.values[inside], there[leading], rates[leading][inside])
+        if before is not None and abs(left) > CONVERGING * abs(before[1]):
+            return None
+        slope = -1.0 if before is None else (left - before[1]) / (late - before[0])
+        before, late = (late, left), late - left / slope
     return None
 
 
-def _guess(seen: Evidence) -> tuple[float, float] | None:
+def _guess(seen: Evidence, rate: Real) -> tuple[float, float] | None:
     """The shift (s) to first order, and which part of the difference it leaves; None if it is not like a shift."""
-    if len(seen.times) < FEWEST or not seen.is_visible or not seen.varies:
-        return None
-    rate, apart = _rates(seen), _apart(seen.channel, seen.values, seen.reference)
-    late = -float(np.sum(rate * apart) / np.sum(rate * rate))
+    apart = _apart(seen.channel, seen.values, seen.reference)
+    late = _shift(seen.channel, seen.values, seen.reference, rate)
     left = float(np.linalg.norm(apart + late * rate) / np.linalg.norm(apart))
     return (late, left) if left <= LIKE_A_SHIFT else None
 
 
-def _further(seen: Evidence, there: Real, inside: np.ndarray) -> float:
-    """The further shift (s) that remains where the reference is `there`."""
-    rate = _rates(seen)[inside]
-    return -float(np.sum(rate * _apart(seen.channel, seen.values[inside], there)) / np.sum(rate * rate))
+def _shift(channel: str, values: Real, reference: Real, rate: Real) -> float:
+    """By how much (s) values are later than the reference, to first order."""
+    return -float(np.sum(rate * _apart(channel, values, reference)) / np.sum(rate * rate))
 
 
-def _rates(seen: Evidence) -> Real:
-    """The rate of change of the reference: good enough for Newton's iterations, whatever the samples."""
-    rows = seen.reference
-    if seen.channel.endswith(".orientation"):
-        jumps = np.sum(rows[1:] * rows[:-1], axis=1) < 0.0
-        rows = rows * np.cumprod(np.concatenate([[1.0], np.where(jumps, -1.0, 1.0)]))[:, None]
-    return np.asarray(make_interp_spline(seen.times, rows, k=5).derivative()(seen.times), float)
+def _rates(
+    differing: Mapping[str, Evidence], reference_at: Callable[[Real], Mapping[str, Real]], t_end: float
+) -> dict[str, Real]:
+    """The rates of change of the channels that move: by splines, or where these are too rough, by differences of the
+    reference close to each sample."""
+    found, rough = {}, {}
+    for channel, seen in differing.items():
+        if len(seen.times) < FEWEST or not (seen.is_visible and seen.varies):
+            continue
+        rows = _continuous(channel, seen.reference)
+        found[channel], other = (
+            np.asarray(make_interp_spline(seen.times, rows, k=degree).derivative()(seen.times), float)
+            for degree in DEGREES
+        )
+        if np.linalg.norm(found[channel] - other) > ROUGH * np.linalg.norm(other):
+            del found[channel]
+            rough[channel] = seen
+    vectors = [channel for channel in rough if not channel.endswith(".orientation")]  # quaternions may have any signs
+    if not vectors:
+        return found
+    times = rough[vectors[0]].times
+    step = CLOSE * float(np.min(np.diff(times)))
+    early, late = np.maximum(times - step, 0.0), np.minimum(times + step, t_end)
+    asked = np.union1d(early, late)
+    there = reference_at(asked)
+    before, behind = np.searchsorted(asked, early), np.searchsorted(asked, late)
+    for channel in vectors:
+        if channel in there:
+            found[channel] = (there[channel][behind] - there[channel][before]) / (late - early)[:, None]
+    return found
+
+
+def _continuous(channel: str, rows: Real) -> Real:
+    """The rows; quaternions with signs that do not jump."""
+    if not channel.endswith(".orientation"):
+        return rows
+    jumps = np.sum(rows[1:] * rows[:-1], axis=1) < 0.0
+    return rows * np.cumprod(np.concatenate([[1.0], np.where(jumps, -1.0, 1.0)]))[:, None]
 
 
 def _apart(channel: str, values: Real, reference: Real) -> Real:
     """The difference; of quaternions with the signs in which the reference is continuous."""
+    reference = _continuous(channel, reference)
     if channel.endswith(".orientation"):
-        jumps = np.sum(reference[1:] * reference[:-1], axis=1) < 0.0
-        reference = reference * np.cumprod(np.concatenate([[1.0], np.where(jumps, -1.0, 1.0)]))[:, None]
         values = values * np.where(np.sum(values * reference, axis=1) < 0.0, -1.0, 1.0)[:, None]
     return values - reference
 

@@ -11,7 +11,7 @@ A constant difference and a constant force that are perpendicular by symmetry sa
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -21,56 +21,100 @@ from flexmb.run.channels import norms
 from flexmb.typing import Real
 
 FEWEST = 8  # samples from which a point is found
+NODES = 8  # between two samples, for Gauss's formula
+HOPEFUL = 0.2  # part of a difference that may be left by an inaccurate integral
+EPS = 1e-14  # relative change up to which a momentum is constant
+MOMENTUM, LINEAR = "momentum.angular", "momentum.linear"
+MOMENTUM_ABOUT, TORQUE_ABOUT = "it is the angular momentum about", "it is the torque about"
 
 
 def about_other_points(seen: Evidence) -> Iterator[str]:
     """Causes that make the moment agree; none for channels that are no moments."""
     if len(seen.times) < FEWEST:
         return
-    if seen.channel == "momentum.angular":
+    if seen.channel == MOMENTUM:
         yield from _momenta(seen)
     elif seen.channel.endswith(".torque"):
         yield from _torques(seen)
 
 
 def _momenta(seen: Evidence) -> Iterator[str]:
-    p = seen.channels.get("momentum.linear")
+    p = seen.channels.get(LINEAR)
     if p is None or not _says_enough(seen, p):
         return
-    at_rest, declared = "it is the angular momentum about", "not about World's origin"
-    axes = np.broadcast_to(np.eye(3), (len(p), 3, 3))
-    point = _fitted(seen, p, axes)
+    point = _fitted(seen, p, np.broadcast_to(np.eye(3), (len(p), 3, 3)))
     if point is not None:
-        yield f"{at_rest} the point ({_numbers(point, seen)}) m, {declared}"
+        yield f"{MOMENTUM_ABOUT} another point than World's origin, such as ({_numbers(point)}) m"
     for marker, position in seen.markers("position").items():
         if _moves(position) and seen.agrees(seen.values + np.cross(position, p)):
-            yield f'{at_rest} the marker "{marker}", {declared}'
-    travelled = make_interp_spline(seen.times, p, k=5).antiderivative()(seen.times)
-    columns = np.concatenate([_crossed(axes, p), np.cross(travelled, p)[:, :, None]], axis=2)
-    found = _least_squares(columns, seen.reference - seen.values)
-    moved = np.linalg.norm(np.cross(travelled, p)) > 0.0
-    is_mass = found[3] > 0.0 or not moved or point is not None
-    if is_mass and seen.agrees(seen.values + columns @ found):
-        yield f"{at_rest} the mass centre, {declared}"
+            yield f'{MOMENTUM_ABOUT} the marker "{marker}", not about World\'s origin'
+
+
+def about_mass_centre(
+    seen: Evidence, mass: float | None, reference_at: Callable[[Real], Mapping[str, Real]]
+) -> str:
+    """The cause that an angular momentum is that about the mass centre, if it then agrees; else "".
+
+    The mass centre is at r + the integral of p / `mass` (kg), with a constant r that is found by least squares. The
+    linear momentum p is integrated by Gauss's formula, for which `reference_at` gives it between the samples, unless
+    an integral by a spline is already far from explaining the difference. Where the mass centre moves along p, no mass
+    is needed.
+    """
+    p = seen.channels.get(LINEAR)
+    if p is None or len(seen.times) < FEWEST or not _says_enough(seen, p):
+        return ""
+    wanted = seen.reference - seen.values
+    travelled = np.asarray(make_interp_spline(seen.times, p, k=5).antiderivative()(seen.times), float)
+    if np.max(np.ptp(p, axis=0)) <= EPS * np.max(np.abs(p)):
+        turning = np.zeros_like(p)
+    elif mass is None or not mass > 0.0:
+        return ""
+    else:
+        rough = np.cross(travelled, p) / mass
+        if np.linalg.norm(wanted - rough - _by_point(p, wanted - rough)) > HOPEFUL * np.linalg.norm(wanted):
+            return ""
+        integral = _integrated(seen.times, reference_at)
+        if integral is None:
+            return ""
+        turning = np.cross(integral, p) / mass
+    added = turning + _by_point(p, wanted - turning)
+    return f"{MOMENTUM_ABOUT} the mass centre, not about World's origin" if seen.agrees(seen.values + added) else ""
+
+
+def _by_point(p: Real, wanted: Real) -> Real:
+    """What a constant r adds to a moment, by least squares."""
+    columns = _crossed(np.broadcast_to(np.eye(3), (len(p), 3, 3)), p)
+    return np.asarray(columns @ _least_squares(columns, wanted), float)
+
+
+def _integrated(times: Real, reference_at: Callable[[Real], Mapping[str, Real]]) -> Real | None:
+    """The integral (T,3) of the linear momentum from the first time to each; None if it is not known in between."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    half = 0.5 * np.diff(times)
+    between = (times[:-1] + half)[:, None] + half[:, None] * nodes
+    there = reference_at(between.ravel())
+    if LINEAR not in there:
+        return None
+    p = there[LINEAR].reshape(len(half), NODES, 3)
+    return np.concatenate([np.zeros((1, 3)), np.cumsum(half[:, None] * np.einsum("n,tnk->tk", weights, p), axis=0)])
 
 
 def _torques(seen: Evidence) -> Iterator[str]:
     force = seen.channels.get(f"{seen.channel.removesuffix('.torque')}.force")
     if force is None or not _says_enough(seen, force):
         return
-    told = "it is the torque about"
     point = _fitted(seen, force, np.broadcast_to(np.eye(3), (len(force), 3, 3)))
     if point is not None:
-        yield f"{told} a point that is ({_numbers(point, seen)}) m from the hinge point in World axes"
+        yield f"{TORQUE_ABOUT} a point that is ({_numbers(point)}) m from the hinge point in World axes"
     for marker, quaternions in seen.markers("orientation").items():
         axes = np.stack([turned(quaternions, np.tile(unit, (len(force), 1))) for unit in np.eye(3)], axis=2)
         point = _fitted(seen, force, axes) if _moves(quaternions) else None
         if point is not None:
-            place = f'({_numbers(point, seen)}) m from the hinge point in the axes of "{marker}"'
-            yield f"{told} a point of the body that is {place}: its mass centre instead of the hinge point?"
+            place = f'({_numbers(point)}) m from the hinge point in the axes of "{marker}"'
+            yield f"{TORQUE_ABOUT} a point of the body, its mass centre perhaps, {place}"
     for marker, position in seen.markers("position").items():
         if _moves(position) and seen.agrees(seen.values - np.cross(position, force)):
-            yield f'{told} World\'s origin, not about the hinge point at "{marker}"'
+            yield f'{TORQUE_ABOUT} World\'s origin, not about the hinge point at "{marker}"'
 
 
 def _says_enough(seen: Evidence, force: Real) -> bool:
@@ -101,6 +145,6 @@ def _moves(rows: Real) -> bool:
     return bool(np.max(np.ptp(rows, axis=0)) > 0.0)
 
 
-def _numbers(point: Real, seen: Evidence) -> str:
+def _numbers(point: Real) -> str:
     """The coordinates, without the digits that are rounding."""
     return ", ".join(f"{np.round(x, 9) + 0.0:.6g}" for x in point)

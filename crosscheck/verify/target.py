@@ -26,6 +26,7 @@ from crosscheck.running.plan import jobs_at, plan, sample_times
 from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import run_planned
 from crosscheck.verify.columns import VerifyError
+from crosscheck.verify.mass import total_mass
 from flexmb.typing import Real
 
 
@@ -41,6 +42,10 @@ class Target(Protocol):
     @property
     def known(self) -> Sequence[str]:
         """The channels that it stores; empty if that shows only when it runs."""
+
+    @property
+    def mass(self) -> float | None:
+        """The mass (kg) of its scene; None if a body has it in a file."""
 
     def signals(self, times: Real) -> dict[str, Signal]:
         """Its channels at `times` (T,) s, rising, from 0 to the last of its own. ValueError if it cannot have them."""
@@ -68,6 +73,10 @@ class StoredTarget:
     def known(self) -> Sequence[str]:
         return tuple(self.stored.channels)
 
+    @property
+    def mass(self) -> float | None:
+        return total_mass(self.case.scene(self.case.run.variant(self.stored.knowledge.variant)))
+
     def signals(self, times: Real) -> dict[str, Signal]:
         places = shared_times(times, self.times)
         if places is None:
@@ -94,6 +103,10 @@ class EngineTarget:
     @property
     def times(self) -> Real:
         return sample_times(self.case.run, self.variant)
+
+    @property
+    def mass(self) -> float | None:
+        return total_mass(self.case.scene(self.variant))
 
     def signals(self, times: Real) -> dict[str, Signal]:
         begun = times if times[0] <= CLOCK * times[-1] else np.concatenate([[0.0], times])
