@@ -1,4 +1,4 @@
-"""The stored reference of a case at other times than those it holds: its routes are run again, at these times too.
+"""The stored reference of a case at other times than those it holds: its engines run again, at these times too.
 
 Samples of a motion do not say what happens between them, and an interpolation is as accurate as it happens to be: with
 the usual samples it is off by 1e-7 to 1e-2 of the range, where goals are 1e-6. Therefore the values at other times are
@@ -19,12 +19,11 @@ from crosscheck.judging.uncertainty import Uncertainty
 from crosscheck.judging.verdict import Signal
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import Case
-from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
+from crosscheck.library.recipe import ReferenceRecipe
 from crosscheck.library.reference import StoredReference
 from crosscheck.references.routes import RouteSignals, run_routes
 from crosscheck.running.scheduler import BY_DEFAULT, Scheduler
 from flexmb.run.channels import distance
-from flexmb.scene.user_code import user_code_is_forbidden
 from flexmb.typing import Real
 
 
@@ -33,10 +32,10 @@ def reference_at(
 ) -> dict[str, Signal]:
     """The channels of a case's stored reference at `times` (T,) s, rising, between its first and its last.
 
-    A channel is taken from the first route of the recipe that offers it and that can be had here: closed forms unless
-    user code is forbidden, and the first engine that finishes. Its U is the largest of what the reference states, of
-    the route's own, and of its distance from the stored numbers. It is infinite if the route does not reproduce these
-    within both uncertainties. CaseError if no route can be had.
+    A channel is taken from the first engine of the recipe that offers it and that finishes; closed forms, which are
+    code of the case's folder, are left to `crosscheck regenerate`. Its U is the largest of what the reference states,
+    of the engine's own, and of its distance from the stored numbers. It is infinite if the engine does not reproduce
+    these within both uncertainties. Channels that no engine offers at these times are left out. CaseError if none runs.
     """
     recipe = case.run.reference
     assert recipe is not None
@@ -70,33 +69,26 @@ def _nearest(times: Real, wanted: Real) -> np.ndarray:
 def _routes(
     case: Case, recipe: ReferenceRecipe, stored: StoredReference, times: Real, provider: str, scheduler: Scheduler
 ) -> Iterator[RouteSignals]:
-    """Closed forms, and the first engine that finishes if they do not offer all channels; in the recipe's order."""
-
-    def run(route: ReferenceRoute) -> RouteSignals:
+    """The routes that are engines and finish, in the recipe's order, until every stored channel is offered."""
+    lacking, found, faults = set(stored.channels), 0, []
+    for route in recipe.routes:
+        if not (route.engine and lacking):
+            continue
         alone = msgspec.structs.replace(recipe, routes=(route,))
-        (signals,) = run_routes(case, alone, times, provider, BY_DEFAULT, scheduler, lambda jobs, event: None)
-        return signals
-
-    found: dict[int, RouteSignals] = {}
-    for place, route in enumerate(recipe.routes):
-        if route.exact and not user_code_is_forbidden():
-            found[place] = run(route)
-    lacking = set(stored.channels) - {name for route in found.values() for name in route.channels}
-    faults = []
-    for place, route in enumerate(recipe.routes):
-        if route.engine and lacking:
-            try:
-                found[place] = run(route)
-                break
-            except CaseError as error:  # missing here, or stopped: another route may do
-                faults.append(str(error))
-    else:
-        if lacking:
-            raise CaseError(
-                f"{case.name}: its reference is stored at {len(stored.times)} times, and cannot be had at others, as "
-                f"no route of it runs here ({'; '.join(faults)}): write your results at the times of --template"
-            )
-    yield from (found[place] for place in sorted(found))
+        try:
+            (signals,) = run_routes(case, alone, times, provider, BY_DEFAULT, scheduler, lambda jobs, event: None)
+        except CaseError as error:  # missing here, or stopped: another route may do
+            faults.append(str(error))
+            continue
+        found += 1
+        lacking -= set(signals.channels)
+        yield signals
+    if not found:
+        raise CaseError(
+            f"{case.name}: its reference is stored at {len(stored.times)} times, and cannot be had at others, as no "
+            f"engine of it runs here ({'; '.join(faults) or 'it has none'}): write your results at the times of "
+            "--template"
+        )
 
 
 def _channel(

@@ -61,8 +61,8 @@ def verify_csv(
 ) -> CsvOutcome:
     """Verdicts on every channel of a CSV against the stored reference of a case.
 
-    No engine runs if the CSV has the reference's times or some of them. At other times the reference is computed by its
-    routes, in runs that reproduce what is stored. An `engine`, or a `variant` of which there is no stored reference, is
+    No engine runs if the CSV has the reference's times or some of them. At other times the reference is computed by
+    an engine of its recipe, in runs that reproduce what is stored. An `engine`, or a `variant` of which there is no stored reference, is
     run instead (by default "native" on the first variant). The CSV's own U is 3 x its distance from the `coarse` CSV at
     the times that both have; without one it is taken to claim just the case's goal. Of a complete trajectory.csv or
     reference.csv the channels are compared that have a goal and that the reference contains. Where a channel differs,
@@ -178,7 +178,7 @@ def _finding(
 ) -> Finding:
     """The finding on a channel, which the file calls `name`; of the samples `kept` alone, if only they count."""
     if channel not in signals and channel in asked.target.known:
-        return Finding("unresolved", "no route of the reference gives this channel at your times: take the template's")
+        return Finding("unresolved", "no engine of the reference gives this channel at your times: take the template's")
     if channel not in signals:
         return Finding("did not run", f"the reference has no channel {channel}: check the name")
     if goal is None:
@@ -230,7 +230,7 @@ def _jumping(
         return {}
     try:
         found_at = at_jumps(suspects, asked.mine.times, lambda times: _rows(asked.target, times), t_end)
-    except (CaseError, VerifyError):  # no route of the reference runs here: nothing is excused
+    except (CaseError, VerifyError):  # no engine of the reference runs here: nothing is excused
         return {}
     return {channel: places for channel, places in found_at.items() if len(places)}
 
@@ -293,7 +293,7 @@ def _own_times(whole: Columns, mine: Columns, target: Target) -> str:
         return f"{len(mine.times)} samples, at some of the reference's {len(target.times)} times"
     return (
         f"{len(mine.times)} samples at times of its own; nothing was interpolated: the reference was computed at these "
-        "times, by the routes that reproduce what is stored"
+        "times, by an engine that reproduces what is stored"
         if target.known
         else f"{len(mine.times)} samples at times of its own, at which {target.engine} ran"
     )

@@ -24,7 +24,7 @@ def diagnose(differing: Mapping[str, Evidence], target: Target) -> dict[str, tup
     def reference_at(times: Real) -> dict[str, Real]:
         return {name: signal.values for name, signal in target.signals(times).items()}
 
-    with suppress(CaseError, VerifyError):  # no route of the reference runs here: causes that need one stay unknown
+    with suppress(CaseError, VerifyError):  # no engine of the reference runs here: causes that need one stay unknown
         found |= _by_runs(differing, found, target, reference_at)
     return found
 

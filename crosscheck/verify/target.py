@@ -53,7 +53,7 @@ class Target(Protocol):
 
 @dataclass(frozen=True)
 class StoredTarget:
-    """The stored reference: nothing runs for times that it holds, its routes run again for others."""
+    """The stored reference: nothing runs for times that it holds, an engine of its recipe for others."""
 
     case: Case
     stored: StoredReference
