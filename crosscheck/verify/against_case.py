@@ -61,12 +61,12 @@ def verify_csv(
 ) -> CsvOutcome:
     """Verdicts on every channel of a CSV against the stored reference of a case.
 
-    No engine runs if the CSV has the reference's times or some of them. At other times the reference is computed by
-    an engine of its recipe, in runs that reproduce what is stored. An `engine`, or a `variant` of which there is no stored reference, is
-    run instead (by default "native" on the first variant). The CSV's own U is 3 x its distance from the `coarse` CSV at
-    the times that both have; without one it is taken to claim just the case's goal. Of a complete trajectory.csv or
-    reference.csv the channels are compared that have a goal and that the reference contains. Where a channel differs,
-    the engine may run again, to find out whether a jump or shifted times explain it.
+    No engine runs if the CSV has the reference's times or some of them. At other times the reference is computed by an
+    engine of its recipe, in runs that reproduce what is stored. An `engine`, or a `variant` of which there is no stored
+    reference, is run instead (by default "native" on the first variant). The CSV's own U is 3 x its distance from the
+    `coarse` CSV at the times that both have; without one it is taken to claim just the case's goal. Of a complete
+    trajectory.csv or reference.csv the channels are compared that have a goal and that the reference contains. Where a
+    channel differs, the engine may run again, to find out whether a jump or shifted times explain it.
     """
     chosen = chosen_variant(case, variant, stored=engine is None)
     target = target_of(case, chosen, engine, provider, scheduler)
@@ -196,9 +196,7 @@ def _finding(
 
 
 def _claimed(channel: str, target: Signal, goal: float) -> Uncertainty:
-    """The U that together with the reference's just meets the goal (within rounding).
-
-    """
+    """The U that together with the reference's just meets the goal (within rounding)."""
     value = max(_allowed(channel, target, goal) - target.uncertainty.value, 0.0)
     return Uncertainty(np.full(len(target.values), value), value, "claimed: the case's goal")
 

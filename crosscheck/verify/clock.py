@@ -24,7 +24,10 @@ FEWEST = 8  # samples that must remain where both have values
 
 @dataclass(frozen=True)
 class Shift:
-    """The values belong to times that are `late_s` (s) earlier: all of `channels` agree with the reference there."""
+    """The values belong to times that are `late_s` (s) earlier: all of `channels` agree with the reference there.
+
+    `step_s` (s) is the usual distance of two samples.
+    """
 
     late_s: float
     channels: tuple[str, ...]
@@ -41,10 +44,11 @@ class Shift:
 def find_shift(
     differing: Mapping[str, Evidence], reference_at: Callable[[Real], Mapping[str, Real]], t_end: float
 ) -> Shift | None:
-    """The shift of all times with which at least one moving channel agrees; None if there is none.
+    """The shift of all times with which most channels that move agree; None if there is none.
 
-    It starts from the channel whose difference is most like a shift, and takes the reference at shifted times as it is
-    computed there. `reference_at` gives the channels (T,k) at times (s) between 0 and `t_end`.
+    A single channel may agree by chance, while a clock concerns all of them. The search starts from the channel whose
+    difference is most like a shift, and takes the reference at shifted times as it is computed there. `reference_at`
+    gives the channels (T,k) at times (s) between 0 and `t_end`.
     """
     rates = _rates(differing, reference_at, t_end)
     guesses = {channel: guess for channel, rate in rates.items() if (guess := _guess(differing[channel], rate))}
@@ -59,7 +63,7 @@ def find_shift(
             return None
         there = reference_at(seen.times[inside] - late)
         agreeing = tuple(name for name, each in differing.items() if _agrees(each, there, inside))
-        if agreeing:
+        if len(agreeing) > 0.5 * sum(each.is_visible and each.varies for each in differing.values()):
             return Shift(late, agreeing, float(np.median(np.diff(seen.times))))
         if leading not in there:
             return None

@@ -50,9 +50,7 @@ def _momenta(seen: Evidence) -> Iterator[str]:
             yield f'{MOMENTUM_ABOUT} the marker "{marker}", not about World\'s origin'
 
 
-def about_mass_centre(
-    seen: Evidence, mass: float | None, reference_at: Callable[[Real], Mapping[str, Real]]
-) -> str:
+def about_mass_centre(seen: Evidence, mass: float | None, reference_at: Callable[[Real], Mapping[str, Real]]) -> str:
     """The cause that an angular momentum is that about the mass centre, if it then agrees; else "".
 
     The mass centre is at r + the integral of p / `mass` (kg), with a constant r that is found by least squares. The

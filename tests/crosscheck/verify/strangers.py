@@ -69,10 +69,8 @@ class Stranger:
         return written(file, times, self.solution(times, self.heavier))
 
     def too_late(self, file: Path, times: Real) -> Path:
-        """Right values with a clock that is late."""
-        late = self.late * self.stored.times[-1]
-        told = times[times >= late]
-        return written(file, told, self.solution(told - late))
+        """Right values with a clock that is late, which stands still until then."""
+        return written(file, times, self.solution(np.maximum(times - self.late * self.stored.times[-1], 0.0)))
 
 
 def written(file: Path, times: Real, channels: dict[str, Real]) -> Path:
@@ -86,10 +84,10 @@ def _uniform(random: np.random.Generator, stored: Real) -> Real:
 
 
 def _random(random: np.random.Generator, stored: Real) -> Real:
-    """Any times; even without the first they begin within their largest step, and end so."""
+    """Any times; they begin within their largest step, and end so."""
     while True:
         times = np.unique(random.uniform(0.0, stored[-1], int(random.integers(12, 300))))
-        if max(times[1], stored[-1] - times[-1]) <= np.max(np.diff(times[1:])):
+        if max(times[0], stored[-1] - times[-1]) <= np.max(np.diff(times)):
             return times
 
 
