@@ -275,7 +275,7 @@ def _told(finding: Finding, detail: Detail | None) -> Finding:
     """The finding with its details in words."""
     if detail is None:
         return finding
-    cause = f"; {detail.cause}?" if detail.cause else ""
+    cause = f"; {detail.cause.removesuffix('?')}?" if detail.cause else ""
     left = ""
     if detail.left_out:
         first, more = f"t = {detail.left_out[0]:.6g} s", len(detail.left_out) - 1

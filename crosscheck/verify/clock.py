@@ -14,6 +14,7 @@ from flexmb.typing import Real
 
 UNITS = {"milliseconds": 1e-3, "microseconds": 1e-6, "minutes": 60.0, "hours": 3600.0}  # in s
 ROUNDS = 8  # secants for a shift
+FOUND = 1e-15  # of the duration: a smaller further shift is rounding
 CONVERGING = 0.5  # of the remaining shift, at most, may be left after a secant
 LIKE_A_SHIFT = 0.5  # of the difference, in the root mean square, may remain after the best shift to first order
 DEGREES, ROUGH = (5, 3), 0.1  # of splines, whose derivatives are too rough where they differ by more than this part
@@ -68,8 +69,9 @@ def find_shift(
         if leading not in there:
             return None
         left = _shift(seen.channel, seen.values[inside], there[leading], rates[leading][inside])
-        if before is not None and abs(left) > CONVERGING * abs(before[1]):
-            return None
+        is_stuck = before is not None and not abs(left) <= CONVERGING * abs(before[1])
+        if is_stuck or abs(left) <= FOUND * t_end:
+            return None  # the best shift is found, and does not explain the difference
         slope = -1.0 if before is None else (left - before[1]) / (late - before[0])
         before, late = (late, left), late - left / slope
     return None
@@ -85,7 +87,8 @@ def _guess(seen: Evidence, rate: Real) -> tuple[float, float] | None:
 
 def _shift(channel: str, values: Real, reference: Real, rate: Real) -> float:
     """By how much (s) values are later than the reference, to first order."""
-    return -float(np.sum(rate * _apart(channel, values, reference)) / np.sum(rate * rate))
+    whole = float(np.sum(rate * rate))
+    return -float(np.sum(rate * _apart(channel, values, reference))) / whole if whole > 0.0 else 0.0
 
 
 def _rates(

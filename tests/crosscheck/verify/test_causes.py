@@ -17,8 +17,11 @@ from crosscheck.verify.against_case import CsvOutcome, verify_csv
 from crosscheck.verify.clock import find_shift
 from crosscheck.verify.columns import VerifyError
 from crosscheck.verify.evidence import Evidence, turned
+from crosscheck.verify.mass import total_mass
 from crosscheck.verify.outcome import outcome_json
 from crosscheck.verify.points import about_mass_centre, about_other_points
+from flexmb.scene.bodies import BeamBody, BeamStation, Modes, SidBody
+from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 from tests.crosscheck.sessions import here
 from tests.crosscheck.verify.strangers import Stranger, written
@@ -255,6 +258,42 @@ def test_a_shift_by_part_of_a_sample_is_found_exactly(late: float) -> None:
     assert find_shift({"marker:m.velocity": wrong}, path, 10.0) is None
 
 
+def test_a_shift_that_most_channels_do_not_share_is_none() -> None:
+    """One of three channels is late: a clock would concern all of them."""
+    times = np.linspace(0.0, 10.0, 101)
+
+    def path(when: Real) -> Channels:
+        return {f"marker:{name}.velocity": np.sin(when)[:, None] * np.eye(3)[i] for i, name in enumerate("abc")}
+
+    def seen(name: str, values: Channels) -> Evidence:
+        return Evidence(name, values[name], times, path(times), 1e-9)
+
+    late, right = path(times - 0.03), path(times)
+    heavy = {name: 1.001 * rows for name, rows in right.items()}
+    differing = {name: seen(name, late if name == "marker:a.velocity" else heavy) for name in right}
+    assert find_shift(differing, path, 10.0) is None
+    shared = {name: seen(name, late) for name in right}
+    found = find_shift(shared, path, 10.0)
+    assert found is not None
+    assert found.channels == tuple(right)
+
+
+@pytest.mark.parametrize("size", [1e-13, 1e-6, 1.0])
+def test_values_that_are_best_without_a_shift_have_none(size: float) -> None:
+    """The search ends where it finds that the best shift is none, also when that is so at once."""
+    times = np.linspace(0.0, 2.0 * np.pi, 41)
+
+    def path(when: Real) -> Channels:
+        return {"marker:m.velocity": np.column_stack([np.sin(when), np.cos(when), 0.0 * when])}
+
+    def found(values: Real) -> object:
+        seen = Evidence("marker:m.velocity", values, times, path(times), 1e-14)
+        return find_shift({"marker:m.velocity": seen}, path, float(times[-1]))
+
+    assert found(path(times)["marker:m.velocity"] + size * np.array([0.0, 0.0, 1.0])) is None
+    assert found(path(times - 0.01)["marker:m.velocity"] + size * np.array([0.0, 0.0, 1.0])) is None
+
+
 # What is not in the file
 
 
@@ -275,3 +314,27 @@ def test_channels_that_a_file_lacks_are_listed(tmp_path: Path) -> None:
     whole = tmp_path / "whole.csv"
     whole.write_text(values_text(times, channels), encoding="utf-8")
     assert not verdicts("tops/free_body", whole).not_given
+
+
+# The mass
+
+
+@pytest.mark.parametrize(("name", "kg"), [
+    ("wheel_gyrostat/torque_free", 120.0 + 3 * 4.0),  # a hub and wheels
+    ("free_flying/flexible_beam", 4.0 * 0.8 + 6.0),  # a uniform beam and a lump
+    ("pendulums/double", 1.0 + 1.0),
+])  # fmt: skip
+def test_the_mass_of_a_scene_is_that_of_all_its_parts(name: str, kg: float) -> None:
+    case = load_case(shipped_folder() / name)
+    assert total_mass(case.scene(case.run.variants[0])) == pytest.approx(kg, rel=1e-14)
+
+
+def test_the_mass_of_a_tapered_beam_and_of_a_file() -> None:
+    stations = [
+        BeamStation(x_m=x, EA_N=1e6, EIy_Nm2=1e3, EIz_Nm2=1e3, GJ_Nm2=1e3, mass_per_length_kg_m=density)
+        for x, density in ((0.0, 2.0), (1.0, 2.0), (3.0, 4.0))
+    ]
+    tapered = BeamBody(name="beam", length_m=3.0, elements=4, stations=tuple(stations), modes=Modes(count=2))
+    assert total_mass(Scene(name="tapered", bodies=(tapered,), hinges=())) == pytest.approx(2.0 + 6.0, rel=1e-14)
+    from_file = SidBody(name="panel", file="panel.sid")
+    assert total_mass(Scene(name="file", bodies=(tapered, from_file), hinges=())) is None
