@@ -1,15 +1,24 @@
 """Moving frames with their Jacobians, and the field of displacement of a flexible body."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .rotations import cross, skew
 
 
+@dataclass
 class JacobianFrame:
     """A moving frame: rotation R, position r, velocities w, v = W u, V u, accelerations alpha, a for udot = 0."""
 
-    def __init__(self, R, r, W, V, w, v, alpha, a):
-        self.R, self.r, self.W, self.V, self.w, self.v, self.alpha, self.a = R, r, W, V, w, v, alpha, a
+    R: np.ndarray
+    r: np.ndarray
+    W: np.ndarray
+    V: np.ndarray
+    w: np.ndarray
+    v: np.ndarray
+    alpha: np.ndarray
+    a: np.ndarray
 
     def at(self, offset, rotation):
         """A frame fixed to this one, `offset` and `rotation` in its axes."""
