@@ -80,7 +80,7 @@ def equal(what: str, found: Any, expected: Any, scale: float = 1.0) -> None:
     value = np.asarray(found, dtype=float)
     allowed = POINTWISE * np.maximum(np.abs(right), scale)
     good = value.shape == right.shape and bool(np.all(np.abs(value - right) <= allowed))  # False with any NaN
-    expected_digits, found_digits = told_apart(right, value)
+    expected_digits, found_digits = told_apart(right, value, allowed)
     require(good, f"{what} must be {expected_digits} and is {found_digits}")
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from flexmb.scene.build import SceneBuilder
+from flexmb.scene.build import SceneBuilder, angular
 from flexmb.scene.collecting import make
 from flexmb.scene.functions import Constant, Sine
 from flexmb.scene.modal_data import inertia_points
@@ -79,17 +79,33 @@ def out_of_order() -> Scene:
     )  # fmt: skip
 
 
-def loaded() -> Scene:
-    """A force in World axes on the inner body, one in node axes on the last, a torque on the first."""
-    wave = Sine(amplitude=2.0, angular_frequency_rad_s=3.0, phase_rad=0.9)
+def driven(tree: SceneBuilder) -> Scene:
+    """A chain with its second hinge prescribed, beside a spring."""
+    wave = Sine(amplitude=0.5, angular_frequency_rad_s=3.0, phase_rad=0.8)
+    moved, scene = angular(prescribed=wave, stiffness=2.0), tree.scene()
+    hinges = [replace(each, rotation=moved) if each.name == "to middle" else each for each in scene.hinges]
+    return replace(scene, hinges=tuple(hinges))
+
+
+def loaded(tree: SceneBuilder) -> SceneBuilder:
+    """A force in World axes on the inner body, one in node axes on the last, torques on the first and the inner one."""
+    wave = Sine(amplitude=5.0, angular_frequency_rad_s=4.0, phase_rad=0.9)
     return (
-        chain()
-        .force("push", "middle", node="port", direction=(0.0, 0.6, 0.8), function=Constant(value=5.0))
+        tree.force("push", "middle", node="port", direction=(0.0, 0.6, 0.8), function=Constant(value=5.0))
         .force("jet", "end", node="port", direction=(0.6, 0.8, 0.0), function=wave, frame="node")
         .torque("turn", "base", node="port", direction=(1.0, 0.0, 0.0), function=Constant(value=-3.0))
         .torque("twist", "middle", direction=(0.0, 1.0, 0.0), function=Constant(value=1.7), frame="node")
-        .scene()
     )
+
+
+def working() -> Scene:
+    """All that does work: loads at nodes, a prescribed hinge beside a spring, a motor, a damper."""
+    turn = Sine(amplitude=3.0, angular_frequency_rad_s=4.0, phase_rad=0.3)
+    own: dict[str, Any] = {"stiffness": 6.0, "damping": 0.4, "rest": 0.3, "torque": turn}
+    last = chain(last=False).revolute(
+        "to end", "middle", "end", axis=AXES[2], angle=1.1, rate=2.5, **own, **placed("end", "middle")
+    )
+    return driven(loaded(last))
 
 
 def bending() -> SceneBuilder:

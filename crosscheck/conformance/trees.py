@@ -10,21 +10,29 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from msgspec.structs import replace
 
 from crosscheck.conformance.clause import Chapter, acceleration, equal, finest_two, given, hold_at_samples, snapshot
 from crosscheck.conformance.tree_mechanics import Answer, TreeMechanics
-from crosscheck.conformance.tree_scenes import AXES, bending, body, branched, chain, loaded, out_of_order, placed
+from crosscheck.conformance.tree_scenes import (
+    AXES,
+    bending,
+    body,
+    branched,
+    chain,
+    driven,
+    loaded,
+    out_of_order,
+    placed,
+    working,
+)
 from crosscheck.engines.contract import Engine, Snapshot
 from crosscheck.engines.conventions import quaternion_of
-from flexmb.scene.build import angular
-from flexmb.scene.functions import Constant, Sine
+from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 TREES = Chapter(physical=True)
 TIMES = np.linspace(0.0, 0.5, 11)
-_PRESCRIBED = angular(prescribed=Sine(amplitude=0.5, angular_frequency_rad_s=3.0, phase_rad=0.8), stiffness=2.0)
 WHEEL: dict[str, Any] = {
     "axis": (0.6, 0.0, 0.8), "mass": 0.8, "axial_inertia": 0.05, "transverse_inertia": 0.03, "speed": 60.0,
     "offset": (0.1, -0.2, 0.3),
@@ -71,7 +79,7 @@ def loads_pass_through_a_chain(engine: Engine) -> None:
 
 @TREES.clause("Loads at nodes of inner bodies act on these bodies, and pass on through the hinges.")
 def loads_at_nodes_act_in_a_chain(engine: Engine) -> None:
-    found, right = _both(engine, loaded())
+    found, right = _both(engine, loaded(chain()).scene())
     _accelerations(found, right)
     _loads(found, right)
 
@@ -130,7 +138,7 @@ def an_inner_free_hinge_is_relative_to_its_parent(engine: Engine) -> None:
 
 @TREES.clause("A prescribed inner hinge reports the drive load that all outboard of it needs.")
 def an_inner_drive_moves_all_outboard(engine: Engine) -> None:
-    found, right = _both(engine, _driven())
+    found, right = _both(engine, driven(chain()))
     _velocities(found, right)
     equal("the drive load of to middle", given("drive loads", found.drives.get("to middle")), right.drives["to middle"])
     _accelerations(found, right)
@@ -209,6 +217,23 @@ def outputs_of_a_tree_hold_at_every_sample(engine: Engine) -> None:
         hold_at_samples("the momentum (Nms, Ns)", found, momentum, TIMES)
 
 
+@TREES.clause("Loads, motors and prescribed hinges that change with time move a tree as they are at each time.")
+def what_changes_with_time_moves_a_tree(engine: Engine) -> None:
+    rough, fine = finest_two(engine, working(), TIMES)
+    for name in fine.markers:
+        place = np.array([each.markers[name].position for each in _working()])
+        paths = (run.markers[name].position for run in (rough, fine))
+        hold_at_samples(f"the position (m) of marker {name}", paths, place, TIMES)
+
+
+@TREES.clause("`work` is that of all drives, motors, dampers and loads at nodes of a tree, and of nothing else.")
+def work_is_what_the_energy_of_a_tree_gains(engine: Engine) -> None:
+    runs = finest_two(engine, working(), TIMES)
+    works = [np.asarray(given("the work", run.work)) for run in runs]
+    energy = np.array([[sum(each.energy.values())] for each in _working()])
+    hold_at_samples("the work (J)", ((work - work[0])[:, None] for work in works), energy - energy[0], TIMES)
+
+
 @TREES.clause("What hangs on a flexible body rides on its deformed node, shifted and turned by all modes.")
 def a_child_rides_on_the_deformed_node(engine: Engine) -> None:
     found, right = _both(engine, bending().scene())
@@ -278,16 +303,14 @@ def _sliding() -> Scene:
     return tree.revolute("to twig", "end", "twig", axis=AXES[0], angle=0.6, rate=0.8, **placed("twig", "end")).scene()
 
 
-def _driven() -> Scene:
-    """The chain with its second hinge prescribed."""
-    scene = chain().scene()
-    hinges = [replace(each, rotation=_PRESCRIBED) if each.name == "to middle" else each for each in scene.hinges]
-    return replace(scene, hinges=tuple(hinges))
-
-
 @cache
 def _swing() -> list[Answer]:
     return TreeMechanics(branched().scene()).at(TIMES)
+
+
+@cache
+def _working() -> list[Answer]:
+    return TreeMechanics(working()).at(TIMES)
 
 
 @cache
