@@ -1,7 +1,7 @@
-"""What outsiders got wrong in adapters: `mutants.toml`, changes of the text of `small_adapter.py`, and scenes misread.
+"""What outsiders got wrong in adapters: changes of the text of `small_adapter.py`, and scenes that are misread.
 
-Scenes with flexible bodies are changed before flexmb sees them. `EQUIVALENT` has the changes that change no answer, with
-the reason.
+The changes of text are in `mutants.toml`. Scenes with flexible bodies are changed before flexmb sees them. `EQUIVALENT`
+has the changes that change no answer, with the reason.
 """
 
 from __future__ import annotations
