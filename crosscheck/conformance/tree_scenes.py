@@ -98,14 +98,18 @@ def loaded(tree: SceneBuilder) -> SceneBuilder:
     )
 
 
-def working() -> Scene:
-    """All that does work: loads at nodes, a prescribed hinge beside a spring, a motor, a damper."""
+def sprung() -> SceneBuilder:
+    """The chain with a spring, a damper and a motor that changes with time at its last hinge."""
     turn = Sine(amplitude=3.0, angular_frequency_rad_s=4.0, phase_rad=0.3)
     own: dict[str, Any] = {"stiffness": 6.0, "damping": 0.4, "rest": 0.3, "torque": turn}
-    last = chain(last=False).revolute(
+    return chain(last=False).revolute(
         "to end", "middle", "end", axis=AXES[2], angle=1.1, rate=2.5, **own, **placed("end", "middle")
     )
-    return driven(loaded(last))
+
+
+def working() -> Scene:
+    """All that does work: loads at nodes and a prescribed hinge beside a spring, a damper and a motor."""
+    return driven(loaded(sprung()))
 
 
 def bending() -> SceneBuilder:

@@ -23,9 +23,10 @@ from crosscheck.conformance.tree_scenes import (
     loaded,
     out_of_order,
     placed,
+    sprung,
     working,
 )
-from crosscheck.engines.contract import Engine, Snapshot
+from crosscheck.engines.contract import Engine, Snapshot, Trajectory
 from crosscheck.engines.conventions import quaternion_of
 from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Scene
@@ -86,11 +87,7 @@ def loads_at_nodes_act_in_a_chain(engine: Engine) -> None:
 
 @TREES.clause("Springs, dampers and motors of inner hinges act on both bodies, and are part of the hinge's load.")
 def inner_motors_react_on_their_parent(engine: Engine) -> None:
-    own: dict[str, Any] = {"stiffness": 6.0, "damping": 0.4, "rest": 0.3, "torque": Constant(value=2.5)}
-    tree = chain(last=False).revolute(
-        "to end", "middle", "end", axis=AXES[2], angle=1.1, rate=2.5, **own, **placed("end", "middle")
-    )
-    found, right = _both(engine, tree.scene())
+    found, right = _both(engine, sprung().scene())
     _accelerations(found, right)
     equal("the spring energy", given("the spring energy", found.energy.get("spring")), right.energy["spring"])
     _loads(found, right)
@@ -217,13 +214,14 @@ def outputs_of_a_tree_hold_at_every_sample(engine: Engine) -> None:
         hold_at_samples("the momentum (Nms, Ns)", found, momentum, TIMES)
 
 
-@TREES.clause("Loads, motors and prescribed hinges that change with time move a tree as they are at each time.")
+@TREES.clause("Springs, dampers and motors move a tree as they are at each time.")
+def springs_and_motors_move_a_tree(engine: Engine) -> None:
+    _moves(finest_two(engine, sprung().scene(), TIMES), _sprung())
+
+
+@TREES.clause("Loads and prescribed hinges move a tree as they are at each time.")
 def what_changes_with_time_moves_a_tree(engine: Engine) -> None:
-    rough, fine = finest_two(engine, working(), TIMES)
-    for name in fine.markers:
-        place = np.array([each.markers[name].position for each in _working()])
-        paths = (run.markers[name].position for run in (rough, fine))
-        hold_at_samples(f"the position (m) of marker {name}", paths, place, TIMES)
+    _moves(finest_two(engine, working(), TIMES), _working())
 
 
 @TREES.clause("`work` is that of all drives, motors, dampers and loads at nodes of a tree, and of nothing else.")
@@ -255,11 +253,7 @@ def a_flexible_inner_body_is_loaded_by_its_child(engine: Engine) -> None:
 
 @TREES.clause("A tree with a flexible inner body moves as its equations of motion say, at every sample of a run.")
 def a_tree_with_a_flexible_body_swings(engine: Engine) -> None:
-    rough, fine = finest_two(engine, bending().scene(), TIMES)
-    for name in fine.markers:
-        place = np.array([each.markers[name].position for each in _vibrating()])
-        paths = (run.markers[name].position for run in (rough, fine))
-        hold_at_samples(f"the position (m) of marker {name}", paths, place, TIMES)
+    _moves(finest_two(engine, bending().scene(), TIMES), _vibrating())
 
 
 def _both(engine: Engine, scene: Scene) -> tuple[Snapshot, Answer]:
@@ -291,6 +285,14 @@ def _loads(found: Snapshot, right: Answer) -> None:
         _equal(f"the load [torque; force] across {name}", found.loads[name], right.loads[name])
 
 
+def _moves(runs: tuple[Trajectory, Trajectory], right: list[Answer]) -> None:
+    """The positions of all markers at every sample of the last two runs."""
+    for name in runs[-1].markers:
+        place = np.array([each.markers[name].position for each in right])
+        paths = (run.markers[name].position for run in runs)
+        hold_at_samples(f"the position (m) of marker {name}", paths, place, TIMES)
+
+
 def _equal(what: str, found: Any, expected: Real) -> None:
     """Within POINTWISE of the largest component: in a tree all of them come from one solve."""
     equal(what, found, expected, max(1.0, float(np.abs(expected).max())))
@@ -306,6 +308,11 @@ def _sliding() -> Scene:
 @cache
 def _swing() -> list[Answer]:
     return TreeMechanics(branched().scene()).at(TIMES)
+
+
+@cache
+def _sprung() -> list[Answer]:
+    return TreeMechanics(sprung().scene()).at(TIMES)
 
 
 @cache

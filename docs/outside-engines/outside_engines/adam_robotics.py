@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from outside_engines.robot import Robot, beyond, joint_name, link_name
 
 from crosscheck.engines.contract import Effort, EngineMissing, MarkerSnapshot, Run, Snapshot, Support, Trajectory
 from crosscheck.engines.conventions import angular_first, cross, quaternion_of
@@ -18,6 +17,7 @@ from crosscheck.engines.links import Attachment, Scalar, links
 from crosscheck.engines.scipy_loop import RTOL_LADDER, integrate
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
+from outside_engines.robot import Robot, beyond, joint_name, link_name
 
 STANDS = np.eye(4)  # the pose of the base
 

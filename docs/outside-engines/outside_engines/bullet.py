@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from outside_engines.robot import Robot, beyond
 
 from crosscheck.engines.contract import Effort, EngineMissing, MarkerSnapshot, Run, Snapshot, Support, Trajectory
 from crosscheck.engines.conventions import cross, quaternion_of, rotation_matrix, scalar_first
@@ -23,6 +22,7 @@ from crosscheck.engines.pace import pace
 from crosscheck.engines.steps import USUAL_S, ladder
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
+from outside_engines.robot import Robot, beyond
 
 METHOD, RUNGS = "semi-implicit Euler", 4
 NO_DAMPING = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0, "maxJointVelocity": 1e9}

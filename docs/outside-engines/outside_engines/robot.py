@@ -37,8 +37,9 @@ class Robot:
         self.gravity = np.array(scene.gravity_m_s2, dtype=float)
         self.markers = {marker.name: attachment(scene, self.links, marker) for marker in scene.markers}
         self.urdf = _written(self.links)
-        self._springs = np.array([(f.stiffness, f.damping, f.rest) for _, f in map(_pair, self.moving)]).reshape(-1, 3).T
-        self._motors = [None if f.effort is None else profile(f.effort) for _, f in map(_pair, self.moving)]
+        freedoms = [each.freedom for each in self.moving]
+        self._springs = np.array([(f.stiffness, f.damping, f.rest) for f in freedoms]).reshape(-1, 3).T
+        self._motors = [None if f.effort is None else profile(f.effort) for f in freedoms]
 
     def efforts(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """What springs, dampers and motors do along the joints (Nm, N)."""
@@ -73,10 +74,6 @@ def joint_name(link: int) -> str:
 
 def link_name(link: int) -> str:
     return WORLD if link < 0 else f"link {link}"
-
-
-def _pair(moving: Moving) -> tuple[int, Scalar]:
-    return moving.link, moving.freedom
 
 
 def _written(chain: tuple[Link, ...]) -> str:
