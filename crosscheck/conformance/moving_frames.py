@@ -11,7 +11,7 @@ from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.typing import Real
 
 
-class Placed(NamedTuple):
+class PlacedFrame(NamedTuple):
     """A frame in World axes: rotation R, origin p; w = Jw u and v = Jv u are its velocities for the speeds u.
 
     `alpha` and `a` are the accelerations that it has where all rates of u are zero.
@@ -26,7 +26,7 @@ class Placed(NamedTuple):
     alpha: Real
     a: Real
 
-    def moved(self, turns: bool, axis: Real, column: int, value: float, rate: float) -> Placed:
+    def moved(self, turns: bool, axis: Real, column: int, value: float, rate: float) -> PlacedFrame:
         """The frame turned about `axis`, or shifted along it, by a coordinate; the axis need not have unit length."""
         along = (self.R @ axis)[:, None]
         if turns:
@@ -37,7 +37,7 @@ class Placed(NamedTuple):
 
     def _freed(
         self, shift: Real, turned: Real, columns: list[int], turns: Real, shifts: Real, rates: Real, w_of_shifts: Real
-    ) -> Placed:
+    ) -> PlacedFrame:
         """The frame after a freedom with speeds in `columns`, along `turns` and `shifts` (3,k) in World axes.
 
         Turns are fixed in the frame before or after (both have the same rate), shifts in one that turns with
@@ -50,7 +50,7 @@ class Placed(NamedTuple):
         turning, shifting = turns @ rates, shifts @ rates
         alpha = at.alpha + cross(self.w, turning)
         a = at.a + cross(self.w, shifting) + cross(w_of_shifts, shifting)
-        return Placed(at.R, at.p, Jw, Jv, at.w + turning, at.v + shifting, alpha, a)
+        return PlacedFrame(at.R, at.p, Jw, Jv, at.w + turning, at.v + shifting, alpha, a)
 
 
 def cross(a: Real, b: Real) -> Real:
@@ -59,22 +59,22 @@ def cross(a: Real, b: Real) -> Real:
     return np.array([v * z - w * y, w * x - u * z, u * y - v * x])
 
 
-def ground(size: int) -> Placed:
+def ground(size: int) -> PlacedFrame:
     """The World frame in a tree with `size` speeds."""
     none, still = np.zeros((3, size)), np.zeros(3)
-    return Placed(np.eye(3), still, none, none, still, still, still, still)
+    return PlacedFrame(np.eye(3), still, none, none, still, still, still, still)
 
 
-def carried(at: Placed, offset: Real, turned: Real | None = None) -> Placed:
+def carried(at: PlacedFrame, offset: Real, turned: Real | None = None) -> PlacedFrame:
     """A frame fixed to another one, at an offset and turned in its axes."""
     r = at.R @ offset
     R = at.R if turned is None else at.R @ turned
     Jv = at.Jv - cross_matrix(r) @ at.Jw
     a = at.a + cross(at.alpha, r) + cross(at.w, cross(at.w, r))
-    return Placed(R, at.p + r, at.Jw, Jv, at.w, at.v + cross(at.w, r), at.alpha, a)
+    return PlacedFrame(R, at.p + r, at.Jw, Jv, at.w, at.v + cross(at.w, r), at.alpha, a)
 
 
-def freed(at: Placed, freedom: Freedom, column: int, q: Real, u: Real) -> Placed:
+def freed(at: PlacedFrame, freedom: Freedom, column: int, q: Real, u: Real) -> PlacedFrame:
     """The frame after a freedom whose first speed is number `column`.
 
     Quaternions are those of the freedom, its initial ones: only scalar coordinates are taken from `q`.

@@ -12,7 +12,7 @@ from typing import NamedTuple, assert_never
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from crosscheck.conformance.moving_frames import Placed, carried, cross, freed, ground
+from crosscheck.conformance.moving_frames import PlacedFrame, carried, cross, freed, ground
 from crosscheck.engines.conventions import frame, rotation_matrix
 from crosscheck.engines.functions_of_time import Profile, profile
 from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
@@ -21,14 +21,14 @@ from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
 
-class Lump(NamedTuple):
+class RigidPart(NamedTuple):
     """A rigid part at its mass centre: mass (kg), inertia (3,3) about it in its own axes; `body` carries it."""
 
     body: str
     item: str
     mass: float
     inertia: Real
-    at: Placed
+    at: PlacedFrame
 
 
 class Push(NamedTuple):
@@ -37,7 +37,7 @@ class Push(NamedTuple):
     body: str
     force: Real
     torque: Real
-    at: Placed
+    at: PlacedFrame
 
 
 class Motion(NamedTuple):
@@ -152,7 +152,7 @@ class TreeMechanics:
         q, u = self._prescribed(t, q, u)
         now = _Instant(self, t, q, u)
         M, f = np.zeros((self._size, self._size)), self._own_forces(t, q, u)
-        for lump in now.lumps:
+        for lump in now.parts:
             w, J = lump.at.w, lump.at.R @ lump.inertia @ lump.at.R.T
             M += lump.mass * lump.at.Jv.T @ lump.at.Jv + lump.at.Jw.T @ J @ lump.at.Jw
             f += lump.at.Jv.T @ (lump.mass * (self._gravity - lump.at.a))
@@ -188,7 +188,7 @@ class TreeMechanics:
             item = self._columns[n].item
             drives[item] = np.append(drives.get(item, np.zeros(0)), load)
         kinetic, momentum, gravity = 0.0, np.zeros(6), 0.0
-        for lump in now.lumps:
+        for lump in now.parts:
             w, spin = lump.at.w, lump.at.R @ lump.inertia @ lump.at.R.T @ lump.at.w
             p = lump.mass * lump.at.v
             kinetic += 0.5 * float(w @ spin + p @ lump.at.v)
@@ -214,19 +214,19 @@ class TreeMechanics:
         return {body}.union(*(self._outboard(child) for child in children))
 
     def _wheel_load(self, now: _Instant, udot: Real, wheel: str) -> Real:
-        (lump,) = (each for each in now.lumps if each.item == wheel)
+        (lump,) = (each for each in now.parts if each.item == wheel)
         return self._inertial(lump, udot, lump.at.p)
 
     def _load(self, now: _Instant, udot: Real, bodies: set[str], point: Real) -> Real:
         """[torque; force] about a point that bodies need from inboard: Newton and Euler, less what else acts on
         them."""
-        total = sum((self._inertial(each, udot, point) for each in now.lumps if each.body in bodies), np.zeros(6))
+        total = sum((self._inertial(each, udot, point) for each in now.parts if each.body in bodies), np.zeros(6))
         for push in now.pushes:
             if push.body in bodies:
                 total -= np.concatenate([push.torque + cross(push.at.p - point, push.force), push.force])
         return np.asarray(total)
 
-    def _inertial(self, lump: Lump, udot: Real, point: Real) -> Real:
+    def _inertial(self, lump: RigidPart, udot: Real, point: Real) -> Real:
         acceleration = _acceleration(lump.at, udot)
         J, w = lump.at.R @ lump.inertia @ lump.at.R.T, lump.at.w
         force = lump.mass * (acceleration[3:] - self._gravity)
@@ -239,19 +239,19 @@ class _Instant:
 
     def __init__(self, tree: TreeMechanics, t: float, q: Real, u: Real) -> None:
         self._tree, self.q, self.u = tree, q, u
-        self._frames: dict[str, Placed] = {GROUND: ground(len(q))}
-        self.outer: dict[str, Placed] = {}  # outboard frames of hinges
+        self._frames: dict[str, PlacedFrame] = {GROUND: ground(len(q))}
+        self.outer: dict[str, PlacedFrame] = {}  # outboard frames of hinges
         scene = tree._scene
-        self.lumps = [lump for body in scene.bodies for lump in self._lumps(body)]
+        self.parts = [lump for body in scene.bodies for lump in self._parts(body)]
         for wheel in scene.wheels:
             at = self._moved(self.node(wheel.body, wheel.node, wheel.offset_m), wheel.name, wheel.freedoms)
             axis = np.array(wheel.axis)
             across = wheel.transverse_inertia_kg_m2 * (np.eye(3) - np.outer(axis, axis))
             inertia = across + wheel.axial_inertia_kg_m2 * np.outer(axis, axis)
-            self.lumps.append(Lump(wheel.body, wheel.name, wheel.mass_kg, inertia, at))
+            self.parts.append(RigidPart(wheel.body, wheel.name, wheel.mass_kg, inertia, at))
         for point in scene.point_masses:
             at = self.node(point.body, point.node, point.offset_m)
-            self.lumps.append(Lump(point.body, point.name, point.mass_kg, np.zeros((3, 3)), at))
+            self.parts.append(RigidPart(point.body, point.name, point.mass_kg, np.zeros((3, 3)), at))
         self.pushes = []
         for load in scene.loads:
             at = self.node(load.body, load.node)
@@ -261,7 +261,7 @@ class _Instant:
             force, torque = (size, none) if load.type == "force" else (none, size)
             self.pushes.append(Push(load.body, force, torque, at))
 
-    def node(self, body: str, node: str, offset: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Placed:
+    def node(self, body: str, node: str, offset: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> PlacedFrame:
         """A frame at a node, plus an offset in its axes."""
         if body == GROUND:
             return carried(self._frames[GROUND], np.array(offset))
@@ -274,7 +274,7 @@ class _Instant:
             return carried(carried(base, np.zeros(3), rotation_matrix(at.quaternion)), np.array(offset))
         return carried(carried(base, np.array(at.position), rotation_matrix(at.quaternion)), np.array(offset))
 
-    def _frame(self, body: str) -> Placed:
+    def _frame(self, body: str) -> PlacedFrame:
         """The frame of a body, from that of its parent through the hinge between them."""
         if body not in self._frames:
             hinge = self._tree._inboard[body]
@@ -288,14 +288,14 @@ class _Instant:
             self._frames[body] = carried(outer, back.position, back.rotation)
         return self._frames[body]
 
-    def _moved(self, at: Placed, item: str, freedoms: tuple[Freedom, ...]) -> Placed:
+    def _moved(self, at: PlacedFrame, item: str, freedoms: tuple[Freedom, ...]) -> PlacedFrame:
         place = self._tree._places[item].start
         for freedom in freedoms:
             at = freed(at, freedom, place, self.q, self.u)
             place += freedom.sizes[1]
         return at
 
-    def _deformed(self, at: Placed, body: str, shifts: object, turns: object) -> Placed:
+    def _deformed(self, at: PlacedFrame, body: str, shifts: object, turns: object) -> PlacedFrame:
         """A node of a flexible body: shifted along the shapes of its modes, then turned about theirs."""
         first = self._tree._places[body].start
         size = self._tree._places[body].stop - first
@@ -304,17 +304,17 @@ class _Instant:
                 at = at.moved(kind == "turn", shape, first + n, float(self.q[first + n]), float(self.u[first + n]))
         return at
 
-    def _lumps(self, body: Body) -> list[Lump]:
+    def _parts(self, body: Body) -> list[RigidPart]:
         match body:
             case RigidBody():
                 at = carried(self._frame(body.name), np.array(body.com_m))
-                return [Lump(body.name, body.name, body.mass_kg, np.array(body.inertia_kg_m2), at)]
+                return [RigidPart(body.name, body.name, body.mass_kg, np.array(body.inertia_kg_m2), at)]
             case ModalBody():
                 base, found = self._frame(body.name), []
                 for point in body.points:
                     at = self._deformed(carried(base, np.array(point.position_m)), body.name,
                                         point.translation_modes, point.rotation_modes)  # fmt: skip
-                    found.append(Lump(body.name, body.name, point.mass_kg, np.array(point.inertia_kg_m2), at))
+                    found.append(RigidPart(body.name, body.name, point.mass_kg, np.array(point.inertia_kg_m2), at))
                 return found
             case BeamBody() | SidBody():
                 raise NotImplementedError(f"{body.name}: clauses on trees have rigid and raw modal bodies")
@@ -322,5 +322,5 @@ class _Instant:
                 assert_never(body)
 
 
-def _acceleration(at: Placed, udot: Real) -> Real:
+def _acceleration(at: PlacedFrame, udot: Real) -> Real:
     return np.concatenate([at.alpha + at.Jw @ udot, at.a + at.Jv @ udot])
