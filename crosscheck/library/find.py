@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TypeVar
 
@@ -60,7 +61,8 @@ def shipped_names() -> tuple[str, ...]:
 
 
 def resolve(words: tuple[str, ...]) -> tuple[Case, ...]:
-    """The cases a user asks for: "canonical" or another tag, "all", a case name or its last part, or a folder.
+    """The cases a user asks for: "canonical" or another tag, "all", a case name or its last part, a pattern such as
+    "pendulums/*", or a folder.
 
     CaseError also for two folders whose cases have the same name: records and report could not tell them apart.
     """
@@ -79,7 +81,7 @@ def _resolve_one(word: str) -> tuple[Case, ...]:
     folder = Path(word)
     if os.path.isfile(folder / "run.toml"):  # False also for words that cannot be a path
         return (load_case(folder),)
-    named = [name for name in shipped_names() if word in (name, name.partition("/")[2])]
+    named = [name for name in shipped_names() if word in (name, name.partition("/")[2]) or fnmatchcase(name, word)]
     if named:  # only these cases are read
         return tuple(load_case(shipped_folder() / name) for name in named)
     cases = shipped_cases()
