@@ -33,7 +33,8 @@ def columns(trajectory: Trajectory) -> dict[str, tuple[str, np.ndarray]]:
 
 def test_csv(trajectory, tmp_path):
     trajectory.to_csv(tmp_path / "t.csv")
-    header, *rows = list(csv.reader((tmp_path / "t.csv").open(newline="")))
+    with (tmp_path / "t.csv").open(newline="") as stream:
+        header, *rows = list(csv.reader(stream))
     for i, (name, (unit, values)) in enumerate(columns(trajectory).items()):
         assert header[i] == f"{name} [{unit}]"
         assert np.array_equal([float(row[i]) for row in rows], values)

@@ -11,7 +11,7 @@ import flexmb as fm
 from flexmb.scene.shapes import beam_section
 from flexmb.system.algorithms import RUNNING
 from tests.flexmb.run.test_events_of_signals import G, ball, floor
-from tests.flexmb.run.test_events_on_chains import four_bar
+from tests.flexmb.run.test_events_on_chains import ROUNDED, four_bar
 
 RESTS = floor("rail.translation", restitution=0.5, rests=True)
 SPEED = fm.CoordinateSensor(name="speed", of="rail", quantity="rate")
@@ -89,6 +89,7 @@ def test_every_algorithm_rests_and_leaves(algorithm: Any) -> None:
 
 
 @pytest.mark.parametrize("algorithm", ["articulated", "composite"])
+@ROUNDED
 def test_a_linkage_rests_on_a_stop(algorithm: Any) -> None:
     """By virtual work along the speeds that an impact there had, the stop carries the weights."""
     stop = fm.Impact(coordinate="c.rotation", restitution=0.4, rests=True)
@@ -102,6 +103,7 @@ def test_a_linkage_rests_on_a_stop(algorithm: Any) -> None:
     assert np.abs(run.energy_drift).max() < 1e-9 * run.energy_scale
 
 
+@ROUNDED
 def test_what_knows_no_closed_chains_refuses_them() -> None:
     stop = fm.Impact(coordinate="c.rotation", restitution=0.4, rests=True)
     event = fm.SceneEvent(name="stop", watch="c.rotation", level=1.8, actions=(stop,))
@@ -109,9 +111,7 @@ def test_what_knows_no_closed_chains_refuses_them() -> None:
         fm.simulate(four_bar(event), 1.0, algorithm="frisch")
 
 
-@pytest.mark.parametrize(
-    ("level", "algorithm"), [("full", "articulated"), ("full", "composite"), ("linear", "frisch")]
-)
+@pytest.mark.parametrize(("level", "algorithm"), [("full", "articulated"), ("full", "composite"), ("linear", "frisch")])
 def test_a_bending_body_rests_on_a_stop(level: Any, algorithm: Any) -> None:
     """An arm on a hinge with a stop: its load, once vibrations have died out, is the moment of the weight."""
     strip = beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=8e-10, Iz=8e-10, rho=2700.0)
@@ -151,8 +151,10 @@ def test_units_change_no_event(length: float, time: float, mass: float, how: Any
 
 
 @pytest.mark.parametrize("length", [1.0, 1e3])
+@ROUNDED
 def test_what_closures_do_not_allow_is_told_in_other_units(length: float) -> None:
     """A driven crank with a stop for its rocker; with a latch there, both stand still, exactly."""
+
     def loop(*items: Any, **crank: Any) -> fm.Scene:
         scene = fm.SceneBuilder("loop", gravity=(0.0, -9.81 * length, 0.0))
         for name, own in (("crank", 0.3), ("coupler", 1.0), ("rocker", 0.8)):
