@@ -135,7 +135,7 @@ class BatchRun:
         last, solve = None, None
         for copy in copies:
             system = self._batch.system(copy)
-            if solve is None or system is not last or system.scene.closures:  # closed chains store their branch
+            if solve is None or system is not last or system.scene.constraints:  # closed chains store their branch
                 last, solve = system, alone(system, self._settings.integrator)
             [ends] = self._copies_ends([copy])
             found.counts[copy, :STOP], found.out[copy] = 0, np.nan
@@ -177,7 +177,7 @@ class Alone:
 
     def __init__(self, system: System, method: Integrator) -> None:
         self._method = method
-        if system.scene.closures or method.linearises:
+        if system.scene.constraints or method.linearises:
             algorithm = algorithms.chosen("articulated")
             whole = Integration(system, algorithm, system.route(), method)
             self._solve, self._workspace = whole, whole

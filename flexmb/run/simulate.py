@@ -139,7 +139,7 @@ def _again(system: System, t_end: float, settings: Settings, **same: Any) -> Tra
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
     """NotImplementedError if a method that needs Jacobians is used where there are none."""
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
-    if system.scene.closures:
+    if system.scene.constraints:
         from flexmb.system.closed import ClosedSystem  # imported here because trees do not need it
 
         assert isinstance(system, ClosedSystem)

@@ -17,6 +17,7 @@ from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.closures import PinocchioClosures
 from crosscheck.engines.pinocchio.connections import PinocchioConnections
+from crosscheck.engines.pinocchio.couplings import PinocchioCouplings
 from crosscheck.engines.pinocchio.forces import JointForces, PlacedLoads
 from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, initial_state, places
 from flexmb.scene.schema import Scene
@@ -51,6 +52,7 @@ class Dynamics:
         self.closures = PinocchioClosures(tree, scene)
         self.connections = PinocchioConnections(tree, scene)
         self.driven: list[PinocchioSlot] = [slot for slot in tree.slots if slot.driven]
+        self.couplings = PinocchioCouplings(tree, scene, [slot.v for slot in self.driven])
         self._motions = [profile(slot.freedom.prescribed) for slot in self.driven]
         driven_q, driven_v = [slot.q for slot in self.driven], [slot.v for slot in self.driven]
         free_q = np.setdiff1d(np.arange(tree.model.nq), driven_q)
@@ -101,6 +103,9 @@ class Dynamics:
             a, drive = self.closures.solve(state.q, state.v, tau + self._generalised(state, wrenches)), np.zeros(0)
         else:
             a = self._hybrid(state, tau, wrenches)
+            if self.couplings:
+                tau += self.couplings.efforts(state.q, a)
+                a = self._hybrid(state, tau, wrenches)
             drive = self.inverse(state, a, wrenches)[D] - tau[D] if self.driven else self._undriven
         if self.driven:
             power += drive @ state.v[D]

@@ -155,7 +155,7 @@ def _sensors(scene: Scene) -> Iterator[Defect]:
         CoordinateSensor: (("of",), "hinge, wheel, point mass or modes", moving),
         MarkerSensor: (("marker",), "marker", markers),
         DistanceSensor: (("marker_a", "marker_b"), "marker", markers),
-        LoadSensor: (("hinge",), "hinge or closure", [each.name for each in (*scene.hinges, *scene.closures)]),
+        LoadSensor: (("hinge",), "hinge or closure", [each.name for each in (*scene.hinges, *scene.constraints)]),
         DriveSensor: (("coordinate",), "scalar coordinate", list(scalar_paths(scene))),
     }
     for place, sensor in entries(scene, "sensors"):
