@@ -116,7 +116,7 @@ class _Model:
         """ModelError for elements that change the motion and have no counterpart in a scene."""
         m = self.m
         for count, what, remedy in (
-            (int(np.sum(m.eq_type > TENDON) + np.sum(m.eq_type < JOINT)), "equality constraints between bodies",
+            (int(np.sum((m.eq_type != JOINT) & (m.eq_type != TENDON))), "equality constraints between bodies",
              "remove them, and add closures to the scene"),
             (getattr(m, "nflex", 0), "flexible parts", "remove them, and add flexible bodies to the scene"),
             (m.npluginstate, "plugins", "remove them"),

@@ -94,7 +94,7 @@ def tendon_that_acts(m: Any) -> str:
         ("tendon_stiffness", "stiffness"), ("tendon_stiffnesspoly", "stiffness"), ("tendon_damping", "damping"),
         ("tendon_dampingpoly", "damping"), ("tendon_armature", "inertia"),
     ):  # fmt: skip
-        values = np.asarray(getattr(m, key, np.zeros(m.ntendon))).reshape(m.ntendon, -1)
-        for k in np.flatnonzero(np.any(values != 0.0, axis=1)):
-            return f'tendon "{m.tendon(int(k)).name}" has {what}'
+        for k, values in enumerate(getattr(m, key, ())):  # versions of MuJoCo differ in what tendons have
+            if np.any(values):
+                return f'tendon "{m.tendon(k).name or k}" has {what}'
     return ""

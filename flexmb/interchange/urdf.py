@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NoReturn
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,16 +54,24 @@ def _parsed(path: Path) -> ElementTree.Element:
         text = read_text(path)
         if "<!ENTITY" in text:
             raise ModelError(f"{path}: it declares entities, which no URDF needs: remove them")
-        root = ElementTree.fromstring(text)
+        root = _elements(text)
     except Unreadable as error:
         raise ModelError(f"{path}: {error}") from None
-    except ElementTree.ParseError as error:
+    except expat.ExpatError as error:
         raise ModelError(f"{path}: not XML ({error}): correct it there") from None
-    if any(each.tag.startswith("{") and "xacro" in each.tag for each in root.iter()):
+    if any(each.tag.startswith("xacro:") for each in root.iter()):
         raise ModelError(f"{path}: it has xacro macros: expand them first, by the command xacro")
     if root.tag != "robot":
         raise ModelError(f'{path}: the outermost element is "{root.tag}", not "robot": is it a URDF file?')
     return root
+
+
+def _elements(text: str) -> ElementTree.Element:
+    """The outermost element. Names keep their prefixes: many files have extensions whose prefix they do not declare."""
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.Parse(text, True)
+    return builder.close()
 
 
 class _Robot:

@@ -14,13 +14,13 @@ from flexmb.scene.connectors import Connector
 from flexmb.scene.control import Controller, Sensor
 from flexmb.scene.events import SceneEvent
 from flexmb.scene.hinges import Closure, Hinge
-from flexmb.scene.schema import Load, PointMass, Scene, Wheel
+from flexmb.scene.schema import Coupling, Load, PointMass, Scene, Wheel
 from flexmb.scene.tree import Coordinate, coordinates, with_coordinates
 
 AnyNode = Node | BeamNode | ModalNode
 Struct = TypeVar("Struct", bound=msgspec.Struct)
 Named = TypeVar(
-    "Named", Body, Hinge, Wheel, Load, Closure, Connector, PointMass, Sensor, Controller, SceneEvent
+    "Named", Body, Hinge, Wheel, Load, Closure, Coupling, Connector, PointMass, Sensor, Controller, SceneEvent
 )
 
 
@@ -42,6 +42,10 @@ def on_load(scene: Scene, target: str, change: Callable[[Load], Load]) -> Scene:
 
 def on_closure(scene: Scene, target: str, change: Callable[[Closure], Closure]) -> Scene:
     return msgspec.structs.replace(scene, closures=replaced(scene.closures, target, change))
+
+
+def on_coupling(scene: Scene, target: str, change: Callable[[Coupling], Coupling]) -> Scene:
+    return msgspec.structs.replace(scene, couplings=replaced(scene.couplings, target, change))
 
 
 def on_connector(scene: Scene, target: str, change: Callable[[Any], Any]) -> Scene:
