@@ -247,7 +247,7 @@ def _refuse_other_structure(i: int, system: FreeMotion, first: FreeMotion) -> No
     if system.scene.constraints or first.scene.constraints:
         if system.scene.constraints and first.scene.constraints:
             return
-        raise ValueError(f"scene {i} has another structure than scene 0: only one of them has closures")
+        raise ValueError(f"scene {i} has another structure than scene 0: only one of them has closures or couplings")
     difference = structural_difference(first.constants, system.constants)
     if difference is not None:
         raise ValueError(f"scene {i} has another structure than scene 0: they differ in {difference}")

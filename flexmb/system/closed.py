@@ -147,7 +147,8 @@ class ClosedSystem(System):
     def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
         """Evaluators are of trees."""
         raise NotImplementedError(
-            f'scene "{self.scene.name}" has closures, and an evaluator is for trees: use accelerations(state)'
+            f'scene "{self.scene.name}" has closures or couplings, and an evaluator is for trees: '
+            "use accelerations(state)"
         )
 
     def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
@@ -282,8 +283,8 @@ class ClosedSystem(System):
 
     def _of_trees(self, what: str) -> NotImplementedError:
         return NotImplementedError(
-            f'scene "{self.scene.name}" has closures, and {what} are of trees: closure_operators(state) has what '
-            "closures add, and flexmb.System(scene) is the tree alone, whose accelerations are not the scene's"
+            f'scene "{self.scene.name}" has closures or couplings, and {what} are of trees: closure_operators(state) '
+            "has what closures add, and flexmb.System(scene) is the tree alone, whose accelerations are not the scene's"
         )
 
     def closure_gaps(self, state: State) -> dict[str, tuple[float, float]]:
@@ -320,7 +321,7 @@ class ClosedSystem(System):
         if motion is None:
             known = " or ".join(f'"{name}"' for name in algorithms.ON_CHAINS)
             raise NotImplementedError(
-                f'scene "{self.scene.name}" has closures, which algorithm {algorithm!r} does not know: '
+                f'scene "{self.scene.name}" has closures or couplings, which algorithm {algorithm!r} does not know: '
                 f"use algorithm={known}"
             )
         return motion

@@ -20,7 +20,7 @@ class MujocoEngine(PeerEngine):
     """Rigid trees with RK4, exact but for two artifices whose errors are at round-off (see `mujoco.tree`)."""
 
     name = "mujoco"
-    takes = ("connectors",)
+    takes = ("connectors", "couplings")
     summary = "rigid trees in minimal coordinates, fixed steps"
     algorithm = "composite bodies, sparse factors"
     settings = (

@@ -94,6 +94,8 @@ def build_tree(
         _close(spec, bodies, closed, i)
     for coupling in couplings:
         _couple(spec, coupling)
+    if couplings:  # its solver stops at errors relative to the mean inertia, in which an armature would hide them
+        spec.option.tolerance = 0.0
     model = spec.compile()
     ids = np.array([model.body(_body_name(link)).id for link in links], dtype=np.intp)
     return MujocoTree(model, links, ids, _slots(model, links, ids))

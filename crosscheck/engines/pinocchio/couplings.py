@@ -17,7 +17,8 @@ class PinocchioCouplings:
     def __init__(self, tree: PinocchioTree, scene: Scene, driven: list[int]) -> None:
         """`driven`: speeds whose accelerations are given."""
         self._placed, nv = placed_couplings(scene, tree.slots), tree.model.nv
-        self._joints = [1 + tree.slots.index(each.slots[0]) for each in self._placed]
+        at = {slot.v: joint for joint, slot in enumerate(tree.slots, 1)}  # the joint of World comes first
+        self._joints = [at[each.slots[0].v] for each in self._placed]
         self._model, self._data = tree.model, tree.model.createData()
         self._J = np.array([each.row(nv) for each in self._placed]).reshape(-1, nv)
         self._free = np.setdiff1d(np.arange(nv), driven)

@@ -17,7 +17,7 @@ class PinocchioEngine(PeerEngine):
     """Rigid trees, exact: articulated-body accelerations, hybrid dynamics where coordinates are prescribed."""
 
     name = "pinocchio"
-    takes = ("connectors", "t_start")
+    takes = ("connectors", "couplings", "t_start")
     summary = "rigid trees in minimal coordinates"
     algorithm = "articulated bodies, O(N)"
     settings = (
