@@ -1,8 +1,8 @@
 """The arrays of closures: constants of a scene, and the workspace of one evaluation.
 
-C closures and couplings with G suppressed motions ("rows") in all, on N bodies with at most m modes and nu speeds. Frame A is on
-body_a (the inboard side), frame B on body_b, both turned so that an axis is z; rows are in A axes. A coupling, whose
-one row is a linear relation of coordinates, has terms in place of frames; couplings come after all closures.
+C closures and couplings with G suppressed motions ("rows") in all, on N bodies with at most m modes and nu speeds.
+Frame A is on body_a (the inboard side), frame B on body_b, both turned so that an axis is z; rows are in A axes. A
+coupling, whose one row is a linear relation of coordinates, has terms in place of frames; couplings come last.
 
 Closures form K groups by the bodies that their loads move, and groups form L clusters by the bodies that carry them
 (`flexmb.closure.groups`); Lambda^-1 is block diagonal with a block for each cluster. Rows are numbered group by group,

@@ -333,8 +333,8 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         )
 
     def coupling(
-        self, name: str, hinge: str, ratios: Mapping[str | tuple[str, str], float], *, coordinate: str = "",
-        offset: float = 0.0,
+        self, name: str, hinge: str, ratios: Mapping[str, float] | Mapping[str | tuple[str, str], float], *,
+        coordinate: str = "", offset: float = 0.0,
     ) -> Self:  # fmt: skip
         """A linear relation of hinge coordinates, q = `offset` + sum of ratio_i q_i: a gear, belt, rack or linkage.
 

@@ -48,7 +48,8 @@ from flexmb.scene.control import (
     TimeSensor,
     UserLaw,
 )
-from flexmb.scene.couplings import CoupledCoordinate, Coupling
+from flexmb.scene.couplings import *  # noqa: F403
+from flexmb.scene.couplings import Coupling
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
 from flexmb.scene.freedoms import AngularCoordinate, Freedom, LinearCoordinate, MotionKeys, ScalarFreedom
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table

@@ -45,8 +45,8 @@ def _hinge_axis(scene: Scene, target: str) -> Scene:
 def _reversal_is_a_name(scene: Scene, target: str) -> str:
     """Reversing the sign of a coordinate has no effect if nothing depends on the sign."""
     hinge = next(hinge for hinge in scene.hinges if hinge.name == target)
-    led = [item.hinge for each in scene.couplings for item in (each, *each.terms)]
-    if target in led or any(getattr(each, "hinge", "") == target for each in scene.connectors):
+    coupled = {each.hinge for each in scene.couplings} | {term.hinge for each in scene.couplings for term in each.terms}
+    if target in coupled or any(getattr(each, "hinge", "") == target for each in scene.connectors):
         return ""
     for _, coordinate in coordinates(hinge):
         driven = coordinate.effort is not None or coordinate.prescribed is not None

@@ -27,7 +27,8 @@ def machine(driven: bool = True) -> Scene:
     turn = {"prescribed": motion} if driven else {"rate": 1.2}
     scene.revolute("turn", "ground", "table", axis=(0, 0, 1), **turn)
     scene.universal("shoulder", "table", "arm", parent_position=(0.5, 0, 0.1),
-                    first=angular(angle=0.3, rate=0.8), second=angular(angle=0.05, rate=1.5 * 1.2 - 15.0 * 0.08))  # fmt: skip
+                    first=angular(angle=0.3, rate=0.8),
+                    second=angular(angle=0.05, rate=1.5 * 1.2 - 15.0 * 0.08))  # fmt: skip
     scene.revolute("wrist", "arm", "hand", axis=(0, 0.6, 0.8), parent_position=(0.4, 0, 0), angle=0.2, stiffness=3.0,
                    rate=0.2 * 1.2 - 0.5 * 0.8)  # fmt: skip
     scene.prismatic("rail", "table", "slide", axis=(0.6, 0.8, 0), position=0.03, rate=0.1 * 0.8)

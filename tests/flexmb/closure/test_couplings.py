@@ -213,9 +213,8 @@ def test_a_latch_stops_both_wheels_at_once():
     """The latch takes the momentum of both, seen at its coordinate: (I1 + n² I2) u."""
     scene = gears(torque=0.0)
     moving = scene.with_values({"A.rotation.rate_rad_s": 1.0})
-    moving = msgspec.structs.replace(
-        moving, events=(s.SceneEvent(name="stop", watch="time", level=0.5, actions=(s.Latch(coordinate="A.rotation"),)),)
-    )
+    stop = s.SceneEvent(name="stop", watch="time", level=0.5, actions=(s.Latch(coordinate="A.rotation"),))
+    moving = msgspec.structs.replace(moving, events=(stop,))
     run = flexmb.simulate(moving, 1.0, samples=11)
     assert run.q[-1] == pytest.approx([0.5, -1.0], rel=1e-9)
     assert np.max(np.abs(run.u[-1])) <= 1e-12

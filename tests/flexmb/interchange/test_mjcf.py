@@ -140,8 +140,9 @@ def test_what_is_left_out_is_said(tmp_path):
     text = COUPLED.replace("</mujoco>", '<actuator><motor joint="roll"/></actuator></mujoco>')
     notes = " | ".join(read(text.replace('name="pitch"', 'name="pitch" frictionloss="0.1"'), tmp_path).notes)
     for words in (
-        "contacts", "equality constraints of coordinates are exact here", "inactive equality constraints are left out: equ",
-        "actuators of tendons are left out: cable, strap", "limits of joints are left out: twist", "dry friction is left out: pitch", "1 actuators",
+        "contacts", "equality constraints of coordinates are exact here",
+        "inactive equality constraints are left out: equality 2", "actuators of tendons are left out: cable, strap",
+        "limits of joints are left out: twist", "dry friction is left out: pitch", "1 actuators",
         "count from the reference position, not from zero: twist",
     ):  # fmt: skip
         assert words in notes
