@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from msgspec.structs import replace
 
-from crosscheck.library.mutations.edits import on_coupling
-from crosscheck.library.mutations.mutation import FACTOR, OPPOSITE, Mutation, MutationTarget
+from crosscheck.library.mutations.edits import of_coupling
+from crosscheck.library.mutations.mutation import FACTOR, OPPOSITE, Mutation, MutationTarget, SceneChange
 from flexmb.scene.schema import Coupling, Scene
 from flexmb.scene.tree import coupled
 
@@ -20,15 +20,17 @@ def couplings(scene: Scene) -> Iterator[MutationTarget]:
         yield MutationTarget(each.name, f"coupling {what}")
 
 
-def _ratios(factor: float) -> Callable[[Scene, str], Scene]:
-    def changed(coupling: Coupling) -> Coupling:
+def _ratios(factor: float) -> SceneChange:
+    @of_coupling
+    def scaled(coupling: Coupling) -> Coupling:
         return replace(coupling, terms=tuple(replace(each, ratio=factor * each.ratio) for each in coupling.terms))
 
-    return lambda scene, target: on_coupling(scene, target, changed)
+    return scaled
 
 
-def _offset(scene: Scene, target: str) -> Scene:
-    return on_coupling(scene, target, lambda each: replace(each, offset=FACTOR * each.offset))
+@of_coupling
+def _offset(coupling: Coupling) -> Coupling:
+    return replace(coupling, offset=FACTOR * coupling.offset)
 
 
 MUTATIONS = (
