@@ -170,7 +170,7 @@ class ClosedSystem(System):
         """
         if accelerations is not None:
             raise NotImplementedError(
-                f'scene "{self.scene.name}" has closures or couplings, and hinge loads for given accelerations are for trees only: '
+                f'scene "{self.scene.name}" has closures, and hinge loads for given accelerations are for trees only: '
                 "leave accelerations out, or prescribe coordinates"
             )
         t, y = self.layout.entering(state)

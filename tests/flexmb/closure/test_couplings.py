@@ -243,3 +243,33 @@ def test_coordinates_of_hinges_with_several_are_named():
     u = found.accelerations
     assert u[3] == pytest.approx(0.1 * u[1] + 0.05 * u[2], abs=1e-15)
     assert found.loads["cam"][:3] == pytest.approx(np.zeros(3), abs=0)
+
+
+def test_stabilised_relations_stay_fulfilled():
+    run = flexmb.simulate(_free_base(one={"rate": 2.0}).scene(), 2.0, samples=11, stabilise=5.0)
+    system = flexmb.compile(_free_base().scene())
+    one, two = system.coordinate("turn one"), system.coordinate("turn two")
+    assert np.max(np.abs(run.q[:, two] - 0.2 + 1.5 * run.q[:, one])) <= 1e-8  # the tolerance 1e-10 over the run
+
+
+def test_ratios_can_be_varied_by_their_paths():
+    scene = gears().with_values({"mesh.terms.0.ratio": 3.0, "mesh.offset": 0.5})
+    assert scene.couplings[0].terms[0].ratio == 3.0
+    system = flexmb.compile(scene)
+    assert system.accelerations(system.initial_state)[0] == pytest.approx(3.0 / (0.3 + 9.0 * 0.2), rel=ROUNDING)
+    assert system.initial_state.q @ [-3.0, 1.0] == pytest.approx(0.5, rel=ROUNDING)
+
+
+def test_controllers_read_the_load_of_a_coupling():
+    """A law that gives the motor a torque from the load that the teeth transmit: T = 3 - 0.5 f."""
+    scene = SceneBuilder("gears with a torque sensor")
+    disc(disc(scene, "a", 0.3), "b", 0.2)
+    scene.revolute("A", "ground", "a", torque=s.Constant(value=3.0))
+    scene.revolute("B", "ground", "b").coupling("mesh", "B", {"A": -2.0})
+    scene.angular_spring("drive", "A", torque=s.ControlSignal(source="law"))
+    scene.sense_load("teeth", "mesh").state_space("law", ["teeth[2]"], D=[[-0.5]], period=0.01)
+    run = flexmb.simulate(scene.scene(), 0.025, samples=[0.0, 0.015, 0.025])
+    load = 0.2 * -2.0 * 3.0 / 1.1  # with the motor alone, at t = 0, which the law knows from t = 0 on
+    first = 0.2 * -2.0 * (3.0 - 0.5 * load) / 1.1
+    second = 0.2 * -2.0 * (3.0 - 0.5 * first) / 1.1
+    assert run.loads["mesh"][1, 2] == pytest.approx(second, rel=1e-9)
