@@ -79,6 +79,7 @@ class ScalarSpeed:
     stiffness: float
     damping: float
     rest: float
+    armature: float
     motor: s.Function | None
     prescribed: s.Function | None
 
@@ -151,14 +152,14 @@ def _append(
 def _append_wheel(tree: DenseTree, wheel: s.Wheel, seat: Seat) -> DenseTree:
     rotor = Rotor(wheel, len(tree.members) - 1, seat, tree.nq, tree.nu)
     friction, motor, prescribed = wheel.friction_Nms_rad, wheel.torque_Nm, wheel.prescribed_rad
-    scalar = ScalarSpeed(wheel.name, tree.nq, tree.nu, 0.0, friction, 0.0, motor, prescribed)
+    scalar = ScalarSpeed(wheel.name, tree.nq, tree.nu, 0.0, friction, 0.0, 0.0, motor, prescribed)
     return replace(
         tree, rotors=[*tree.rotors, rotor], scalars=[*tree.scalars, scalar], nq=tree.nq + 1, nu=tree.nu + 1
     )
 
 
 def _scalar(owner: str, q: int, u: int, c: Coordinate) -> ScalarSpeed:
-    return ScalarSpeed(owner, q, u, *c.spring, c.effort, c.prescribed)
+    return ScalarSpeed(owner, q, u, *c.spring, c.armature, c.effort, c.prescribed)
 
 
 def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY) -> Seat:

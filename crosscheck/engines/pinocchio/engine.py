@@ -36,7 +36,7 @@ class PinocchioEngine(PeerEngine):
     def obstacle(self, scene: Scene) -> str:
         if len(scene.hinges) > MOST_JOINTS:
             return f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
-        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), KNOWN, screws=True)
+        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), KNOWN, screws=True, armatures=True)
         return reason or (_beside_closures(scene) if scene.closures else "")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:

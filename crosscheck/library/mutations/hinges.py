@@ -139,6 +139,11 @@ def _hinge_constant(hinge: Hinge, stem: str, factor: float) -> Hinge:
     return with_each_coordinate(hinge, changed)
 
 
+def _armature(scene: Scene, target: str) -> Scene:
+    """Every armature of a hinge left out."""
+    return on_hinge(scene, target, lambda hinge: _hinge_constant(hinge, "armature", DROPPED))
+
+
 def _rest(scene: Scene, target: str) -> Scene:
     def unloaded(coordinate: Coordinate) -> Coordinate:
         return msgspec.structs.replace(coordinate, **{key_of(coordinate, "rest"): 0.0})
@@ -225,6 +230,7 @@ MUTATIONS = (
     ),
     Mutation("gimbal_order", "rotations of a gimbal in the opposite order", "xyz for zyx", hinges, _gimbal_order),
     Mutation("stiffness", "+1 % stiffness of a body or of a hinge's springs", "a wrong figure", _sprung, _stiffness),
+    Mutation("armature_dropped", "no armatures", "the rotors of drives left out", hinges, _armature),
     Mutation("spring_rest", "springs at rest at zero", "the rest value left out", hinges, _rest, _slack),
     Mutation("damping", "+1 % damping", "a wrong figure", _damped, _damping(FACTOR)),
     Mutation("damping_dropped", "no damping", "dissipation left out", _damped, _damping(DROPPED)),

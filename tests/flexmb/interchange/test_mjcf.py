@@ -23,16 +23,52 @@ def read(text: str, folder):
     return read_mjcf(folder / "creature.xml")
 
 
-def test_accelerations_are_those_of_mujoco(tmp_path):
-    scene = read(MJCF, tmp_path).scene
-    model = mujoco.MjModel.from_xml_string(MJCF)
+ARMED = MJCF.replace('name="pitch"', 'name="pitch" armature="0.3"').replace(
+    'name="reach"', 'name="reach" armature="1.5"'
+)
+
+
+def with_actuators(actuators: str) -> str:
+    return ARMED.replace("</mujoco>", f"<actuator>{actuators}</actuator></mujoco>")
+
+
+def flagged(flag: str) -> str:
+    return ARMED.replace('gravity="0.3 -0.2 -9.81"/>', f'gravity="0.3 -0.2 -9.81"><flag {flag}="disable"/></option>')
+
+
+MODELS = {
+    "as it is": MJCF,
+    "armatures": ARMED,
+    "armature of an actuator": with_actuators('<motor joint="pitch" gear="3" armature="0.1"/>'),
+    "damping of an actuator": with_actuators('<motor joint="reach" gear="-2" damping="0.7"/>'),
+    "two actuators": with_actuators(2 * '<motor joint="roll" gear="0.5" armature="0.2" damping="0.1"/>'),
+    "gravity compensated": ARMED.replace('name="ankle"', 'name="ankle" gravcomp="1"').replace(
+        'name="foot"', 'name="foot" gravcomp="-0.3"'
+    ),
+    "without gravity": flagged("gravity"),
+    "without springs": flagged("spring"),
+    "without dampers": flagged("damper"),
+    "a tendon that measures": ARMED.replace(
+        "</mujoco>", '<tendon><fixed range="-1 1"><joint joint="roll" coef="1"/></fixed></tendon></mujoco>'
+    ),
+}
+"""What the reader represents exactly."""
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_accelerations_and_masses_are_those_of_mujoco(name, tmp_path):
+    _held_against(MODELS[name], read(MODELS[name], tmp_path).scene)
+
+
+def _held_against(text: str, scene: fm.Scene) -> None:
+    """Accelerations and mass matrix of MuJoCo's model of the text, at a random state, are those of the scene."""
+    model = mujoco.MjModel.from_xml_string(text)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
     data, system = mujoco.MjData(model), fm.compile(scene)
     rng = np.random.default_rng(5)
     q, u = system.initial_state.q.copy(), np.zeros(system.nu)
-    order = np.zeros(model.nv, dtype=int)
+    to_theirs, swept = np.zeros((model.nv, system.nu)), np.zeros(model.nv)
     data.qpos[:], data.qvel[:] = model.qpos0, rng.normal(size=model.nv)
-    turned, swept = np.eye(model.nv), np.zeros(model.nv)
     for j in range(model.njnt):
         name = model.joint(j).name or "tail.joint 5"
         at, speed = system.coordinate(name), system.speed(name)
@@ -45,22 +81,36 @@ def test_accelerations_are_those_of_mujoco(tmp_path):
             q[at] = np.r_[R0.T @ (data.qpos[a : a + 3] - model.qpos0[a : a + 3]), _quaternion(R0.T @ R)]
             linear, w = R.T @ data.qvel[v : v + 3], data.qvel[v + 3 : v + 6]
             u[speed] = np.r_[w, linear]
-            order[v : v + 6] = np.r_[speed.start + 3 : speed.start + 6, speed.start : speed.start + 3]
-            turned[v : v + 3, v : v + 3], swept[v : v + 3] = R, R @ np.cross(w, linear)
+            to_theirs[v : v + 6, speed] = np.block([[np.zeros((3, 3)), R], [np.eye(3), np.zeros((3, 3))]])
+            swept[v : v + 3] = R @ np.cross(w, linear)
         elif model.jnt_type[j] == BALL:
             quaternion = rng.normal(size=4)
             data.qpos[a : a + 4] = q[at] = quaternion / np.linalg.norm(quaternion)
-            u[speed], order[v : v + 3] = data.qvel[v : v + 3], np.arange(speed.start, speed.stop)
+            u[speed], to_theirs[v : v + 3, speed] = data.qvel[v : v + 3], np.eye(3)
         else:
             q[at] = rng.normal() * 0.3
             data.qpos[a] = model.qpos0[a] + q[at][0]
-            u[speed], order[v] = data.qvel[v], speed.start
+            u[speed], to_theirs[v, speed] = data.qvel[v], 1.0
     mujoco.mj_forward(model, data)
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
-    found = turned @ system.accelerations(system.state(q, u, 0.0))[order] + swept
+    state = system.state(q, u, 0.0)
+    found = to_theirs @ system.accelerations(state) + swept
     terms = np.abs(M) @ np.abs(data.qacc) + np.abs(data.qfrc_bias) + np.abs(data.qfrc_passive)
-    assert backward_error(M, found, M @ data.qacc, terms) < algebra(system.nu, 6)
+    bound = algebra(system.nu, 6)
+    assert backward_error(M, found, M @ data.qacc, terms) < bound
+    ours, theirs = system.mass_matrix(state), to_theirs.T @ M @ to_theirs
+    assert np.max(np.abs(ours - theirs)) < bound * np.max(np.abs(theirs))
+
+
+def test_armatures_are_read_as_they_are(tmp_path):
+    """Negative control of the comparison above: without them the mass matrix is another."""
+    hinges = {each.name: each for each in read(MODELS["armature of an actuator"], tmp_path).scene.hinges}
+    assert hinges["pitch"].rotation.armature_kg_m2 == pytest.approx(0.3 + 3.0**2 * 0.1, rel=1e-15)
+    assert hinges["reach"].translation.armature_kg == 1.5
+    assert hinges["roll"].rotation.armature_kg_m2 == 0.0
+    with pytest.raises(AssertionError):
+        _held_against(MODELS["armature of an actuator"], read(ARMED, tmp_path).scene)
 
 
 def _quaternion(R: np.ndarray) -> np.ndarray:
@@ -70,30 +120,47 @@ def _quaternion(R: np.ndarray) -> np.ndarray:
 
 
 def test_what_is_left_out_is_said(tmp_path):
-    text = MJCF.replace("</mujoco>", '<actuator><motor joint="roll"/></actuator></mujoco>')
+    text = MODELS["a tendon that measures"].replace("</mujoco>", '<actuator><motor joint="roll"/></actuator></mujoco>')
     notes = " | ".join(read(text.replace('name="pitch"', 'name="pitch" frictionloss="0.1"'), tmp_path).notes)
     for words in (
-        "contacts", "limits of joints are left out: tail.joint 5", "dry friction is left out: pitch", "1 actuators",
+        "contacts", "1 tendons are left out", "limits of joints are left out: tail.joint 5",
+        "dry friction is left out: pitch", "1 actuators",
         "count from the reference position, not from zero: tail",
     ):  # fmt: skip
         assert words in notes
 
 
 BAD = {
-    "armature": (
-        MJCF.replace('name="pitch"', 'name="pitch" armature="0.1"'),
-        'joint "pitch" has the rotor inertia 0.1',
+    "armature of a free joint": (
+        MJCF.replace('<freejoint name="float"/>', '<joint type="free" name="float" armature="0.1"/>'),
+        'the free or ball joint "float" has the armature 0.1',
     ),
+    "armature of a ball": (
+        MJCF.replace('name="ball"', 'name="ball" armature="0.1"'),
+        'the free or ball joint "ball" has the armature 0.1',
+    ),
+    "armature at a tendon": (
+        MJCF.replace(
+            "</mujoco>",
+            '<tendon><fixed name="t"><joint joint="roll" coef="1"/></fixed></tendon>'
+            '<actuator><motor name="m" tendon="t" armature="0.1"/></actuator></mujoco>',
+        ),
+        'actuator "m" has armature',
+    ),
+    "armature at a ball": (with_actuators('<motor joint="ball" damping="0.1"/>'), 'actuator "actuator 0" has damping'),
+    "powers of an actuator": (with_actuators('<motor joint="roll" damping="0 0.1"/>'), 'actuator "actuator 0" has da'),
+    "powers of a damper": (MJCF.replace('name="pitch"', 'name="pitch" damping="0 1"'), 'joint "pitch" has a nonlinear'),
+    "powers of a spring": (MJCF.replace('stiffness="3"', 'stiffness="3 1"'), 'joint "roll" has a nonlinear'),
+    "yield": (MJCF.replace('stiffness="3"', 'stiffness="3" springyield="0.1"'), 'joint "roll" has a nonlinear'),
     "equality": (
         MJCF.replace("</mujoco>", '<equality><weld body1="foot" body2="tail"/></equality></mujoco>'),
         "1 equality",
     ),
     "tendon": (
-        MJCF.replace("</mujoco>", '<tendon><fixed><joint joint="roll" coef="1"/></fixed></tendon></mujoco>'),
-        "1 tendons",
+        MODELS["a tendon that measures"].replace("<fixed range", '<fixed stiffness="1" range'),
+        "1 tendons with a spring",
     ),
     "fluid": (MJCF.replace("<option", '<option density="1.2"'), "no fluid"),
-    "levity": (MJCF.replace('name="foot"', 'name="foot" gravcomp="1"'), 'body "foot" has gravity compensation'),
     "no model": ("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "MuJoCo refuses"),
     "no xml": ("hello", "not XML"),
 }
