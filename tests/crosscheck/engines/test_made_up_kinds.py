@@ -37,8 +37,8 @@ class Boring(_Hinge, frozen=True, kw_only=True, tag="boring"):
         return ScalarFreedom("rotation", Z, self.rotation, 0.5), ScalarFreedom("x", X, self.x)
 
 
-def _directions(hinges: list[Any]) -> list[Any]:
-    return _free_directions([each.freedoms for each in hinges])
+def _directions(hinge: Any) -> Any:
+    return _free_directions([hinge.freedoms])
 
 
 class Silent(_Hinge, frozen=True, kw_only=True, tag="silent"):
@@ -84,7 +84,7 @@ def test_rules_of_mutations_follow_from_freedoms() -> None:
 @pytest.mark.parametrize("use", [_directions, freedoms], ids=["directions", "joints"])
 def test_a_hinge_that_does_not_say_its_freedoms_is_refused_by_name(use: Any) -> None:
     with pytest.raises(NotImplementedError, match='hinge "joint": Silent does not say which freedoms it has'):
-        use([Silent(**ENDS)])
+        use(Silent(**ENDS))
 
 
 STILL = MovingFrame(constant(np.zeros(3)), constant(np.eye(3)))
