@@ -230,10 +230,10 @@ MUTATIONS = (
     ),
     Mutation("gimbal_order", "rotations of a gimbal in the opposite order", "xyz for zyx", hinges, _gimbal_order),
     Mutation("stiffness", "+1 % stiffness of a body or of a hinge's springs", "a wrong figure", _sprung, _stiffness),
-    Mutation("armature_dropped", "no armatures", "the rotors of drives left out", hinges, _armature),
     Mutation("spring_rest", "springs at rest at zero", "the rest value left out", hinges, _rest, _slack),
     Mutation("damping", "+1 % damping", "a wrong figure", _damped, _damping(FACTOR)),
     Mutation("damping_dropped", "no damping", "dissipation left out", _damped, _damping(DROPPED)),
+    Mutation("armature_dropped", "no armatures", "the rotors of drives left out", hinges, _armature),
     Mutation(
         "initial_place", "+1 % initial angle or displacement", "a wrong figure", hinges, _initial("place", FACTOR)
     ),
