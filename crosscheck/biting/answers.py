@@ -6,7 +6,7 @@ conventions.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +23,8 @@ MILLI = 1e3
 SHIFT = 0.01  # of the scene's extent
 ALONG = ("drive", "hinge_force")  # channels with one part, named after a hinge, wheel or connector
 
+Falsify = Callable[[Trajectory, Scene], Trajectory]
+
 
 @dataclass(frozen=True)
 class AnswerFault:
@@ -31,69 +33,60 @@ class AnswerFault:
     name: str
     what: str
     slip: str
-    falsify: Callable[[Trajectory, Scene], Trajectory]
+    falsify: Falsify
 
 
-def _loads_reversed(run: Trajectory, scene: Scene) -> Trajectory:
-    return replace(run, loads={name: -load for name, load in run.loads.items()})
+def _with(run: Trajectory, output: str, instead: Any) -> Trajectory:
+    return replace(run, **{output: instead})
 
 
-def _wheel_loads_reversed(run: Trajectory, scene: Scene) -> Trajectory:
-    return replace(run, wheel_loads={name: -load for name, load in run.wheel_loads.items()})
+def _reversed(output: str) -> Falsify:
+    """An output that is given by item, with the opposite sign."""
+
+    def falsify(run: Trajectory, scene: Scene) -> Trajectory:
+        return _with(run, output, {name: -values for name, values in getattr(run, output).items()})
+
+    return falsify
 
 
-def _drives_reversed(run: Trajectory, scene: Scene) -> Trajectory:
-    return replace(run, drives={name: -drive for name, drive in run.drives.items()})
-
-
-def _connectors_reversed(run: Trajectory, scene: Scene) -> Trajectory:
-    return replace(run, connectors={name: -load for name, load in run.connectors.items()})
-
-
-def _hinge_forces_reversed(run: Trajectory, scene: Scene) -> Trajectory:
-    return replace(run, hinge_forces={name: -force for name, force in run.hinge_forces.items()})
-
-
-def _load_point(run: Trajectory, scene: Scene) -> Trajectory:
-    return replace(run, loads=_about_another_point(run, run.loads))
-
-
-def _connector_point(run: Trajectory, scene: Scene) -> Trajectory:
-    return replace(run, connectors=_about_another_point(run, run.connectors))
-
-
-def _about_another_point(run: Trajectory, loads: dict[str, Real]) -> dict[str, Real]:
+def _about_another_point(output: str) -> Falsify:
     """Torques about a point displaced by `SHIFT` of the scene's extent along (1, 1, 1)."""
-    extent = max((float(np.max(np.abs(path.position))) for path in run.markers.values()), default=1.0) or 1.0
-    arm = np.full(3, SHIFT * extent)
 
-    def shifted(load: Real) -> Real:
-        return np.hstack([load[:, :3] + np.cross(arm, load[:, 3:]), load[:, 3:]])
+    def falsify(run: Trajectory, scene: Scene) -> Trajectory:
+        extent = max((float(np.max(np.abs(path.position))) for path in run.markers.values()), default=1.0) or 1.0
+        arm = np.full(3, SHIFT * extent)
 
-    return {name: shifted(load) for name, load in loads.items()}
+        def shifted(load: Real) -> Real:
+            return np.hstack([load[:, :3] + np.cross(arm, load[:, 3:]), load[:, 3:]])
 
+        return _with(run, output, {name: shifted(load) for name, load in getattr(run, output).items()})
 
-def _load_axes(run: Trajectory, scene: Scene) -> Trajectory:
-    """Loads in the axes of a marker on the outboard body, if there is one."""
-    shown = {marker.body: run.markers[marker.name] for marker in scene.markers if marker.name in run.markers}
-    loads = dict(run.loads)
-    for hinge in scene.hinges:
-        if hinge.child in shown and hinge.name in loads:
-            loads[hinge.name] = _in_axes(shown[hinge.child], loads[hinge.name])
-    return replace(run, loads=loads)
+    return falsify
 
 
-def _connector_axes(run: Trajectory, scene: Scene) -> Trajectory:
-    """Loads of connectors in the axes of a marker on `body_b`, if there is one."""
-    shown = {marker.body: run.markers[marker.name] for marker in scene.markers if marker.name in run.markers}
-    loads = dict(run.connectors)
-    for each in scene.connectors:
-        if isinstance(each, BetweenNodes) and each.body_b in shown and each.name in loads:
-            loads[each.name] = _in_axes(shown[each.body_b], loads[each.name])
-    return replace(run, connectors=loads)
+def _in_body_axes(output: str, loaded: Callable[[Scene], Iterable[tuple[str, str]]]) -> Falsify:
+    """Loads in the axes of a marker on the body that they act on, if there is one; `loaded` gives items and bodies."""
+
+    def falsify(run: Trajectory, scene: Scene) -> Trajectory:
+        shown = {marker.body: run.markers[marker.name] for marker in scene.markers if marker.name in run.markers}
+        loads = dict(getattr(run, output))
+        for name, body in loaded(scene):
+            if body in shown and name in loads:
+                loads[name] = _in_axes(shown[body], loads[name])
+        return _with(run, output, loads)
+
+    return falsify
 
 
-def _on_paths(change: Callable[[MarkerPath], MarkerPath]) -> Callable[[Trajectory, Scene], Trajectory]:
+def _by_hinges(scene: Scene) -> list[tuple[str, str]]:
+    return [(hinge.name, hinge.child) for hinge in scene.hinges]
+
+
+def _by_connectors(scene: Scene) -> list[tuple[str, str]]:
+    return [(each.name, each.body_b) for each in scene.connectors if isinstance(each, BetweenNodes)]
+
+
+def _on_paths(change: Callable[[MarkerPath], MarkerPath]) -> Falsify:
     return lambda run, scene: replace(run, markers={name: change(path) for name, path in run.markers.items()})
 
 
@@ -142,7 +135,7 @@ def _wheels_left_out(run: Trajectory, scene: Scene) -> Trajectory:
     return replace(run, momentum=momentum)
 
 
-def _energy_left_out(kind: str) -> Callable[[Trajectory, Scene], Trajectory]:
+def _energy_left_out(kind: str) -> Falsify:
     def falsify(run: Trajectory, scene: Scene) -> Trajectory:
         energy = {name: 0.0 * values if name == kind else values for name, values in run.energy.items()}
         return replace(run, energy=energy)
@@ -178,29 +171,50 @@ def _in_axes(path: MarkerPath, spatial: Real) -> Real:
 
 FAULTS = (
     AnswerFault(
-        "load_reaction", "hinge loads negated", "load on the inboard body for that on the outboard", _loads_reversed
-    ),
-    AnswerFault("load_reference", "hinge torques about another point", "another reference point", _load_point),
-    AnswerFault("load_axes", "hinge loads in body axes", "axes of the outboard body for World axes", _load_axes),
-    AnswerFault(
-        "connector_reaction", "loads of connectors negated", "load on body A for that on body B", _connectors_reversed
+        "load_reaction", "hinge loads negated", "load on the inboard body for that on the outboard", _reversed("loads")
     ),
     AnswerFault(
-        "connector_reference", "torques of connectors about another point", "another reference point", _connector_point
+        "load_reference", "hinge torques about another point", "another reference point", _about_another_point("loads")
     ),
     AnswerFault(
-        "connector_axes", "loads of connectors in axes of body B", "axes of a body for World axes", _connector_axes
+        "load_axes",
+        "hinge loads in body axes",
+        "axes of the outboard body for World axes",
+        _in_body_axes("loads", _by_hinges),
+    ),
+    AnswerFault(
+        "connector_reaction",
+        "loads of connectors negated",
+        "load on body A for that on body B",
+        _reversed("connectors"),
+    ),
+    AnswerFault(
+        "connector_reference",
+        "torques of connectors about another point",
+        "another reference point",
+        _about_another_point("connectors"),
+    ),
+    AnswerFault(
+        "connector_axes",
+        "loads of connectors in axes of body B",
+        "axes of a body for World axes",
+        _in_body_axes("connectors", _by_connectors),
     ),
     AnswerFault(
         "hinge_force_reaction",
         "loads of connectors along hinges negated",
         "what acts on the hinge for what resists it",
-        _hinge_forces_reversed,
+        _reversed("hinge_forces"),
     ),
     AnswerFault(
-        "wheel_load_reaction", "wheel loads negated", "load on the body for that on the wheel", _wheel_loads_reversed
+        "wheel_load_reaction", "wheel loads negated", "load on the body for that on the wheel", _reversed("wheel_loads")
     ),
-    AnswerFault("drive_reaction", "drive loads negated", "load of the motion for load of the drive", _drives_reversed),
+    AnswerFault(
+        "drive_reaction",
+        "drive loads negated",
+        "load of the motion for load of the drive",
+        _reversed("drives"),
+    ),
     AnswerFault(
         "orientation_transposed", "conjugate quaternions", "World to body for body to World", _on_paths(_transposed)
     ),

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -22,7 +23,6 @@ from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import roundoff_floor
 from crosscheck.judging.verdict import Signal, Verdict, compare
-from crosscheck.library.case import Control
 from crosscheck.library.find import Case
 from crosscheck.library.patterns import most_specific
 from crosscheck.records.archive import read
@@ -102,7 +102,12 @@ def scored(what: JudgedVariant, mutants: Litter, results: CaseResults) -> CaseBi
     for name, control in mutants.mutants.items():
         faulty = results.get(what.variant.name, what.engine, f"control:{name}")
         reference = stored.of_scene(faulty) if stored is not None else {}
-        of_scene.append(_mutant(control, verdicts[name], reference, patient))
+        channels = {
+            each.channel: ShownIn(status=each.status, E=each.E, U=each.U, goal=each.goal) for each in verdicts[name]
+        }
+        worst = max(verdicts[name], key=lambda each: each.E or 0.0, default=None)
+        reason = "no verdict" if worst is None else worst.reason
+        of_scene.append(_mutant("scene", control.mutation, control.target, reason, channels, reference, patient))
     of_answer, not_asked = _answers(what, true, stored)
     return bite(
         what.case.name,
@@ -114,14 +119,16 @@ def scored(what: JudgedVariant, mutants: Litter, results: CaseResults) -> CaseBi
     )
 
 
-def _mutant(control: Control, verdicts: Sequence[Verdict], reference: dict[str, ShownIn], patient: bool) -> Mutant:
-    channels = {each.channel: ShownIn(status=each.status, E=each.E, U=each.U, goal=each.goal) for each in verdicts}
-    reason = max(verdicts, key=lambda each: each.E or 0.0).reason if verdicts else "no verdict"
+def _mutant(
+    of: Literal["scene", "answer"], mutation: str, target: str, reason: str, channels: dict[str, ShownIn],
+    reference: dict[str, ShownIn], patient: bool = False,
+) -> Mutant:  # fmt: skip
+    """What became of a fault, by the verdicts on the channels and those by the stored reference."""
     what, beyond = outcome(channels, patient)
     return Mutant(
-        mutation=control.mutation,
-        target=control.target,
-        of="scene",
+        mutation=mutation,
+        target=target,
+        of=of,
         outcome=what,
         beyond_goal=beyond,
         reason=reason,
@@ -148,22 +155,10 @@ def _answers(what: JudgedVariant, true: Result, stored: ByReference | None) -> t
             reason = f"the case sets no goal for what it changes: {', '.join(changed)}"
             passed.append(PassedOver(mutation=fault.name, target="", reason=reason))
         else:
-            verdict, beyond = outcome(channels)
             reference = stored.of_answer(wrong) if stored is not None else {}
             worst = max(channels, key=lambda name: channels[name].E or 0.0)
-            found.append(
-                Mutant(
-                    mutation=fault.name,
-                    target="",
-                    of="answer",
-                    outcome=verdict,
-                    beyond_goal=beyond,
-                    reason=f"{fault.what}: {worst}",
-                    channels=channels,
-                    by_reference=outcome(reference)[0] if reference else None,
-                    reference=reference,
-                )
-            )
+            reason = f"{fault.what}: {worst}"
+            found.append(_mutant("answer", fault.name, "", reason, channels, reference))
     return found, passed
 
 

@@ -16,13 +16,13 @@ from scipy.spatial.transform import Rotation
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.records.drawing import CarriedPoint, Drawing, DrawnWheel, Line
 from flexmb.scene.bodies import ZERO, BeamBody, Body, ModalBody, RigidBody, SidBody, Vector
-from flexmb.scene.connectors import BetweenNodes, Bushing, HingeSpring, SpringDamper
+from flexmb.scene.connectors import BetweenNodes, HingeSpring
+from flexmb.scene.ends import ends
 from flexmb.scene.schema import Marker, Scene, Wheel
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
 LARGEST_ASPECT = 12.0
-DRAWN_AS = {SpringDamper: "spring", Bushing: "mount"}
 THINNEST_WHEEL = 0.1  # least drawn width of a wheel over its radius
 
 
@@ -85,11 +85,8 @@ def _connectors(scene: Scene) -> list[Line]:
     for each in scene.connectors:
         kind, points = "mount", []
         if isinstance(each, BetweenNodes):
-            kind = DRAWN_AS[type(each)]
-            points = [
-                _carried(scene, each.body_a, each.node_a, each.position_a_m),
-                _carried(scene, each.body_b, each.node_b, each.position_b_m),
-            ]
+            kind = "mount" if hasattr(each, "quaternion_a") else "spring"  # between frames or between points
+            points = [_carried(scene, end.body, end.node, end.position_m) for end in ends(each)]
         elif isinstance(each, HingeSpring):
             hinges = [hinge for hinge in scene.hinges if hinge.name == each.hinge]
             points = [_carried(scene, hinge.child, hinge.child_node, hinge.child_position_m) for hinge in hinges]
@@ -169,10 +166,8 @@ def _joints(scene: Scene, body: RigidBody) -> list[Real]:
         elif hinge.parent == body.name:
             points.append(_node_point(body, hinge.parent_node, hinge.parent_position_m))
     for each in (*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))):
-        if each.body_a == body.name:
-            points.append(_node_point(body, each.node_a, each.position_a_m))
-        elif each.body_b == body.name:
-            points.append(_node_point(body, each.node_b, each.position_b_m))
+        own = [_node_point(body, end.node, end.position_m) for end in ends(each) if end.body == body.name]
+        points += own[:1]  # what joins two points of the body counts at its first
     return points
 
 

@@ -12,10 +12,9 @@ from typing import Any, NamedTuple, assert_never, get_args
 
 import numpy as np
 
-from crosscheck.engines.conventions import Frame, cross, cross_matrix, frame, quaternion_of, rotation_vector
+from crosscheck.engines.conventions import Frame, cross, cross_matrix, quaternion_of, rotation_vector
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Attachment, Link, attachment
-from flexmb.scene.bodies import IDENTITY
+from crosscheck.engines.links import Link, closed_frames
 from flexmb.scene.connectors import (
     AngularFriction,
     AngularSpring,
@@ -27,8 +26,8 @@ from flexmb.scene.connectors import (
     actuator,
     by_stem,
 )
-from flexmb.scene.schema import Marker, Scene
-from flexmb.scene.tree import GROUND, coordinate_of
+from flexmb.scene.schema import Scene
+from flexmb.scene.tree import coordinate_of
 from flexmb.typing import Real
 
 PeerLine = SpringDamper | Bushing
@@ -81,7 +80,7 @@ class Connection:
 
     def __init__(self, scene: Scene, chain: tuple[Link, ...], connector: PeerLine) -> None:
         self.name = connector.name
-        self.a, self.b = (_attached(scene, chain, connector, side) for side in "ab")
+        self.a, self.b = closed_frames(scene, chain, connector)
         self.exerted = exerts(connector)
 
 
@@ -121,15 +120,6 @@ def along_hinges(scene: Scene) -> list[tuple[str, str, int, Callable[[float, flo
             item, number = coordinate_of(scene, connector)
             found.append((connector.name, item.name, number, _along(connector)))
     return found
-
-
-def _attached(scene: Scene, chain: tuple[Link, ...], connector: PeerLine, side: str) -> Attachment:
-    body, node = getattr(connector, f"body_{side}"), getattr(connector, f"node_{side}")
-    own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
-    if body == GROUND:
-        return Attachment(-1, own)
-    at = attachment(scene, chain, Marker(name="", body=body, node=node))
-    return Attachment(at.link, at.frame @ own)
 
 
 def law_of(stems: dict[str, Any]) -> Law:

@@ -20,7 +20,8 @@ from crosscheck.engines.conventions import (
     outboard_frame,
 )
 from flexmb.scene.bodies import ZERO
-from flexmb.scene.connectors import Connector
+from flexmb.scene.connectors import BetweenNodes, Connector
+from flexmb.scene.ends import EndFrame, ends
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.schema import (
@@ -185,17 +186,19 @@ def attachment(scene: Scene, chain: tuple[Link, ...], item: Marker | Load) -> At
     return Attachment(index, chain[index].body @ offset_frame(body, item.node, offset))
 
 
-def closed_frames(scene: Scene, chain: tuple[Link, ...], closure: Closure) -> tuple[Attachment, Attachment]:
-    """Frames A and B of a closure, link -1 being World."""
-    a = (closure.body_a, closure.node_a, frame(closure.position_a_m, closure.quaternion_a))
-    b = (closure.body_b, closure.node_b, frame(closure.position_b_m, closure.quaternion_b))
-    return _closed_frame(scene, chain, *a), _closed_frame(scene, chain, *b)
+def closed_frames(
+    scene: Scene, chain: tuple[Link, ...], item: Closure | BetweenNodes
+) -> tuple[Attachment, Attachment]:
+    """Frames A and B of a closure or of a connector, link -1 being World."""
+    a, b = ends(item)
+    return _closed_frame(scene, chain, a), _closed_frame(scene, chain, b)
 
 
-def _closed_frame(scene: Scene, chain: tuple[Link, ...], body: str, node: str, offset: Frame) -> Attachment:
-    if body == GROUND:
+def _closed_frame(scene: Scene, chain: tuple[Link, ...], end: EndFrame) -> Attachment:
+    offset = frame(end.position_m, end.quaternion)
+    if end.body == GROUND:
         return Attachment(-1, offset)
-    at = attachment(scene, chain, Marker(name="", body=body, node=node))
+    at = attachment(scene, chain, Marker(name="", body=end.body, node=end.node))
     return Attachment(at.link, at.frame @ offset)
 
 

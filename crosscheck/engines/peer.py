@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
-from crosscheck.engines.contract import Model, Support
+from crosscheck.engines.contract import EngineMissing, Model, Support
 from crosscheck.engines.links import Link
 from flexmb.scene.schema import Scene
 
@@ -38,6 +39,15 @@ class PeerEngine:
         if reason := self.obstacle(scene):
             raise ValueError(f'scene "{scene.name}": {reason}')
         return self.model(scene)
+
+
+@contextmanager
+def needed(library: str, extra: str) -> Iterator[None]:
+    """Around the import of a library: if it fails, EngineMissing says which extra of flexmb installs it."""
+    try:
+        yield
+    except ImportError as error:
+        raise EngineMissing(f"{library} is not installed: pip install flexmb[{extra}]") from error
 
 
 def inertia_obstacle(links: Iterable[Link], engine: str) -> str:

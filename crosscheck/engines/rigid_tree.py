@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from crosscheck.engines.connections import Along, Exerted, Moving, along_hinges, connections
 from crosscheck.engines.conventions import Frame
-from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.functions_of_time import Profile, profile
 from crosscheck.engines.links import Attachment, Freedom, Link, Scalar
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
@@ -27,6 +28,19 @@ class Slot:
     @property
     def driven(self) -> bool:
         return isinstance(self.freedom, Scalar) and self.freedom.prescribed is not None
+
+
+AnySlot = TypeVar("AnySlot", bound=Slot)
+
+
+def scalars(slots: Sequence[AnySlot]) -> list[AnySlot]:
+    """Those of joints of one coordinate."""
+    return [slot for slot in slots if isinstance(slot.freedom, Scalar)]
+
+
+def motors(slots: Sequence[Slot]) -> list[tuple[int, Callable[[float], Profile]]]:
+    """The place in `v` of every coordinate with a motor, and the load of that as a function of time."""
+    return [(slot.v, profile(slot.freedom.effort)) for slot in scalars(slots) if slot.freedom.effort is not None]
 
 
 def scalar_start(freedom: Scalar) -> tuple[float, float]:
@@ -66,8 +80,8 @@ class TreeConnectors:
         self.between = connections(scene, links)
         self.along_hinges = []
         for name, item, number, load in along_hinges(scene):
-            scalars = [slot for slot in slots if slot.link.joint == item and isinstance(slot.freedom, Scalar)]
-            self.along_hinges.append((name, scalars[number], load))
+            own = [slot for slot in scalars(slots) if slot.link.joint == item]
+            self.along_hinges.append((name, own[number], load))
 
     def __bool__(self) -> bool:
         return bool(self.between or self.along_hinges)

@@ -23,7 +23,7 @@ _ATOL_RATIO = 1e-3
 _LEAST_ATOL = 1e-13
 
 
-RTOL_LADDER = tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-8, 1e-10, 1e-12))
+RTOL_LADDER = tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-6, 1e-8, 1e-10, 1e-12))
 
 
 class EquationsOfMotion(Protocol):
@@ -89,7 +89,8 @@ def integrate(
         evaluations += solved.nfev
         good = np.isfinite(solved.y).all(axis=0)
         count = len(good) if good.all() else int(np.argmin(good))
-        states += [solved.y[:, k] for k in range(count) if solved.t[k] in inside]
+        asked = np.isin(solved.t[:count], inside)
+        states += list(solved.y.T[:count][asked])
         if solved.status != 0 or count < len(good):
             stopped = solved.t[count - 1] if count else begin
             return states, evaluations, f"stopped after t = {stopped:g} s: {solved.message}"

@@ -33,12 +33,18 @@ def reduce(quantity: SweptQuantity, channels: Mapping[str, Real]) -> float:
 
 def _signal(quantity: SweptQuantity, values: Real) -> Real:
     """One component (T,), the only one, or the norm of all."""
-    width = values.shape[1]
-    match quantity.component:
-        case None:
-            return values[:, 0] if width == 1 else np.linalg.norm(values, axis=1)
-        case str(letter) if len(letter) == 1 and letter in LETTERS.get(width, ""):
-            return values[:, LETTERS[width].index(letter)]
-        case int(index) if 0 <= index < width:
-            return values[:, index]
-    raise ValueError(f"{quantity.name}: {quantity.channel} has {width} components, none is {quantity.component!r}")
+    width, component = values.shape[1], quantity.component
+    if component is None:
+        return values[:, 0] if width == 1 else np.linalg.norm(values, axis=1)
+    place = place_of(component, width)
+    if place is None:
+        raise ValueError(f"{quantity.name}: {quantity.channel} has {width} components, none is {component!r}")
+    return values[:, place]
+
+
+def place_of(component: int | str, width: int) -> int | None:
+    """The column of a component in a channel of some width, None if it has no such component."""
+    if isinstance(component, int):
+        return component if 0 <= component < width else None
+    letters = LETTERS.get(width, "")
+    return letters.index(component) if len(component) == 1 and component in letters else None

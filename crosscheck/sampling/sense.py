@@ -13,7 +13,7 @@ from crosscheck.library.case import CaseError
 from crosscheck.library.channels import part_of
 from crosscheck.running.execute import NoSuchEngine, find_engine
 from crosscheck.sampling.file import SampleEffort, SweepFile, SweptQuantity
-from crosscheck.sampling.quantities import LETTERS
+from crosscheck.sampling.quantities import LETTERS, place_of
 from crosscheck.sampling.scenes import require_numbers
 from flexmb.integrate.integrator import Method
 from flexmb.scene.problems import Defect, Place, closest
@@ -85,13 +85,9 @@ def _items(scene: Scene) -> dict[str, list[str]]:
 def _component(quantity: SweptQuantity) -> tuple[str, str] | None:
     part, component = part_of(quantity.channel), quantity.component
     width = None if part is None else part.width
-    if component is None or width is None:
+    if component is None or width is None or place_of(component, width) is not None:
         return None
     letters = LETTERS.get(width, "")
-    if isinstance(component, int) and 0 <= component < width:
-        return None
-    if isinstance(component, str) and len(component) == 1 and component in letters:
-        return None
     choice = f"{', '.join(letters)}, or " if letters else ""
     return f"{quantity.channel} has no component {component!r}", f"give {choice}a number from 0 to {width - 1}"
 

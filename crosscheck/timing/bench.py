@@ -18,8 +18,8 @@ from crosscheck.library.find import Case
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import PROVIDER, Listener
 from crosscheck.timing.facts import EngineFacts, facts_of
-from crosscheck.timing.rivals import Rival, Rivals, Rung, find_rivals
-from crosscheck.timing.turns import Timed, in_turns
+from crosscheck.timing.rivals import Rival, Rivals, Rung, find_rivals, timed
+from crosscheck.timing.turns import Timed
 
 Standing = Literal["equal", "apart", "not timed"]
 ACCURACY = 1e-4  # of the signals' sizes: peers with fixed steps reach it too
@@ -70,12 +70,10 @@ def bench(
         rivals = find_rivals(case, engines, variants, provider=provider, limits=limits, listener=listener)
     except CaseError as error:
         return CaseBench(case.name, accuracy, rounds, problem=str(error))
-    facts = facts_of(sorted({each.job.engine for each in rivals.found}), provider)
+    facts = facts_of(rivals.engines, provider)
     contests = [_entered(rival, facts[rival.job.engine], rivals, accuracy) for rival in rivals.found]
-    entered = [each for each in contests if each.rung is not None]
-    timed = in_turns([(each.rival.job, each.rung.effort) for each in entered if each.rung], rounds)
-    done = dict(zip((id(each) for each in entered), timed, strict=True))
-    contests = [_ended(each, done.get(id(each)), rivals, accuracy) for each in contests]
+    times = timed(((each.rival, each.rung) for each in contests if each.rung is not None), rounds)
+    contests = [_ended(each, times.get(id(each.rung)), rivals, accuracy) for each in contests]
     return CaseBench(case.name, accuracy, rounds, tuple(sorted(contests, key=_place)))
 
 
@@ -97,18 +95,19 @@ def _entered(rival: Rival, facts: EngineFacts, rivals: Rivals, accuracy: float) 
     return Contest(rival, facts, "equal", f"agrees with the reference, {accurate.error:.2g} from it", accurate)
 
 
-def _ended(each: Contest, timed: Timed | None, rivals: Rivals, accuracy: float) -> Contest:
+def _ended(each: Contest, measured: Timed | None, rivals: Rivals, accuracy: float) -> Contest:
     """The contest with its times, unless the rival failed while it was timed or gave another result."""
-    if timed is None:
+    if measured is None:
         return each
-    if timed.failure or not timed.samples or timed.first is None:
-        why = f"it passed the verdicts, but not its turns: {timed.failure or 'it took none'}"
+    if measured.failure or not measured.samples or measured.first is None:
+        why = f"it passed the verdicts, but not its turns: {measured.failure or 'it took none'}"
         return Contest(each.rival, each.facts, "not timed", why, each.rung)
-    again = max(each.rival.errors(timed.first.times, timed.first.channels, rivals.reference).values(), default=None)
+    errors = each.rival.errors(measured.first.times, measured.first.channels, rivals.reference)
+    again = max(errors.values(), default=None)
     if again is None or (each.standing == "equal" and not again <= accuracy):
         why = f"what was timed is not what was judged: its error is {again} instead of {each.rung and each.rung.error}"
         return Contest(each.rival, each.facts, "not timed", why, each.rung)
-    return Contest(each.rival, each.facts, each.standing, each.why, each.rung, timed)
+    return Contest(each.rival, each.facts, each.standing, each.why, each.rung, measured)
 
 
 def _place(each: Contest) -> tuple[int, float]:

@@ -15,8 +15,8 @@ from crosscheck.library.find import Case
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import PROVIDER, Listener
 from crosscheck.timing.facts import EngineFacts, facts_of
-from crosscheck.timing.rivals import Rival, Rivals, Rung, find_rivals
-from crosscheck.timing.turns import Timed, in_turns
+from crosscheck.timing.rivals import Rival, Rivals, Rung, find_rivals, timed
+from crosscheck.timing.turns import Timed
 
 ROUNDS = 5
 
@@ -84,10 +84,8 @@ def chart(
         observables = _observables(case, rivals)
     except CaseError as error:
         return CaseCharts(case.name, case.run.title, "", 0.0, rounds, problem=str(error))
-    entered = [(rival, rung) for rival in rivals.found for rung in rival.rungs if rung.status == "finished"]
-    timed = in_turns([(rival.job, rung.effort) for rival, rung in entered], rounds)
-    times = {id(rung): each for (_, rung), each in zip(entered, timed, strict=True)}
-    facts = facts_of(sorted({each.job.engine for each in rivals.found}), provider)
+    finished = ((rival, rung) for rival in rivals.found for rung in rival.rungs if rung.status == "finished")
+    times = timed(finished, rounds)
     return CaseCharts(
         case=case.name,
         title=case.run.title,
@@ -96,7 +94,7 @@ def chart(
         rounds=rounds,
         charts=tuple(_chart(name, rivals, times) for name in observables),
         verdicts=tuple((rival.name, rival.status, rival.reason) for rival in rivals.found),
-        facts=tuple(facts.items()),
+        facts=tuple(facts_of(rivals.engines, provider).items()),
     )
 
 
@@ -125,17 +123,17 @@ def _chart(observable: str, rivals: Rivals, times: dict[int, Timed]) -> ChartDat
     return ChartData(observable, floor, tuple(with_front(points, floor)))
 
 
-def _point(observable: str, rival: Rival, rung: Rung, timed: Timed | None, rivals: Rivals) -> ChartPoint:
-    if timed is None:
+def _point(observable: str, rival: Rival, rung: Rung, measured: Timed | None, rivals: Rivals) -> ChartPoint:
+    if measured is None:
         return _without(rival, rung, f"{rung.status}: {rung.message}")
-    if timed.failure or timed.first is None or not timed.samples:
-        return _without(rival, rung, timed.failure or "it was not timed")
-    errors = rival.errors(timed.first.times, timed.first.channels, rivals.reference)
+    if measured.failure or measured.first is None or not measured.samples:
+        return _without(rival, rung, measured.failure or "it was not timed")
+    errors = rival.errors(measured.first.times, measured.first.channels, rivals.reference)
     if observable not in errors:
         return _without(rival, rung, f"it does not offer {observable}, or not at the reference's times")
     if not errors[observable] < inf:
         return _without(rival, rung, "its error is no number")
-    solves = sorted(sample.solve_s for sample in timed.samples)
+    solves = sorted(sample.solve_s for sample in measured.samples)
     return ChartPoint(
         variant=rival.job.variant,
         engine=rival.job.engine,

@@ -6,7 +6,7 @@ compared with `reference.csv` by the usual verdicts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -29,6 +29,7 @@ from crosscheck.running.job import Job
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import PROVIDER, Listener, run_planned
+from crosscheck.timing.turns import Timed, in_turns
 from flexmb.run.channels import distance
 from flexmb.typing import Real
 
@@ -89,6 +90,11 @@ class Rivals:
     reference: ReferenceSignals
     found: tuple[Rival, ...]
 
+    @property
+    def engines(self) -> list[str]:
+        """The names of their engines, sorted."""
+        return sorted({each.job.engine for each in self.found})
+
 
 ORDER = ("did not run", "crashed", "did not finish", "failed", "refused", "diverged", "differ", "unresolved", "agree")
 """Statuses of verdicts from the gravest; refused channels count only for an engine that offers none."""
@@ -129,6 +135,13 @@ def find_rivals(
             for job in jobs
         ),
     )
+
+
+def timed(entered: Iterable[tuple[Rival, Rung]], rounds: int) -> dict[int, Timed]:
+    """Time rivals at these efforts in turns: what was measured, by the `id` of the effort's `Rung`."""
+    pairs = list(entered)
+    measured = in_turns([(rival.job, rung.effort) for rival, rung in pairs], rounds)
+    return {id(rung): each for (_, rung), each in zip(pairs, measured, strict=True)}
 
 
 def _reference(case: Case) -> RecordedReference:

@@ -7,13 +7,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from flexmb.building.carried import CarriedTables, moved_inertia
+from flexmb.building.carried import moved_inertia
 from flexmb.building.connector_arrays import connector_arrays
 from flexmb.building.inertia_arrays import group, inertia_arrays, second_order_rows, shape_rows
 from flexmb.building.links import BodyLink, Port
 from flexmb.building.numbering import Numbering
-from flexmb.building.ports import Attached, attached, inboard_frames_and_ports
-from flexmb.building.rigid_arrays import Frames
+from flexmb.building.ports import attached, inboard_frames_and_ports
 from flexmb.hinges.catalogue import KINDS
 from flexmb.jit.strips import whole
 from flexmb.levels.body import LEVELS
@@ -23,14 +22,15 @@ from flexmb.tables import arrays as a
 from flexmb.tables.features import as_asked
 from flexmb.tables.functions import pack
 
-DOUBTFUL = 2.0**-33  # of all that a speed moves: chains of hundreds of bodies yield no less than this
-
+# A pivot below this share of the inertia that its speed moves may consist of rounding errors (docs/notation.md); the
+# pivots of sound chains of hundreds of bodies are larger.
+DOUBTFUL = 2.0**-33
 
 Item = TypeVar("Item", s.Wheel, s.Load)
 
 
 class Functions:
-    """Functions of time by number, each stored once."""
+    """Numbers the functions of time of a scene; equal functions share a number."""
 
     def __init__(self) -> None:
         self._number: dict[s.Function, int] = {}
@@ -44,19 +44,19 @@ class Functions:
 
 @dataclass(frozen=True)
 class Assembled:
-    """The arrays of a scene, and which of its ports belong to whom: (body, port) each, (-1, -1) on the ground."""
+    """The arrays of a scene, and (body, port) of its markers and closures; (-1, -1) for a port on the ground."""
 
     constants: a.Constants
     markers: dict[str, tuple[int, int]]  # by name
     closures: list[tuple[int, int]]  # sides A and B of the first, of the second ...
-    signals: dict[int, s.ControlSignal]  # by number among the functions, those that controllers drive
+    signals: dict[int, s.ControlSignal]  # the functions that controllers drive, by their numbers
 
 
 def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_partitions: bool = False) -> Assembled:
     """The arrays of a scene, from its links and the places of its coordinates.
 
-    `null_partitions` gives a port to inboard hinges at nodes that do not deform too, so that terms which vanish are
-    computed all the same.
+    With `null_partitions`, inboard hinge frames at nodes that do not deform also get a port, so that the terms that
+    vanish for them are computed nevertheless.
     """
     index = {link.name: k for k, link in enumerate(chain) if not isinstance(link.body, s.PointMass)}
     parent = [index.get(link.parent, -1) for link in chain]
@@ -73,11 +73,12 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     body = inertia.pop("body")
     body["parent"] = parent
     _describe(body, chain, numbering)
-    _place(body, placement, at)
+    body["inboard_port"], body["outboard_port"] = at.inboard, at.outboard
+    body["placement_position"], body["placement_rotation"] = placement.p, placement.R.reshape(-1, 9)
     group(body, "port", [len(each) for each in ports_by_body])
     for name, items in (("wheel", wheels), ("load", loads)):
         group(body, name, np.bincount(np.array([index[item.body] for item in items], int), minlength=len(chain)))
-    _who_starts(body)
+    _mark_first_contributions(body)
 
     functions = Functions()
     speed = _speeds(chain, wheels, numbering, functions, body)
@@ -85,7 +86,7 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     connected = connector_arrays(scene, at.connectors, numbering, functions.number)
     function, table = pack(functions.all())
     port, wheel = _ports(ports, port_rows), _wheels(wheels, at.wheels, numbering)
-    moved = moved_inertia(CarriedTables(body, port, inertia["mff"], wheel), len(speed))
+    moved = moved_inertia(body, port, inertia["mff"], wheel, len(speed))
     speed["doubtful"] = DOUBTFUL * (moved + speed["armature"])
     constants = a.Constants(
         gravity=np.array(scene.gravity_m_s2, float),
@@ -108,12 +109,12 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
 
 
 def _by_body(items: tuple[Item, ...], index: dict[str, int]) -> list[Item]:
-    """In the order of the bodies, those of one body in the scene's order."""
+    """The items in the order of their bodies, and within a body in the order of the scene."""
     return sorted(items, key=lambda item: index[item.body])
 
 
 def _describe(body: a.Record, chain: list[BodyLink], numbering: Numbering) -> None:
-    """What bodies and hinges are, and where their coordinates and speeds are."""
+    """Write the kinds and parameters of bodies and hinges, and the places of their coordinates and speeds."""
     body["level"] = [LEVELS.index(link.level) for link in chain]
     body["modes"] = [link.mode_count for link in chain]
     body["hinge_kind"] = [KINDS.index(link.kind) for link in chain]
@@ -127,14 +128,12 @@ def _describe(body: a.Record, chain: list[BodyLink], numbering: Numbering) -> No
     body["quaternion"] = np.where(in_hinge < 0, -1, body["q_index"] + in_hinge)
 
 
-def _place(body: a.Record, placement: Frames, at: Attached) -> None:
-    """Where hinges are on their parents and on their bodies."""
-    body["inboard_port"], body["outboard_port"] = at.inboard, at.outboard
-    body["placement_position"], body["placement_rotation"] = placement.p, placement.R.reshape(-1, 9)
+def _mark_first_contributions(body: a.Record) -> None:
+    """Mark the outboard body that is the first to add to its parent's inertia in the inward sweep: the last one.
 
-
-def _who_starts(body: a.Record) -> None:
-    """Whose inertia the first body to reach it in the inward sweep starts: that is the last one hinged to it."""
+    It also adds the parent's own inertia, which the sweep then need not write beforehand. Only rigid parents without
+    wheels are treated in this way.
+    """
     steady = (body["level"] == LEVELS.index(RIGID)) & (body["wheel_start"] == body["wheel_stop"])
     last = np.full(len(body), -1)
     on = np.flatnonzero(body["parent"] >= 0)

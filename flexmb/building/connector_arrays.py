@@ -1,15 +1,15 @@
-"""From connectors to the arrays of flexmb.tables.arrays: ends, laws, bushings, springs and laws along hinges."""
+"""From connectors to the arrays of flexmb.tables.arrays: ends, springs, and the numbers of all other laws."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, assert_never
+from typing import Any
 
 import numpy as np
 
 from flexmb.building.links import BodyLink, Port, port
 from flexmb.building.numbering import Numbering
-from flexmb.connectors.catalogue import law_of
+from flexmb.connectors.catalogue import frame_law_of, law_of
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.connectors import AlongHinge, BetweenNodes, HingeSpring, actuator, by_stem
@@ -18,12 +18,14 @@ from flexmb.scene.tree import GROUND, coordinate_of
 from flexmb.tables import arrays as a
 from flexmb.typing import Real
 
-SMOOTHING = 1e-8  # of the free length
-SHORTEST = 1e-12  # m, the smoothing of a spring without free length
-NO_STOP = 1e300  # no coordinate is ever beyond it
+SMOOTHING = 1e-8  # the smoothing length of a spring, relative to its free length
+SMALLEST_SMOOTHING = 1e-12  # m, for springs without free length
+NO_STOP = 1e300  # a limit that no coordinate reaches
 ACTS = {"both": a.BOTH, "tension": a.TENSION, "compression": a.COMPRESSION}
 
 Rows = list[tuple[float, ...]]
+Number = Callable[[s.Function | None], int]
+"""Returns the number of a function of time, -1 for None."""
 
 
 def between_nodes(scene: s.Scene) -> list[BetweenNodes]:
@@ -47,27 +49,25 @@ def end_ports(scene: s.Scene, chain: list[BodyLink], index: dict[str, int]) -> l
             at = port(link.node(node), *_offset(connector, side), np.eye(3))
             if link.level.at_rest and at.deforms:
                 raise NotImplementedError(
-                    f'connector "{connector.name}": body "{body}" of level "{link.level.name}" shows its rest shape to '
-                    f'all that acts on it, and a spring at its node "{node}" would not feel it bend; use level '
-                    '"linear" or "full"'
+                    f'connector "{connector.name}": loads act on body "{body}" of level "{link.level.name}" in its '
+                    f'undeformed shape, so a spring at its node "{node}" would not respond to its deformation; use '
+                    'level "linear" or "full"'
                 )
             found.append((index[body], at))
     return found
 
 
 def connector_arrays(
-    scene: s.Scene, ends: list[tuple[int, int]], numbering: Numbering, number: Callable[[s.Function | None], int]
+    scene: s.Scene, ends: list[tuple[int, int]], numbering: Numbering, number: Number
 ) -> dict[str, Any]:
     """The tables of connectors by their names in Constants.
 
-    ends: (body, port) of sides A and B of the first between two nodes, of the second ..., (-1, -1) on the ground;
-    `number` gives the number of a function of time.
+    ends: (body, port) of sides A and B of each connector between two nodes, (-1, -1) on the ground.
     """
     laws: Rows = []
     connectors = between_nodes(scene)
     records, sides = np.zeros(len(connectors), a.CONNECTOR), np.zeros((len(connectors), 2), a.END)
-    bushings = [each for each in connectors if isinstance(each, s.Bushing)]
-    matrices = np.zeros(len(bushings), a.BUSHING_MATRIX)
+    frame_laws: list[tuple[float, ...]] = []
     for i, connector in enumerate(connectors):
         record = records[i]
         record["function"] = record["row"] = -1
@@ -76,34 +76,38 @@ def connector_arrays(
             if sides[i, j]["body"] == a.ON_GROUND:
                 offset, quaternion = _offset(connector, side)
                 sides[i, j]["position"], sides[i, j]["rotation"] = offset, rotation_matrix(quaternion).ravel()
-        match connector:
-            case s.Bushing():
-                record["kind"], row = a.BUSHING, bushings.index(connector)
-                record["row"] = row
-                matrices[row]["stiffness"], matrices[row]["damping"] = connector.stiffness, connector.damping
-            case s.SpringDamper():
-                record["kind"], record["acts"] = a.ALONG_LINE, ACTS[connector.acts]
-                record["free_length"], record["damping"] = connector.free_length_m, connector.damping_Ns_m
-                record["smoothing"] = max(SMOOTHING * connector.free_length_m, SHORTEST)
-                record["function"] = number(connector.force_N)
-                record["start"], record["stop"] = _add(laws, _pieces(by_stem(connector), connector.acts))
-            case _:
-                assert_never(connector)
+        record["kind"], parameters = frame_law_of(connector)
+        if parameters:
+            record["row"] = len(frame_laws)
+            frame_laws.append(parameters)
+        if isinstance(connector, s.SpringDamper):
+            record["acts"] = ACTS[connector.acts]
+            record["free_length"], record["damping"] = connector.free_length_m, connector.damping_Ns_m
+            record["smoothing"] = max(SMOOTHING * connector.free_length_m, SMALLEST_SMOOTHING)
+            record["function"] = number(connector.force_N)
+            record["start"], record["stop"] = _add(laws, _pieces(by_stem(connector), connector.acts))
     springs = [each for each in scene.connectors if isinstance(each, HingeSpring)]
     along = [each for each in scene.connectors if isinstance(each, AlongHinge)]
     others = [each for each in along if not isinstance(each, HingeSpring)]
     return {
         "connector": records,
         "end": sides,
-        "bushing": matrices,
+        "frame_law": _frame_laws(frame_laws),
         "hinge_spring": _hinge_springs(scene, springs, numbering, laws, number),
         "coordinate_law": _coordinate_laws(scene, others, numbering),
         "law": np.array(laws, float).reshape(-1, 8),
     }
 
 
+def _frame_laws(parameters: Sequence[tuple[float, ...]]) -> a.Record:
+    out = np.zeros(len(parameters), a.FRAME_LAW)
+    for row, numbers in zip(out, parameters, strict=True):
+        row["parameters"][: len(numbers)] = numbers
+    return out
+
+
 def _offset(connector: BetweenNodes, side: str) -> tuple[s.Vector, s.Quaternion]:
-    """Fixed offsets of frame A or B from its node."""
+    """Position and orientation of frame A or B relative to its node."""
     return getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY)
 
 
@@ -113,11 +117,7 @@ def _speed(scene: s.Scene, connector: AlongHinge, numbering: Numbering) -> int:
 
 
 def _hinge_springs(
-    scene: s.Scene,
-    springs: list[HingeSpring],
-    numbering: Numbering,
-    laws: Rows,
-    number: Callable[[s.Function | None], int],
+    scene: s.Scene, springs: list[HingeSpring], numbering: Numbering, laws: Rows, number: Number
 ) -> a.Record:
     out = np.zeros(len(springs), a.HINGE_SPRING)
     for row, spring in zip(out, springs, strict=True):
@@ -140,7 +140,7 @@ def _coordinate_laws(scene: s.Scene, connectors: Sequence[AlongHinge], numbering
 
 
 def _add(laws: Rows, pieces: Rows) -> tuple[int, int]:
-    """Where in the table of all laws these pieces are."""
+    """Append the pieces of a law to the table of all laws, and return the range of their rows."""
     start = len(laws)
     laws += pieces
     return start, len(laws)
@@ -169,11 +169,6 @@ def _through(x: Real, loads: Real) -> Rows:
     (before, *_, after) = ([at, stored, 0.0, 0.0, 0.0, 0.0, slope, load] for at, stored, load, slope in ends)
     cubics = [[left, energy(left), 0.0, 0.0, *spline.c[:, i]] for i, left in enumerate(x[:-1])]
     rows = np.array([before, *cubics, after], float)
-    rows[:, 1] -= _energy_at(rows, 0.0)
+    at_zero = rows[max(0, int(np.searchsorted(rows[:, 0], 0.0, side="right")) - 1)]  # the piece that contains x = 0
+    rows[:, 1] -= at_zero[1] + np.polyval(np.polyint(at_zero[2:]), -at_zero[0])
     return [tuple(row) for row in rows.tolist()]
-
-
-def _energy_at(rows: Real, x: float) -> float:
-    """Of a law."""
-    row = rows[max(0, int(np.searchsorted(rows[:, 0], x, side="right")) - 1)]
-    return float(row[1] + np.polyval(np.polyint(row[2:]), x - row[0]))

@@ -1,4 +1,4 @@
-"""Inertia of all bodies as arrays: what each level sums over points before a run, and what is left to sum in it."""
+"""Inertia of all bodies as arrays: sums over points that are constant in a run, and the points left to sum in it."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from flexmb.tables import arrays as a
 
 
 def inertia_arrays(chain: list[BodyLink], m: int) -> tuple[dict[str, Any], dict[str, Any], list[SecondOrder | None]]:
-    """Inertia at rest and modal integrals by body, slopes of level linear; the points left to sum at run time, and the
-    second-order field of each."""
+    """The tables of inertia, those of the points that are left to sum at run time, and the second-order field of each
+    of these points."""
     body = np.zeros(len(chain), a.BODY)
     rigid = [k for k, link in enumerate(chain) if link.is_rigid and link.wheels == 0]
     alone = [chain[k] for k in rigid]
@@ -36,7 +36,7 @@ def inertia_arrays(chain: list[BodyLink], m: int) -> tuple[dict[str, Any], dict[
 def _modal_arrays(
     chain: list[BodyLink], bodies: dict[int, InertiaTables], body: a.Record, m: int
 ) -> dict[str, NDArray[Any]]:
-    """Inertia at rest, stiffness and damping; notes which of them are diagonal."""
+    """Inertia at rest, stiffness and damping; writes to `body` which of the matrices are diagonal."""
     pairs = {name: strip_zeros((len(chain), m, m)) for name in ("mff", "stiffness", "damping")}
     modes = {name: strip_zeros((len(chain), 6, m)) for name in ("mfr", "gyration")}
     body["orthogonal"] = body["uncoupled"] = True
@@ -51,8 +51,8 @@ def _modal_arrays(
 
 
 def _integrals(bodies: dict[int, InertiaTables], body: a.Record, m: int) -> dict[str, NDArray[Any]]:
-    """Modal integrals of the bodies that have some; notes the row of each."""
-    most = max((len(each.mff) for each in bodies.values()), default=0)  # no strips: these grow fast
+    """Modal integrals of the bodies that have some; writes the row of each to `body`."""
+    most = max((len(each.mff) for each in bodies.values()), default=0)  # not whole strips: the size is its cube
     empty = {
         "product": strip_zeros((m // ROW, 1 + m, NUMBERS * ROW)),
         "slope": np.zeros((most, most), a.SLOPE),
@@ -68,7 +68,7 @@ def _integrals(bodies: dict[int, InertiaTables], body: a.Record, m: int) -> dict
 def _points(
     bodies: dict[int, InertiaTables], body: a.Record, m: int
 ) -> tuple[dict[str, NDArray[Any]], list[SecondOrder | None]]:
-    """The points left to sum at run time, and the second-order field of each; notes whose they are."""
+    """The points left to sum at run time, and the second-order field of each; writes each body's range to `body`."""
     counts = np.zeros(len(body), int)
     counts[list(bodies)] = [0 if each.summed is None else len(each.summed.mass) for each in bodies.values()]
     group(body, "point", counts)
@@ -85,17 +85,18 @@ def _points(
 
 @lru_cache(maxsize=64)
 def _tables(level: FidelityLevel, model: FlexibleModel, wheels: int) -> InertiaTables:
-    """Those of a level. Equal bodies, of one scene or of copies of it, share one: its arrays must not be written to."""
+    """The tables of a level. Equal bodies, also in copies of a scene, share their tables, which must not be changed."""
     found = level.tables(model, wheels)
     _drop_rounding(found.mff, len(model.mass))
     return found
 
 
 def _drop_rounding(masses: a.Real, points: int) -> None:
-    """Zeros for modal masses off the diagonal that are rounding of their sum over points: gamma(points) of its terms.
+    """Set modal masses off the diagonal to zero where they are rounding errors of their sum over points.
 
-    Orthogonal modes then have diagonal modal masses, which is cheaper. |sum m phi_n . phi_i| of terms in magnitude is
-    at most the root of both diagonal elements' product (Cauchy and Schwarz).
+    Orthogonal modes then have diagonal modal masses, which cost less in a run. The error is at most gamma(points) times
+    the sum of the magnitudes |m phi_n . phi_i|, and that sum is at most the square root of the product of the two
+    diagonal elements (Cauchy and Schwarz).
     """
     size = np.sqrt(np.diag(masses))
     masses[np.abs(masses) <= points * 2.0**-53 * np.outer(size, size)] = 0.0
@@ -106,7 +107,7 @@ def _is_diagonal(m: a.Real) -> bool:
 
 
 def _rows(tables: Sequence[NDArray[Any] | None], empty: NDArray[Any]) -> tuple[list[int], NDArray[Any]]:
-    """By body the number of its table, -1 for none; and the tables, each enlarged to the shape of `empty`."""
+    """For each body the row of its table, -1 for none; and the tables, each enlarged to the shape of `empty`."""
     some = [table for table in tables if table is not None]
     shape = len(some), *empty.shape
     out = strip_zeros(shape) if empty.dtype == np.float64 else np.zeros(shape, empty.dtype)
@@ -117,7 +118,7 @@ def _rows(tables: Sequence[NDArray[Any] | None], empty: NDArray[Any]) -> tuple[l
 
 
 def group(body: a.Record, name: str, counts: ArrayLike) -> None:
-    """Consecutive groups of items by body: their start and stop."""
+    """Write to each body the range of its items, which are stored body by body."""
     stop = np.cumsum(counts)
     body[f"{name}_stop"] = stop
     body[f"{name}_start"] = stop - counts
@@ -132,7 +133,7 @@ def shape_rows(shapes: list[tuple[a.Real, a.Real]], m: int) -> a.Real:
 
 
 def second_order_rows(fields: list[SecondOrder | None], first: int, m: int) -> tuple[list[int], a.Record]:
-    """By field the number of its row, counted from `first`, -1 for none; and the rows, SHAPE records (...,m,m)."""
+    """For each field the number of its row, counted from `first`, -1 for none; and the rows, SHAPE (...,m,m)."""
     rows = np.zeros((sum(field is not None for field in fields), m, m), a.SHAPE)
     numbers, last = [], -1
     for field in fields:

@@ -62,8 +62,8 @@ class End(NamedTuple):
 class BodyLink:
     """One body as the dynamics sees it, and the hinge that holds it.
 
-    `axes`: the hinge as its kernels take it. The last `wheels` points of its model are the despun wheels of the
-    body. Models and ports are made when first asked for: those of rigid bodies rarely are.
+    `axes`: axis, sequence and parameters of the hinge as its kernels take them. The last `wheels` points of the model
+    are the despun wheels of the body. Models and ports are made at the first access: rigid bodies rarely need them.
     """
 
     name: str
@@ -79,7 +79,7 @@ class BodyLink:
 
     @property
     def turn(self) -> Real:
-        """(3,3) What turns both frames of the hinge."""
+        """Rotation (3,3) by which both frames of the hinge are turned, so that its axis is z."""
         return self.axes.turn
 
     @property
@@ -146,7 +146,8 @@ class BodyLink:
 
 @lru_cache(maxsize=64)
 def _seen_from(m: FlexibleModel, origin: tuple[float, ...], frame: tuple[float, ...]) -> FlexibleModel:
-    """The model in the frame (3,3) at an origin (3,). Equal beams on equal hinges share one: see `flexible_model`."""
+    """The model in the frame (3,3) at an origin (3,). Equal beams on equal hinges share the result: see
+    `flexible_model`."""
     back, at = np.reshape(frame, (3, 3)).T, np.array(origin)
     return replace(
         m,
@@ -173,7 +174,7 @@ def links(scene: s.Scene) -> list[BodyLink]:
         outboard = End(hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
         level, parent = level_of(body), hinge.parent
         if isinstance(body, s.SidBody):
-            models[body.name]  # says that they are not supported
+            models[body.name]  # raises the NotImplementedError
         found.append(BodyLink(body.name, hinge, parent, level, kind, axes, inboard, outboard, body, models))
     return found + [_point_mass(mass, models) for mass in scene.point_masses]
 

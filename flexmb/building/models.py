@@ -1,4 +1,4 @@
-"""Inertia points, modes and nodes of the bodies of a scene, in the bodies' own frames, found when first asked for."""
+"""Inertia points, modes and nodes of the bodies of a scene, in the bodies' own frames, made at the first access."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ORIGIN = FlexibleNode(np.zeros(3), np.eye(3), _NO_MODES, _NO_MODES)
 
 
 class Models:
-    """By name of a body; the ground has one too. Wheels are folded into their body, despun (Frisch)."""
+    """The models of bodies and of the ground, by name. Wheels are parts of their bodies, despun (Frisch)."""
 
     def __init__(self, scene: s.Scene) -> None:
         self.body: dict[str, s.Body] = {body.name: body for body in scene.bodies}
@@ -65,9 +65,6 @@ class Models:
                 raise NotImplementedError(f'body "{name}": SID files are not supported yet; use kind = "modal"')
             case _:
                 assert_never(body)
-        return self._with_wheels(name, model)
-
-    def _with_wheels(self, name: str, model: FlexibleModel) -> FlexibleModel:
         for wheel in self.wheels.get(name, ()):
             model = _with_wheel(model, wheel)
         return model

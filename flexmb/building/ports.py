@@ -21,18 +21,18 @@ Place = tuple[int, int] | None
 
 
 class _Ports:
-    """Ports by body; numbered when all are known."""
+    """The ports of each body, and their numbers once all have been added."""
 
     def __init__(self, chain: list[BodyLink]) -> None:
         self.by_body: list[list[Port]] = [[] for _ in chain]
 
     def add(self, body: int, at: Port) -> tuple[int, int]:
-        """Its place."""
+        """Add a port to a body; returns its place."""
         self.by_body[body].append(at)
         return body, len(self.by_body[body]) - 1
 
     def on_body(self, place: Place) -> tuple[int, int]:
-        """Its body and its number among all ports, once all are added; (-1, -1) for none."""
+        """Body of a place, and number of its port among all; (-1, -1) for None. All ports must have been added."""
         if place is None:
             return -1, -1
         body, i = place
@@ -40,13 +40,13 @@ class _Ports:
 
     @cached_property
     def _first(self) -> list[int]:
-        """By body, how many ports those before it have."""
+        """For each body, the number of ports of the bodies before it."""
         return list(accumulate((len(ports) for ports in self.by_body), initial=0))
 
 
 class Attached(NamedTuple):
-    """Numbers of the ports of hinges, wheels and loads, -1 for none; (body, port) of markers and of sides A and B of
-    the first closure and connector, of the second ..., (-1, -1) on the ground."""
+    """Numbers of the ports of hinges, wheels and loads, -1 for none; (body, port) of markers, and of sides A and B of
+    each closure and connector, (-1, -1) on the ground."""
 
     inboard: list[int]
     outboard: list[int]
@@ -63,7 +63,7 @@ def attached(
 ) -> tuple[list[list[Port]], Attached]:  # fmt: skip
     """The ports of all bodies, and what is attached to them.
 
-    index: number of a body by its name; hinges: by link the port of its inboard hinge frame, if it needs one.
+    index: number of a body by its name; hinges: for each link the port of its inboard hinge frame, if it needs one.
     """
     ports = _Ports(chain)
 
@@ -127,7 +127,7 @@ def _on_rigid_bodies(chain: list[BodyLink], parent: list[int]) -> Frames:
 
 
 def _on_flexible_bodies(chain: list[BodyLink], parent: list[int]) -> dict[int, Port]:
-    """By link, the inboard hinge frames in the frames of their parents' links, where the parent is flexible."""
+    """Inboard hinge frames in the frames of their parents' links, by number of the link, for flexible parents."""
     return {
         k: _moved(link.inboard, chain[p])
         for k, (link, p) in enumerate(zip(chain, parent, strict=True))

@@ -1,4 +1,4 @@
-"""Rigid bodies of a scene all at once: the frames of hinges on them, and their inertia about the origins of links."""
+"""Frames of hinges on rigid bodies, and their inertia about the origins of links, for all rigid bodies at once."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Frames(NamedTuple):
     p: Real
 
     def seen_from(self, base: Frames) -> Frames:
-        """The same in axes of other frames on the same bodies, about their origins."""
+        """These frames relative to other frames on the same bodies."""
         back = np.swapaxes(base.R, 1, 2)
         return Frames(back @ self.R, np.einsum("nij,nj->ni", back, self.p - base.p))
 

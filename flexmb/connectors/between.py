@@ -1,11 +1,7 @@
 """Connectors between two frames: dispatch by kind, and sums of energy and power."""
 
-from flexmb.connectors.bushings import load_of_bushing
-from flexmb.connectors.line import load_along_line
-from flexmb.jit.features import has
+from flexmb.connectors.catalogue import load_between_frames
 from flexmb.jit.kernel import helper
-from flexmb.tables.arrays import BUSHING
-from flexmb.tables.features import BUSHINGS
 
 
 @helper
@@ -14,10 +10,7 @@ def load_between(c, w, i, A, B):
 
     A and B are (position, rotation, velocity) of the two frames, World axes.
     """
-    if has(c, BUSHINGS) and c.connector[i].kind == BUSHING:
-        load_of_bushing(c, w, i, A, B)
-    else:
-        load_along_line(c, w, i, A, B)
+    load_between_frames(c, c.connector[i].kind, c, w, i, A, B)
 
 
 @helper

@@ -12,8 +12,10 @@ energy with it: a run ends ten degrees before.
 
 from math import cos, radians
 
+from flexmb.connectors.law import FrameLaw
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import every, kept
+from flexmb.scene.connectors import BetweenNodes, Bushing
 from flexmb.spatial.rotation import (
     inverse_jacobian_coefficient,
     inverse_left_jacobian_times,
@@ -23,8 +25,8 @@ from flexmb.spatial.rotation import (
 )
 from flexmb.spatial.spatial_vector import dot6, scale6, store6, sum6, times6
 from flexmb.spatial.vector import cross, dot, matmul, store3, sub, times_t, transpose
-from flexmb.tables.arrays import BUSHING
 
+STIFFNESS, DAMPING = 0, 36  # where they begin among the parameters
 LEAST_UPRIGHT = cos(0.5 * radians(170.0)) ** 2  # the quaternion's scalar part is the cosine of half the angle
 
 
@@ -40,8 +42,8 @@ def load_of_bushing(c, w, i, A, B):
     b = inverse_jacobian_coefficient(dot(theta, theta))
     turning = inverse_left_jacobian_times(theta, b, times_t(R_A, sub(B[2][0], A[2][0])))
     moving = sub(times_t(R_A, sub(B[2][1], A[2][1])), cross(times_t(R_A, A[2][0]), x))
-    elastic = _product(c.bushing[row].stiffness, (theta, x))
-    damping = _product(c.bushing[row].damping, (turning, moving))
+    elastic = _product(c.frame_law[row].parameters, STIFFNESS, (theta, x))
+    damping = _product(c.frame_law[row].parameters, DAMPING, (turning, moving))
     g = sum6(elastic, damping)
     # the transpose of the inverse left Jacobian is the inverse right one
     upright = q[0] * q[0]
@@ -57,28 +59,38 @@ def load_of_bushing(c, w, i, A, B):
 
 @helper
 def overturned(c, w):
-    """A bushing that is turned beyond its range, or -1.
+    """A connector with parameters (a bushing) that is turned beyond its range, or -1.
 
     In lanes, one that is so in all copies; the copies in which it is so alone have loads NaN and end by that.
     """
     for i in range(c.connector.shape[0]):
-        if c.connector[i].kind == BUSHING and every(w.connector[i].upright.real <= LEAST_UPRIGHT):
+        if c.connector[i].row >= 0 and every(w.connector[i].upright.real <= LEAST_UPRIGHT):
             return i
     return -1
 
 
 @helper
-def _product(m, V):
-    """m V of a matrix (6,6)."""
+def _product(p, start, V):
+    """m V of the matrix m (6,6) whose rows begin at p[start]."""
     return (
-        (_row(m, 0, V), _row(m, 1, V), _row(m, 2, V)),
-        (_row(m, 3, V), _row(m, 4, V), _row(m, 5, V)),
+        (_row(p, start, V), _row(p, start + 6, V), _row(p, start + 12, V)),
+        (_row(p, start + 18, V), _row(p, start + 24, V), _row(p, start + 30, V)),
     )
 
 
 @helper
-def _row(m, r, V):
+def _row(p, k, V):
     return (
-        m[r, 0] * V[0][0] + m[r, 1] * V[0][1] + m[r, 2] * V[0][2]
-        + m[r, 3] * V[1][0] + m[r, 4] * V[1][1] + m[r, 5] * V[1][2]
+        p[k] * V[0][0] + p[k + 1] * V[0][1] + p[k + 2] * V[0][2]
+        + p[k + 3] * V[1][0] + p[k + 4] * V[1][1] + p[k + 5] * V[1][2]
     )  # fmt: skip
+
+
+def parameters(connector: BetweenNodes) -> tuple[float, ...] | None:
+    """The rows of the stiffness, then those of the damping."""
+    if not isinstance(connector, Bushing):
+        return None
+    return tuple(value for matrix in (connector.stiffness, connector.damping) for row in matrix for value in row)
+
+
+LAW = FrameLaw("bushing", load_of_bushing, parameters)

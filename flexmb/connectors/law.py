@@ -1,4 +1,4 @@
-"""The declaration that the file of a law along a coordinate makes of it, and what derivatives ask of its kernel.
+"""The declarations that the files of laws make of them, and what derivatives ask of a kernel along a coordinate.
 
 A kernel is compiled for floats, for lanes and for duals, which carry derivatives along. What these cannot do is found
 here when the law is declared, by a call of its source on numbers that refuse it, and said with its file and line: the
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from flexmb.jit.counting import Interpreter
-from flexmb.scene.connectors import AlongHinge
+from flexmb.scene.connectors import AlongHinge, BetweenNodes
 
 MOST = 6
-"""Parameters that the tables have room for."""
+"""Parameters of a law along a coordinate that the tables have room for; of one between frames there are 72."""
 _DIFFERENTIATED = (math.sin, math.cos, math.atan2)  # beside square roots
 _TRIED = ((0.3, 0.7), (-0.3, -0.7))  # values and rates on both sides of zero
 
@@ -55,6 +55,22 @@ class CoordinateLaw:
                 if not isinstance(number, _Differentiated):
                     remedy = "take functions from flexmb.spatial.scalar, and 0.0 * v where there is none"
                     raise LawError(f'law "{self.name}": its {what} has lost the derivatives: {remedy}')
+
+
+@dataclass(frozen=True, eq=False)
+class FrameLaw:
+    """One law between two frames.
+
+    The kernel ``load(c, w, i, A, B)`` writes load, arm, energy and power of connector i to w.connector[i], and as
+    `upright`, if the law has parameters, the square of the cosine of half the rotation, or 1 if the law allows every
+    rotation. A and B are (position, rotation, velocity) of the two frames, World axes. `parameters` gives the numbers
+    of a connector of this law, 72 at most, which the kernel finds in ``c.frame_law[c.connector[i].row].parameters``;
+    None of all others.
+    """
+
+    name: str
+    load: Callable[..., Any]
+    parameters: Callable[[BetweenNodes], tuple[float, ...] | None]
 
 
 def _refused(what: str) -> Any:

@@ -5,10 +5,12 @@ T = F(L - L0) + c L' - f, and the load on B is -T n. The smoothing length s (`fl
 continuous where the ends meet: the load vanishes there, and its elastic part remains the derivative of the energy.
 """
 
+from flexmb.connectors.law import FrameLaw
 from flexmb.connectors.laws import resistance
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import select
+from flexmb.scene.connectors import BetweenNodes, SpringDamper
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.spatial_vector import store6
 from flexmb.spatial.vector import dot, scale, store3, sub
@@ -50,3 +52,11 @@ def _while_loaded(acts, elastic, tension):
     if acts == COMPRESSION:
         return select((elastic.real < 0.0) & (tension.real < 0.0), tension, 0.0)
     return tension
+
+
+def parameters(connector: BetweenNodes) -> tuple[float, ...] | None:
+    """None beside the columns that the table of connectors has for springs."""
+    return () if isinstance(connector, SpringDamper) else None
+
+
+LAW = FrameLaw("line", load_along_line, parameters)

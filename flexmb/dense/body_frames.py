@@ -8,15 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.dense.hinge_frames import hinge_frame, rotated
-from flexmb.dense.jets import (
-    Jet,
-    MovingFrame,
-    constant,
-    join,
-    quadratic,
-    rotation_exponential,
-    turn,
-)
+from flexmb.dense.jets import Jet, MovingFrame, constant, join, quadratic, rotation_exponential, turn
 from flexmb.dense.members import DenseTree, Member, Rotor, Seat
 from flexmb.typing import Real
 

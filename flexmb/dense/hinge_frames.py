@@ -1,7 +1,7 @@
-"""All that the dense route knows of hinges: sizes, frames, rates and springs of the freedoms that they consist of.
+"""Hinges in the dense route: sizes, frames, rates and springs of the freedoms of which they consist.
 
-The scene says which freedoms a hinge has; the compiled kernels of `flexmb.hinges` do not read that, but have each kind
-written out. A slip in either therefore shows when the two routes are compared.
+The freedoms of a hinge are those in the scene. The compiled kernels of `flexmb.hinges` do not use them, but implement
+each kind of hinge separately. An error in either therefore shows when the two routes are compared.
 """
 
 from __future__ import annotations

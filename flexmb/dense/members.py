@@ -19,7 +19,8 @@ from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, Vector
 from flexmb.scene.connectors import BetweenNodes
-from flexmb.scene.tree import GROUND, Coordinate, coordinates, ordered, rest_frames
+from flexmb.scene.ends import ends
+from flexmb.scene.tree import GROUND, coordinates, ordered, rest_frames
 from flexmb.typing import Real
 
 LEVELS = ("rigid", "ruthless", "linear", "full", "stiffened")
@@ -126,10 +127,9 @@ def build(scene: s.Scene, folder: Path | None = None) -> DenseTree:
         sites[f"marker:{x.name}"] = tree.index(x.body), _seat(models[x.body], x.node, x.offset_m)
     for each in scene.connectors:
         if isinstance(each, BetweenNodes):
-            for side in "ab":
-                at, node = getattr(each, f"body_{side}"), getattr(each, f"node_{side}")
-                offset = getattr(each, f"position_{side}_m"), getattr(each, f"quaternion_{side}", IDENTITY)
-                sites[f"connector {side}:{each.name}"] = tree.index(at), _seat(models[at], node, *offset)
+            for side, end in zip("ab", ends(each), strict=True):
+                seat = _seat(models[end.body], end.node, end.position_m, end.quaternion)
+                sites[f"connector {side}:{each.name}"] = tree.index(end.body), seat
     return replace(tree, sites=sites)
 
 
@@ -143,7 +143,10 @@ def _append(
         name, tree.index(parent), hinge, inboard, outboard, model, level,
         slice(q, q + nq), slice(u, u + nu), slice(q + nq, q + nq + m), slice(u + nu, u + nu + m),
     )  # fmt: skip
-    scalars = [_scalar(hinge.name, q + n, u + n, c) for n, (_, c) in enumerate(coordinates(hinge))]
+    scalars = [
+        ScalarSpeed(hinge.name, q + n, u + n, *c.spring, c.armature, c.effort, c.prescribed)
+        for n, (_, c) in enumerate(coordinates(hinge))
+    ]
     return replace(
         tree, members=[*tree.members, member], scalars=tree.scalars + scalars, nq=q + nq + m, nu=u + nu + m
     )
@@ -156,10 +159,6 @@ def _append_wheel(tree: DenseTree, wheel: s.Wheel, seat: Seat) -> DenseTree:
     return replace(
         tree, rotors=[*tree.rotors, rotor], scalars=[*tree.scalars, scalar], nq=tree.nq + 1, nu=tree.nu + 1
     )
-
-
-def _scalar(owner: str, q: int, u: int, c: Coordinate) -> ScalarSpeed:
-    return ScalarSpeed(owner, q, u, *c.spring, c.armature, c.effort, c.prescribed)
 
 
 def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY) -> Seat:

@@ -14,7 +14,7 @@ from flexmb.levels.range import is_out_of_range
 from flexmb.motion.coordinates import hinge_forces, load_state, speed_power, store_slope
 from flexmb.spatial.spatial_vector import dot6, shift_motion, sum6, vec6
 from flexmb.spatial.vector import vec3
-from flexmb.tables.features import BUSHINGS, CONNECTORS
+from flexmb.tables.features import CONNECTORS, FRAME_LAWS
 from flexmb.tables.status import CONNECTOR_OVERTURNED, OK, OUT_OF_RANGE
 
 
@@ -36,7 +36,7 @@ def accelerations(t, y, c, w):
         if is_out_of_range(c, w.modal[k], k):
             w.fault[0] = k
             return OUT_OF_RANGE
-    if has(c, BUSHINGS):
+    if has(c, FRAME_LAWS):
         i = overturned(c, w)
         if i >= 0:
             w.fault[0] = i

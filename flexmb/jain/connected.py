@@ -9,7 +9,7 @@ from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.spatial_vector import ZERO6, scale6, shift_force, times6, times6_t, vec6
 from flexmb.spatial.vector import add, mat3, matmul, times, vec3
 from flexmb.tables.arrays import ON_GROUND
-from flexmb.tables.features import BUSHINGS
+from flexmb.tables.features import FRAME_LAWS
 from flexmb.tables.status import CONNECTOR_OVERTURNED, OK
 
 
@@ -27,7 +27,7 @@ def evaluate_connectors(c, w):
 def connect(c, w):
     """Subtract the loads of all connectors from the bias forces of the bodies that they join; returns a status code."""
     evaluate_connectors(c, w)
-    if has(c, BUSHINGS):
+    if has(c, FRAME_LAWS):
         i = overturned(c, w)
         if i >= 0:
             w.fault[0] = i

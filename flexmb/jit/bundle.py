@@ -1,9 +1,9 @@
-"""Many arrays as one argument of a kernel: a class of named arrays, or bundles, whose address is all that is passed.
+"""Many arrays as one argument of a kernel: a class of named arrays, or bundles, that is passed by its address.
 
-A kernel that takes a NamedTuple of sixty arrays hands a thousand words to each function it calls, and counts references
-to every array it touches. A bundle is one pointer to a table of addresses and shapes. So the right-hand side of a tree
-with all hinges and levels is compiled in 19 s of processor time instead of 28 s, and a call from Python takes 9 us
-instead of 160 us. The arrays are borrowed: whoever calls the kernel holds the bundle, hence its arrays.
+A kernel that takes a NamedTuple of sixty arrays passes a thousand words to each function that it calls, and counts
+references to every array that it uses. A bundle is one pointer to a table of addresses and shapes. The right-hand side
+of a tree with all hinges and levels then compiles in 19 s of processor time instead of 28 s, and a call from Python
+takes 9 us instead of 160 us. Kernels do not own the arrays: the caller must keep the bundle, which holds them.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ _ROW = 1 + _DIMENSIONS  # words of the table for one array: address, shape; of a
 def bundle(cls: Class) -> Class:
     """Make a class of annotated arrays and bundles a frozen dataclass that kernels take as one argument.
 
-    Inside a kernel `b.name` is the array or bundle; in Python too. The arrays must be C-contiguous; kernels may
-    write to them. A method `features` says what is in them: a frozenset of names, part of the type of the bundle. Of a
-    class with `numbers = LANE` or DUAL the floats are such numbers: the arrays are those of `flexmb.jit.wide_arrays`.
+    In kernels and in Python, `b.name` is the array or bundle. The arrays must be C-contiguous; kernels may write to
+    them. A method `features` returns the features of the contents: a frozenset of names, part of the type of the
+    bundle. In a class with `numbers = LANE` or DUAL, floats are such numbers: see `flexmb.jit.wide_arrays`.
     """
     cls.__post_init__ = _describe  # type: ignore[attr-defined]
     cls.__reduce__ = _reduce  # type: ignore[method-assign]
@@ -42,9 +42,9 @@ def bundle(cls: Class) -> Class:
 
 
 def _describe(self: Any) -> None:
-    """Table of addresses and shapes, its own address, and the type of the bundle, for the compiler and its callers.
+    """Make the table of addresses and shapes, its address, and the type of the bundle.
 
-    Where the type says which features the arrays have, they are made read-only: what is not there must not come later.
+    Arrays of a bundle with features are made read-only, because a change could add a feature that the kernels lack.
     """
     features = self.features() if hasattr(self, "features") else frozenset()
     numbers = getattr(type(self), "numbers", types.float64)
@@ -75,12 +75,12 @@ def _names(cls: type) -> tuple[str, ...]:
 
 @cache
 def _array_type(dtype: np.dtype, dimensions: int, numbers: types.Type) -> TableType:
-    """Kept, because numba takes a tenth of a millisecond to describe a record."""
+    """Cached, because numba takes 0.1 ms to describe a record."""
     return TableType(numbers if dtype == np.float64 else from_dtype(dtype), dimensions)
 
 
 def broaden(bundles: Sequence[Any]) -> None:
-    """Give bundles of one class the features that any of them has: one kernel fits all, and they share workspaces."""
+    """Give all bundles of one class the features that any of them has, so that they share kernels and workspaces."""
     features = frozenset[str]().union(*(each._numba_type_.features for each in bundles))
     for each in bundles:
         kind = each._numba_type_
@@ -88,9 +88,9 @@ def broaden(bundles: Sequence[Any]) -> None:
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:
-    """Pickle the arrays only: addresses are of one process.
+    """Pickle the arrays only, because addresses belong to one process.
 
-    TypeError where arrays are parts of one array: those of a copy would not be, and go on without each other.
+    TypeError where arrays share memory: those of a copy would not.
     """
     members = tuple(getattr(self, name) for name in _names(type(self)))
     owners = [id(each if each.base is None else each.base) for each in members if isinstance(each, np.ndarray)]
@@ -102,7 +102,7 @@ def _reduce(self: Any) -> tuple[Any, ...]:
 class BundleType(types.Type):
     """Type of a bundle: its class, the names and types of its members, and its features (see `flexmb.jit.features`).
 
-    Its name is short, for it is part of symbols.
+    Its name contains a digest of these instead of a list, because it is part of symbols.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class BundleType(types.Type):
 
 @cache
 def _bundle_type(of: type, kinds: tuple[tuple[str, types.Type], ...], features: frozenset[str]) -> BundleType:
-    """Kept, because the name of a type is the digest of a page."""
+    """Cached, because the name of a type is the digest of a long text."""
     return BundleType(of, kinds, features)
 
 
@@ -129,7 +129,7 @@ def is_long(kind: BundleType) -> bool:
 
 
 class AnyBundleType(types.Type):
-    """Type of bundles that a kernel passes on and never looks into."""
+    """Type of bundles that a kernel passes on without accessing their members."""
 
     def __init__(self) -> None:
         super().__init__(name="AnyBundle")
@@ -169,7 +169,7 @@ class _BundleAttribute(AttributeTemplate):
 
 @lower_getattr_generic(BundleType)
 def _member_of(context, builder, typ, value, attr):
-    """A bundle's address, or the table of its row.
+    """The address of a bundle that is a member, or the table of an array.
 
     "invariant" lets LLVM load each address once per function.
     """

@@ -1,15 +1,15 @@
-"""Compiled kernels on disk: a file for each kernel and the types it was compiled for, read only if it is sound.
+"""Compiled kernels on disk: a file for each kernel and the types it was compiled for, used only if it is intact.
 
-Numba's own cache believes what it finds: a file that was cut short ends in a traceback, one with a flipped bit is run.
-And its index gives two processes that compile one kernel at once, for different types, the same file. Here a file is
-named after all that its contents depend on, appears at once, and begins with their digest. What does not match it is
-deleted and compiled anew, with one warning.
+Numba's own cache does not check its files: a truncated file ends in a traceback, and one with a flipped bit is run. If
+two processes compile a kernel at the same time for different types, its index gives both the same file. Here the name
+of a file is a digest of everything that its contents depend on, files are written atomically, and each begins with the
+digest of its contents. A file that does not match is deleted and compiled anew, with one warning.
 
-Two folders are looked into: the user's own, where what is compiled here is kept, and that of the installation, with
-kernels that were compiled when flexmb was installed (`flexmb.ready`). Nothing is ever written into the second.
+Two folders are searched: the user's, which receives what is compiled here, and that of the installation, with kernels
+that were compiled when flexmb was installed (`flexmb.ready`) and which is never written to.
 
-A pendulum's first accelerations, with all imports, take 1 s of processor time where its kernel is found, and 20 s where
-it is compiled.
+A pendulum's first accelerations, with all imports, take 1 s of processor time if its kernel is found, and 20 s if it is
+compiled.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ _DIGEST = hashlib.sha256().digest_size
 
 
 class KernelCache(NullCache):
-    """What numba's dispatcher asks for compiled versions of one function; `folder`: where they are kept, if at all."""
+    """The cache of one function for numba's dispatcher; `folder`: where versions are kept, None to keep none."""
 
     def __init__(self, function: FunctionType, folder: Path | None) -> None:
         self._folder, self._function = folder, function
 
     @cached_property
     def _fingerprint(self) -> str:
-        """Only when it is asked for: while a module is imported, what its functions refer to is not yet complete."""
+        """At the first access, because names that a module refers to may be undefined while it is imported."""
         return fingerprint(self._function)
 
     @property
@@ -71,7 +71,7 @@ class KernelCache(NullCache):
         return None
 
     def _contents(self, file: Path) -> memoryview | None:
-        """What a file holds behind its digest; None where there is none that is sound."""
+        """The contents of a file after the digest; None if it is missing or damaged."""
         try:
             data = file.read_bytes()
         except FileNotFoundError:
@@ -86,9 +86,10 @@ class KernelCache(NullCache):
         return contents
 
     def filling(self, kernel: Any) -> Callable[[Any], Any]:
-        """What compiles the versions of `kernel`: one that is not on disk by one process, with a line where it is long.
+        """The replacement of `kernel.compile`: a version that is not on disk is compiled by one process only, with a
+        message if it takes long.
 
-        Numba's lock is taken first: of two threads, one must not wait for the other's lock on a file with it.
+        Numba's lock is taken before that of a file, so that two threads cannot wait for each other.
         """
         plain = kernel.compile
 
@@ -105,7 +106,7 @@ class KernelCache(NullCache):
         return compile_once
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a version; a warning where that cannot be done."""
+        """Keep a version; a warning if that is impossible."""
         offer(data, self._function, self._key(sig))
         if self._folder is None:
             return
@@ -135,7 +136,7 @@ class KernelCache(NullCache):
                 written.unlink()
 
     def _places(self, sig: Any, codegen: Any) -> Iterator[Path]:
-        """Where the version for a signature may be, the user's own first."""
+        """The possible files of the version for a signature, the user's own first."""
         if self._folder is not None:
             yield self._own(self._folder, sig, codegen)
         installed = installed_directory()
@@ -150,7 +151,7 @@ class KernelCache(NullCache):
         return f"{self._key(sig, processor)}.kernel"
 
     def _key(self, sig: Any, *more: tuple[str, ...]) -> str:
-        """A name for all that the code of a version depends on."""
+        """A name that depends on everything that the code of a version depends on."""
         key = repr((self._fingerprint, str(sig), *more))
         return f"{self._function.__name__}-{hashlib.sha256(key.encode()).hexdigest()[:32]}"
 
@@ -166,12 +167,12 @@ class KernelCache(NullCache):
             else:
                 file.unlink(missing_ok=True)
         except OSError:
-            pass  # where the new one cannot be put in its place either, `save_overload` says so
+            pass  # if it cannot be replaced either, `save_overload` warns
         warn_once(f"damaged files in {self._folder}: they were deleted, and their kernels are compiled anew")
 
 
 def _digest(file: Path, contents: Any) -> bytes:
-    """Of a file's name and contents: one that was renamed is not sound either."""
+    """Digest of a file's name and contents, so that a renamed file is not used either."""
     digest = hashlib.sha256(file.name.encode())
     digest.update(contents)
     return digest.digest()

@@ -1,10 +1,10 @@
-"""Operations that a kernel executes: its own source, interpreted, on scalars that count.
+"""Operations that a kernel executes, counted by interpreting its source on scalars that count.
 
     count(dynamics.accelerations, 0.0, y, system.constants, system.workspace()).operations
 
-Every addition, multiplication, division and square root with a number of the arguments in it counts, also with zeros
-and ones; a change of sign does not, nor does what the source does to its literals alone. The compiled kernel executes
-no more than that. Kernels do not know of it: who does not count pays nothing.
+Every addition, multiplication, division and square root whose operands depend on the arguments counts, also with zeros
+and ones. Changes of sign and operations on literals alone do not count. The compiled kernel executes no more operations
+than that. Kernels are not changed for it.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ from typing import Any
 
 import numpy as np
 
-_OF_THE_PACKAGE = f"{__name__.partition('.')[0]}."  # how names of its modules begin
-_CHOOSERS = {f"{__package__}.kernel", f"{__package__}.numbered"}  # where functions are made that choose
-
-_LANES = f"{__package__}.lanes"  # where functions are Python beside what they are compiled to
+_OF_THE_PACKAGE = f"{__name__.partition('.')[0]}."  # prefix of the names of its modules
+_CHOOSERS = {f"{__package__}.kernel", f"{__package__}.numbered"}  # modules that make functions that dispatch
+_LANES = f"{__package__}.lanes"  # its functions have a Python implementation beside the compiled one
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class Operations:
 
 @dataclass(frozen=True)
 class Counted:
-    """Operations of one call, what it returned, and its arguments as it left them."""
+    """Operations of one call, its result, and its arguments after the call."""
 
     operations: Operations
     result: Any
@@ -61,7 +60,7 @@ class Counted:
 def count(kernel: Callable[..., Any], *arguments: Any) -> Counted:
     """Call a kernel or helper, interpreted, on copies of the arguments: floats, arrays, bundles, tuples of these.
 
-    Arrays of floats become arrays of objects, tables of records hold namespaces; all else stays what it is.
+    Arrays of floats become arrays of objects, and tables of records arrays of namespaces; other types stay as they are.
     """
     tally = Counter[str]()
     scalar = _scalars(tally)
@@ -110,7 +109,7 @@ def _scalars(tally: Counter[str]) -> Any:
 
 
 def _divide(a: float, b: float) -> float:
-    """As the compiled code divides: by zero without an exception."""
+    """Division as in compiled code: division by zero raises no exception."""
     if b == 0.0:
         with np.errstate(all="ignore"):
             return float(np.divide(float(a), float(b)))
@@ -118,7 +117,7 @@ def _divide(a: float, b: float) -> float:
 
 
 def _counting(value: Any, scalar: Any) -> Any:
-    """A copy of an argument, of the same class, whose every float is a `scalar`; records become namespaces."""
+    """A copy of an argument, of the same class, in which every float is a `scalar`; records become namespaces."""
     if is_dataclass(value) and not isinstance(value, type):
         copy = object.__new__(type(value))  # a bundle's own constructor takes addresses of arrays
         for field in fields(value):
@@ -145,9 +144,9 @@ def _counting(value: Any, scalar: Any) -> Any:
 
 
 class Interpreter:
-    """Twins of compiled functions: the same code, with twins of what their modules hold, on numbers of a class.
+    """Makes interpreted twins of compiled functions: the same code, whose global names refer to twins as well.
 
-    `scalar` is the class, with what its `square_root` and `elementary` functions are.
+    `scalar` is the class of the numbers, with its methods `square_root` and `elementary`.
     """
 
     def __init__(self, scalar: Any) -> None:
@@ -155,14 +154,14 @@ class Interpreter:
         self._namespaces: dict[int, dict[str, Any]] = {}
 
     def __call__(self, thing: Any) -> Any:
-        """The twin of a function or of several, of a module of the package, of a function of `math`; else the thing."""
+        """The twin of a function, a tuple of functions, a module of the package or a function of `math`; anything else
+        is returned unchanged."""
         function = getattr(thing, "py_func", None)
         if isinstance(function, FunctionType):
             return self._function(function)
-        if isinstance(thing, FunctionType) and thing.__closure__ and thing.__module__ in _CHOOSERS:
-            return self._function(thing)
-        if isinstance(thing, FunctionType) and thing.__module__ == _LANES:
-            return self._function(thing)
+        if isinstance(thing, FunctionType):
+            chooses = thing.__closure__ and thing.__module__ in _CHOOSERS
+            return self._function(thing) if chooses or thing.__module__ == _LANES else thing
         if isinstance(thing, tuple):
             return tuple(map(self, thing)) if all(callable(each) for each in thing) else thing
         if isinstance(thing, ModuleType) and thing.__name__.startswith(_OF_THE_PACKAGE):

@@ -3,8 +3,8 @@
 A kernel whose workspace holds such dual numbers is compiled from the same source as for floats. Sums, products,
 quotients and elementary functions carry the derivatives along by the rules of calculus: nothing is approximated and
 nothing cancels (forward differentiation: Griewank & Walther, Evaluating Derivatives, 2nd ed., ch. 3). The derivatives
-are the lanes of one vector, so that a product costs one multiplication and two of vectors. Comparisons look at the
-number alone, by `.real`.
+are the lanes of one vector, so that a product costs one scalar multiplication and two of vectors. Comparisons use the
+number alone, `.real`.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ class DualType(types.Type):
         super().__init__(name=f"dual{LANES}")
 
     def can_convert_from(self, typing: Any, other: types.Type) -> Conversion | None:
-        """Numbers that do not change along any direction."""
+        """Numbers convert to duals with zero derivatives."""
         return Conversion.safe if isinstance(other, types.Float | types.Integer) else None
 
     def load(self, builder: Any, place: Any) -> Any:
-        """From an address, at which no vector instruction needs to be content."""
+        """Load from an address, which need not be aligned for vector instructions."""
         value, rates = _places(builder, place)
         return _dual(builder, builder.load(value), builder.load(rates, align=8))
 
     def store(self, builder: Any, dual: Any, place: Any) -> None:
-        """Likewise."""
+        """Store to such an address."""
         value, rates = _places(builder, place)
         builder.store(builder.extract_value(dual, 0), value)
         builder.store(builder.extract_value(dual, 1), rates, align=8)
@@ -80,12 +80,12 @@ def _scaled(builder: Any, factor: Any, rates: Any) -> Any:
 
 
 def seeded(x: Any, lane: int) -> Any:
-    """x, whose derivative along the direction of this lane is one. A float has no room for it."""
+    """x with the derivative along the direction of this lane set to one; a float stays as it is."""
     return x
 
 
 def rate(x: Any, lane: int) -> Any:
-    """Derivative of x along the direction of this lane. A float has none."""
+    """Derivative of x along the direction of this lane; zero for a float."""
     return 0.0
 
 
@@ -109,7 +109,7 @@ def _real(context, builder, kind, value):
 
 
 class _Binary(AbstractTemplate):
-    """Of two duals, or of one and a number that does not change."""
+    """Types of operators on two duals, or on a dual and a constant number."""
 
     def generic(self, args, kws):
         if DUAL in args and all(kind == DUAL or isinstance(kind, types.Float | types.Integer) for kind in args):

@@ -1,11 +1,11 @@
-"""What a bundle contains, in its type: a kernel is compiled for the features of its bundles, and without all others.
+"""Features of bundles, which are part of their types: a kernel contains only the code for the features of its bundles.
 
     if has(c, WHEELS):
         wheel_forces(c, w, k)
 
-The class of a bundle says which features it has by a method `features`. Branches that a bundle cannot take are cut out
-before types are inferred (parts.py), so that nothing in them is compiled. A kernel of more features than a scene has
-is correct too, only larger: GENERAL stands for all of them.
+The method `features` of the class of a bundle returns its features. Branches that a bundle cannot take are removed
+before type inference (parts.py), so that they are not compiled. A kernel with more features than a scene has is correct
+too, only larger: GENERAL stands for all features.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ GENERAL = "general"
 
 
 def has(bundle: Any, feature: str) -> bool:
-    """Whether a bundle has a feature, or has them all; in kernels a constant, `feature` a literal or a global name."""
+    """Whether a bundle has a feature or all of them; a constant in kernels, where `feature` is a literal or global."""
     return includes(bundle._numba_type_.features, feature)
 
 
@@ -32,13 +32,13 @@ def includes(features: frozenset[str], feature: str) -> bool:
 
 
 def numbers_of(features: frozenset[str], prefix: str, count: int) -> tuple[int, ...]:
-    """Which of the features "prefix 0", "prefix 1", ... there are, of `count`."""
+    """The numbers n below `count` for which the feature "<prefix> n" is present."""
     return tuple(n for n in range(count) if includes(features, f"{prefix} {n}"))
 
 
 @overload(has)
 def _has(bundle, feature):
-    """Where branches are not cut (no hooks into numba): still a constant, which the optimiser sees."""
+    """For numba versions without hooks, where branches are not removed early: a constant that the optimiser uses."""
     if not isinstance(feature, types.StringLiteral):
         raise errors.RequireLiteralValue("features have names that are known when a kernel is compiled")
     if includes(bundle.features, feature.literal_value):
@@ -48,7 +48,7 @@ def _has(bundle, feature):
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class KnownFeatures(FunctionPass):
-    """`has(c, WHEELS)` becomes True or False, for numba's next pass to cut branches by."""
+    """Replaces `has(c, WHEELS)` by True or False, so that numba's next pass removes the branches."""
 
     _name = "known_features"
 
@@ -68,7 +68,7 @@ class KnownFeatures(FunctionPass):
 
 
 def _known(state: Any, value: Any) -> bool | None:
-    """Value of a call of `has` by the types of the arguments; None for anything else."""
+    """The value of a call of `has`, from the types of its arguments; None for any other expression."""
     if not isinstance(value, ir.Expr) or value.op != "call" or len(value.args) != 2:
         return None
     called = guard(get_definition, state.func_ir, value.func)
@@ -83,7 +83,7 @@ def _known(state: Any, value: Any) -> bool | None:
 
 
 def _type_of(state: Any, variable: Any) -> Any:
-    """Type of a bundle that is an argument, or a member of one; None where that is not known yet."""
+    """Type of a bundle that is an argument, or a member of such a bundle; None if it is not known yet."""
     definition = guard(get_definition, state.func_ir, variable)
     if isinstance(definition, ir.Arg):
         kind = state.args[definition.index]

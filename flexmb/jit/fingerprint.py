@@ -1,13 +1,15 @@
-"""What a compiled kernel depends on, as one digest: the code of every function it reaches, and nothing else.
+"""The fingerprint of a compiled kernel: one digest of the code of every function that it can call, and nothing else.
 
-A kernel is walked as its compiler walks it: from its code through the global names, the attributes of modules and the
-closure cells that this refers to, to helpers, choosers (`by_bundle`), constants and classes, and on from there. Of each
-function count its instructions, names, constants and defaults, but neither docstring nor comments, nor line numbers and
-files; of constants their values. So correcting a comment compiles nothing anew, and editing one hinge compiles what
-reaches this hinge. Numba and numpy count by their versions, the room `jit`, which is part of the compiler, as a whole.
+References are followed as the compiler follows them: from the code of the kernel through global names, attributes of
+modules and closure cells to helpers, dispatching functions (`by_bundle`), constants and classes, and on from there. The
+digest contains the instructions, names, constants and defaults of each function, and the values of constants, but no
+docstrings, comments, line numbers or file names. Correcting a comment therefore compiles nothing anew, and editing one
+hinge compiles the kernels that use it. Of numba and numpy the digest contains the versions; of the room `jit`, which is
+part of the compiler, it contains all code.
 
-Whatever cannot be told from its value ends in a TypeError: a kernel that is wrongly found on disk is silently wrong.
-Globals count as they are when a kernel is first asked for; as for numba, rebinding them later changes nothing.
+A reference to an object whose value cannot be determined raises TypeError, because a wrong kernel from the disk would
+give wrong results without an error. Global names have their values at the first use of a kernel; as in numba, rebinding
+them later has no effect.
 """
 
 from __future__ import annotations
@@ -33,18 +35,18 @@ import numba
 import numpy as np
 
 _BY_VERSION = {"builtins", "math", "cmath", "numpy", "numba"}
-# Modules of this room.
+# Modules of this room that have no influence on compiled code.
 _COMPILE_NOTHING = {"counting", "folder", "installed", "once", "processors", "progress", "warmed"}
 _PLAIN = {type(None), type(...), bool, int, float, complex, str, bytes}
-_KIND = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS | inspect.CO_GENERATOR  # other flags say how the file was compiled
+_KIND = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS | inspect.CO_GENERATOR  # other flags depend on compiler options
 _CONSTANT, _GLOBAL, _EXTENDED = frozenset(dis.hasconst), dis.opmap["LOAD_GLOBAL"], dis.opmap["EXTENDED_ARG"]
 _STORE = bytes([dis.opmap["STORE_NAME"]])
 
 
 def fingerprint(kernel: FunctionType) -> str:
-    """Digest of all that the compiled kernel depends on, but for the types of its arguments and the processor.
+    """Digest of everything that the compiled kernel depends on, except the types of its arguments and the processor.
 
-    Raises TypeError where a function refers to something whose value cannot be told.
+    Raises TypeError if a function refers to an object whose value cannot be determined.
     """
     functions = reached(kernel)
     place = {function: i for i, function in enumerate(functions)}
@@ -56,7 +58,7 @@ def fingerprint(kernel: FunctionType) -> str:
 
 
 def reached(kernel: FunctionType) -> list[FunctionType]:
-    """The kernel and all functions that it refers to, directly or not, in the order in which they are met."""
+    """The kernel and all functions that it refers to, directly or indirectly, in the order in which they are found."""
     met = {kernel: None}
     waiting = [kernel]
     for function in waiting:
@@ -69,7 +71,7 @@ def reached(kernel: FunctionType) -> list[FunctionType]:
 
 @cache
 def compiler() -> bytes:
-    """Digest of what compiles: Python, numba and what it stands on, and the code of this room."""
+    """Digest of the compiler: the versions of Python, numba, llvmlite and numpy, and the code of this room."""
     versions = sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__
     names = sorted(module.name for module in iter_modules(sys.modules[__package__].__path__))  # in a zip file, too
     room = [_digest(_ModuleWords(name)) for name in names if name not in _COMPILE_NOTHING]
@@ -80,7 +82,7 @@ def compiler() -> bytes:
 
 @dataclass(frozen=True)
 class _Own:
-    """What one function says by itself, and the functions it refers to in the order of its words."""
+    """The digest of one function without those it refers to, and these in the order of its words."""
 
     digest: bytes
     refers_to: tuple[FunctionType, ...]
@@ -101,7 +103,7 @@ def _digest(words: Iterable[str | bytes]) -> bytes:
 
 
 class _Words:
-    """A function as a sequence of words, which differ where what is compiled differs."""
+    """A function as a sequence of words, which differ for functions that compile differently."""
 
     def __init__(self, function: FunctionType) -> None:
         self.refers_to: list[FunctionType] = []
@@ -122,7 +124,7 @@ class _Words:
             yield from self._value(cell.cell_contents)
 
     def _code(self, code: CodeType) -> Iterator[str | bytes]:
-        """Its instructions; in place of the numbers of constants, among which docstrings have one, their values."""
+        """Its instructions, with the values of constants instead of their indices, which depend on docstrings."""
         operations, arguments = code.co_code[::2], bytearray(code.co_code[1::2])
         constants, names = list[Any](), dict[str, None]()
         for i, operation in enumerate(operations):
@@ -130,7 +132,7 @@ class _Words:
                 continue
             number = arguments[i] + (arguments[i - 1] << 8 if i and operations[i - 1] == _EXTENDED else 0)
             if operation == _GLOBAL:
-                names[code.co_names[number >> 1]] = None  # the last bit is no part of the number
+                names[code.co_names[number >> 1]] = None  # the last bit is not part of the index
             else:
                 arguments[i] = 0
                 if not _is_docstring(code, operations[i + 1 : i + 2], arguments[i + 1 : i + 2]):
@@ -153,7 +155,7 @@ class _Words:
             raise TypeError(f"{self._function.__qualname__}: there is no {name}") from None
 
     def _value(self, value: Any) -> Iterator[str | bytes]:
-        """A constant, or what a name stands for."""
+        """Words of a constant, or of the value of a name."""
         function = getattr(value, "py_func", value)  # of what is compiled
         if isinstance(function, FunctionType) and _root(function.__module__) not in _BY_VERSION:
             self.refers_to.append(function)
@@ -186,7 +188,7 @@ class _Words:
             )
 
     def _module(self, module: ModuleType) -> Iterator[str | bytes]:
-        """Its name, and what it holds of all names that the function looks up in anything."""
+        """Its name, and the values in it of all attribute names that the function uses."""
         yield f"module {module.__name__}"
         if _root(module.__name__) in _BY_VERSION or module.__name__ in self._modules:
             return
@@ -197,7 +199,7 @@ class _Words:
                 yield from self._value(getattr(module, name))
 
     def _class(self, value: type) -> Iterator[str | bytes]:
-        """A class that a kernel may make an object of, or that a chooser asks for."""
+        """A class that a kernel may instantiate, or that a dispatching function tests for."""
         yield f"class {value.__module__}.{value.__qualname__}"
         if issubclass(value, tuple) and hasattr(value, "_fields"):
             yield repr(value._fields)
@@ -215,7 +217,7 @@ class _Words:
 
 
 class _ModuleWords(_Words):
-    """A module of this room: what its functions refer to is in this room too, or in the libraries."""
+    """A module of this room; global names are not followed, because they refer to this room or to libraries."""
 
     def __init__(self, name: str) -> None:
         name = f"{__package__}.{name}"
@@ -226,10 +228,10 @@ class _ModuleWords(_Words):
 
 
 def _code_of(module: str) -> CodeType:
-    """What a module says, compiled here where its source is a file: whatever loaded it may have changed it.
+    """The code of a module, compiled here if its source is a file, because its loader may have changed it.
 
-    pytest loads all modules of a distribution that has a plug-in by a loader of its own, which knows no `get_code`.
-    Loaders of zip files and of frozen programs have no files, but `get_code`.
+    pytest loads the modules of distributions with plug-ins by a loader without `get_code`. Loaders of zip files and of
+    frozen programs have no files, but `get_code`.
     """
     spec = find_spec(module)
     if spec is not None and spec.origin and spec.has_location and Path(spec.origin).suffix == ".py":
@@ -242,18 +244,18 @@ def _code_of(module: str) -> CodeType:
 
 
 def _is_docstring(code: CodeType, operation: bytes, argument: Sequence[int]) -> bool:
-    """Whether the instruction after a constant stores it as the docstring of a file or class, or as its line."""
+    """Whether the instruction after a constant stores it as docstring or line number of a module or class."""
     return operation == _STORE and code.co_names[argument[0]] in ("__doc__", "__firstlineno__")
 
 
 def _names(code: CodeType) -> set[str]:
-    """All names in a function and in those inside it."""
+    """All names in a function and in the functions nested in it."""
     inner = (_names(constant) for constant in code.co_consts if isinstance(constant, CodeType))
     return set(code.co_names).union(*inner)
 
 
 def _home(value: Any) -> str:
-    """Module of a built-in function; numpy's have none of their own, but a class."""
+    """Module of a built-in function; for numpy's, which have none, that of their class."""
     return getattr(value, "__module__", None) or type(value).__module__
 
 

@@ -1,10 +1,10 @@
-"""The folder of compiled kernels: where it is, who may write to it, and how long files stay there.
+"""The folder of compiled kernels: its place, its permissions, and how long files are kept.
 
-A kernel is unpickled and run as code, and its digest, which has no key, shows what was damaged, not who wrote it. So
-all that is there has to be the user's own, or the administrator's, and nobody else may write to it.
+A kernel is unpickled and run as code. Its digest is not signed, so it reveals damage, but not who wrote the file.
+Therefore all files must belong to the user or the administrator, and nobody else may write to the folder.
 
-Every edit of the sources leaves kernels behind that nobody asks for any more, but no file tells whether an older state
-of the sources will come back. So a file is as young as its last use, and what was not used for two months is deleted.
+Every edit of the sources leaves unused kernels behind, but an older state of the sources may come back. Therefore every
+use updates the time of a file, and files that were not used for two months are deleted.
 """
 
 from __future__ import annotations
@@ -28,11 +28,10 @@ _UNUSED = 60 * 24 * 3600.0  # s since a file was last used
 
 @cache
 def cache_directory() -> Path | None:
-    """Where kernels are kept; None where nothing can be written.
+    """The folder for kernels; None if it cannot be written to, and, with a warning, if others may have written to it.
 
-    Below the directory that NUMBA_CACHE_DIR names, or else below numba's own cache directory of the user. Its name is
-    one that nothing else has: a checkout or a program called flexmb may be there, too. None, with a warning, also where
-    others may have written.
+    It is below the directory that NUMBA_CACHE_DIR names, or else below numba's own cache directory of the user. Its
+    name is not "flexmb", because a checkout or program of that name may be there.
     """
     root = Path(config.CACHE_DIR or _of_the_user())
     directory = root / "flexmb-kernels"
@@ -42,24 +41,24 @@ def cache_directory() -> Path | None:
         directory.mkdir(mode=_MINE_ALONE, parents=True, exist_ok=True)
         if stranger := _stranger(directory.resolve()):
             warn_once(
-                f"compiled kernels in {directory} are not used, and every process compiles them again, for {stranger}, "
-                "and they are run as code: remove the folder, which is made anew, or set NUMBA_CACHE_DIR to a folder "
-                "where nobody else may write"
+                f"compiled kernels in {directory} are not used, and every process compiles them again, because "
+                f"{stranger}, and kernels are run as code: remove the folder, which is then made anew, or set "
+                "NUMBA_CACHE_DIR to a folder where nobody else may write"
             )
             return None
         tempfile.TemporaryFile(dir=directory).close()
     except OSError as problem:
         warn_once(
             f"compiled kernels cannot be kept in {root} ({problem.strerror}), and every process compiles them again: "
-            "permit writing there, or set NUMBA_CACHE_DIR to a folder where it is"
+            "permit writing there, or set NUMBA_CACHE_DIR to a folder that is writable"
         )
         return None
     return directory
 
 
 def _stranger(directory: Path) -> str | None:
-    """Who else than the user and the administrator may have put something into the folder; None where nobody."""
-    if sys.platform == "win32":  # there folders of a user are closed to others, and modes say nothing
+    """Why somebody else than the user and the administrator may have put files into the folder; None if nobody may."""
+    if sys.platform == "win32":  # there the folders of a user are private, and file modes have no meaning
         return None
     own = directory.stat()
     if not _owned(own):
@@ -75,7 +74,7 @@ def _stranger(directory: Path) -> str | None:
         for entry in entries:
             try:
                 file = entry.stat(follow_symlinks=False)
-            except FileNotFoundError:  # another process has just put it in its place, under another name
+            except FileNotFoundError:  # a temporary file that another process has just renamed
                 continue
             if not _owned(file):
                 return f"{entry.name} in it belongs to user {file.st_uid}"
@@ -89,7 +88,7 @@ def _owned(file: os.stat_result) -> bool:
 
 
 def _of_the_user() -> Path:
-    """Numba's folder, where each system keeps what can be made again."""
+    """Numba's folder in the cache directory of the operating system."""
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"), "numba", "Cache")
     if sys.platform == "darwin":
@@ -98,14 +97,14 @@ def _of_the_user() -> Path:
 
 
 def mark_used(file: Path) -> None:
-    """Make a file as young as one that was just written."""
+    """Set the time of a file to now."""
     with suppress(OSError):
         os.utime(file)
 
 
 @cache
 def delete_unused(directory: Path) -> None:
-    """Delete, once in a process, kernels that nobody has used for two months, and what their writers left behind."""
+    """Delete, once in a process, kernels that were not used for two months, and temporary files of their writers."""
     oldest = time.time() - _UNUSED
     with suppress(OSError):
         for file in (*directory.glob("*.kernel*"), *directory.glob("*.special")):
@@ -116,5 +115,5 @@ def delete_unused(directory: Path) -> None:
 
 @cache
 def warn_once(text: str) -> None:
-    """In this process: numba resets what Python knows of warnings that were shown."""
+    """Warn once in this process; Python's own record of warnings that were shown is reset by numba."""
     warnings.warn(text, RuntimeWarning, stacklevel=2)

@@ -1,4 +1,4 @@
-"""Functions that are not this package's own, compiled to be called by address from its kernels."""
+"""Functions of users, compiled to be called by address from kernels."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from flexmb.jit.pointer import pointer
 
 
 class Uncompilable(TypeError):
-    """A function that numba does not take, with its reasons."""
+    """A function that numba cannot compile, with its reasons."""
 
 
 def foreign(function: Callable[..., Any]) -> Any:
-    """Mark a function to be compiled, in each process anew: what it reaches may change without our knowing."""
+    """Mark a function to be compiled, anew in each process, because changes of the code it calls cannot be detected."""
     return njit(**SEMANTICS)(function)
 
 
 def as_python(function: Any) -> Any:
-    """What was written, of a function that is marked to be compiled; any other one itself."""
+    """The Python function behind a marked function; any other function is returned unchanged."""
     return function.py_func if isinstance(function, Dispatcher) else function
 
 
 def is_foreign(function: Any) -> bool:
-    """Whether it is marked to be compiled."""
+    """Whether a function is marked to be compiled."""
     return isinstance(function, Dispatcher)
 
 
 def address_of(function: Any, returned: Any, *arguments: Any) -> int:
-    """Of a marked function, compiled for these types; Uncompilable where it cannot be."""
+    """Address of a marked function, compiled for these types; Uncompilable if that is impossible."""
     try:
         return pointer(function, returned, *arguments).__wrapper_address__()
     except (NumbaError, TypeError) as error:

@@ -1,12 +1,13 @@
-"""What is used of numba's internals: three hooks, for versions of numba that they were tried with.
+"""The use of numba's internals: three hooks, for the versions of numba with which they were tested.
 
-`parts`  helpers are compiled into what calls them only; see `flexmb/jit/parts.py`.
-`keep`   compiled kernels are kept on disk by a cache of our own; see `flexmb/jit/cache.py`.
+`parts`  helpers are compiled into their callers only; see `flexmb/jit/parts.py`.
+`keep`   compiled kernels are kept on disk by our own cache; see `flexmb/jit/cache.py`.
 `address`  a compiled kernel is called by the address of the wrapper that numba made with it; see `pointer.py`.
 
-With any other numba, or where one of the internals is missing, kernels are compiled by plain `njit` and reached through
+With any other numba, or if one of the internals is missing, kernels are compiled by plain `njit` and called through
 `cfunc`, both documented: results are the same, every process compiles anew, and one warning says so. Numba's own cache
-is no way out: it does not see an edited helper in another file, and two processes may overwrite each other's entries.
+cannot be used instead: it does not notice an edited helper in another file, and two processes may overwrite each
+other's entries.
 """
 
 from __future__ import annotations
@@ -22,19 +23,19 @@ from numba import __version__, cfunc
 from flexmb.jit.folder import cache_directory, warn_once
 from flexmb.jit.progress import announced
 
-OLDEST, NEWEST = (0, 60), (0, 68)  # numba versions that the hooks were tried with: tests/flexmb/jit/test_hooks.py
+OLDEST, NEWEST = (0, 60), (0, 68)  # numba versions with which the hooks were tested: tests/flexmb/jit/test_hooks.py
 
-# "contract" fuses a*b + c. No "nnan" or "ninf": they would let the compiler delete the checks that catch a blow-up.
+# "contract" fuses a*b + c. Not "nnan" or "ninf", which would let the compiler delete the checks for finite numbers.
 SEMANTICS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "nogil": True}
 
 
 def _compiled_anew(compiled: Any, function: FunctionType) -> None:
-    """Without a cache: nothing is kept."""
+    """Announce long compilations; nothing is kept."""
     compiled.compile = _announcing(compiled.compile, function)
 
 
 def _announcing(compile: Callable[[Any], Any], function: FunctionType) -> Callable[[Any], Any]:
-    """What compiles the versions of a kernel that is not kept, with a line about it where it takes long."""
+    """The `compile` of a kernel that is not kept, with a message if it takes long."""
 
     def compile_anew(signature: Any) -> Any:
         with announced(function, None):
@@ -49,13 +50,13 @@ def _through_cfunc(kernel: Any, signature: Any) -> int:
 
 @cache
 def _c_function(kernel: Any, signature: Any) -> Any:
-    """Held as long as the process: its address is of no use without it."""
+    """Kept as long as the process, because its address is valid only while it exists."""
     return cfunc(signature, **SEMANTICS)(kernel.py_func)
 
 
 @dataclass(frozen=True)
 class Hooks:
-    """How helpers and kernels are compiled: as here, by what numba documents, or by its internals."""
+    """How helpers and kernels are compiled; the defaults use only documented parts of numba."""
 
     parts: dict[str, Any] = field(default_factory=dict)  # options of njit for a helper
     kernels: dict[str, Any] = field(default_factory=dict)  # of a kernel
@@ -64,7 +65,7 @@ class Hooks:
 
 
 def _by_internals() -> Hooks:
-    """Raises ImportError or AttributeError where numba is another than was tried."""
+    """Raises ImportError or AttributeError for versions of numba that were not tested."""
     if not OLDEST <= _version() <= NEWEST:
         raise ImportError(f"it was tried with {_text(OLDEST)} to {_text(NEWEST)}")
     from numba.core.types.function_type import CompileResultWAP

@@ -1,7 +1,7 @@
-"""Kernels that were compiled when flexmb was installed: where they are, and whether they are for this process.
+"""Kernels that were compiled when flexmb was installed: their folder, and whether this process can use them.
 
-Each is found by a key of its own (cache.py), so that none that does not fit is ever taken. What is told here is the
-same of all together, before any is asked for: kernels of another numba or for another processor are of no use.
+Each is found by its own key (cache.py), so that only kernels that fit are loaded. Here it is determined in advance
+whether all of them were made for another numba or another processor, and therefore cannot be used.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ MADE_BY = "made.json"
 
 @cache
 def installed_directory() -> Path | None:
-    """Where they are; None where there are none."""
-    here = globals().get("__file__")  # what a frozen program loads out of its archive has none
+    """The folder of installed kernels; None if there is none."""
+    here = globals().get("__file__")  # modules that a frozen program loads from its archive have none
     folder = Path(here).parents[1] / "ready" / "kernels" if here else None
     return folder if folder and folder.is_dir() else None
 
 
 @cache
 def unfit() -> str:
-    """Why they are of no use in this process; nothing where they are."""
+    """Why this process cannot use the installed kernels; an empty string if it can."""
     folder = installed_directory()
     try:
         made = json.loads((folder / MADE_BY).read_text(encoding="utf-8")) if folder else None
@@ -52,7 +52,7 @@ def unfit() -> str:
 
 
 def description() -> str:
-    """What this process compiles with, for the file MADE_BY beside its kernels."""
+    """The versions and the processor for which this process compiles, for the file MADE_BY beside its kernels."""
     return json.dumps(_maker() | {"processor": compiled_for(_codegen())}, indent=1) + "\n"
 
 

@@ -2,9 +2,9 @@
 
 `kernel` marks an entry point: compiled for the argument types of its first call, callable from Python and from other
 kernels (see `linking.py`), cached on disk.
-`helper` marks a function that is called from kernels only: it is compiled into its callers, has no Python wrapper, no
-machine code and no cache entry of its own (see `parts.py`). From Python, call its `.py_func`. `handed_on` marks one
-that kernels take as an argument.
+`helper` marks a function that is called from kernels only: it is compiled into its callers and has no Python wrapper,
+no machine code and no cache entry of its own (see `parts.py`). From Python, call its `.py_func`. `handed_on` marks a
+helper that kernels take as an argument.
 """
 
 from __future__ import annotations
@@ -41,28 +41,30 @@ def helper(function: Callable[..., Any]) -> Any:
 
 
 def sweep(function: Callable[..., Any]) -> Any:
-    """A helper that is part of the kernels that call it, but called there, not inlined at every call.
+    """A helper that is compiled into the kernels that call it, but as a function, not inlined at every call.
 
-    For loops over all bodies or over matrices, beside which a call costs nothing: kernels that have several are smaller
-    and compiled in less time. What most kernels need is better a `kernel` of its own, whose code is there once for all.
+    For loops over all bodies or over matrices, for which the cost of a call is negligible: kernels with several calls
+    become smaller and compile faster. Functions that most kernels need should rather be a `kernel`, which is compiled
+    once for all of them.
     """
     return njit(**(AS_PART | {"forceinline": False}))(function)
 
 
 def written_out(function: Callable[..., Any]) -> Any:
-    """A helper that is written out where it is called.
+    """A helper that numba inlines into its callers before type inference.
 
-    For the short ones around a call by address, which no optimiser sees through: arrays that are handed on once more on
-    their way there are counted again. It takes longer to compile.
+    For short helpers around a call by address, which the optimiser cannot look into: every function that passes arrays
+    on would count their references again. It takes longer to compile.
     """
     return njit(inline="always", **AS_PART)(function)
 
 
 def handed_on(function: Callable[..., Any]) -> Any:
-    """A helper that kernels take as an argument, or hold in a tuple, and hand on to others, which call it.
+    """A helper that kernels take as an argument, or hold in a tuple, and pass on to others, which call it.
 
-    It is handed on by its type alone, and chosen by that while its caller is compiled, like `by_bundle`. A plain helper
-    is a value too, its address in this process: a kernel that hands one on to what is not written out cannot be kept.
+    It is identified by its type alone, and selected while its caller is compiled, like `by_bundle`. A plain helper also
+    has a value, its address in this process, so that a kernel that passes it to a function that is not inlined cannot
+    be kept on disk.
     """
     part = sweep(function)
 
@@ -81,9 +83,9 @@ def handed_on(function: Callable[..., Any]) -> Any:
 
 
 def handed_in(function: Callable[..., Any]) -> Any:
-    """The same of a helper that is written out where it is called: for a part of a loop that calls it at one place.
+    """The same for a helper that is inlined: for a part of a loop that calls it at one place.
 
-    Beside short steps a call costs as much as they do: all arrays that are handed on are counted again.
+    A call costs as much as a short step, because the references of all arrays that are passed are counted again.
     """
 
     def choose(*args: Any) -> Any:
@@ -98,10 +100,10 @@ def handed_in(function: Callable[..., Any]) -> Any:
 
 
 def by_bundle(kind: type, of_kind: Callable[..., Any], others: Callable[..., Any]) -> Callable[..., Any]:
-    """One helper for two kinds of bundles: `of_kind` where the first argument is of class `kind`, else `others`.
+    """One helper for two kinds of bundles: `of_kind` if the first argument is of class `kind`, else `others`.
 
-    Decided by type, while the caller is compiled: a kernel is compiled once for each class of bundles that it is called
-    with, and contains nothing of the other.
+    Decided by type while the caller is compiled: a kernel is compiled separately for each class of bundles, and
+    contains only one of the two.
     """
 
     def choose(bundle: Any, *args: Any) -> Any:
@@ -121,9 +123,9 @@ def by_bundle(kind: type, of_kind: Callable[..., Any], others: Callable[..., Any
 
 
 def by_number(one: Callable[..., Any], lanes: Callable[..., Any]) -> Callable[..., Any]:
-    """One function for two kinds of numbers: `lanes` where an argument is a `flexmb.jit.lanes.LaneType`, else `one`.
+    """One function for two kinds of numbers: `lanes` if an argument is a `flexmb.jit.lanes.LaneType`, else `one`.
 
-    Decided by type, while the caller is compiled, like `by_bundle`.
+    Decided by type while the caller is compiled, like `by_bundle`.
     """
 
     def choose(*args: Any) -> Any:
@@ -142,13 +144,13 @@ def by_number(one: Callable[..., Any], lanes: Callable[..., Any]) -> Callable[..
 
 
 def by_width(strips: Callable[..., Any], one: Callable[..., Any]) -> Callable[..., Any]:
-    """One function of (c, w, ...): `strips` where strips of the workspace w have several elements, else `one`.
+    """One function of (c, w, ...): `strips` if strips of the workspace w have several elements, else `one`.
 
-    Decided by type, while the caller is compiled, like `by_bundle`; interpreted as Python it is `one`.
+    Decided by type while the caller is compiled, like `by_bundle`; interpreted as Python it is `one`.
     """
 
     def choose(c: Any, w: Any, *args: Any) -> Any:
-        interpreted, _ = one, strips  # both are named, for what it refers to is what the key of a kernel knows
+        interpreted, _ = one, strips  # a reference to both, so that the fingerprint of a kernel contains both
         return interpreted(c, w, *args)
 
     @overload(choose, jit_options=AS_PART)
@@ -164,7 +166,7 @@ def by_width(strips: Callable[..., Any], one: Callable[..., Any]) -> Callable[..
 
 
 def _named_after(choice: Callable[..., Any], call: Callable[..., Any]) -> Callable[..., Any]:
-    """The call with a symbol of its own: of two equal symbols in two files of the cache, the linker takes the first."""
+    """`call` with a unique symbol: if two files of the cache have equal symbols, the linker takes the first."""
     called = getattr(choice, "py_func", choice)
     call.__qualname__ = f"call.{called.__module__}.{called.__qualname__}"
     return call

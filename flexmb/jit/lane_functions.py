@@ -1,7 +1,7 @@
 """Elementary functions of lanes: the square root by one instruction, sine and cosine together, the rest lane by lane.
 
-Sine and cosine of floats are here too. Far arguments, infinite ones and NaN go to the library's functions, lane by
-lane.
+Sine and cosine of floats are here too. Arguments far from zero, infinity and NaN are passed to the library's functions,
+lane by lane.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def _lane_by_lane(context: Any, builder: Any, function: Any, *args: Any) -> Any:
 
 
 def _library(context: Any, builder: Any, function: Any, count: int) -> Any:
-    """A function of `count` floats, to be called with their values."""
+    """A library function of `count` floats, to be called with their values."""
     called = context.get_function(function, signature(types.float64, *[types.float64] * count))
     return lambda args: called(builder, args)
 
@@ -62,7 +62,7 @@ class _Sines(AbstractTemplate):
 
 @lower_builtin(sines, TableType, TableType, TableType, types.Integer)
 def _sines(context, builder, sig, args):
-    """Floats are taken from their tables as lanes."""
+    """Floats are loaded from their tables as lanes."""
     kind, count, word = sig.args[0].dtype, args[3], ir.IntType(64)
     each, stride = (LANE, LANES) if kind == types.float64 else (kind, 1)
     align = 8 if kind == types.float64 else None
@@ -77,7 +77,7 @@ def _sines(context, builder, sig, args):
 
 
 def _both(context: Any, builder: Any, x: Any) -> tuple[Any, Any]:
-    """(sin x, cos x). What one lane gets does not depend on the others: far ones are put in by themselves."""
+    """(sin x, cos x). The result of a lane does not depend on the others: only far ones use the library."""
     near = is_near(builder, x)
     places = [cgutils.alloca_once(builder, _NUMBERS) for _ in range(2)]
     for place, value in zip(places, sine_cosine(builder, builder.select(near, x, number(_NUMBERS, 0.0))), strict=True):

@@ -1,16 +1,16 @@
-"""Eight copies of a number as one value of compiled code: what kernels compute with when they run eight scenes at once.
+"""Eight copies of a number as one value of compiled code: the numbers of kernels that run eight scenes at once.
 
 A *lane* is one of the eight numbers. A kernel whose workspace holds lanes is compiled from the same source as for
-floats: sums, products and quotients act on all lanes, floats among them count for every lane. A comparison gives a
-*mask*, a truth for each lane, and no branch can follow all of them. So kernels that compare write
+floats: operations act on all lanes, and a float operand is the same for every lane. A comparison gives a *mask*, a
+boolean for each lane, on which a kernel cannot branch. Kernels that compare therefore use
 
     select(mask, a, b)     a where the mask is true, else b
     every(mask)            whether it is true for all lanes
-    some(mask)             whether it is true for one at least
-    kept(mask, a)          a where the mask is true; elsewhere what fails, NaN, while the other lanes go on
+    some(mask)             whether it is true for at least one
+    kept(mask, a)          a where the mask is true; elsewhere NaN, which marks a failure while other lanes continue
 
-which for floats are the plain conditional expression, the truth itself, and a. What follows `every` and `some` in a
-branch must be right for all lanes. Interpreted as Python they take floats.
+For floats these are the conditional expression, the boolean itself, and a. A branch on `every` or `some` must be right
+for all lanes. Interpreted as Python they take floats.
 """
 
 from __future__ import annotations
@@ -24,21 +24,14 @@ from llvmlite import ir
 from numba import types
 from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_global, signature
-from numba.extending import (
-    infer_getattr,
-    lower_builtin,
-    lower_cast,
-    lower_getattr,
-    models,
-    register_model,
-)
+from numba.extending import infer_getattr, lower_builtin, lower_cast, lower_getattr, models, register_model
 
 LANES = 8
-BYTES = 8 * LANES  # of a lane value, and what its address must be a multiple of
+BYTES = 8 * LANES  # size and alignment of a lane value
 
 
 class LaneType(types.Type):
-    """Eight float64; floats and integers become one by repetition."""
+    """Eight float64; floats and integers are converted by repetition."""
 
     width = LANES
     bitwidth = 8 * BYTES
@@ -47,18 +40,18 @@ class LaneType(types.Type):
         super().__init__(name=f"f64x{LANES}")
 
     def can_convert_from(self, typing: Any, other: types.Type) -> Conversion | None:
-        """Numbers that are the same in all lanes."""
+        """Numbers convert to lanes with equal values."""
         return Conversion.safe if isinstance(other, types.Float | types.Integer) else None
 
 
 class MaskType(types.Type):
-    """A truth for each lane."""
+    """A boolean for each lane."""
 
     def __init__(self) -> None:
         super().__init__(name=f"b1x{LANES}")
 
     def can_convert_from(self, typing: Any, other: types.Type) -> Conversion | None:
-        """A truth for all of them."""
+        """Booleans convert to masks with equal values."""
         return Conversion.safe if isinstance(other, types.Boolean) else None
 
 
@@ -91,12 +84,12 @@ def some(truth: Any) -> Any:
 
 
 def select(truth: Any, a: Any, b: Any) -> Any:
-    """a where a comparison is true, else b. Both have been computed before."""
+    """a where a comparison is true, else b; both are computed."""
     return a if truth else b
 
 
 def kept(truth: Any, a: Any) -> Any:
-    """a, in lanes NaN where the comparison is false; a kernel for floats has returned there."""
+    """a; with lanes, NaN where the comparison is false. A kernel for floats has already returned in that case."""
     return a
 
 
@@ -106,13 +99,13 @@ def sincos(x: Any) -> Any:
 
 
 def sines(x: Any, sine: Any, cosine: Any, count: int) -> None:
-    """Sine and cosine of the first `count` numbers of a table (n,), floats by LANES: n is a multiple of it for them."""
+    """Sine and cosine of the first `count` numbers of a table (n,); for floats n must be a multiple of LANES."""
     for i in range(count):
         sine[i], cosine[i] = sincos(x[i])
 
 
 def repeated(builder: Any, value: Any) -> Any:
-    """One number or truth, in all lanes."""
+    """One number or boolean in all lanes."""
     empty = ir.Constant(ir.VectorType(value.type, LANES), ir.Undefined)
     first = builder.insert_element(empty, value, _PLACE(0))
     return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(_PLACE, LANES), None))
@@ -143,7 +136,7 @@ def _real(context, builder, kind, value):
 
 
 def _is_lanes(*kinds: types.Type) -> bool:
-    """Whether some are lanes, and all can be."""
+    """Whether at least one is lanes, and the others can be converted to lanes."""
     return LANE in kinds and all(kind == LANE or isinstance(kind, types.Float | types.Integer) for kind in kinds)
 
 
@@ -152,7 +145,7 @@ def _is_mask(*kinds: types.Type) -> bool:
 
 
 def _on(operands: types.Type, fits: Any, result: types.Type, *functions: Any) -> None:
-    """The functions take operands of this type, which casts make where they `fit`, and give the result."""
+    """Declare that functions take operands of this type, to which arguments that `fits` accepts are converted."""
     for function in functions:
 
         @infer_global(function)

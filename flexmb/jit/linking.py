@@ -1,9 +1,9 @@
-"""Kernels that call kernels: machine code that is there once, whoever calls, found by a name.
+"""Kernels that call kernels: their machine code exists once for all callers, which refer to it by a symbol.
 
-The recursions over a tree are most of what two dozen kernels do. Each is a kernel of its own; another that calls it has
-a symbol in its place, named after all that the code behind it depends on, and whoever loads or compiles the caller
-puts the address there. So a symbol can never stand for other code than the caller was compiled for, and a process that
-finds no such kernel on disk compiles it, as it does one that is called from Python.
+Two dozen kernels consist mostly of the recursions over a tree. Each recursion is a kernel; a kernel that calls it
+contains a symbol, whose name depends on everything that the code behind it depends on, and which is bound to the
+address when the caller is loaded or compiled. A symbol therefore always refers to the code for which the caller was
+compiled, and a process that does not find that kernel on disk compiles it, as for calls from Python.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _SYMBOL = "flexmb.{}"
 
 @dataclass(frozen=True)
 class Callee:
-    """A version of a kernel, as those that call it name it: where it is defined, for which types, by what symbol."""
+    """A version of a kernel as seen by its callers: its module and name, the types of its arguments, and its symbol."""
 
     module: str
     name: str
@@ -31,7 +31,7 @@ class Callee:
 
 @dataclass(frozen=True)
 class _Code:
-    """Machine code of a version of a kernel: the callee that it is, and its address in this process."""
+    """Machine code of a version of a kernel: its description as a callee, and its address in this process."""
 
     callee: Callee
     own_symbol: str
@@ -42,16 +42,16 @@ _codes: WeakKeyDictionary[Any, _Code] = WeakKeyDictionary()  # by numba's librar
 
 
 def offer(compiled: Any, function: FunctionType, key: str) -> None:
-    """Let kernels call this one, just compiled or loaded; `key` names all that its code depends on."""
+    """Make a kernel that was just compiled or loaded available to callers; `key` depends on all its code depends on."""
     callee = Callee(function.__module__, function.__qualname__, compiled.signature.args, _SYMBOL.format(key))
     own = compiled.fndesc.llvm_func_name
     _codes[compiled.library] = _Code(callee, own, compiled.library.get_pointer_to_function(own))
 
 
 def refer(module: Any, library: Any) -> Callee | None:
-    """Name in a module of LLVM what it calls of a library by its symbol; None where that is no kernel's.
+    """Rename the function of a library to its symbol in the LLVM module that calls it; None if it is no kernel.
 
-    TypeError for a kernel that was made in a function: another process could not find it, nor load who calls it.
+    TypeError for a kernel that was defined in a function, because other processes could not find it.
     """
     code = _codes.get(library)
     if code is None:
@@ -64,9 +64,9 @@ def refer(module: Any, library: Any) -> Callee | None:
 
 
 def resolve(callees: tuple[Callee, ...]) -> tuple[Any, ...] | None:
-    """Have all of these in this process, for a caller that is to be loaded: their libraries, which it has to hold.
+    """Load or compile the callees of a kernel that is to be loaded; their libraries, which the caller must keep.
 
-    None where one is not what it was, or not where it was.
+    None if one has changed or is not found.
     """
     libraries = []
     for callee in callees:
@@ -84,7 +84,7 @@ def resolve(callees: tuple[Callee, ...]) -> tuple[Any, ...] | None:
 
 
 def _find(callee: Callee) -> Any:
-    """The kernel; None where its module, or a kernel of this name in it, is no more."""
+    """The kernel; None if its module, or a kernel of this name in it, does not exist any more."""
     try:
         found = getattr(import_module(callee.module), callee.name, None)
     except ImportError:

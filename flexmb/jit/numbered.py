@@ -1,4 +1,4 @@
-"""One helper for several: a number in front of the arguments says which."""
+"""One helper that dispatches to several, by a number in front of the arguments."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from flexmb.jit.kernel import AS_PART
 
 
 def numbered(name: str, feature: str, functions: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
-    """A helper `name(bundle, number, ...)` that hands `...` to the one of `functions` of this number.
+    """A helper `name(bundle, number, ...)` that calls `functions[number](...)`.
 
-    They are of one signature. Only those whose number n is a feature of the bundle, "<feature> n", are compiled. The
-    helper is written as one would by hand,
+    All have the same signature. Only those with a feature "<feature> n" of the bundle are compiled. The source of the
+    helper is generated,
 
         def name(bundle, number, q, i):
             if number == 1:
@@ -25,7 +25,7 @@ def numbered(name: str, feature: str, functions: Sequence[Callable[..., Any]]) -
             ...
             return function_4(q, i)
 
-    so that one that is alone costs nothing.
+    so that a single function is called without a test.
     """
 
     functions = tuple(functions)
@@ -50,7 +50,7 @@ def numbered(name: str, feature: str, functions: Sequence[Callable[..., Any]]) -
 
     @overload(choose, jit_options=AS_PART, strict=False)  # the written one names the arguments
     def _typed(bundle, number, *arguments):
-        # a bundle without any calls none: where its branches are not cut, the first stands there
+        # a bundle without any never calls it; if branches are not removed early, the first is compiled in vain
         return written(numbers_of(bundle.features, feature, len(functions)) or (0,))
 
     return choose

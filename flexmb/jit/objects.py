@@ -1,12 +1,12 @@
-"""Compiled functions that Python calls without a dispatcher: their arguments are read where the interpreter has them.
+"""Compiled functions that Python calls without a dispatcher: they read their arguments directly from Python objects.
 
-Numba's dispatcher finds the types of three arguments in 0.3 us, and takes 0.1 us for each array. Here a kernel is a
-function of the interpreter itself (`builtin`), as one that is written in C: it is handed the addresses of the objects
-that it is called with, and reads what it needs if, and only if, they are of the exact types that it knows. For all
-other objects it calls a function of Python, with the same arguments (`called`).
+Numba's dispatcher takes 0.3 us for the types of three arguments, and 0.1 us for each array. Here a kernel is a builtin
+function of the interpreter (`builtin`), like one written in C: it gets the addresses of its arguments, and reads them
+only if they have exactly the expected types. For all other objects it calls a Python function with the same arguments
+(`called`).
 
-Where objects have their words is part of Python's and of numpy's binary interface. `readable` holds it against
-objects of this process; where it does not hold, nothing here may be used.
+The layout of objects is part of the binary interfaces of Python and numpy. `readable` checks it for objects of this
+process; if the check fails, nothing in this module may be used.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ FLOAT, ARRAY, REALS, VECTORCALL, INCREF, SAVE, RESTORE, IDENT = range(8)  # rows
 
 @cache
 def interpreter() -> Index:
-    """(8,) Addresses in this process: types float and array, dtype float64, and functions of the interpreter."""
+    """Addresses (8,) in this process: types float and array, dtype float64, and functions of the interpreter."""
     api = ctypes.pythonapi
     lock = api.PyEval_SaveThread, api.PyEval_RestoreThread
     functions = api.PyObject_Vectorcall, api.Py_IncRef, *lock, api.PyThread_get_thread_ident
@@ -46,12 +46,12 @@ def interpreter() -> Index:
 
 @cache
 def readable() -> bool:
-    """Whether objects have their words where the kernels look for them."""
+    """Whether the objects of this interpreter have the layout that the kernels expect."""
     return all(map(_reads, (1.5, np.arange(3.0), np.zeros((2, 3)), np.arange(8.0)[1::2], np.zeros(2, np.int64))))
 
 
 def _reads(example: Any) -> bool:
-    """What kernels would read of a float or an array is what Python says of it."""
+    """Whether kernels would read the correct values from a float or an array."""
     word = (ctypes.c_int64 * (1 + _FLAGS)).from_address(id(example))
     if isinstance(example, float):
         return word[_TYPE] == id(float) and ctypes.c_double.from_buffer(word, 8 * _VALUE).value == example
@@ -78,21 +78,21 @@ class _Method(ctypes.Structure):
 
 
 _FAST, _WITH_NAMES = 0x0080, 0x0002
-_methods: dict[int, _Method] = {}  # held as long as the process, as the kernels are
+_methods: dict[int, _Method] = {}  # kept as long as the process, like the kernels
 
 
 class Anchor(np.ndarray):
-    """The table of a bundle as the `self` of a builtin; it holds all that is reached from there."""
+    """The table of a bundle as the `self` of a builtin; it keeps everything that its addresses refer to."""
 
     held: tuple[Any, ...]
 
 
 def builtin(address: int, bundle: Any, *held: Any) -> Callable[..., Any]:
-    """The kernel at an address as a function of Python.
+    """The kernel at an address as a builtin function of Python.
 
-    Four whole numbers enter it: address of an Anchor, address of the arguments, how many they are by position, and the
-    address of the names of those that come by name, or 0. It returns the address of an object, as a new reference, or 0
-    after an error.
+    The kernel takes four integers, by the protocol METH_FASTCALL | METH_KEYWORDS: address of an Anchor, address of the
+    arguments, number of positional arguments, and address of the names of keyword arguments, or 0. It returns the
+    address of an object, as a new reference, or 0 after an error.
     """
     place = bundle.kernel_table.view(Anchor)
     place.held = bundle, held
@@ -105,7 +105,7 @@ def builtin(address: int, bundle: Any, *held: Any) -> Callable[..., Any]:
 
 @helper
 def bundle_of(place):
-    """Address of the bundle that an Anchor is the table of."""
+    """Address of the bundle whose table is an Anchor."""
     return word_at(place, _DATA)
 
 
@@ -117,7 +117,7 @@ def is_float(python, x):
 
 @helper
 def value(x):
-    """Of a float."""
+    """The value of a float object."""
     return reals_at(x, _VALUE + 1)[_VALUE]
 
 
@@ -140,7 +140,7 @@ def vector(x):
 
 @helper
 def called(python, function, arguments, count, names):
-    """What a function of Python returns for the arguments of a builtin."""
+    """The result of a Python function for the arguments of a builtin."""
     return status_at(python[VECTORCALL], (function, arguments, count, names))
 
 
@@ -153,16 +153,16 @@ def taken(python, x):
 
 @helper
 def this_thread(python):
-    """The number of the thread that calls, `threading.get_ident()`."""
+    """The number of the calling thread, `threading.get_ident()`."""
     return status_at(python[IDENT], ())
 
 
 def word_at(address: Any, i: Any) -> Any:
-    """For kernels: whole number i at an address."""
+    """For kernels: 64-bit integer i at an address."""
 
 
 def reals_at(address: Any, count: Any) -> Any:
-    """For kernels: the table of so many floats at an address."""
+    """For kernels: the table of `count` floats at an address."""
 
 
 @type_callable(word_at)

@@ -1,14 +1,14 @@
-"""A kernel that is not on disk yet is compiled by one process, while the others that want it wait for its file.
+"""A kernel that is not on disk yet is compiled by one process, while other processes that need it wait for its file.
 
-Compiling takes seconds to minutes of a processor, and the workers of a session start at once with the same scenes. Who
-compiles holds a lock on a file beside the kernel's. The operating system frees it when its holder ends, however it
-ends; nobody waits longer than `PATIENCE`; and where there are no locks (a file system without them, a folder that
-nobody may write to) everybody compiles for himself, as without this file. Kernels are written whole or not at all, so
-that a lock saves work and nothing else depends on it.
+Compiling takes seconds to minutes of processor time, and the workers of a session start at the same time with the same
+scenes. The process that compiles holds a lock on a file beside the kernel's. The operating system releases the lock
+when the process ends in any way, and no process waits longer than `PATIENCE`. Without locks (on a file system that has
+none, or in a folder that is not writable) every process compiles. The lock only saves work: nothing else depends on it,
+because kernels are written atomically.
 
-Threads of one process wait for each other by numba's lock, which is taken before that of a file, and llvmlite's after
-both. A process that is forked off while another thread holds one of them would find it held for ever, at its first
-kernel: so the fork waits until they are free.
+Threads of one process are serialised by numba's lock, which is taken before that of a file, and llvmlite's lock is
+taken after both. A lock that another thread holds during a fork is never released in the child, whose first kernel
+would wait for it without end. Therefore forking waits until these locks are free.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ from numba.core.compiler_lock import global_compiler_lock
 
 PATIENCE = 600.0  # s; the longest kernel takes a tenth of it on an idle processor
 
-
-# llvmlite has no name for its lock; where it comes to be elsewhere, forks go on without waiting for it.
+# llvmlite's lock is not public; should it move in a later version, forks do not wait for it.
 _LOCKS: tuple[Any, ...] = (global_compiler_lock, getattr(getattr(ffi, "lib", None), "_lock", nullcontext()))
 
 
@@ -45,8 +44,8 @@ if hasattr(os, "register_at_fork"):
 
 @contextmanager
 def compiled_once(file: Path, patience: float = PATIENCE) -> Iterator[None]:
-    """Hold the lock of a kernel's file; if another process wrote the file meanwhile, it is there for the body."""
-    from filelock import FileLock, Timeout  # only who compiles needs it
+    """Hold the lock of a kernel's file; if another process has written the file meanwhile, the body finds it."""
+    from filelock import FileLock, Timeout  # imported here, because it is needed only for compiling
 
     lock = FileLock(file.with_name(f"{file.name}.lock"))
     try:
@@ -59,7 +58,7 @@ def compiled_once(file: Path, patience: float = PATIENCE) -> Iterator[None]:
         yield
     finally:
         with suppress(OSError):
-            if file.is_file():  # nobody asks for its lock any more
+            if file.is_file():  # its lock is not needed any more
                 Path(lock.lock_file).unlink()
         with suppress(OSError):
             lock.release()

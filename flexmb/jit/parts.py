@@ -1,14 +1,14 @@
-"""Compilation of helpers: into what calls them only.
+"""Compilation of helpers into their callers only.
 
-Numba optimises every function it compiles together with all that it calls, and makes machine code of both, at every
-level of the calls: for helpers, which nobody calls from outside, that is lost. Here they are kept as they were lowered;
-what is left of the work is done once, in the kernel that they become part of. The right-hand side of a tree with all
-hinges and levels is compiled in 20 s of processor time instead of 36 s, and runs as fast.
+Numba optimises every function together with all functions that it calls, and generates machine code for both, at every
+level of the calls. For helpers, which are called from kernels only, this work is wasted. Here the unoptimised LLVM code
+of helpers is kept, and optimised once in the kernel that it becomes part of. The right-hand side of a tree with all
+hinges and levels then compiles in 20 s of processor time instead of 36 s, and runs as fast.
 
-Helpers are written out where they are called, whatever their size: that makes a kernel for one kind of scene nearly
-twice as fast, and a general one by a third, for a sixth more of compiling.
+Helpers are inlined whatever their size. This makes special kernels nearly twice as fast and general ones faster by a
+third, and takes a sixth more time to compile.
 
-A kernel that calls another kernel has a symbol in its place and nothing of its code (linking.py).
+A kernel that calls another kernel contains a symbol for it, and none of its code (linking.py).
 """
 
 from __future__ import annotations
@@ -26,28 +26,28 @@ from flexmb.jit.linking import Callee, refer
 
 
 class _NoMachineCode:
-    """A code generator without places for environments: Python objects that no helper uses."""
+    """A code generator that does not store environments, Python objects that helpers do not use."""
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Nothing to set: there is no machine code yet."""
+        """Does nothing, because there is no machine code."""
 
 
 class _PartLibrary(JITCodeLibrary):
-    """A function as it was lowered, for linking."""
+    """The unoptimised LLVM code of a helper, for linking."""
 
     codegen = _NoMachineCode()
 
     def finalize(self) -> None:
-        """Linking what it calls, optimising and verifying are left to the kernel."""
+        """Linking, optimisation and verification are left to the kernel."""
         self._raise_if_finalized()
         self._finalized = True
 
     def alone(self) -> Any:
-        """Its module, without what it calls."""
+        """Its module, without the functions that it calls."""
         return super()._get_module_for_linking()
 
     def _get_module_for_linking(self) -> Any:
-        """With all that it calls, for a caller that is not compiled by this file."""
+        """Its module with the functions that it calls, for a caller that is not compiled by this module."""
         whole = self.alone().clone()
         for called in _callers_first(self):
             linked = called.alone() if isinstance(called, _PartLibrary) else called._get_module_for_linking()
@@ -56,13 +56,13 @@ class _PartLibrary(JITCodeLibrary):
 
 
 class KernelLibrary(JITCodeLibrary):
-    """A kernel, into which every part of it is linked once, however many others call it; `callees` are kernels."""
+    """A kernel, into which each of its helpers is linked once, whatever the number of calls; `callees` are kernels."""
 
     callees: tuple[Callee, ...] = ()
     held: tuple[Any, ...] = ()
 
     def finalize(self) -> None:
-        """With all that it calls, directly or not."""
+        """Link all helpers that it calls, directly or indirectly, and refer to kernels by symbols."""
         called = _callers_first(self)
         for part in called:
             if isinstance(part, _PartLibrary):
@@ -76,7 +76,7 @@ class KernelLibrary(JITCodeLibrary):
 
 
 def _callers_first(library: JITCodeLibrary) -> list[JITCodeLibrary]:
-    """What it calls, directly or through parts, each after all its callers: a linker takes only what is asked for."""
+    """Libraries that it calls, directly or through helpers, each after its callers: the linker drops unused code."""
     met, found = set[JITCodeLibrary](), list[JITCodeLibrary]()
 
     def visit(calling: JITCodeLibrary) -> None:
@@ -111,13 +111,13 @@ class _KernelLowering(NativeLowering):
 
 
 class KernelCompiler(Compiler):
-    """The default compiler, which knows the features of bundles before it infers types, and links parts by itself."""
+    """Numba's compiler, with features of bundles known before type inference, and a `KernelLibrary` for linking."""
 
     _lowering: type[NativeLowering] = _KernelLowering
     _left_out: frozenset[type] = frozenset()
 
     def define_pipelines(self) -> list[Any]:
-        """The default passes and one more, with the last but one exchanged."""
+        """The default passes with `KnownFeatures` added, the lowering replaced, and those of `_left_out` removed."""
         [manager] = super().define_pipelines()
         manager.add_pass_after(KnownFeatures, RewriteSemanticConstants)
         manager.passes = [
@@ -131,7 +131,7 @@ class KernelCompiler(Compiler):
 
 
 class PartCompiler(KernelCompiler):
-    """The same for helpers: up to the lowering, which leaves a part."""
+    """The same for helpers, whose lowering makes a `_PartLibrary`."""
 
     _lowering = _PartLowering
-    _left_out = frozenset({InlineClosureLikes, InlineOverloads, NopythonRewrites})  # helpers have none to improve
+    _left_out = frozenset({InlineClosureLikes, InlineOverloads, NopythonRewrites})  # helpers have no such code

@@ -1,8 +1,9 @@
-"""Kernels as arguments of kernels, by address: who takes one is compiled once, for all that have its signature.
+"""Kernels as arguments of kernels, by address: a kernel that takes one is compiled once for all of equal signature.
 
-Bundles are passed on to it as `AnyBundle`, whose type says nothing of what is in them. A call through an address costs
-some 20 ns; it is made where a kernel does a thousand times that, as an integrator that evaluates equations of motion.
-An integrator is compiled in some 2 s of processor time: once, instead of once for each algorithm and kind of scene.
+Bundles are passed as `AnyBundle`, a type that does not depend on their contents. A call through an address costs some
+20 ns, which is negligible where the called kernel takes a thousand times as long, as when an integrator evaluates
+equations of motion. An integrator, which compiles in some 2 s of processor time, is compiled once instead of once for
+each algorithm and kind of scene.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ STATUS, WHOLE, VOID = types.int64, types.int64, types.none
 
 
 class Pointer(WrapperAddressProtocol):  # type: ignore[misc]
-    """The address of a kernel, for numba: what it is asked for when a kernel takes this as an argument."""
+    """The address of a kernel with the methods that numba requires of an argument of this type."""
 
     def __init__(self, address: int, signature: Any) -> None:
         self._address, self._signature = address, signature
@@ -36,18 +37,18 @@ class Pointer(WrapperAddressProtocol):  # type: ignore[misc]
 
 
 def pointer(kernel: Any, returned: Any, *arguments: Any) -> Pointer:
-    """Compile a kernel, or find it compiled, for the types of these arguments: of the constants above, or bundles.
+    """Compile a kernel, or find it compiled, for these arguments, each a bundle or one of the types above.
 
-    Raises TypeError where it returns something else than `returned`.
+    Raises TypeError if it does not return `returned`.
     """
     return _pointer(kernel, returned, *(getattr(argument, "_numba_type_", argument) for argument in arguments))
 
 
 @cache
 def _pointer(kernel: Any, returned: Any, *exact: Any) -> Pointer:
-    """Kept, because numba takes a tenth of a millisecond to describe a signature."""
+    """Cached, because numba takes 0.1 ms to describe a signature."""
     kernel.compile(exact)
-    kind = types.unliteral(kernel.overloads[exact].signature.return_type)  # a kernel that only ever returns OK
+    kind = types.unliteral(kernel.overloads[exact].signature.return_type)  # for kernels that always return OK
     if kind != returned:
         raise TypeError(f"{kernel.__name__} returns {kind}, not {returned}")
     shown = (AnyBundle._numba_type_ if isinstance(kind, BundleType) else kind for kind in exact)

@@ -1,4 +1,4 @@
-"""Records of a table asked for ahead of their turn, in sweeps over more bodies than the processor's caches hold."""
+"""Prefetching of records of a table, for sweeps over more bodies than fit into the processor's caches."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numba.extending import lower_builtin, type_callable
 
 from flexmb.jit.tables import BYTE, TableType
 
-_LINE, _LINES = 64, 8  # bytes of a line, and how many of a record every sweep uses
+_LINE, _LINES = 64, 8  # bytes of a cache line, and number of lines of a record that every sweep uses
 
 
 def prefetch(table: Any, i: Any) -> None:
-    """For kernels: row i is soon read and written. There may be no such row: asking for it harms nothing."""
+    """For kernels: row i will soon be read and written. The row need not exist."""
 
 
 @type_callable(prefetch)

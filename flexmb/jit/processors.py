@@ -1,7 +1,7 @@
-"""Which processors a kernel runs on: the one it was compiled for, or any that can do as much.
+"""The processors that a kernel runs on: the one it was compiled for, or all that have its instructions.
 
-What is compiled here is for this very processor. Kernels of a wheel that others install are for a level of x86-64
-instead, as the psABI of System V defines them: v3 has AVX2 and fused multiplication, v4 has AVX-512 too.
+Kernels that are compiled here are for this processor. Kernels of a wheel for other machines are for a level of x86-64
+instead, as defined by the System V psABI: v3 has AVX2 and fused multiply-add, v4 has AVX-512 too.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ LEVELS = {
     "x86-64-v4": ("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"),
     "x86-64-v3": ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"),
 }
-"""What a processor has to have beside what the next lower level has; the highest first."""
+"""The features that a level requires in addition to those of the next lower level; the highest level first."""
 
 
 def compiled_for(codegen: Any) -> tuple[str, ...]:
-    """Platform, processor and its features that kernels are now compiled for: part of their keys."""
+    """The platform, the processor and its features for which kernels are compiled now; part of their keys."""
     return tuple(codegen.magic_tuple())
 
 
 def running(codegen: Any) -> list[tuple[str, ...]]:
-    """Of what kernels can have been compiled for that run here: this processor first, then the levels that it has.
+    """The processors whose kernels run here: this processor first, then the levels that it has.
 
-    Who names a processor to numba gets kernels for that one.
+    If numba is configured for a certain processor, that one only.
     """
     own = compiled_for(codegen)
     if config.CPU_NAME is not None:
@@ -37,7 +37,7 @@ def running(codegen: Any) -> list[tuple[str, ...]]:
 
 @cache
 def _levels() -> tuple[str, ...]:
-    """Levels of this processor, the highest first."""
+    """The levels of x86-64 that this processor has, the highest first."""
     if not binding.get_process_triple().startswith("x86_64"):
         return ()
     features = binding.get_host_cpu_features()

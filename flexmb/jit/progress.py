@@ -1,8 +1,8 @@
-"""A line for who waits: what is being compiled, when it takes longer than two seconds, and that it is once.
+"""A message when compiling takes longer than two seconds: what is being compiled, and that this is done once.
 
-A kernel is compiled once for each kind of arguments, as an integrator is for runs that watch for events and for those
-that do not. So lines about one kernel say which version it is, and no line comes twice. Of kernels that it calls, which
-are compiled on the way, nothing is said.
+A kernel is compiled once for each kind of arguments, for example an integrator for runs with events and for runs
+without. Messages about one kernel therefore number its versions, and no message is repeated. Kernels that it calls are
+compiled with it without a message.
 
 It is a warning of the logger `flexmb.jit`, which Python shows on stderr unless the program has set up its logging:
 `logging.getLogger("flexmb.jit").setLevel(logging.ERROR)` silences it.
@@ -23,14 +23,14 @@ from flexmb.jit.installed import unfit
 
 AFTER = 2.0  # s
 _LOGGER = logging.getLogger("flexmb.jit")
-_versions = Counter[str]()  # that were announced, by the name of the kernel
+_versions = Counter[str]()  # number of announced versions by the name of the kernel
 _counting = threading.Lock()
-_thread = threading.local()  # `announcing`: there while this thread compiles
+_thread = threading.local()  # has an attribute `announcing` while this thread compiles
 
 
 @contextmanager
 def announced(function: FunctionType, folder: Path | None) -> Iterator[None]:
-    """Say after a while that a kernel is being compiled, and why it has to be."""
+    """Announce after `AFTER` that a kernel is being compiled, and why this is necessary."""
     if hasattr(_thread, "announcing"):
         yield
         return

@@ -1,9 +1,9 @@
-"""Sine and cosine together, of a float or of eight in a vector, written out where they are needed.
+"""Sine and cosine together, of a float or of a vector of eight floats, as inlined code.
 
-The argument is reduced by multiples of pi/2 in three parts (Cody & Waite 1980), with what rounding leaves of it as a
-tail; then come the polynomials of fdlibm for |r| <= pi/4. The result is within one unit in the last place while the
-multiple is below 2^17. There is no branch and no call, so that the processor works on several at once; the library's
-functions take longer than all else that a hinge needs to move its body.
+The argument is reduced by multiples of pi/2 in three parts (Cody & Waite 1980), with the rounding error of the
+reduction as a tail; the polynomials are those of fdlibm for |r| <= pi/4. The result is within one unit in the last
+place while the multiple is below 2^17. There is no branch and no call, so that the processor evaluates several at the
+same time; the library's functions take longer than everything else that a hinge needs to move its body.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ _COSINE = (  # of r^14, r^12 .. r^4
     -1.13596475577881948265e-11, 2.08757232129817482790e-09, -2.75573143513906633035e-07,
     2.48015872894767294178e-05, -1.38888888888741095749e-03, 4.16666666666666019037e-02,
 )  # fmt: skip
-_ROUNDING = 1.5 * 2.0**52  # a number to which it is added is rounded to a whole one, which is in its last bits then
+_ROUNDING = 1.5 * 2.0**52  # adding it rounds a number to an integer, which is then in the last bits of the sum
 
 _NUMBER, _WORD = ir.DoubleType(), ir.IntType(64)
 
 
 def number(kind: Any, value: float) -> Any:
-    """A constant, of a vector in all places."""
+    """A constant; for a vector, in all places."""
     return ir.Constant(kind, [ir.Constant(_NUMBER, value)] * kind.count if _is_vector(kind) else value)
 
 
 def instruction(builder: Any, name: str, *args: Any) -> Any:
-    """An instruction that LLVM has for numbers and for vectors of them."""
+    """An LLVM intrinsic for floats or vectors of floats."""
     kind = args[0].type
     function = ir.FunctionType(kind, [kind] * len(args))
     suffix = f"v{kind.count}f64" if _is_vector(kind) else "f64"
@@ -44,12 +44,12 @@ def instruction(builder: Any, name: str, *args: Any) -> Any:
 
 
 def is_near(builder: Any, x: Any) -> Any:
-    """Whether `sine_cosine` may be asked."""
+    """Whether `sine_cosine` is accurate for x."""
     return builder.fcmp_ordered("<", instruction(builder, "fabs", x), number(x.type, FARTHEST))
 
 
 def sine_cosine(builder: Any, x: Any) -> tuple[Any, Any]:
-    """(sin x, cos x) of arguments that are not far from zero."""
+    """(sin x, cos x) for arguments up to FARTHEST."""
 
     def fma(a: Any, b: Any, c: Any) -> Any:
         return instruction(builder, "fma", a, b, c)
@@ -63,7 +63,7 @@ def sine_cosine(builder: Any, x: Any) -> tuple[Any, Any]:
     r = fma(less, constant(_PARTS[1]), first)
     tail = fma(less, constant(_PARTS[2]), fma(less, constant(_PARTS[1]), builder.fsub(first, r)))
     z = builder.fmul(r, r)
-    half = fma(z, constant(-0.5), constant(1.0))  # 1 - r^2/2, and what rounding leaves of it
+    half = fma(z, constant(-0.5), constant(1.0))  # 1 - r^2/2, and its rounding error
     left = fma(z, constant(-0.5), builder.fsub(constant(1.0), half))
     s = fma(builder.fmul(z, r), _polynomial(builder, _SINE, z), builder.fmul(tail, half))
     c = fma(builder.fmul(z, z), _polynomial(builder, _COSINE, z), fma(builder.fneg(r), tail, left))
@@ -79,7 +79,7 @@ def _polynomial(builder: Any, coefficients: tuple[float, ...], z: Any) -> Any:
 
 
 def _of_quadrant(builder: Any, s: Any, c: Any, rounded: Any) -> tuple[Any, Any]:
-    """Sine and cosine of the angle itself, from those of its distance to a multiple of pi/2: exchanged, negated."""
+    """Sine and cosine of the angle, from those of its distance to a multiple of pi/2, by exchange and sign."""
     kind = s.type
     words = ir.VectorType(_WORD, kind.count) if _is_vector(kind) else _WORD
 

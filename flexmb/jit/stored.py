@@ -1,8 +1,8 @@
-"""A compiled kernel as bytes: its machine code, the symbols in it, the kernels it calls, what numba needs to call it.
+"""A compiled kernel as bytes: its machine code and symbols, the kernels it calls, and numba's data for calling it.
 
-Numba keeps beside the machine code the same once more as bitcode of LLVM, for functions that it will be compiled into,
-and the type of every variable as text. Nobody compiles kernels into anything, nor reads the text. For the right-hand
-side of all scenes they make 1.2 MB of what is 0.2 MB without them; to read the bitcode took half the time of loading.
+Numba also stores the LLVM bitcode, for inlining into other functions, and the type of every variable as text. Neither
+is needed for kernels. For the right-hand side of all scenes they would increase the size from 0.2 MB to 1.2 MB, and
+reading the bitcode took half the time of loading.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from numba.core.serialize import dumps
 
 from flexmb.jit.linking import resolve
 
-_LEVEL = 6  # of compression: nine takes twice as long, for 1 %
+_LEVEL = 6  # of compression; level 9 takes twice as long and saves 1 %
 
 
 def packed(compiled: Any) -> bytes:
-    """Bytes of a compiled version of a kernel; afterwards it can be called as before."""
+    """A compiled version of a kernel as bytes; the version itself is not changed."""
     (name, kind, (machine_code, _)), fndesc, environment, signature, objectmode, lifted, _, *rest = compiled._reduce()
     library = name, kind, (machine_code, _nothing_to_link())
     module = compiled.library._final_module
@@ -32,7 +32,7 @@ def packed(compiled: Any) -> bytes:
 
 
 def unpacked(context: Any, contents: Any) -> Any:
-    """The compiled version again, in this process, and all kernels that it calls; None where one is not what it was."""
+    """The compiled version in this process, with all kernels that it calls; None if one of these has changed."""
     symbols, callees, state = pickle.loads(zlib.decompress(contents))
     held = resolve(callees)
     if held is None:

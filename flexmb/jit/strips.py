@@ -1,15 +1,15 @@
-"""Eight neighbours of a row of floats as one value: how one scene's long sums over modes fill vector instructions.
+"""Eight neighbouring floats of a row as one value: vector instructions for long sums over the modes of one scene.
 
-A *strip* of a workspace of floats is a value of `flexmb.jit.lanes` whose lanes are elements n .. n + 7 of a row. Of a
-workspace of lanes or duals, whose numbers are vectors already, a strip is one element. One source serves both:
+A *strip* of a workspace of floats is a value of `flexmb.jit.lanes` whose lanes are elements n .. n + 7 of a row. In a
+workspace of lanes or duals, whose numbers are vectors already, a strip is one element. The same source serves both:
 
     moved = ZERO6
     for n in range(0, modes, width(w)):
         moved = axpy6(strip(w, w.eta[k], n), strips6(w, shapes, n), moved)
     moved = total6(w, moved)
 
-Rows of the tables that are read like this, of constants too, are as long as a whole number of strips (`whole`), zero
-beyond their modes. Interpreted as Python every strip is one element.
+The rows of tables that are read in strips, also of constants, are padded with zeros to a whole number of strips
+(`whole`). Interpreted as Python every strip is one element.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from flexmb.typing import Real
 _STRIP = ir.VectorType(ir.DoubleType(), LANES)
 _PLACE = ir.IntType(32)
 _PLACES = ir.Constant(ir.VectorType(WORD, LANES), list(range(LANES)))
-ROW = LANES  # length of rows that hold six strips as columns
+ROW = LANES  # length of rows with six strips as columns
 
 
 def whole(n: int) -> int:
@@ -44,7 +44,7 @@ def whole(n: int) -> int:
 
 
 def strip_zeros(shape: tuple[int, ...]) -> Real:
-    """Zeros at an address at which strips begin."""
+    """Zeros at an address that is aligned for strips."""
     size = 8 * prod(shape)
     room = np.zeros(size + BYTES, np.uint8)
     start = -room.ctypes.data % BYTES
@@ -52,13 +52,13 @@ def strip_zeros(shape: tuple[int, ...]) -> Real:
 
 
 def width(w: Any) -> int:
-    """How many elements a strip of the workspace w has; in kernels a constant."""
+    """Number of elements of a strip of the workspace w; in kernels a constant."""
     return 1
 
 
 @helper
 def start(w, n):
-    """Where the strip begins that has element n of a row."""
+    """The first element of the strip that contains element n of a row."""
     return n - n % width(w)
 
 
@@ -68,12 +68,12 @@ def strip(w: Any, row: Any, n: int) -> Any:
 
 
 def part(w: Any, row: Any, first: int, n: int, count: int) -> Any:
-    """The strip of w from element n on of the `count` numbers that start at row[first]; zeros beyond them."""
+    """The strip of w from element n of the `count` numbers that start at row[first]; zeros beyond these."""
     return row[first + n]
 
 
 def put(w: Any, row: Any, n: int, x: Any) -> None:
-    """The strip x, or a number for all its elements, into row[n]."""
+    """Write the strip x, or a number for all its elements, to row[n]."""
     row[n] = x
 
 
@@ -83,21 +83,21 @@ def total(w: Any, x: Any) -> Any:
 
 
 def after(w: Any, x: Any, n: int, i: int) -> Any:
-    """The strip x that starts at n of its row, with zeros up to and including element i of the row."""
+    """The strip x, which starts at n of its row, with zeros up to and including element i of the row."""
     return x if n > i else 0.0
 
 
 def put_across(w: Any, a: Any, n: int, V: Any) -> None:
-    """Six strips, a pair of three, as columns of a from row n on: of each of their elements a row of eight, two zero.
+    """Write six strips, given as two triples, as columns of a from row n; the last two of eight columns are zero.
 
-    A strip of one element fills the first six places of row n.
+    With strips of one element, only the first six places of row n are written.
     """
     a[n, 0], a[n, 1], a[n, 2] = V[0]
     a[n, 3], a[n, 4], a[n, 5] = V[1]
 
 
 def add_across(w: Any, a: Any, n: int, V: Any) -> None:
-    """The same added to what is there."""
+    """The same, added to the present values."""
     for i in range(6):
         a[n, i] += V[i // 3][i % 3]
 
@@ -169,7 +169,7 @@ def _lower_strip(context, builder, sig, args):
 
 @lower_builtin(part, BundleType, TableType, types.Integer, types.Integer, types.Integer)
 def _lower_part(context, builder, sig, args):
-    """What lies beyond is not read."""
+    """Elements beyond the `count` numbers are not read."""
     w, row = sig.args[:2]
     _, value, first, n, number = args
     place = _place(builder, row, value, builder.add(first, n))
@@ -204,7 +204,7 @@ class _Total(AbstractTemplate):
 
 @lower_builtin(total, BundleType, types.Any)
 def _lower_total(context, builder, sig, args):
-    """Halves added to halves."""
+    """Pairwise: the upper half is added to the lower half until one element is left."""
     if not is_long(sig.args[0]):
         return args[1]
     x, length = args[1], LANES
@@ -237,7 +237,7 @@ def _lower_after(context, builder, sig, args):
 
 
 def _is_six(w: types.Type, V: types.Type) -> bool:
-    """Whether V is a pair of three strips, or numbers that they are made from."""
+    """Whether V is a pair of triples of strips or numbers."""
     return isinstance(V, types.BaseTuple) and [getattr(part, "count", 0) for part in V] == [3, 3]
 
 

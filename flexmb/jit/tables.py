@@ -1,10 +1,11 @@
-"""Arrays of bundles as kernels see them: an address and extents, in C order; a row of records is an address alone.
+"""Arrays of bundles in kernels: an address and extents, in C order; a row of records is an address alone.
 
-Numba's own arrays carry owners, strides and reference counts, which every function they are handed to takes, counts and
-compiles again. A kernel needs none of this: the bundle holds its arrays, and they are contiguous. Inside a kernel a
-table reads as an array does (`c.body[k].parent`, `w.pff[k, n, i] = x`, `U[m, m + 1 : n]`, `a.shape[0]`); a nested array
-of a record is a table with constant extents. Indices are not checked, and negative ones do not count from the end.
-The floats of a record with a field PADDING are lanes or duals, by their last axis: see `flexmb.jit.wide_arrays`.
+Numba's own arrays have owners, strides and reference counts, which cost time in every function that they are passed
+to, at compilation and in a run. Kernels do not need them: the bundle keeps its arrays, and they are contiguous. In a
+kernel a table is used like an array (`c.body[k].parent`, `w.pff[k, n, i] = x`, `U[m, m + 1 : n]`, `a.shape[0]`); a
+nested array of a record is a table with constant extents. Indices are not checked, and negative ones do not count from
+the end. The floats of a record with a field PADDING are lanes or duals, depending on the length of their last axis: see
+`flexmb.jit.wide_arrays`.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ _WIDE = {kind.width: kind for kind in (LANE, DUAL)}
 
 @cache
 def _short(dtype: types.Type) -> str:
-    """A name for symbols, of a record the digest of its own, which is pages long."""
+    """A name for symbols; for a record a digest of its description, which is long."""
     return f"r{sha256(str(dtype).encode()).hexdigest()[:12]}" if isinstance(dtype, types.Record) else str(dtype)
 
 
@@ -58,7 +59,7 @@ class RowType(types.Type):
         super().__init__(name=f"R{_short(record)}")
 
     def member(self, name: str) -> tuple[types.Type, tuple[int, ...]]:
-        """Type of a field; of a nested array that of its elements, and its extents."""
+        """Type and extents of a field; for a nested array the type of its elements."""
         kind, shape = self.record.fields[name].type, ()
         if isinstance(kind, types.NestedArray):
             kind, shape = kind.dtype, kind.shape
@@ -80,7 +81,7 @@ class _RowModel(models.PrimitiveModel):
 
 
 def _indices(index: types.Type) -> tuple[types.Type, ...] | None:
-    """Types of the integers, and of the slice that may follow them; None for any other index."""
+    """Types of the integers of an index, and of the slice that may follow; None for any other index."""
     found = tuple(index) if isinstance(index, types.BaseTuple) else (index,)
     *first, last = found
     whole = all(isinstance(i, types.Integer) for i in first) and isinstance(last, types.Integer | types.SliceType)
@@ -88,7 +89,7 @@ def _indices(index: types.Type) -> tuple[types.Type, ...] | None:
 
 
 def _element(kind: TableType, index: types.Type) -> tuple[types.Type, types.Type] | None:
-    """Types of kind[index], and of the index as the lowering takes it."""
+    """Types of kind[index] and of the index in the form that the lowering takes."""
     found = _indices(index)
     if found is None or len(found) > kind.ndim:
         return None
@@ -162,7 +163,7 @@ def table(context: Any, builder: Any, kind: TableType, data: Any, shape: list[An
 
 
 def _place(builder, kind, value, indices):
-    """Address of value[indices], and the extents left."""
+    """Address of value[indices], and the remaining extents."""
     shape = cgutils.unpack_tuple(builder, builder.extract_value(value, 1))
     offset = indices[0]
     for i, extent in enumerate(shape[1:], 1):
@@ -219,7 +220,7 @@ def _set_field(context, builder, sig, args, name):
 
 
 def load_number(context: Any, builder: Any, kind: types.Type, place: Any, align: int | None = None) -> Any:
-    """A number of this type from an address, which is a multiple of `align`, by default of what the type asks for."""
+    """Load a number of this type from an address with alignment `align`, by default that of the type."""
     if kind == DUAL:
         return kind.load(builder, place)
     place = builder.bitcast(place, context.get_data_type(kind).as_pointer())
@@ -229,7 +230,7 @@ def load_number(context: Any, builder: Any, kind: types.Type, place: Any, align:
 def store_number(
     context: Any, builder: Any, kind: types.Type, value: Any, place: Any, align: int | None = None
 ) -> None:
-    """Likewise."""
+    """Store a number of this type at such an address."""
     if kind == DUAL:
         kind.store(builder, value, place)
         return

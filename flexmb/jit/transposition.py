@@ -1,7 +1,7 @@
-"""Rows of numbers, one for each of eight copies, to lanes and back: squares of eight by eight numbers by shuffles.
+"""Conversion of the rows of eight copies to lanes and back: transposition of squares of eight by eight numbers.
 
-Number by number a row of the state of each copy costs a load, a store and an address for every number, which for small
-mechanisms is a tenth of what an evaluation takes. A square takes eight loads, 24 shuffles and eight stores.
+Conversion number by number needs a load, a store and an address for each, which for small mechanisms is a tenth of the
+time of an evaluation. A square takes eight loads, 24 shuffles and eight stores.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ _FLOAT = 8  # bytes, also the alignment of rows
 
 
 def square_to_lanes(rows: Any, first: Any, i: Any, lanes: Any) -> None:
-    """lanes (n,LANES), from number i on, of the numbers i .. i + LANES - 1 of rows (copies,n), from copy `first` on."""
+    """Write numbers i .. i + LANES - 1 of LANES rows (copies,n), from copy `first` on, to lanes (n,LANES)."""
     lanes[i : i + LANES] = rows[first : first + LANES, i : i + LANES].T
 
 
 def square_to_rows(rows: Any, first: Any, i: Any, lanes: Any) -> None:
-    """The same square of rows, of lanes."""
+    """Write the same numbers of the lanes to the rows."""
     rows[first : first + LANES, i : i + LANES] = lanes[i : i + LANES].T
 
 
@@ -60,7 +60,7 @@ def _to_rows(context, builder, sig, args):
 
 
 def _places(context: Any, builder: Any, sig: Any, args: Any) -> tuple[list[Any], list[Any]]:
-    """Where the rows of a square are, and its lanes."""
+    """Addresses of the rows of a square, and of its lanes."""
     rows, first, i, lanes = args
     array = context.make_array(sig.args[0])(context, builder, rows)
     length = builder.extract_value(array.shape, 1)
@@ -81,7 +81,7 @@ def _places(context: Any, builder: Any, sig: Any, args: Any) -> tuple[list[Any],
 
 
 def transposed(builder: Any, square: list[Any]) -> list[Any]:
-    """Column j of the rows as row j: halves, then quarters, then eighths change sides of the diagonal."""
+    """The transposed square: blocks of half, a quarter and an eighth of its size are exchanged across the diagonal."""
     rows, distance = list(square), LANES // 2
     while distance:
         for upper in (k for k in range(LANES) if not k & distance):

@@ -1,7 +1,7 @@
-"""Which special kernels were compiled ahead, so that who lets flexmb choose gets them.
+"""Records which special kernels were compiled ahead, so that the choice "auto" takes them.
 
-What is noted is a file beside the kernels, named after the features and what compiles. The kernels themselves are still
-looked for one by one: where the note is older than the code, they are compiled anew.
+The record is a file beside the kernels, whose name depends on the features and the compiler. The kernels themselves are
+found by their own keys: if the record is older than the code, they are compiled anew.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ SUFFIX = ".special"
 
 
 def is_warm(features: frozenset[str]) -> bool:
-    """Whether kernels for just these features were compiled ahead."""
+    """Whether special kernels for exactly these features were compiled ahead."""
     note = _note(features)
     if note is None or not note.is_file():
         return False
@@ -26,7 +26,7 @@ def is_warm(features: frozenset[str]) -> bool:
 
 
 def note_warm(features: frozenset[str]) -> None:
-    """Note that they are, where that can be written."""
+    """Record that they were, if the folder is writable."""
     note = _note(features)
     if note is not None:
         with suppress(OSError):

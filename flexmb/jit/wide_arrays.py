@@ -1,6 +1,6 @@
-"""Arrays whose floats are lanes or duals: a last axis beside each float, at addresses that vector instructions ask for.
+"""Arrays whose floats are lanes or duals: each float gets a last axis, aligned for vector instructions.
 
-Integers stand once: what a scene consists of is the same in all lanes.
+Integers get none: the structure of a scene is the same in all lanes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from flexmb.jit.tables import PADDING
 
 
 def wide_dtype(dtype: np.dtype, width: int = LANES) -> np.dtype:
-    """Type of the records: floats first, so that each lane value begins at a multiple of BYTES, then integers."""
+    """Type of the records: floats first, so that each lane value is aligned to BYTES, then integers."""
     if dtype == np.float64:
         return dtype
     floats, others = list[Any](), list[Any]()
@@ -43,7 +43,7 @@ def wide_zeros(shape: tuple[int, ...], dtype: Any = np.float64, width: int = LAN
 
 
 def in_lanes(copies: list[Any]) -> Any:
-    """The lane array of equal arrays, one for each of LANES copies; integers are those of the first."""
+    """The lane array of arrays of equal shape, one for each of LANES copies; integers are those of the first."""
     first = copies[0]
     out = wide_zeros(first.shape, first.dtype)
     if first.dtype == np.float64:
@@ -58,7 +58,7 @@ def in_lanes(copies: list[Any]) -> Any:
 
 
 def as_duals(array: Any) -> Any:
-    """The same numbers, which do not change along any direction."""
+    """The same numbers as duals with zero derivatives."""
     out = wide_zeros(array.shape, array.dtype, DualType.width)
     if array.dtype == np.float64:
         out[..., 0] = array

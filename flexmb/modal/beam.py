@@ -138,15 +138,9 @@ def beam_elements(body: BeamBody) -> BeamElements:
         raise ValueError(f"beam '{body.name}': modes.families is empty; name at least one of {', '.join(FAMILIES)}")
     table = section_table(body)
     mesh = ElementMesh(np.linspace(0.0, body.length_m, body.elements + 1))
-    fields: dict[str, LineField | BendingField] = {}
-    for name in FAMILIES:
-        if name not in body.modes.families:
-            continue
-        if name in _LINE_ROWS:
-            fields[name] = LineField(mesh)
-        else:
-            fields[name] = BendingField(mesh, shear=body.theory == "timoshenko")
-    return BeamElements(mesh, table, fields)
+    bending = BendingField(mesh, shear=body.theory == "timoshenko")
+    chosen = [name for name in FAMILIES if name in body.modes.families]
+    return BeamElements(mesh, table, {name: LineField(mesh) if name in _LINE_ROWS else bending for name in chosen})
 
 
 def lump_mass(lump: Lump) -> Real:

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.modal.beam import BeamElements, beam_elements
-from flexmb.modal.element_points import Points
-from flexmb.modal.flexible import points_of
+from flexmb.modal.beam import beam_elements
+from flexmb.modal.element_points import Points, on_axis
+from flexmb.modal.flexible import points_of, second_order_of
 from flexmb.modal.flexible_model import SecondOrder
 from flexmb.modal.reduce import beam_modes
-from flexmb.modal.second_order import beam_second_order
 from flexmb.modal.stations import inertia_stations, lumps
 from flexmb.scene.bodies import BeamBody
 from flexmb.typing import Index, Real
@@ -58,15 +57,11 @@ def beam_sections(body: BeamBody, x: Real) -> BeamSections:
         x=x,
         points=points,
         beyond=np.searchsorted(x, points.x, side="right"),
-        second=_second(body, elements, columns, points.x, points.position - points.x[:, None] * (1.0, 0.0, 0.0)),
+        second=second_order_of(body, elements, columns, points.x, points.position - on_axis(points.x)),
         motion=elements.motion(x, columns),
-        second_motion=_second(body, elements, columns, x, np.zeros((len(x), 3))),
+        second_motion=second_order_of(body, elements, columns, x, np.zeros((len(x), 3))),
         EA=table.at(table.EA, x),
         EIy=table.at(table.EIy, x),
         EIz=table.at(table.EIz, x),
         GJ=table.at(table.GJ, x),
     )
-
-
-def _second(body: BeamBody, elements: BeamElements, columns: Real, x: Real, offset: Real) -> SecondOrder | None:
-    return beam_second_order(elements, columns, x, offset) if body.level == "stiffened" else None

@@ -85,7 +85,7 @@ def _sums(model: FlexibleModel) -> FirstOrder:
     return FirstOrder(
         mass=float(m.sum()),
         s0=m @ rho,
-        J0=_steiner(np.einsum("p,pa,pb->ab", m, rho, rho)) + J.sum(axis=0),
+        J0=steiner(np.einsum("p,pa,pb->ab", m, rho, rho)) + J.sum(axis=0),
         E=inertia_slope(model),
         C0=np.einsum("p,pna->na", m, np.cross(rho[:, None], u)) + spin.sum(axis=0),
         L0=np.einsum("p,pna->na", m, u),
@@ -100,7 +100,7 @@ def _sums(model: FlexibleModel) -> FirstOrder:
 def inertia_slope(model: FlexibleModel) -> Real:
     """E_n = dJ/deta_n at rest shape (m,3,3): twice the symmetric part of sum m (rho.u_n 1 - rho u_n'), plus T_n."""
     rho, u, _ = _mass_centres(model)
-    return 2.0 * _steiner(np.einsum("p,pa,pnb->nab", model.mass, rho, u, optimize=True)) + _turning(model).sum(axis=0)
+    return 2.0 * steiner(np.einsum("p,pa,pnb->nab", model.mass, rho, u, optimize=True)) + _turning(model).sum(axis=0)
 
 
 def _mass_centres(model: FlexibleModel) -> tuple[Real, Real, Real]:
@@ -127,14 +127,15 @@ def _inertia_curvature(model: FlexibleModel) -> Real:
     psi, J = cross_matrix(np.swapaxes(model.rotation, 1, 2)), model.inertia
     twice = 0.5 * np.einsum("pnab,pkbc,pcd->nkad", psi, psi, J, optimize=True)
     across = 0.5 * np.einsum("pnab,pbc,pkcd->nkad", psi, J, psi, optimize=True)
-    turned = _symmetric(twice + np.swapaxes(twice, 0, 1)) - across - np.swapaxes(across, 0, 1)
-    return _steiner(places) + turned
+    turned = symmetric(twice + np.swapaxes(twice, 0, 1)) - across - np.swapaxes(across, 0, 1)
+    return steiner(places) + turned
 
 
-def _steiner(A: Real) -> Real:
+def steiner(A: Real) -> Real:
     """The symmetric part of sum m (a.b 1 - b a') from A = sum m a b' (...,3,3)."""
-    return np.trace(A, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - _symmetric(A)
+    return np.trace(A, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - symmetric(A)
 
 
-def _symmetric(A: Real) -> Real:
+def symmetric(A: Real) -> Real:
+    """The symmetric part of matrices (...,n,n)."""
     return 0.5 * (A + np.swapaxes(A, -1, -2))

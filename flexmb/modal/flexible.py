@@ -69,7 +69,7 @@ def beam_model(body: BeamBody) -> FlexibleModel:
         damping=damping,
         nodes=_nodes(body, elements, modes.columns),
         clamped=body.modes.boundary == "clamped-free",
-        second=_second_order(body, elements, modes.columns, points.x, points.position - on_axis(points.x)),
+        second=second_order_of(body, elements, modes.columns, points.x, points.position - on_axis(points.x)),
     )
 
 
@@ -81,9 +81,7 @@ def points_of(
     return join([along(elements, columns, stations), *(at_lump(elements, columns, lump) for lump in rigid_lumps)])
 
 
-def _second_order(
-    body: BeamBody, elements: BeamElements, columns: Real, x: Real, offset: Real
-) -> SecondOrder | None:
+def second_order_of(body: BeamBody, elements: BeamElements, columns: Real, x: Real, offset: Real) -> SecondOrder | None:
     """Second-order field of points at `offset` (n,3) from the axis points x (n,); only level "stiffened" needs it."""
     return beam_second_order(elements, columns, x, offset) if body.level == "stiffened" else None
 
@@ -99,7 +97,7 @@ def _nodes(body: BeamBody, elements: BeamElements, columns: Real) -> dict[str, F
             raise ValueError(f"beam '{body.name}': node '{name}' at x = {x:g} m is not on [0, {body.length_m:g}] m")
         moved = elements.motion(np.array([x]), columns)[0]
         turn = rotation_matrix(quaternion)
-        second = _second_order(body, elements, columns, np.array([x]), np.zeros((1, 3)))
+        second = second_order_of(body, elements, columns, np.array([x]), np.zeros((1, 3)))
         of_node = None if second is None else second.map(lambda G: G[0])
         nodes[name] = FlexibleNode(np.array([x, 0.0, 0.0]), turn, moved[:3], moved[3:], of_node)
     return nodes

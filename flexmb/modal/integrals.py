@@ -11,7 +11,7 @@ eta: such points are listed separately and summed at every evaluation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,9 @@ class TurningPoints:
     translation: Real
     rotation: Real
     second: SecondOrder | None = None
+
+
+_ARRAYS = ("mass", "position", "com_offset", "inertia", "translation", "rotation")  # of points, also of a FlexibleModel
 
 
 @dataclass(frozen=True)
@@ -102,16 +105,8 @@ def modal_integrals(model: FlexibleModel) -> ModalIntegrals:
 
 def _turning(model: FlexibleModel, offset: NDArray[np.bool_]) -> TurningPoints:
     """Points with an offset mass, with mass and tensor, and other points with a tensor, without their mass."""
-    kept = offset | np.any(model.inertia != 0.0, axis=(1, 2))
-    return TurningPoints(
-        mass=np.where(offset, model.mass, 0.0)[kept],
-        position=model.position[kept],
-        com_offset=model.com_offset[kept],
-        inertia=model.inertia[kept],
-        translation=model.translation[kept],
-        rotation=model.rotation[kept],
-        second=None if model.second is None else model.second.map(lambda G: G[kept]),
-    )
+    kept = np.flatnonzero(offset | np.any(model.inertia != 0.0, axis=(1, 2)))
+    return _chosen(replace(model, mass=np.where(offset, model.mass, 0.0)), kept)
 
 
 def _spatial_mass(model: FlexibleModel) -> Real:
@@ -128,15 +123,14 @@ def _spatial_mass(model: FlexibleModel) -> Real:
 
 def still_points(model: FlexibleModel, chosen: NDArray[np.intp]) -> TurningPoints:
     """Masses without offset, as points that are summed at every evaluation but do not turn."""
-    return TurningPoints(
-        mass=model.mass[chosen],
-        position=model.position[chosen],
-        com_offset=np.zeros((len(chosen), 3)),
-        inertia=np.zeros((len(chosen), 3, 3)),
-        translation=model.translation[chosen],
-        rotation=np.zeros_like(model.rotation[chosen]),
-        second=None if model.second is None else model.second.map(lambda G: G[chosen]),
-    )
+    zeros = {name: np.zeros_like(getattr(model, name)) for name in ("com_offset", "inertia", "rotation")}
+    return _chosen(replace(model, **zeros), chosen)
+
+
+def _chosen(model: FlexibleModel, chosen: NDArray[np.intp]) -> TurningPoints:
+    """The points of these numbers."""
+    second = None if model.second is None else model.second.map(lambda G: G[chosen])
+    return TurningPoints(*(getattr(model, name)[chosen] for name in _ARRAYS), second=second)
 
 
 def stacked(first: TurningPoints, then: TurningPoints) -> TurningPoints:
@@ -145,5 +139,4 @@ def stacked(first: TurningPoints, then: TurningPoints) -> TurningPoints:
     def along(name: str) -> Real:
         return np.concatenate([getattr(first, name), getattr(then, name)])
 
-    names = ("mass", "position", "com_offset", "inertia", "translation", "rotation")
-    return TurningPoints(*map(along, names), second=join_second(first.second, then.second))
+    return TurningPoints(*map(along, _ARRAYS), second=join_second(first.second, then.second))

@@ -25,10 +25,6 @@ def raw_model(body: ModalBody, folder: Path | None = None) -> FlexibleModel:
         body = msgspec.structs.replace(body, file=str(folder / body.file))
     try:
         arrays = modal_arrays(body)
-    except ValueError as error:
-        raise ValueError(f"modal body '{body.name}': {error}") from error
-    modes = arrays.translation_modes.shape[2]
-    try:
         second = second_order(arrays) if body.level == "stiffened" else None
     except ValueError as error:
         raise ValueError(f"modal body '{body.name}': {error}") from error
@@ -41,7 +37,7 @@ def raw_model(body: ModalBody, folder: Path | None = None) -> FlexibleModel:
         rotation=arrays.rotation_modes,
         stiffness=arrays.stiffness,
         damping=arrays.damping,
-        nodes=_nodes(body, modes),
+        nodes=_nodes(body, arrays.translation_modes.shape[2]),
         clamped=body.boundary == "clamped-free",
         second=second,
     )

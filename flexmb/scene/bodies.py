@@ -91,11 +91,8 @@ class Modes(SceneStruct, frozen=True, kw_only=True):
     count: int
     boundary: Literal["clamped-free", "free-free"] = "clamped-free"
     families: tuple[Literal["axial", "torsion", "bending_y", "bending_z"], ...] = (
-        "axial",
-        "torsion",
-        "bending_y",
-        "bending_z",
-    )
+        "axial", "torsion", "bending_y", "bending_z",
+    )  # fmt: skip
     static: bool = False
     damping_ratio: float | tuple[float, ...] = 0.0
 

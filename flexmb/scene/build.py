@@ -12,6 +12,7 @@ from typing import Any, Literal, Self, Unpack
 import msgspec
 from numpy.typing import ArrayLike
 
+from flexmb.scene import options as o
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.check import check_scene
@@ -21,30 +22,17 @@ from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.feeding_back import FeedbackMaker
 from flexmb.scene.garbage import collector_paused
 from flexmb.scene.hinges import Z_AXIS
-from flexmb.scene.options import (
-    Angle,
-    BeamOptions,
-    ClosureFrames,
-    Displacement,
-    GivenHinge,
-    ModalMatrices,
-    Placement,
-    SlidingHinge,
-    TurningHinge,
-    WheelMotion,
-    refuse_others,
-)
 
 AT_REST = s.AngularCoordinate()
 IN_PLACE = s.LinearCoordinate()
 
 
-def angular(**angle: Unpack[Angle]) -> s.AngularCoordinate:
+def angular(**angle: Unpack[o.Angle]) -> s.AngularCoordinate:
     """One angle of a hinge with several coordinates, for example ``universal(..., first=angular(rate=2.0))``."""
     return make(s.AngularCoordinate, **angle)
 
 
-def linear(**displacement: Unpack[Displacement]) -> s.LinearCoordinate:
+def linear(**displacement: Unpack[o.Displacement]) -> s.LinearCoordinate:
     """One displacement of a hinge with several coordinates, or of a point mass."""
     return make(s.LinearCoordinate, **displacement)
 
@@ -99,7 +87,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
     def beam(
         self, name: str, *, length: float, elements: int, section: s.BeamStation | Sequence[s.BeamStation],
         modes: int | s.Modes, level: s.Level = "full", nodes: Mapping[str, float] | Sequence[s.BeamNode] = (),
-        **model: Unpack[BeamOptions],
+        **model: Unpack[o.BeamOptions],
     ) -> Self:  # fmt: skip
         """A beam along +x of `length` (m), root at the body origin.
 
@@ -122,7 +110,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
     def modal_body(
         self, name: str, *, points: Sequence[s.InertiaPoint] = (), file: str | None = None,
         boundary: Literal["clamped-free", "free-free"] = "clamped-free", level: s.Level = "full",
-        nodes: Sequence[s.ModalNode] = (), **matrices: Unpack[ModalMatrices],
+        nodes: Sequence[s.ModalNode] = (), **matrices: Unpack[o.ModalMatrices],
     ) -> Self:  # fmt: skip
         """A flexible body of raw points and modes: `points` (see `inertia_points`) or an `.npz` `file`.
 
@@ -139,12 +127,12 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
 
     # Hinges
 
-    def weld(self, name: str, parent: str, child: str, **placement: Unpack[Placement]) -> Self:
+    def weld(self, name: str, parent: str, child: str, **placement: Unpack[o.Placement]) -> Self:
         """No freedom between `parent` ("ground" for the inertial frame) and `child`."""
         return self._append(s.Weld, name=name, parent=parent, child=child, **placement)
 
     def revolute(
-        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, **options: Unpack[TurningHinge]
+        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, **options: Unpack[o.TurningHinge]
     ) -> Self:
         """One rotation about the unit vector `axis` (inboard hinge axes).
 
@@ -152,15 +140,10 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         (N m s/rad), `armature` (kg m²), motor `torque` (N m) or `prescribed` angle (rad) as functions of time; nodes
         and offsets as for every hinge (`flexmb.scene.options.Placement`).
         """
-        refuse_others("a Revolute", options, TurningHinge)
-        angle, placement = _divided(options, Angle)
-        rotation = make(s.AngularCoordinate, **angle)
-        return self._append(
-            s.Revolute, name=name, parent=parent, child=child, axis=axis, rotation=rotation, **placement
-        )
+        return self._turning(s.Revolute, options, name=name, parent=parent, child=child, axis=axis)
 
     def prismatic(
-        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, **options: Unpack[SlidingHinge]
+        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, **options: Unpack[o.SlidingHinge]
     ) -> Self:
         """One translation along the unit vector `axis` (inboard hinge axes).
 
@@ -168,8 +151,8 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         `armature` (kg), motor `force` (N) or `prescribed` displacement (m) as functions of time; nodes and offsets as
         for every hinge (`flexmb.scene.options.Placement`).
         """
-        refuse_others("a Prismatic", options, SlidingHinge)
-        displacement, placement = _divided(options, Displacement)
+        o.refuse_others("a Prismatic", options, o.SlidingHinge)
+        displacement, placement = _divided(options, o.Displacement)
         translation = make(s.LinearCoordinate, **displacement)
         return self._append(
             s.Prismatic, name=name, parent=parent, child=child, axis=axis, translation=translation, **placement
@@ -177,23 +160,24 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
 
     def screw(
         self, name: str, parent: str, child: str, *, pitch: float, axis: ArrayLike = Z_AXIS,
-        **options: Unpack[TurningHinge],
+        **options: Unpack[o.TurningHinge],
     ) -> Self:  # fmt: skip
         """One rotation about the unit vector `axis`, with `pitch` (m/rad) times as much translation along it.
 
         A screw that advances by h (m) a turn has the pitch h / (2 pi), a left-handed one a negative pitch. The angle is
         as of a `revolute`.
         """
-        refuse_others("a Screw", options, TurningHinge)
-        angle, placement = _divided(options, Angle)
-        rotation = make(s.AngularCoordinate, **angle)
-        return self._append(
-            s.Screw, name=name, parent=parent, child=child, axis=axis, pitch=pitch, rotation=rotation, **placement
-        )
+        return self._turning(s.Screw, options, name=name, parent=parent, child=child, axis=axis, pitch=pitch)
+
+    def _turning(self, kind: type[s.Revolute | s.Screw], options: Mapping[str, Any], **hinge: Any) -> Self:
+        """A hinge with one angle, whose arguments are among the `options`."""
+        o.refuse_others(f"a {kind.__name__}", options, o.TurningHinge)
+        angle, placement = _divided(options, o.Angle)
+        return self._append(kind, **hinge, rotation=make(s.AngularCoordinate, **angle), **placement)
 
     def cylindrical(
         self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, rotation: s.AngularCoordinate = AT_REST,
-        translation: s.LinearCoordinate = IN_PLACE, **placement: Unpack[Placement],
+        translation: s.LinearCoordinate = IN_PLACE, **placement: Unpack[o.Placement],
     ) -> Self:  # fmt: skip
         """Rotation about and translation along the unit vector `axis`; see `angular` and `linear`."""
         return self._append(
@@ -203,7 +187,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
 
     def universal(
         self, name: str, parent: str, child: str, *, first: s.AngularCoordinate = AT_REST,
-        second: s.AngularCoordinate = AT_REST, **placement: Unpack[Placement],
+        second: s.AngularCoordinate = AT_REST, **placement: Unpack[o.Placement],
     ) -> Self:  # fmt: skip
         """Rotation about x of the inboard frame, then about the carried y; see `angular`."""
         return self._append(
@@ -212,7 +196,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
 
     def gimbal(
         self, name: str, parent: str, child: str, *, sequence: str = "xyz",
-        rotations: Sequence[s.AngularCoordinate] | None = None, **placement: Unpack[Placement],
+        rotations: Sequence[s.AngularCoordinate] | None = None, **placement: Unpack[o.Placement],
     ) -> Self:  # fmt: skip
         """Two or three successive rotations about carried axes, for example "zxz"; one `angular` each."""
         rotations = (AT_REST,) * len(sequence) if rotations is None else rotations
@@ -223,7 +207,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
     def spherical(
         self, name: str, parent: str, child: str, *, quaternion: ArrayLike = IDENTITY,
         angular_velocity: ArrayLike = ZERO, stiffness: float = 0.0, damping: float = 0.0,
-        **placement: Unpack[GivenHinge],
+        **placement: Unpack[o.GivenHinge],
     ) -> Self:  # fmt: skip
         """Three rotations: initial `quaternion` and relative `angular_velocity` (rad/s, outboard axes), `given` if
         closures must keep both, spring `stiffness` (N m/rad) and `damping` (N m s/rad)."""
@@ -234,7 +218,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
 
     def planar(
         self, name: str, parent: str, child: str, *, x: s.LinearCoordinate = IN_PLACE,
-        y: s.LinearCoordinate = IN_PLACE, rotation: s.AngularCoordinate = AT_REST, **placement: Unpack[Placement],
+        y: s.LinearCoordinate = IN_PLACE, rotation: s.AngularCoordinate = AT_REST, **placement: Unpack[o.Placement],
     ) -> Self:  # fmt: skip
         """Translation in the x-y plane of the inboard frame, then rotation about z; see `linear` and `angular`."""
         return self._append(
@@ -243,7 +227,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
 
     def free(
         self, name: str, parent: str, child: str, *, position: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY,
-        angular_velocity: ArrayLike = ZERO, velocity: ArrayLike = ZERO, **placement: Unpack[GivenHinge],
+        angular_velocity: ArrayLike = ZERO, velocity: ArrayLike = ZERO, **placement: Unpack[o.GivenHinge],
     ) -> Self:  # fmt: skip
         """Six freedoms: initial `position` (m, inboard axes), `quaternion`, and relative `angular_velocity` (rad/s) and
         `velocity` (m/s) of the outboard origin, both in outboard axes; `given` if closures must keep all of them."""
@@ -256,7 +240,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
 
     def wheel(
         self, name: str, body: str, *, axis: ArrayLike, mass: float, axial_inertia: float, transverse_inertia: float,
-        node: str = "origin", **motion: Unpack[WheelMotion],
+        node: str = "origin", **motion: Unpack[o.WheelMotion],
     ) -> Self:  # fmt: skip
         """A symmetric wheel at a node plus `offset` (m), spinning about the unit vector `axis` (node axes).
 
@@ -321,7 +305,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
     def closure(
         self, name: str,
         type: Literal["weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar"],
-        body_a: str, body_b: str, *, axis: ArrayLike = Z_AXIS, **frames: Unpack[ClosureFrames],
+        body_a: str, body_b: str, *, axis: ArrayLike = Z_AXIS, **frames: Unpack[o.ClosureFrames],
     ) -> Self:  # fmt: skip
         """A loop closure between nodes of two bodies of the tree, or of a body and "ground".
 

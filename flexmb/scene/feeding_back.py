@@ -5,7 +5,7 @@ Outputs of controllers act through a `flexmb.scene.functions.ControlSignal` in p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, Self, Unpack
 
 from numpy.typing import ArrayLike
@@ -51,31 +51,25 @@ class FeedbackMaker(Collector):
 
     def state_space(self, name: str, inputs: str | Sequence[str], **law: Unpack[LinearLaw]) -> Self:
         """A linear controller: `A`, `B`, `C`, `D`, `initial`; `period`, `offset`, `delay` (s) if it is sampled."""
-        refuse_others("a StateSpace", law, LinearLaw)
-        return self._append(s.StateSpace, name=name, inputs=_several(inputs), **law)
+        return self._controller(s.StateSpace, LinearLaw, law, name=name, inputs=inputs)
 
     def pid(self, name: str, inputs: str | Sequence[str], **law: Unpack[PidLaw]) -> Self:
         """kp e + integral of ki e + kd e', e = setpoint - input: gains, `setpoint`, `filter` (s), `lower`, `upper`,
         `tracking` (s); `period`, `offset`, `delay` (s) if it is sampled."""
-        refuse_others("a Pid", law, PidLaw)
-        return self._append(s.Pid, name=name, inputs=_several(inputs), **law)
+        return self._controller(s.Pid, PidLaw, law, name=name, inputs=inputs)
 
     def saturation(
         self, name: str, inputs: str | Sequence[str], *, lower: float, upper: float, **sampling: Unpack[Sampling]
     ) -> Self:
         """The inputs, limited to a range."""
-        refuse_others("a Saturation", sampling, Sampling)
-        return self._append(s.Saturation, name=name, inputs=_several(inputs), lower=lower, upper=upper, **sampling)
+        return self._controller(s.Saturation, Sampling, sampling, name=name, inputs=inputs, lower=lower, upper=upper)
 
     def gain_table(
         self, name: str, inputs: str | Sequence[str], *, points: ArrayLike, values: ArrayLike,
         **sampling: Unpack[Sampling],
     ) -> Self:  # fmt: skip
         """A gain that depends on the first input, linear between `values` at `points`, times all other inputs."""
-        refuse_others("a GainTable", sampling, Sampling)
-        return self._append(
-            s.GainTable, name=name, inputs=_several(inputs), points=points, values=values, **sampling
-        )
+        return self._controller(s.GainTable, Sampling, sampling, name=name, inputs=inputs, points=points, values=values)
 
     def user_law(
         self, name: str, inputs: str | Sequence[str], function: str | Callable[..., Any], **law: Unpack[OwnLaw]
@@ -84,13 +78,16 @@ class FeedbackMaker(Collector):
 
         Number of `outputs`; `initial` state; `parameters`; `period`, `offset`, `delay` (s) if it is sampled.
         """
-        refuse_others("a UserLaw", law, OwnLaw)
         address = function if isinstance(function, str) else _address(function)
-        return self._append(s.UserLaw, name=name, inputs=_several(inputs), function=address, **law)
+        return self._controller(s.UserLaw, OwnLaw, law, name=name, inputs=inputs, function=address)
 
-
-def _several(inputs: str | Sequence[str]) -> Sequence[str]:
-    return (inputs,) if isinstance(inputs, str) else inputs
+    def _controller(
+        self, kind: type[s.Controller], known: type, options: Mapping[str, Any], *, inputs: str | Sequence[str],
+        **own: Any,
+    ) -> Self:  # fmt: skip
+        """A controller, whose `options` must be `known`; a single input may be given by its name alone."""
+        refuse_others(f"a {kind.__name__}", options, known)
+        return self._append(kind, inputs=(inputs,) if isinstance(inputs, str) else inputs, **own, **options)
 
 
 def _address(function: Callable[..., Any]) -> str:

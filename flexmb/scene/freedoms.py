@@ -1,8 +1,8 @@
 """Elementary freedoms: what every hinge, wheel and point mass consists of, from its inboard frame to its outboard one.
 
 A freedom is a turn about an axis, a shift along it, both at once by one coordinate, a ball joint or free flight. Its
-axes are those that the freedoms before it have carried along. Directions, peers' joints and what mirrors and units do
-to a hinge follow from these; nothing here knows physics.
+axes are carried along by the freedoms before it. The directions of a hinge, the joints of other codes, and the effect
+of mirrors and units on a hinge follow from its freedoms.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class MotionKeys(NamedTuple):
 
 
 class _ScalarCoordinate(SceneStruct, frozen=True, kw_only=True):
-    """What angles and displacements have in common, each under keys with its own units."""
+    """The common properties of angles and displacements, whose keys have different units."""
 
     KEYS: ClassVar[MotionKeys]
     ANGULAR: ClassVar[bool]
@@ -71,9 +71,10 @@ class AngularCoordinate(_ScalarCoordinate, frozen=True, kw_only=True):
     The armature is the inertia of the rotor of a drive, as the coordinate feels it: with a gear ratio n and a rotor of
     moment of inertia I it is n^2 I. Its kinetic energy is half of it times the square of the rate; it has no momentum.
 
-    With closures, initial values other than zero are kept to the last digit where the others can follow, and changed
-    with a warning where they contradict each other. `given = true`: both are meant, zero too; where they cannot be kept
-    there is an error, and angles and displacements without it are guesses that say which way the loop is assembled.
+    With closures, initial values other than zero are kept exactly if the other coordinates can be chosen to close the
+    loops, and are changed with a warning if they contradict each other. With `given = true`, both must be kept, also if
+    they are zero, and it is an error if they cannot be; angles and displacements without it are then only guesses,
+    which determine in which of several ways a loop is assembled.
     """
 
     KEYS: ClassVar[MotionKeys] = MotionKeys("angle_rad", "rate_rad_s", "torque_Nm", "prescribed_rad")

@@ -110,17 +110,6 @@ class WheelMotion(TypedDict, total=False):
     prescribed: s.Function | None
 
 
-class ClosureFrames(TypedDict, total=False):
-    """Frames A and B of a closure: nodes of its two bodies, and fixed offsets from them (node axes, m)."""
-
-    node_a: str
-    node_b: str
-    position_a: ArrayLike
-    quaternion_a: ArrayLike
-    position_b: ArrayLike
-    quaternion_b: ArrayLike
-
-
 class SpringEnds(TypedDict, total=False):
     """Ends of a spring: nodes of its two bodies, and fixed offsets from them (node axes, m)."""
 
@@ -128,6 +117,13 @@ class SpringEnds(TypedDict, total=False):
     node_b: str
     position_a: ArrayLike
     position_b: ArrayLike
+
+
+class ClosureFrames(SpringEnds, total=False):
+    """Frames A and B of a closure: nodes of its two bodies, and fixed offsets from them (node axes, m)."""
+
+    quaternion_a: ArrayLike
+    quaternion_b: ArrayLike
 
 
 class LoadLaw(TypedDict, total=False):

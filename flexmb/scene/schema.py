@@ -59,8 +59,8 @@ from flexmb.scene.values import with_values
 class Wheel(SceneStruct, frozen=True, kw_only=True):
     """A symmetric, balanced wheel on a node of a body; `axis` in node axes, centre at the node plus `offset_m`.
 
-    The scene's body does NOT include the wheel: `compile` adds the despun wheel (mass, axial and transverse inertia) to
-    the body, as Frisch does. The spin is relative to the node. `torque_Nm` is the motor torque on the wheel,
+    The data of the body do not include the wheel: `compile` adds the despun wheel (mass, axial and transverse inertia)
+    to the body, as Frisch does. The spin is relative to the node. `torque_Nm` is the motor torque on the wheel,
     `friction_Nms_rad` viscous bearing friction, `prescribed_rad` a prescribed relative spin angle.
     """
 
@@ -142,27 +142,22 @@ class ModalState(SceneStruct, frozen=True, kw_only=True):
 
 
 Waiver = Literal[
-    "wave_speed",
-    "thick_section",
-    "shear_stiffness",
-    "many_elements",
-    "modal_frequency",
-    "negative_stiffness",
-    "negative_damping",
-    "friction_peak",
-]
+    "wave_speed", "thick_section", "shear_stiffness", "many_elements", "modal_frequency", "negative_stiffness",
+    "negative_damping", "friction_peak",
+]  # fmt: skip
 
 
 class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
-    """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it.
+    """A multibody scene: bodies joined to a tree by hinges (base "ground"), with the loads and devices that act on it.
 
-    Numbers that no usual structure has are warned of, because a slip of units looks like that. `allow` lists what is
-    meant. Of beams: "wave_speed", sqrt(EA / mass per length) outside 50 to 20,000 m/s; "thick_section", sqrt(EI / EA)
-    above half the length; "shear_stiffness", GJ or GA far above EI or EA. Of raw modes: "modal_frequency", the lowest
-    frequency times the size. Of hinges, wheels and modes: "negative_stiffness", "negative_damping". Of friction:
-    "friction_peak", smoothed to less than 99 % of its static value. A scene without dimensions or in other units than
-    SI, which have to fit each other (mm, tonne, s, N), lists the first four. Of beams also "many_elements", more
-    than their modes need, which cost time and memory alone.
+    Numbers that no usual structure has cause a warning, because errors of units have such effects; `allow` lists the
+    warnings to be omitted. For beams: "wave_speed", sqrt(EA / mass per length) outside 50 to 20,000 m/s;
+    "thick_section", sqrt(EI / EA) above half the length; "shear_stiffness", GJ or GA far above EI or EA;
+    "many_elements", more elements than the modes need, which only cost time and memory. For raw modes:
+    "modal_frequency", the lowest frequency times the size. For hinges, wheels and modes: "negative_stiffness",
+    "negative_damping". For friction: "friction_peak", a peak of less than 99 % of static friction because of smoothing.
+    A scene without dimensions, or in other consistent units than SI (mm, tonne, s, N), lists "wave_speed",
+    "thick_section", "shear_stiffness" and "modal_frequency".
     """
 
     name: str
@@ -185,8 +180,8 @@ class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
     def with_values(self, values: Mapping[str, Any]) -> Scene:
         """The scene with other values, for sweeps and stages: `scene.with_values({"rod.mass_kg": 2.0})`.
 
-        Paths go by keys, items by their name, number or `*` for all: see `flexmb.scene.values.with_values`. Raises
-        PathError, a ValueError, for a path that leads to nothing, and for a value of another kind.
+        A path consists of keys, and names or numbers of items, `*` for all: see `flexmb.scene.values.with_values`.
+        Raises PathError, a ValueError, for a path that does not exist, and for a value of another kind.
         """
         return with_values(self, values)
 

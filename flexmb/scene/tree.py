@@ -7,18 +7,10 @@ from typing import Any, NamedTuple, TypeVar, assert_never
 
 from msgspec.structs import replace
 
+from flexmb.scene import control as c
 from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, SidBody, Vector
 from flexmb.scene.columns import struct_keys
 from flexmb.scene.connectors import AlongHinge, AngularFriction
-from flexmb.scene.control import (
-    CoordinateSensor,
-    DistanceSensor,
-    DriveSensor,
-    LoadSensor,
-    MarkerSensor,
-    ProfileSensor,
-    TimeSensor,
-)
 from flexmb.scene.events import Impact
 from flexmb.scene.freedoms import AngularCoordinate, Coordinate, LinearCoordinate
 from flexmb.scene.hinges import Hinge
@@ -197,13 +189,13 @@ def watchable(scene: Scene) -> dict[str, str]:
     found |= {rate: rate for rate in (rate_name(name, path) for name, path in paths.items())}
     for sensor in scene.sensors:
         match sensor:
-            case TimeSensor():
+            case c.TimeSensor():
                 found[sensor.name] = "time"
-            case CoordinateSensor():
+            case c.CoordinateSensor():
                 own = [name for name in paths if name.startswith(f"{sensor.of}.")]
                 if len(own) == 1:
                     found[sensor.name] = own[0] if sensor.quantity == "value" else rate_name(own[0], paths[own[0]])
-            case MarkerSensor() | DistanceSensor() | LoadSensor() | DriveSensor() | ProfileSensor():
+            case c.MarkerSensor() | c.DistanceSensor() | c.LoadSensor() | c.DriveSensor() | c.ProfileSensor():
                 pass  # these are known from a look at them alone
             case _:
                 assert_never(sensor)

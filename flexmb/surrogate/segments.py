@@ -8,19 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from flexmb.scene.schema import (
-    AngularCoordinate,
-    BeamBody,
-    Gimbal,
-    Hinge,
-    LinearCoordinate,
-    Node,
-    Prismatic,
-    Revolute,
-    RigidBody,
-    Scene,
-    Vector,
-)
+from flexmb.scene import schema as s
 from flexmb.scene.tree import rest_frames
 from flexmb.surrogate.chain import (
     NodePlace,
@@ -33,7 +21,7 @@ from flexmb.surrogate.chain import (
 )
 from flexmb.surrogate.lumping import beam_piece, quadrature, rigid_body, section_properties
 
-_X: Vector = (1.0, 0.0, 0.0)
+_X: s.Vector = (1.0, 0.0, 0.0)
 # Families of motion that turn sections: axis letter, axis, stiffness of a station; in the order of the rotations.
 _TURNS = {
     "bending_y": ("z", (0.0, 0.0, 1.0), "EIz_Nm2"),
@@ -52,7 +40,7 @@ class _Cut:
     kind: Literal["turn", "axial"]
 
 
-def finite_segments(scene: Scene, body: str | None, n: int) -> Scene:
+def finite_segments(scene: s.Scene, body: str | None, n: int) -> s.Scene:
     """The beam `body` (all beams if None) as rigid segments joined by sprung hinges.
 
     The beam is divided into n elements of length l with a hinge in the middle of each, so that half an element is rigid
@@ -69,7 +57,7 @@ def finite_segments(scene: Scene, body: str | None, n: int) -> Scene:
     return scene
 
 
-def _segmented(scene: Scene, beam: BeamBody, n: int) -> Scene:
+def _segmented(scene: s.Scene, beam: s.BeamBody, n: int) -> s.Scene:
     if beam.theory == "timoshenko":
         raise ValueError(f'beam "{beam.name}": finite segments have no shear; use theory "euler-bernoulli"')
     cuts = _cuts(beam, n)
@@ -83,7 +71,7 @@ def _segmented(scene: Scene, beam: BeamBody, n: int) -> Scene:
     return in_pieces(scene, beam, _segments(beam, ends, places), joints, places)
 
 
-def _cuts(beam: BeamBody, n: int) -> list[_Cut]:
+def _cuts(beam: s.BeamBody, n: int) -> list[_Cut]:
     """Hinges along the beam: rotations in the middles of the elements, translations at the boundaries between them.
 
     The outer translations include the compliance of the elements at the ends, so that the chain stretches like the beam
@@ -103,23 +91,22 @@ def _cuts(beam: BeamBody, n: int) -> list[_Cut]:
     return sorted(cuts, key=lambda cut: cut.x)
 
 
-def _segments(beam: BeamBody, ends: list[float], places: dict[str, NodePlace]) -> list[RigidBody]:
+def _segments(beam: s.BeamBody, ends: list[float], places: dict[str, NodePlace]) -> list[s.RigidBody]:
     """Rigid pieces between the cuts; each frame at its root end with the beam's axes."""
-    frames = rest_frames(beam)
     segments = []
     for piece, (start, end) in enumerate(zip(ends, ends[1:], strict=False)):
         inertia = beam_piece(beam, start, end)
         own = dataclasses.replace(inertia, com=inertia.com - [start, 0.0, 0.0])
         nodes = tuple(
-            Node(name=name, position_m=(frames[name].position[0] - start, 0.0, 0.0), quaternion=frames[name].quaternion)
-            for name, place in places.items()
-            if place.piece == piece and name != "origin"
+            s.Node(name=name, position_m=(at.position[0] - start, 0.0, 0.0), quaternion=at.quaternion)
+            for name, at in rest_frames(beam).items()
+            if places[name].piece == piece and name != "origin"
         )
         segments.append(rigid_body(_segment_name(beam, piece), own, nodes))
     return segments
 
 
-def _hinges(beam: BeamBody, cuts: list[_Cut], ends: list[float], root: int) -> list[Hinge]:
+def _hinges(beam: s.BeamBody, cuts: list[_Cut], ends: list[float], root: int) -> list[s.Hinge]:
     """The hinges along the beam; `root` is the segment that carries the beam's inboard hinge."""
     lag = stiffness_damping(beam)
     count = {"turn": 0, "axial": 0}
@@ -127,7 +114,7 @@ def _hinges(beam: BeamBody, cuts: list[_Cut], ends: list[float], root: int) -> l
     for piece, cut in enumerate(cuts):
         count[cut.kind] += 1
         inner, outer = _segment_name(beam, piece), _segment_name(beam, piece + 1)
-        at_end: Vector = (ends[piece + 1] - ends[piece], 0.0, 0.0)
+        at_end: s.Vector = (ends[piece + 1] - ends[piece], 0.0, 0.0)
         name = f"{beam.name}.{'h' if cut.kind == 'turn' else 'a'}{count[cut.kind]:02d}"
         if piece >= root:
             placement = {"name": name, "parent": inner, "child": outer, "parent_position_m": at_end}
@@ -137,12 +124,12 @@ def _hinges(beam: BeamBody, cuts: list[_Cut], ends: list[float], root: int) -> l
     return hinges
 
 
-def _slide(beam: BeamBody, cut: _Cut, lag: float, placement: dict) -> Hinge:
+def _slide(beam: s.BeamBody, cut: _Cut, lag: float, placement: dict) -> s.Hinge:
     k = _spring(beam, "EA_N", cut)
-    return Prismatic(**placement, axis=_X, translation=LinearCoordinate(stiffness_N_m=k, damping_Ns_m=lag * k))
+    return s.Prismatic(**placement, axis=_X, translation=s.LinearCoordinate(stiffness_N_m=k, damping_Ns_m=lag * k))
 
 
-def _turn(beam: BeamBody, cut: _Cut, lag: float, placement: dict) -> Hinge:
+def _turn(beam: s.BeamBody, cut: _Cut, lag: float, placement: dict) -> s.Hinge:
     """A hinge with one rotation for each family that turns sections: revolute for one, else a gimbal."""
     letters, axes, turns = "", [], []
     for family, (letter, axis, key) in _TURNS.items():
@@ -150,18 +137,18 @@ def _turn(beam: BeamBody, cut: _Cut, lag: float, placement: dict) -> Hinge:
             k = _spring(beam, key, cut)
             letters += letter
             axes.append(axis)
-            turns.append(AngularCoordinate(stiffness_Nm_rad=k, damping_Nms_rad=lag * k))
+            turns.append(s.AngularCoordinate(stiffness_Nm_rad=k, damping_Nms_rad=lag * k))
     if len(turns) == 1:
-        return Revolute(**placement, axis=axes[0], rotation=turns[0])
-    return Gimbal(**placement, sequence=letters, rotations=tuple(turns))
+        return s.Revolute(**placement, axis=axes[0], rotation=turns[0])
+    return s.Gimbal(**placement, sequence=letters, rotations=tuple(turns))
 
 
-def _spring(beam: BeamBody, key: str, cut: _Cut) -> float:
+def _spring(beam: s.BeamBody, key: str, cut: _Cut) -> float:
     """Stiffness of the piece of beam that the cut represents: the inverse of its integrated compliance."""
     x, weight = quadrature(beam, (cut.start, cut.end))
     (section,) = section_properties(beam, x, key)
     return float(1.0 / np.sum(weight / section))
 
 
-def _segment_name(beam: BeamBody, piece: int) -> str:
+def _segment_name(beam: s.BeamBody, piece: int) -> str:
     return f"{beam.name}.seg{piece:02d}"

@@ -1,4 +1,4 @@
-"""The declaration of an algorithm, which stands in the last lines of its file. `algorithms` lists all of them."""
+"""The declaration of an algorithm. Each is declared at the end of its own file; `algorithms` lists all of them."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ Algorithm = Literal["articulated", "unsplit", "composite", "frisch", "frisch_as_
 
 
 class Route(NamedTuple):
-    """An algorithm as runs see it: a maker of constants and workspace, kernels of the motion and of its manifold.
+    """What a run needs of an algorithm.
 
-    leaping: how runs go on where a step fails, if they can. linear: for these tables, what methods need that linearise.
-    remembered: of tables that have seen a motion, what the next would go on from, and must not. beginning: what tables
-    are made from that may change.
+    tables: makes constants and a workspace. rhs, project: the kernels of the equations of motion and of the projection
+    onto the manifold of the states. leaping: how a run continues where a step fails at a singular position, None if it
+    cannot. linear: the linearisation that implicit methods need, from these tables. remembered: the arrays of used
+    tables that hold the history of a motion, which a new run must reset. beginning: what the tables depend on and may
+    change between runs; tables are shared between runs in which it is equal.
     """
 
     tables: Callable[[], tuple[Any, Any]]
@@ -37,32 +39,32 @@ class Route(NamedTuple):
 
 @dataclass(frozen=True)
 class DynamicsAlgorithm:
-    """A way from a state to its accelerations, and what it can do besides."""
+    """An algorithm for the accelerations of a state, and its further abilities."""
 
     name: Algorithm
     summary: str
     """What it is, in one line."""
     kernel: Callable[[], Any]
-    """Gives the kernel of a tree's accelerations: of t, y and tables, the second of which is a workspace. It leaves
+    """Returns the kernel of a tree's accelerations: of t, y and tables, the second of which is a workspace. It leaves
     udot in w.speed.acceleration and returns a status code."""
     own: Callable[[Mechanics], tuple[Any, ...]]
-    """These tables with the system's workspace."""
+    """The tables, with the workspace that this thread has in the system."""
     fresh: Callable[[Mechanics], tuple[Any, ...]]
-    """The same with a workspace of their own."""
+    """The tables, with a new workspace."""
     observe: Callable[[Mechanics, float, Real], None] | None = None
-    """Fills everything observable of a tree, the system's `Outputs`, at y = [q, u, work]; DynamicsError where there
-    are no accelerations. None where inverse dynamics of the accelerations is all that it takes."""
+    """Fills the system's `Outputs`, everything observable of a tree, at y = [q, u, work]; DynamicsError where there
+    are no accelerations. None where inverse dynamics of the accelerations suffices."""
     route: Callable[[Mechanics], Route] | None = None
-    """For runs of trees; None where it is for single states."""
+    """For runs of trees; None if the algorithm is for single states only."""
     observing: Any = None
-    """The kernel that observes a tree where the right-hand side of `route` was just evaluated, of its tables and
-    `Outputs`. None where Python stands between several."""
+    """The kernel that fills `Outputs` where the right-hand side of `route` was just evaluated, of its tables and
+    `Outputs`. None where this takes several kernels, called from Python."""
     closed_motion: Callable[[Closures, float, Real], ClosedMotion] | None = None
-    """For closed chains; None where it knows trees only."""
+    """For closed chains; None if the algorithm is for trees only."""
     jacobian: bool = False
-    """It has the Jacobians that stiff integrators need."""
+    """Whether it has the Jacobians that stiff integrators need."""
     errata: Set[Erratum] | None = None
-    """Defects of Frisch's print that it keeps; None where its equations are not his."""
+    """The defects of Frisch's print that it reproduces; None if its equations are not Frisch's."""
 
     @property
     def is_first_order(self) -> bool:

@@ -24,6 +24,6 @@ NESTED = tuple(each.name for each in ALGORITHMS.values() if each.errata is not N
 
 def chosen(name: str, among: Collection[str] = ALGORITHMS) -> DynamicsAlgorithm:
     """The algorithm of that name; ValueError for a name that is not `among` those."""
-    if not (isinstance(name, str) and name in among):  # asked at every evaluation: no sentence is written for nothing
+    if not (isinstance(name, str) and name in among):  # at every evaluation, so the message is composed only if needed
         arguments.one_of("algorithm", name, among)
     return ALGORITHMS[name]

@@ -1,4 +1,4 @@
-"""What is asked of the initial state of a closed chain: by its scene, or by names where a run begins."""
+"""The values that the initial state of a closed chain shall keep: those of its scene, or those named for a run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from flexmb.typing import Real
 
 
 class _Item(NamedTuple):
-    """A value and that of its rates, by places in q and in u; what it is where nothing is given."""
+    """A coordinate or quaternion: its indices in q, those of its rates in u, whether the scene marks it as given, and
+    its default value, None for zeros."""
 
     q: tuple[int, ...]
     u: tuple[int, ...]
@@ -26,7 +27,7 @@ class _Item(NamedTuple):
 
 
 def asked(system: System, y: Real, named: NDArray[np.bool_] | None = None) -> AskedFor:
-    """Of values y = [q, u, work] of a scene, or of those of them that a run has named (nq+nu+1,)."""
+    """The values of y = [q, u, work] that the scene gives, or those that a run has `named` (nq+nu+1,)."""
     items = list(_items(system))
     known = named if named is not None else np.zeros(len(y), bool)
     coordinates = [((item.q, item.u), item) for item in items]
@@ -49,7 +50,7 @@ def asked(system: System, y: Real, named: NDArray[np.bool_] | None = None) -> As
 
 
 def everything(system: System) -> AskedFor:
-    """Of a state that was given as a whole."""
+    """All values, for a state that was given as a whole."""
     return AskedFor(
         Wishes(tuple(((i,), ()) for i in range(system.nq))),
         Wishes(tuple(((system.nq + j,), (j,)) for j in range(system.nu))),

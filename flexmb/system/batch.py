@@ -3,8 +3,8 @@
     batch = flexmb.compile_batch(scenes)     each copy with masses, lengths, stiffnesses ... of its own
     found = batch.accelerations(q, u)        (n,nq), (n,nu) -> (n,nu)
 
-Copies of one system, which differ in their states only, are asked by `System.accelerations_batch`. A copy that fails
-fails no other one: what the lanes cannot decide is asked of its own system, alone.
+Copies of one system, which differ in their states only, are evaluated by `System.accelerations_batch`. A copy that
+fails does not affect the others: where the lanes give no result, or a doubtful one, its own system evaluates it again.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import NONFINITE, OK, Status
 from flexmb.typing import Index, Real
 
-_WORTH_A_THREAD = 512  # copies: fewer take no longer than a thread takes to start
+_WORTH_A_THREAD = 512  # copies per thread at least: fewer take no longer than a thread takes to start
 
 
 class Copies(NamedTuple):
-    """n states, what is found of them, and a status for each."""
+    """n states, and the accelerations and the status of each, which an evaluation writes."""
 
     q: Real  # (n,nq)
     u: Real  # (n,nu)
@@ -48,7 +48,7 @@ class Copies(NamedTuple):
 
 
 class LaneTables(NamedTuple):
-    """What one thread writes: workspace and stages, and these as floats; and with what it asks for accelerations."""
+    """The arrays that one thread writes: a workspace, stages in lanes and as floats; and the gate that uses them."""
 
     workspace: LaneWorkspace
     stages: LaneStages
@@ -57,7 +57,7 @@ class LaneTables(NamedTuple):
 
 
 class BatchAccelerations(NamedTuple):
-    """accelerations (n,nu), NaN where a copy has none; status (n,) says why not, numbers of `flexmb.Status`."""
+    """accelerations (n,nu), NaN where a copy has none; status (n,) gives the reason, as numbers of `flexmb.Status`."""
 
     accelerations: Real
     status: Index
@@ -74,9 +74,9 @@ class BatchAccelerations(NamedTuple):
 
 
 class Batch:
-    """Copies that share their structure: hinges, levels, modes, where loads act; their numbers may differ.
+    """Copies of equal structure (hinges, levels, modes, places of loads), whose physical parameters may differ.
 
-    Threads may share a batch, beside those that it starts itself.
+    A batch starts threads of its own, and several threads may use one batch.
 
     `systems`: one for each copy, or a single one for any number of copies. ValueError where there is none, or where one
     has another structure than the first.
@@ -101,28 +101,25 @@ class Batch:
             broaden(self._constants)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copied and pickled as its systems are, which is as their scenes."""
+        """Copies and pickles hold the systems, which are made anew from their scenes."""
         return Batch, (self.systems,)
 
     def system(self, copy: int) -> FreeMotion:
-        """That of a copy; ValueError or TypeError for the number of a copy that there is not."""
+        """The system of a copy; ValueError or TypeError if there is no copy of this number."""
         place = arguments.index("copy", copy, sys.maxsize if self.shares_constants else len(self.systems))
         return self.systems[0 if self.shares_constants else place]
 
     @contextmanager
     def tables(self) -> Iterator[LaneTables]:
-        """For LANES copies, nobody else's meanwhile. To make them takes longer than to evaluate a thousand copies."""
+        """Tables for LANES copies, which no other thread has meanwhile. They are used again, because making them takes
+        longer than evaluating a thousand copies."""
         found = self._free_tables()
         yield found
         self._spare.append(found)
 
     def _free_tables(self) -> LaneTables:
-        try:
+        with suppress(IndexError):
             return self._spare.pop()
-        except IndexError:
-            return self._fresh_tables()
-
-    def _fresh_tables(self) -> LaneTables:
         w, s, c = lane_workspace(self.systems[0].workspace()), lane_stages(self.nq + self.nu + 1), self._constants[0]
         entries = lane_entries(s, w.doubt)
         rhs, stages, _, workspace = addresses(lanes.rhs, STATUS, s, c, w)
@@ -131,7 +128,7 @@ class Batch:
         return LaneTables(w, s, entries, lanes.lane_gate(s, entries, (rhs, begin, stages, workspace), blocks))
 
     def constants(self, block: int, w: LaneWorkspace) -> Constants:
-        """Of the copies LANES * block and on; makes a workspace ready for them."""
+        """The constants of the LANES copies of a block; prepares a workspace for them."""
         if self.shares_constants:
             return self._constants[0]
         c = self._constants[block]
@@ -149,7 +146,7 @@ class Batch:
         return q, u
 
     def rows(self, name: str, x: Any) -> Real:
-        """Those of q (n,nq) or u (n,nu) alone, by its name."""
+        """Coordinates (n,nq) or speeds (n,nu) alone; `name` is "q" or "u"."""
         found, size = arguments.array(name, x), self.nq if name == "q" else self.nu
         if found.ndim != 2 or found.shape[1] != size:
             raise ValueError(f"{name} has shape {found.shape}: give a row of {size} numbers for each copy")
@@ -158,7 +155,7 @@ class Batch:
         return found
 
     def initial_states(self) -> tuple[Real, Real]:
-        """(n,nq) and (n,nu) of the scenes at t = 0."""
+        """Coordinates (n,nq) and speeds (n,nu) of the scenes at t = 0."""
         found = [system.initial_state for system in self.systems]
         return np.array([state.q for state in found]), np.array([state.u for state in found])
 
@@ -185,7 +182,7 @@ class Batch:
         return BatchAccelerations(copies.accelerations, copies.status)
 
     def _in_lanes(self, copies: Copies, threads: int) -> int:
-        """Returns how many copies the lanes do not decide."""
+        """Returns the number of copies for which the lanes give no reliable result."""
         n = len(copies.q)
         if threads == 1:
             return self._on_one_thread(copies, 0, n)
@@ -205,7 +202,7 @@ class Batch:
         return int(missing)
 
     def _alone(self, copies: Copies, copy: int) -> None:
-        """What the system itself says of a copy that the lanes did not decide."""
+        """Evaluate a copy by its own system, where the lanes gave no reliable result."""
         system, found = self.system(copy), copies.accelerations[copy]
         try:
             t = copies.t[min(copy, len(copies.t) - 1)]
@@ -228,7 +225,7 @@ def _entry() -> Any:
 
 
 def listed(name: str, given: Iterable[Any]) -> tuple[Any, ...]:
-    """At least one."""
+    """The items as a tuple; TypeError for anything that is not a collection, ValueError for an empty one."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise TypeError(f"{name} is a {type(given).__name__}: give a list, of one for each copy")
     found = tuple(given)
@@ -260,7 +257,7 @@ def blocks_of(copies: Sequence[Any]) -> list[list[Any]]:
 
 
 def number_of_threads(asked: int | None, most: int) -> int:
-    """As many as asked for; by default one for each processor, but not more than `most`."""
+    """The number asked for; by default one for each processor, but not more than `most`."""
     if asked is None:
         ours = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         return max(1, min(most, ours))
@@ -271,7 +268,7 @@ def number_of_threads(asked: int | None, most: int) -> int:
 
 
 def in_threads(work: Callable[[Iterable[Any]], None], parts: Sequence[Any], threads: int) -> None:
-    """Call work(some of the parts) in each thread: each takes the next one when it is ready."""
+    """Call work(iterator of parts) in each thread; each part goes to the thread that is ready first."""
     threads = min(threads, len(parts))
     if threads <= 1:
         work(parts)
@@ -283,7 +280,7 @@ def in_threads(work: Callable[[Iterable[Any]], None], parts: Sequence[Any], thre
 
 
 def _taken_from(waiting: deque[Any]) -> Iterator[Any]:
-    """One after the other, while there are some: to take one is a single step, which no other thread comes between."""
+    """The items until none is left. `popleft` is atomic, so no two threads get the same item."""
     with suppress(IndexError):
         while True:
             yield waiting.popleft()

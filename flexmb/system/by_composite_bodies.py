@@ -2,21 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from flexmb.entry import composite
 from flexmb.jain.places import matrices
 from flexmb.motion import coordinates
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
-from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.closure.closures import ClosedMotion, Closures
-
-
-def _closed_motion(closures: Closures, t: float, y: Real) -> ClosedMotion:
-    return closures.composite_motion(t, y)
-
 
 ALGORITHM = DynamicsAlgorithm(
     "composite",
@@ -27,5 +16,5 @@ ALGORITHM = DynamicsAlgorithm(
     route=lambda system: Route(
         lambda: (system.constants, system.composite_workspace()), composite.rhs, coordinates.project
     ),
-    closed_motion=_closed_motion,
+    closed_motion=lambda closures, t, y: closures.composite_motion(t, y),
 )

@@ -14,7 +14,7 @@ from flexmb.typing import Real
 
 def _declared(name: Algorithm, summary: str, errata: Set[Erratum]) -> DynamicsAlgorithm:
     def kernel() -> Any:
-        from flexmb.frisch import evaluation  # who uses the recursion waits for none of it
+        from flexmb.frisch import evaluation  # imported here, because users of other algorithms do not need it
 
         return evaluation.accelerations
 
@@ -37,7 +37,7 @@ def _declared(name: Algorithm, summary: str, errata: Set[Erratum]) -> DynamicsAl
     def route(system: Mechanics) -> Route:
         from flexmb.frisch import evaluation
 
-        system.nested_system(errata)  # refused here, not in the run
+        system.nested_system(errata)  # raises here rather than in the run
         return Route(lambda: fresh(system), evaluation.rhs, coordinates.project)
 
     return DynamicsAlgorithm(name, summary, kernel, own, fresh, observe, route=route, errata=errata)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from flexmb.entry import articulated, tangent
 from flexmb.entry.observation import observe
@@ -10,10 +10,6 @@ from flexmb.integrate.problem import Linear
 from flexmb.motion import coordinates, retraction
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.mechanics import Mechanics
-from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.closure.closures import ClosedMotion, Closures
 
 
 def _fresh(system: Mechanics) -> tuple[Any, Any]:
@@ -29,10 +25,6 @@ def _route(system: Mechanics) -> Route:
     return Route(lambda: _fresh(system), articulated.rhs, coordinates.project, linear=lambda *_: _linear(system))
 
 
-def _closed_motion(closures: Closures, t: float, y: Real) -> ClosedMotion:
-    return closures.motion(t, y)
-
-
 ALGORITHM = DynamicsAlgorithm(
     "articulated",
     "the O(N) recursion",
@@ -42,6 +34,6 @@ ALGORITHM = DynamicsAlgorithm(
     Mechanics.observe_recursion,
     route=_route,
     observing=observe,
-    closed_motion=_closed_motion,
+    closed_motion=lambda closures, t, y: closures.motion(t, y),
     jacobian=True,
 )

@@ -1,4 +1,4 @@
-"""A compiled scene with closures: the system of its tree, with the accelerations and loads of the closed chain."""
+"""A compiled scene with closures: the system of its tree, and the accelerations and loads of the closed chain."""
 
 from __future__ import annotations
 
@@ -44,16 +44,16 @@ if TYPE_CHECKING:
     from flexmb.frisch.nested_system import NestedSystem
     from flexmb.jain.operators import Operators
 
-# Largest gap of a closure, relative to its size, in a state that is given. At a distance of d sizes from a crossing of
-# branches their gaps differ by d^2: from a tenth of the size on, the nearest branch is the one that is meant.
+# Largest gap of a closure, relative to its size, that a given state may have. At a distance of d sizes from a crossing
+# of branches their gaps differ by d^2: with this gap the nearest branch is unique from a tenth of the size on.
 LARGEST_INITIAL_GAP = 1e-2
 
 
 class ClosedSystem(System):
     """A tree with closures. Mass matrix, bias and inverse dynamics are those of the tree alone.
 
-    What closures add to them is `closure_operators`; operators and partitions, which have accelerations of their own,
-    are refused.
+    `closure_operators` gives the terms that closures add. Operators and partitions, which belong to the accelerations
+    of a tree, raise NotImplementedError.
     """
 
     def __init__(self, scene: s.Scene) -> None:
@@ -61,26 +61,26 @@ class ClosedSystem(System):
         own = closure_constants(scene, self.constants, self.closure_ports)
         slowest = slowest_mode(self.links)
         tree = scene.closures, self.constants, own, self.layout, self.workspace, slowest
-        self._closures = self.own.closures = Closures(*tree, self.check_status)  # this thread's own
+        self._closures = self.own.closures = Closures(*tree, self.check_status)  # for this thread
         self._start: State | None = None
 
     @per_thread
     def closures(self) -> Closures:
-        """From Python, for what takes several steps."""
+        """The closure equations with workspaces of this thread."""
         return self._closures.for_thread()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """As of a tree."""
+        """As for a tree."""
         return copied, (ClosedSystem, self.kernels, self.scene)
 
     @property
     def initial_state(self) -> State:
         """The state closest to the scene's at t = 0 that closes all closures; ClosureError where there is none.
 
-        Closest in the metric of kinetic energy, bodies bending only where hinges cannot close a loop; coordinates
-        first, then speeds. Prescribed ones are their functions'. What the scene gives is kept to the last digit where
-        the rest can follow (see `flexmb.scene.hinges.AngularCoordinate`); else it warns (`SceneWarning`) from what to
-        what, and ClosureError where it is marked as given.
+        Closest in the metric of kinetic energy, first for the coordinates, then for the speeds; bodies deform only
+        where hinges cannot close a loop. Prescribed motions have the values of their functions. Values that the scene
+        gives are kept exactly where the others can adapt (see `flexmb.scene.hinges.AngularCoordinate`). Otherwise a
+        `SceneWarning` lists the changes, or a ClosureError is raised for values that are marked as given.
         """
         if self._start is None:
             y = pack(super().initial_state)
@@ -90,28 +90,28 @@ class ClosedSystem(System):
 
     @property
     def rank(self) -> int:
-        """Independent motions that the closures suppress, at the initial state."""
-        self.initial_state  # noqa: B018 - counts them
+        """Number of independent constraints at the initial state."""
+        self.initial_state  # noqa: B018 - determines the rank
         return self.closures.rank
 
     def _as_asked(self, t: float, y: Real, wish: AskedFor) -> Real:
-        """y = [q, u, work] with closed closures; warns of what it does not keep."""
+        """y = [q, u, work] with closed closures; warns of values that it cannot keep."""
         found = consistent(self.closures, t, y, wish)
         broken = wish.broken(y, found)
         if broken:
             warnings.warn(
-                f'scene "{self.scene.name}": closures do not allow these values together, and the nearest that they '
-                f"allow are taken: {broken}. Correct them, leave out what follows from the others (zero), or mark by "
-                "given = true what is to be kept",
+                f'scene "{self.scene.name}": the closures do not allow these values together, and the nearest values '
+                f"that they allow are taken: {broken}. Correct the values, leave those out that follow from others, or "
+                "mark those that must be kept by given = true",
                 SceneWarning,
                 stacklevel=4,
             )
         return found
 
     def admissible(self, state: State, given: Given = "guess") -> State:
-        """The nearest state that closes all closures, with the prescribed values of a tree.
+        """The nearest state that closes all closures, with prescribed motions at their values.
 
-        ClosureError where the given one leaves them open by more than `LARGEST_INITIAL_GAP`.
+        ClosureError where a closure is open by more than `LARGEST_INITIAL_GAP` in the given state.
         """
         t, rough = self.layout.entering(super().admissible(state))
         self.closures.linearise(t, rough)
@@ -145,9 +145,9 @@ class ClosedSystem(System):
         return finite_result(self._motion(t, y, algorithm).accelerations, t)
 
     def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
-        """Evaluators are of trees."""
+        """Raises NotImplementedError: evaluators are for trees only."""
         raise NotImplementedError(
-            f'scene "{self.scene.name}" has closures, and an evaluator is for trees: use accelerations(state)'
+            f'scene "{self.scene.name}" has closures, and evaluators are for trees only: use accelerations(state)'
         )
 
     def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
@@ -165,11 +165,11 @@ class ClosedSystem(System):
     ) -> dict[str, Real]:
         """Total load (6,) [torque; force] across each hinge and closure on the outboard body (body_b).
 
-        `axes` and `about` as of a tree; frames "inboard" and "outboard" of a closure are A and B.
+        `axes` and `about` as for a tree; frames "inboard" and "outboard" of a closure are A and B.
         """
         if accelerations is not None:
             raise NotImplementedError(
-                f'scene "{self.scene.name}": the loads of forced accelerations are those of a tree; '
+                f'scene "{self.scene.name}" has closures, and hinge loads for given accelerations are for trees only: '
                 "leave accelerations out, or prescribe coordinates"
             )
         t, y = self.layout.entering(state)
@@ -178,7 +178,8 @@ class ClosedSystem(System):
     def referred_loads(
         self, state: State, loads: dict[str, Real], axes: Axes = "world", about: tuple[str, str] | None = None
     ) -> dict[str, Real]:
-        """Where some are not determined, what is in other axes is found anew, but not where controllers act."""
+        """As for a tree. Where loads are not determined by the motion, they are computed again to find which components
+        in the new axes are determined; not so in scenes with controllers."""
         t, y = self.layout.entering(state)
         if self.scene.controllers or all(np.all(np.isfinite(load)) for load in loads.values()):
             return super().referred_loads(state, loads, axes, about)
@@ -187,7 +188,7 @@ class ClosedSystem(System):
     def _referred(
         self, motion: ClosedMotion, state: State, axes: Axes, about: tuple[str, str] | None
     ) -> dict[str, Real]:
-        """Loads of a motion in other axes about a node, NaN what it does not determine."""
+        """Loads of a motion in other axes about a node, NaN where the motion does not determine them."""
         refer = partial(super().referred_loads, state, axes=axes, about=about)
         found = refer(self._by_load(motion.hinges, motion.closures))
         if motion.spread is None:
@@ -199,16 +200,16 @@ class ClosedSystem(System):
         return found
 
     def _by_load(self, hinges: NDArray[Any], closures: NDArray[Any]) -> dict[str, NDArray[Any]]:
-        """What hinges (N,6) and closures (C,6) have, by their names."""
+        """Rows for hinges (N,6) and closures (C,6) by their names."""
         names = [closure.name for closure in self.scene.closures]
         return self._by_hinge(hinges) | dict(zip(names, closures, strict=True))
 
     def _changes(self, spread: Spread) -> list[dict[str, Real]]:
-        """By null load, how loads change by name (6,), World axes."""
+        """For each null load the changes (6,) of the loads by name, World axes."""
         return [self._by_load(*each) for each in zip(spread.hinges, spread.closures, strict=True)]
 
     def all_loads(self, state: State) -> AllLoads:
-        """With the loads that may be others; those of `exerted` are the least."""
+        """As for a tree, with the changes by null loads of redundant closures; `exerted` has the minimum-norm loads."""
         t, y = self.layout.entering(state)
         motion = self._motion(t, y, "articulated")
         found = self._evaluation(t, y, motion._replace(spread=None))
@@ -224,11 +225,11 @@ class ClosedSystem(System):
         return self.observation.evaluation(self._row(t, y, motion))
 
     def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
-        """As of a tree; in a run, at a singular position too."""
+        """As for a tree, and also at a singular position in a run."""
         row[:] = self._row(t, y, self._motion_or_across(t, y, algorithm))
 
     def _row(self, t: float, y: Real, motion: ClosedMotion) -> Real:
-        """With the loads of closures too; NaN what the motion does not determine."""
+        """A row with the loads of closures; NaN where the motion does not determine loads."""
         self.observe_motion(t, y, motion.accelerations, motion.drives, motion.hinges)
         row = self.observation.row(t, motion.closures)
         if motion.spread is not None:
@@ -238,7 +239,7 @@ class ClosedSystem(System):
         return row
 
     def _motion_or_across(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
-        """The motion; in a run through a singular position, where nothing determines it, the mean of those beside."""
+        """The motion; at a singular position in a run, where it is not determined, the mean of those on either side."""
         try:
             return self._motion(t, y, algorithm)
         except DynamicsError:
@@ -248,13 +249,8 @@ class ClosedSystem(System):
         articulated.rhs(t, y, slope, self.constants, self.workspace())
         sides = [self.closures.beside(t, y, slope[: self.nq], side) for side in (-1, 1)]
         before, after = (self._motion(*each, algorithm) for each in sides)
-        return ClosedMotion(
-            0.5 * (before.accelerations + after.accelerations),
-            0.5 * (before.drives + after.drives),
-            0.5 * (before.hinges + after.hinges),
-            0.5 * (before.closures + after.closures),
-            _of_both(before.spread, after.spread),
-        )
+        means = (0.5 * (one + other) for one, other in zip(before[:-1], after[:-1], strict=True))
+        return ClosedMotion._make((*means, _of_both(before.spread, after.spread)))
 
     def determined_loads(self, state: State) -> dict[str, NDArray[np.bool_]]:
         """Which components (6,) of the loads of hinges and closures are determined by the motion; World axes.
@@ -273,27 +269,27 @@ class ClosedSystem(System):
         return closure_operators(self.closures, *self.layout.entering(state))
 
     def nested(self, algorithm: Algorithm = "frisch") -> NestedSystem:
-        """Refused: NotImplementedError."""
-        raise self._of_trees("Frisch's partitioned equations")
+        """Raises NotImplementedError."""
+        raise self._for_trees("Frisch's partitioned equations")
 
     def operators(self, state: State) -> Operators:
-        """Refused: NotImplementedError."""
-        raise self._of_trees("the spatial operators")
+        """Raises NotImplementedError."""
+        raise self._for_trees("the spatial operators")
 
-    def _of_trees(self, what: str) -> NotImplementedError:
+    def _for_trees(self, what: str) -> NotImplementedError:
         return NotImplementedError(
-            f'scene "{self.scene.name}" has closures, and {what} are of trees: closure_operators(state) has what '
-            "closures add, and flexmb.System(scene) is the tree alone, whose accelerations are not the scene's"
+            f'scene "{self.scene.name}" has closures, and {what} are for trees only: closure_operators(state) gives '
+            "the terms that closures add, and flexmb.System(scene) is the tree alone, which moves differently"
         )
 
     def closure_gaps(self, state: State) -> dict[str, tuple[float, float]]:
-        """By closure, how far it is open along what it suppresses: distance (m) and angle (rad, its sine)."""
+        """Gap of each closure along its constrained directions: distance (m) and sine of the angle."""
         return self.closures.gaps(*self.layout.entering(state))
 
     def route(self, algorithm: Algorithm = "articulated", stabilise: float = 0.0) -> Route:
-        """The algorithm as runs see it; `stabilise`: see `flexmb.simulate`.
+        """What a run needs of the algorithm; `stabilise`: see `flexmb.simulate`.
 
-        NotImplementedError for an algorithm that knows trees only, ClosureError where there is no motion to run.
+        NotImplementedError for an algorithm that is for trees only, ClosureError for a mechanism that cannot move.
         """
         self._on_chains(algorithm)
         if arguments.number("stabilise", stabilise) < 0.0:
@@ -315,19 +311,19 @@ class ClosedSystem(System):
         return Linear(closed_jacobian.jacobian, closed_jacobian.move, chain, tangent, settles=True)
 
     def _on_chains(self, algorithm: Algorithm) -> Callable[[Closures, float, Real], ClosedMotion]:
-        """How the algorithm finds the motion of closed chains; NotImplementedError where it does not."""
+        """The algorithm's function for closed chains; NotImplementedError if it has none."""
         motion = algorithms.chosen(algorithm).closed_motion
         if motion is None:
             known = " or ".join(f'"{name}"' for name in algorithms.ON_CHAINS)
             raise NotImplementedError(
-                f'scene "{self.scene.name}" has closures, which algorithm {algorithm!r} does not know: '
+                f'scene "{self.scene.name}" has closures, and algorithm {algorithm!r} is for trees only: '
                 f"use algorithm={known}"
             )
         return motion
 
     def _refuse_locked(self) -> None:
         if self.closures.rank < 0:
-            self.initial_state  # noqa: B018 - counts the independent rows
+            self.initial_state  # noqa: B018 - determines the rank
         locked = self.closures.mobility == 0 < self.closures.rank  # a tree of welds is not locked by its closures
         if locked and not np.any(self.constants.speed["prescribed"] >= 0):
             names = ", ".join(f'"{closure.name}"' for closure in self.scene.closures)
@@ -338,17 +334,13 @@ class ClosedSystem(System):
 
 
 def _remembered(chain: Closed) -> list[Record | Real | Index]:
-    """Where closures note the branch that a motion is on."""
+    """The arrays that record the branch of a motion."""
     return [array for field in fields(chain.cw) if isinstance(array := getattr(chain.cw, field.name), np.ndarray)]
 
 
 def _of_both(one: Spread | None, other: Spread | None) -> Spread | None:
-    """What either leaves open."""
+    """The null loads of two motions together."""
     if one is None or other is None:
         return one or other
-    return Spread(
-        np.concatenate([one.drives, other.drives]),
-        np.concatenate([one.hinges, other.hinges]),
-        np.concatenate([one.closures, other.closures]),
-        max(one.rounding, other.rounding),
-    )
+    changes = map(np.concatenate, zip(one[:-1], other[:-1], strict=True))
+    return Spread._make((*changes, max(one.rounding, other.rounding)))

@@ -46,11 +46,11 @@ def compile(  # noqa: A001  (used as flexmb.compile)
 
 
 def assembled(scene: Scene, elimination: Elimination = "fastest") -> System:
-    """The system of a scene that was checked before."""
+    """The system of a scene that has been checked."""
     arguments.one_of("elimination", elimination, get_args(Elimination))
     scene = _read(scene)
     if scene.closures:
-        from flexmb.system.closed import ClosedSystem  # a tree needs none of it
+        from flexmb.system.closed import ClosedSystem  # imported here, because trees do not need it
 
         with collector_paused():
             return ClosedSystem(scene)
@@ -65,7 +65,7 @@ def compile_batch(scenes: Sequence[Scene]) -> Batch:
     states. Raises SceneError for a scene that is wrong, TypeError for anything but scenes, ValueError where there is
     none, or where one has another structure than the first: another hinge, level, mode or load, or another name.
     """
-    from flexmb.system.batch import Batch, listed  # lanes are for those who ask for many states
+    from flexmb.system.batch import Batch, listed  # imported here, because only batches need lanes
 
     scenes = listed("scenes", scenes)
     for scene in scenes:
@@ -77,7 +77,7 @@ def _read(scene: Scene) -> Scene:
     """The scene with its SID bodies read, and checked again: only now their nodes and modes are known."""
     if not any(isinstance(body, SidBody) for body in scene.bodies):
         return scene
-    from flexmb.interchange.sid import with_sid_bodies  # few scenes need it
+    from flexmb.interchange.sid import with_sid_bodies  # imported here, because few scenes need it
 
     scene = with_sid_bodies(scene)
     check_scene(scene)

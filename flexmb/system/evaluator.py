@@ -1,4 +1,4 @@
-"""Accelerations of a tree again and again: an algorithm with a workspace and arrays that it uses again."""
+"""Repeated evaluation of the accelerations of a tree, with one workspace and one array for the results."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from flexmb.tables.status import OK
 from flexmb.typing import Real
 
 
-class Evaluator(partial):  # a partial, so that a call takes no way through Python
+class Evaluator(partial):  # a partial, so that calls enter the compiled gate without a frame of Python
     """`evaluator(t, q, u)`: udot (nu,) at time t (s), q (nq,) and u (nu,), in an array that every call writes anew.
 
-    `System.evaluator` makes one. The array, `accelerations`, is for reading; copy what is to be kept. Arrays of floats
-    in C order go in as they are; what else `System.evaluate` takes is converted. Threads may share an evaluator: each
-    gets an array of its own. It is the fastest in the thread that calls it first. Raises ValueError, TypeError and
-    DynamicsError as `System.evaluate` does.
+    `System.evaluator` makes one. The array, `accelerations`, is read-only; copy it to keep its values. Arrays of floats
+    in C order are used directly; other arguments that `System.evaluate` accepts are converted. Threads may share an
+    evaluator: each gets an array of its own. Calls are fastest in the thread that makes the first one. Raises
+    ValueError, TypeError and DynamicsError as `System.evaluate` does.
     """
 
     _careful: _Careful
@@ -47,32 +47,32 @@ class Evaluator(partial):  # a partial, so that a call takes no way through Pyth
 
     @property
     def accelerations(self) -> Real:
-        """(nu,) The array that calls of this thread write into and return."""
+        """The array (nu,) that calls in this thread write and return."""
         return self._careful.shown
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy is made of the copied system."""
+        """A copy is a new evaluator of the copied system."""
         return fresh_evaluator, (self._careful.system, self._careful.algorithm.name)
 
 
 def fresh_evaluator(system: Mechanics, algorithm: str) -> Evaluator:
-    """With a workspace of its own; ValueError for an algorithm that there is not."""
+    """An evaluator with a workspace of its own; ValueError for an unknown algorithm."""
     chosen = algorithms.chosen(algorithm)
     return Evaluator(system, chosen, chosen.fresh(system))
 
 
 class _Careful:
-    """The same step by step, for arguments in another form, for other threads, and for all that there is to say.
+    """The same evaluation in Python, for arguments that need conversion, for other threads, for errors and warnings.
 
-    The evaluator belongs to the thread that calls it first. Another one with the same number, which Python gives again
-    when a thread has ended, may well take it over: no two that live have the same.
+    The evaluator belongs to the thread that calls it first. When that thread has ended, a new one may get its number
+    and thereby the evaluator; no two living threads have the same number.
     """
 
     def __init__(self, system: Mechanics, algorithm: DynamicsAlgorithm, tables: tuple[Any, ...]) -> None:
         self.system, self.algorithm, self._tables, self._w = system, algorithm, tables, tables[1]
         numbers = np.zeros(system.nu)
         self.rates = numbers[:]
-        numbers.flags.writeable = False  # hence those of all other views
+        numbers.flags.writeable = False  # views that are made from now on are read-only too
         self._numbers = numbers
         self.notes = GateNotes(np.full(1, NOBODY), np.zeros(1, np.int64))
         self._first = dict[str, int]()
@@ -92,7 +92,8 @@ class _Careful:
 
     @property
     def shown(self) -> Real:
-        """What calls of this thread return: a new view of the rates where somebody has made another of the last."""
+        """The array that calls in this thread return: a new view of the rates if the shape or type of the last one was
+        changed in place."""
         if self.notes.owner[0] not in (NOBODY, get_ident()):
             return self._of_this_thread.accelerations
         one, other = self._shown, self._numbers
@@ -102,13 +103,14 @@ class _Careful:
 
     def _show(self) -> None:
         shown = self._numbers.view()
-        self.notes.returned[0] = id(shown)  # first: the gate must not return what is let go
+        self.notes.returned[0] = id(shown)  # before the old view is released, which the gate must not return any more
         self._shown = shown
 
     def _is_owner(self) -> bool:
-        """Whether this thread is the first one that called.
+        """Whether this thread made the first call.
 
-        The gate has noted it. Where there is none, as in an interpreter without a lock, one of several at once is.
+        The gate records it. Without a gate, as in an interpreter without a global lock, the atomic `setdefault` decides
+        between threads that call at the same time.
         """
         this = get_ident()
         if self.notes.owner[0] == NOBODY:
@@ -117,10 +119,10 @@ class _Careful:
 
     @per_thread
     def _of_this_thread(self) -> Evaluator:
-        """For a thread that is not the owner."""
+        """The evaluator of a thread that is not the owner."""
         return Evaluator(self.system, self.algorithm, self.algorithm.fresh(self.system))
 
     @per_thread
     def _evaluate(self) -> Direct:
-        """(t, y): the kernel by an entry of its own, compiled when first needed."""
+        """(t, y): the kernel without the gate, compiled at the first access."""
         return direct(self.algorithm.kernel(), STATUS, REAL, VECTOR, *self._tables)

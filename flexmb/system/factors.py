@@ -21,13 +21,15 @@ from flexmb.tables.state import finite_result
 from flexmb.typing import Real
 
 ROUNDING = 2.0**-53
-NEGLIGIBLE = 2.0**-49  # 16 roundings: singular scenes come out at 2 and less, definite ones with a digit left at 90
+# 16 units of roundoff. Estimates of 1/kappa for singular scenes were 2 units at most, and 90 for definite ones of which
+# a digit was left.
+NEGLIGIBLE = 2.0**-49
 STEPS = 30  # of the power method at most
-CONVERGED = 1.1  # it is told to a digit
+CONVERGED = 1.1  # growth of the estimate in a step below which it is final: kappa is needed to a digit
 
 
 class Condition(NamedTuple):
-    """kappa: `flexmb.jain.precision`; speed: number in u of the one whose pivot magnifies rounding most."""
+    """kappa: see `flexmb.jain.precision`; speed: index in u of the speed whose pivot magnifies rounding most."""
 
     kappa: float
     speed: int
@@ -44,7 +46,7 @@ class Condition(NamedTuple):
 
 
 class _Factors(NamedTuple):
-    """The status of the factorisation, the factors in a workspace, and what products write besides."""
+    """The status of the factorisation, the workspace that holds the factors, and the scratch arrays of products."""
 
     status: int
     w: Workspace
@@ -54,7 +56,7 @@ class _Factors(NamedTuple):
 class MassMatrixFactors:
     """M (nu,nu) of one state as F F' in the order of u; every product costs O(N).
 
-    Threads may share it: a product writes beside the factors, so each thread finds them once for itself.
+    Threads may share it: products write to the workspace of the factors, so each thread factorises once for itself.
     """
 
     def __init__(
@@ -100,7 +102,7 @@ class MassMatrixFactors:
 
     @cached_property
     def condition(self) -> Condition:
-        """How much M magnifies rounding: the power method on F^-1 S'S F'^-1, each step O(N)."""
+        """Condition number of the scaled M, by the power method on F^-1 S'S F'^-1; each step is O(N)."""
         free = self._c.speed["prescribed"] < 0
         y = np.where(free, np.random.default_rng(0).normal(size=len(free)), 0.0)
         kappa, size = 0.0, float(np.linalg.norm(y))

@@ -1,4 +1,4 @@
-"""Where hinges, closures and nodes are at the state that a workspace was last filled for, World axes."""
+"""Poses of hinge frames, closure frames and nodes at the state that a workspace was last filled for, World axes."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ AT_GROUND = Pose(np.eye(3), np.zeros(3))
 
 
 def link_pose(w: Workspace, k: int) -> Pose:
-    """Of the frame in which the dynamics sees body k; -1 is the ground."""
+    """Pose of the link frame of body k; -1 is the ground."""
     if k < 0:
         return AT_GROUND
     return Pose(w.body["pose_rotation"][k].reshape(3, 3), w.body["pose_position"][k])
 
 
 def body_pose(arrays: SceneArrays, w: Workspace, k: int) -> Pose:
-    """Of the frame of body k as the scene has it, undeformed."""
+    """Pose of the frame of body k as the scene defines it, undeformed."""
     pose, at = link_pose(w, k), arrays.links[k].outboard
     if at.deforms:
         return pose
@@ -51,7 +51,7 @@ def body_pose(arrays: SceneArrays, w: Workspace, k: int) -> Pose:
 
 
 def node_pose(arrays: SceneArrays, w: Workspace, body: str, node: str) -> Pose:
-    """Of a node, which moves with the deformation; ValueError where there is no such body or node."""
+    """Pose of a node, which moves with the deformation; ValueError if there is no such body or node."""
     if body == GROUND:
         return AT_GROUND
     names = arrays.body_names
@@ -77,7 +77,7 @@ def deformed(at: FlexibleNode, eta: Real) -> tuple[Real, Real]:
 
 
 def hinge_frames(arrays: SceneArrays, w: Workspace) -> dict[str, HingeFrames]:
-    """Of every hinge and point mass, and of closures: frames A and B, and the origin of B."""
+    """The frames of every hinge and point mass, and of closures: frames A and B, and the origin of B."""
     found = {link.hinge.name: hinge_frames_of(arrays, w, k) for k, link in enumerate(arrays.links)}
     closures = enumerate(arrays.scene.closures)
     return found | {closure.name: closure_frames_of(arrays, w, i) for i, closure in closures}
@@ -91,7 +91,7 @@ def closure_frames_of(arrays: SceneArrays, w: Workspace, i: int) -> HingeFrames:
 
 
 def hinge_frames_of(arrays: SceneArrays, w: Workspace, k: int) -> HingeFrames:
-    """Of the hinge of body k. The dynamics turns both frames so that a hinge axis is z: turned back here."""
+    """The frames of the hinge of body k. `BodyLink` turns both so that a hinge axis is z; here they are turned back."""
     body, back = arrays.constants.body[k], arrays.links[k].turn.T
     parent, own = link_pose(w, int(body["parent"])), link_pose(w, k)
     inward, outward = int(body["inboard_port"]), int(body["outboard_port"])

@@ -1,4 +1,4 @@
-"""The free motion of a scene from its states: states that there can be, and their accelerations by each algorithm."""
+"""States of a scene, and the accelerations of its free motion by each algorithm."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from flexmb.tables.state import State
 from flexmb.typing import Real
 
 Given = Literal["guess", "scene", "state"] | NDArray[np.bool_]
-"""What of a state is asked for: nothing, what a scene gives, all of it, or the values (nq+nu+1,) that are named."""
+"""Which values of a state must be kept: none, those that the scene gives, all, or those that are named (nq+nu+1,)."""
 
 
 class FreeMotion(Mechanics):
     """States and accelerations of a scene."""
 
     def state(self, q: Real, u: Real, t: float = 0.0) -> State:
-        """State from q (nq,), u (nu,) and t (s), copies; quaternions need not have unit length, they are scaled.
+        """State from q (nq,), u (nu,) and t (s), which are copied; quaternions are scaled to unit length.
 
         Raises ValueError where lengths do not fit, numbers are not finite or a quaternion is zero, and TypeError for
         anything but real numbers.
@@ -39,21 +39,21 @@ class FreeMotion(Mechanics):
         return self.layout.known(0.0, self._at_start.copy())
 
     def admissible(self, state: State, given: Given = "guess") -> State:
-        """The state that this one stands for at its time; prescribed motions are as they are then.
+        """The state with prescribed motions at their values for its time, and for closed chains with closed closures.
 
-        Of closed chains the nearest one that closes all closures; ClosureError where that is far. It keeps what is
-        given where it can, and warns where not.
+        The latter is the nearest such state; ClosureError if it is far away. Values that are `given` are kept if
+        possible; otherwise a warning names them.
         """
         t, y = self.layout.entering(state)
         return self.layout.known(t, self._projected(t, y))
 
     def scene_state(self, t: float) -> State:
-        """The scene's initial values with prescribed motions as they are at time t (s); closures may be open."""
+        """The scene's initial values with prescribed motions at their values for time t (s); closures may be open."""
         t = arguments.number("t", t)
         return self.layout.known(t, self._projected(t, self._at_start))
 
     def _projected(self, t: float, y: Real) -> Real:
-        """A copy of y = [q, u, work] without work, prescribed motions as they are at t, quaternions of unit length."""
+        """A copy of y with work zero, prescribed motions at their values for time t, and quaternions of unit length."""
         y = np.r_[y[:-1], 0.0]
         coordinates.project(t, y, self.constants)
         return y
@@ -86,32 +86,32 @@ class FreeMotion(Mechanics):
         if type(state) is not State or state.layout is not self.layout:
             state = self.layout.owning(state)
         try:
-            evaluator = self.own._evaluators[algorithm]  # not by way of the property, which costs as much as the call
+            evaluator = self.own._evaluators[algorithm]  # without the property, which costs as much as the evaluation
         except (AttributeError, KeyError):
             evaluator = self._evaluator(algorithms.chosen(algorithm))
         return evaluator(state.t, state.kernel_q, state.kernel_u).copy()
 
     def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
-        """`accelerations` for a loop: `udot = evaluator(t, q, u)` writes into one array, by a workspace of its own.
+        """`accelerations` for a loop: `udot = evaluator(t, q, u)` writes into one array, with a workspace of its own.
 
-        A call costs a tenth of a microsecond besides the kernel, of the thread that calls it first; others may call it
-        too, each with an array and a workspace of its own, and wait half a microsecond longer. Compiled here, not at
-        its first call. NotImplementedError for closed chains.
+        A call costs 0.1 us in addition to the kernel in the thread that makes the first call, and 0.5 us more in other
+        threads, each of which has an array and a workspace of its own. The kernel is compiled here, not at the first
+        call. NotImplementedError for closed chains.
         """
         return fresh_evaluator(self, algorithm)
 
     def _evaluator(self, chosen: DynamicsAlgorithm) -> Evaluator:
-        """With the workspace that this thread has here."""
+        """The evaluator that uses the workspace of this thread in the system."""
         if chosen.name not in self._evaluators:
             self._evaluators[chosen.name] = Evaluator(self, chosen, chosen.own(self))
         return self._evaluators[chosen.name]
 
     @per_thread
     def _evaluators(self) -> dict[str, Evaluator]:
-        """By algorithm."""
+        """By name of the algorithm."""
         return {}
 
-    @per_thread  # not `cached_property`: before Python 3.12 it holds a lock meanwhile, and this may have to compile
+    @per_thread  # not `cached_property`, which before Python 3.12 holds a lock while this possibly compiles
     def start_precision(self) -> Precision | None:
         """`precision_if_doubtful` of the initial state, found once."""
         return self.precision_if_doubtful(self.initial_state)

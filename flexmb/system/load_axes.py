@@ -1,4 +1,4 @@
-"""Loads across hinges in other axes than the World's, and about other points than the hinges' own."""
+"""Loads across hinges in axes other than World's, and about points other than the hinge points."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def referred(
 ) -> dict[str, Real]:
     """Loads (6,) of hinges and closures, World axes about their own points, in other axes about a node.
 
-    `w` is at the state of the loads. ValueError for axes or a node that there are not.
+    `w` is at the state of the loads. ValueError for unknown axes or an unknown node.
     """
     arguments.one_of("axes", axes, get_args(Axes))
     if axes == "world" and about is None:

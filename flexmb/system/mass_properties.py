@@ -17,10 +17,10 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:
-    """Of everything as if it were rigid where it is, wheels and point masses included.
+    """Mass properties of a deformed body or scene taken as rigid, with its wheels and point masses.
 
-    mass kg; centre (3,) m, World; inertia (3,3) kg m² about the centre, World axes. The frame of the body, World for a
-    whole scene: rotation (3,3) R_World_body and origin (3,) m.
+    mass kg; centre (3,) m, World; inertia (3,3) kg m² about the centre, World axes; rotation (3,3) R_World_body and
+    origin (3,) m of the body's frame, which for a whole scene is World.
     """
 
     mass: float
@@ -52,7 +52,8 @@ class MassProperties:
 
 
 def mass_properties(arrays: SceneArrays, w: Workspace, inertias: Real, body: str | None) -> MassProperties:
-    """Of a body and all that it carries, or of all bodies: inertias (N,21) of links, which are where `w` has them."""
+    """Mass properties of a body and all that it carries, or of all bodies, from the inertias (N,21) of the links and
+    their poses in `w`."""
     names, parent = arrays.body_names, arrays.constants.body["parent"]
     if body is None:
         counted, frame = list(range(len(names))), AT_GROUND
@@ -69,7 +70,7 @@ def mass_properties(arrays: SceneArrays, w: Workspace, inertias: Real, body: str
     centres = origins + np.einsum("kab,kb->ka", R, own)
     total = float(np.sum(mass))
     centre = mass @ centres / total if total > 0.0 else frame.position.copy()
-    # Each about its own centre first: far from the World's origin, nothing is left of a difference of squares.
+    # Each about its own centre first: far from the World's origin, differences of squares would lose all digits.
     own_arm, arm = cross_matrix(own), cross_matrix(centres - centre)
     about_own = inertia + mass[:, None, None] * own_arm @ own_arm
     turned = R @ about_own @ np.swapaxes(R, 1, 2) - mass[:, None, None] * arm @ arm
@@ -77,7 +78,7 @@ def mass_properties(arrays: SceneArrays, w: Workspace, inertias: Real, body: str
 
 
 def _carried(parent: list[int], first: int) -> list[int]:
-    """A body and all that it carries: parents stand before their children, point masses behind all bodies."""
+    """A body and all that it carries; parents precede their children, and bodies precede point masses."""
     found = {first}
     for k in range(first + 1, len(parent)):
         if parent[k] in found:

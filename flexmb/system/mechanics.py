@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from flexmb.frisch.errata import Erratum
     from flexmb.frisch.nested_system import NestedSystem
 
-FEW_DIGITS = 4.0  # below it `PrecisionWarning` says so
+FEW_DIGITS = 4.0  # with fewer digits left there is a `PrecisionWarning`
 
 
 class _Doubting(Protocol):
@@ -45,10 +45,10 @@ class _Doubting(Protocol):
 
 
 class Precision(NamedTuple):
-    """What rounding leaves of the accelerations: `digits`, decimal and significant, 0 to 16.
+    """The number of significant decimal digits, 0 to 16, that rounding leaves of the accelerations.
 
-    status: OK, or that the inertia of a body is not positive definite; fault, body: its number and name, or those of
-    the body that costs most digits.
+    status: OK, or NOT_POSITIVE_DEFINITE; fault, body: number and name of the body whose inertia is not positive
+    definite, or else of the body at which most digits are lost.
     """
 
     status: Status
@@ -66,13 +66,13 @@ class Precision(NamedTuple):
         """The text of a `PrecisionWarning`."""
         return (
             f"about {self.digits:.0f} of 16 digits of the accelerations are left: the inertia that body "
-            f'"{self.body}" moves nearly vanishes beside what it is summed from; bring masses, inertias and lengths '
-            "closer together, or leave out the freedom"
+            f'"{self.body}" moves is a small difference of large terms; bring masses, inertias and lengths closer '
+            "together, or leave out the freedom"
         )
 
 
 class ConsistentMotion(NamedTuple):
-    """accelerations (nu,) that need no modal forces, and the tau (nu,) of hinges and wheels that they need."""
+    """accelerations (nu,) for which all modal forces vanish, and the tau (nu,) of hinges and wheels for them."""
 
     accelerations: Real
     tau: Real
@@ -81,8 +81,7 @@ class ConsistentMotion(NamedTuple):
 class Mechanics(SceneArrays):
     """The equations of motion of a scene, and the tables and kernels for them; each thread has workspaces of its own.
 
-    Methods of a state examine what they are given. Those of t and y = [q, u, work] do not: they are for numbers that
-    have been examined.
+    Methods that take a `State` check it. Methods that take t and y = [q, u, work] expect that these have been checked.
     """
 
     def __init__(self, scene: s.Scene, elimination: Elimination) -> None:
@@ -95,22 +94,22 @@ class Mechanics(SceneArrays):
 
         ValueError where the print does not apply: a body whose modes are not clamped at its hinge point.
         """
-        from flexmb.frisch.nested_system import NestedSystem  # who uses the recursion waits for none of it
+        from flexmb.frisch.nested_system import NestedSystem  # imported here, because other algorithms do not need it
 
         if errata not in self._nested:
             return self._nested.setdefault(errata, NestedSystem(self.constants, self.links, self.layout, errata))
         return self._nested[errata]
 
     def workspace(self) -> Workspace:
-        """A fresh workspace for `rhs`; one per thread."""
+        """A new workspace for `rhs`; one per thread."""
         return workspace(self.constants, self.nq, self.nu)
 
     def recursion_workspace(self) -> Workspace:
-        """A fresh workspace for `rhs` with `recursion_constants`, whose bodies are eliminated as chosen."""
+        """A new workspace for `rhs` with `recursion_constants`."""
         return workspace(self.recursion_constants, self.nq, self.nu)
 
     def composite_workspace(self) -> composite.CompositeWorkspace:
-        """A fresh workspace for runs by composite bodies; one per thread."""
+        """A new workspace for runs by composite bodies; one per thread."""
         return composite.CompositeWorkspace(self.workspace(), matrices(self.constants))
 
     def mass_matrix(self, state: State) -> Real:
@@ -135,8 +134,8 @@ class Mechanics(SceneArrays):
         """Estimate of the significant decimal digits, 0 to 16, that rounding leaves of the accelerations of the free
         speeds.
 
-        From the largest magnification of a rounding of the inertias by M^-1 over all loads, in units that do not
-        matter (`flexmb.jain.precision`), in O(N). Single accelerations may be better. Of closed chains: those of the
+        From the condition number of M, scaled so that units do not matter (`flexmb.jain.precision`), in O(N). It holds
+        for the least favourable loads; single accelerations may be more precise. For closed chains it is that of the
         tree. Raises DynamicsError where M is not positive definite, or cannot be told from a singular matrix.
         """
         precision = self.precision(state)
@@ -154,7 +153,7 @@ class Mechanics(SceneArrays):
     def inverse_dynamics(self, state: State, accelerations: Real) -> Real:
         """tau (nu,) = M udot + c of accelerations (nu,), in O(N): Jain & Rodriguez (45).
 
-        Only its hinges and wheels drive a structure. Where the modal rows of tau (`modal_residual`) do not vanish, the
+        Motors can act on hinges and wheels only. Where the modal rows of tau (`modal_residual`) do not vanish, the
         accelerations are not consistent with each other, and tau is not the load that motors would have to exert.
         `consistent_inverse_dynamics` finds the modal accelerations that belong to given hinge accelerations.
         """
@@ -168,7 +167,8 @@ class Mechanics(SceneArrays):
         return {name: tau[place] for name, place in places.items() if place.stop > place.start}
 
     def consistent_inverse_dynamics(self, state: State, accelerations: Real) -> ConsistentMotion:
-        """Inverse dynamics of hinges and wheels with given accelerations, which structures follow without modal forces.
+        """Inverse dynamics for given accelerations of hinges and wheels; modal accelerations follow from zero modal
+        forces.
 
         The modal entries of `accelerations` (nu,) are not used; those of prescribed coordinates are. Costs O(N).
         """
@@ -188,9 +188,10 @@ class Mechanics(SceneArrays):
         return finite_result(self.own_workspace.speed["applied"].copy(), t)
 
     def precision_if_doubtful(self, state: State) -> Precision | None:
-        """`precision` of a state, None where no pivot there is so small that it may be rounding.
+        """`precision` of a state, None if no pivot is so small that it may consist of rounding errors.
 
-        Asked of the right-hand side, which a run needs compiled anyway; kernels of the precision few runs need.
+        Small pivots are found by the right-hand side, which a run has compiled anyway. Few runs need the kernels that
+        estimate the precision.
         """
         w = self.own_recursion_workspace
         t, y = self.layout.entering(state)
@@ -204,12 +205,12 @@ class Mechanics(SceneArrays):
         return tau, loads
 
     def _follow_recursion(self, t: float, y: Real) -> None:
-        """The recursion at one state, with its errors and warnings; leaves all that it found in its workspace."""
+        """The recursion at one state, with its errors and warnings; its results stay in its workspace."""
         w = self.own_recursion_workspace
         self.check_status(self._recur(t, y, np.empty_like(y)), int(w.fault[0]))
         self.check_precision(t, y, w)
 
-    # What fills the outputs of this thread, `observation.out`
+    # Methods that fill the outputs of this thread, `observation.out`
 
     def observe_recursion(self, t: float, y: Real) -> None:
         """Everything observable of the free motion, by the recursion."""
@@ -217,20 +218,19 @@ class Mechanics(SceneArrays):
         self._observe_recursion()
 
     def observe_rates(self, t: float, y: Real, rates: Real) -> None:
-        """Everything observable with accelerations (nu,): hinge loads by inverse dynamics, drives as the workspace
-        has them."""
+        """Everything observable for accelerations (nu,): hinge loads by inverse dynamics, drives from the workspace."""
         out = self.observation.out
         out.rates[:], out.drives[:] = rates, self.own_workspace.speed["drive"]
         out.loads[:] = self._inverse(t, y, out.rates)[1]
         self._observe_motion(t, y)
 
     def observe_motion(self, t: float, y: Real, rates: Real, drives: Real, loads: Real) -> None:
-        """Everything observable with accelerations (nu,), driving loads (nu,) and hinge loads (N,6) found elsewhere."""
+        """Everything observable, from accelerations (nu,), driving loads (nu,) and hinge loads (N,6)."""
         out = self.observation.out
         out.rates[:], out.drives[:], out.loads[:] = rates, drives, loads
         self._observe_motion(t, y)
 
-    # What each thread has of its own
+    # Workspaces of each thread
 
     @per_thread
     def own_workspace(self) -> Workspace:
@@ -244,20 +244,20 @@ class Mechanics(SceneArrays):
 
     @per_thread
     def observation(self) -> Observation:
-        """The arrays that are filled with everything observable at one state, with their names."""
+        """The arrays for everything observable at one state, with their names."""
         return Observation(self.observed_names, self.nu)
 
     @per_thread
     def own_matrices(self) -> Matrices:
-        """Made when first asked for: they are as large as the mass matrix."""
+        """For the mass matrix; as large as that, hence made only at the first access."""
         return matrices(self.constants)
 
     @per_thread
     def own_joint(self) -> Joint:
-        """What the unsplit recursion writes besides the workspace."""
+        """The further arrays that the unsplit recursion writes."""
         return unsplit.joint(self.constants)
 
-    # Kernels with the tables that they are called with; found when asked for, which compiles them
+    # Kernels bound to their tables, compiled at the first access
 
     @per_thread
     def _recur(self) -> Direct:
@@ -267,17 +267,17 @@ class Mechanics(SceneArrays):
 
     @per_thread
     def _observe_recursion(self) -> Direct:
-        """(): everything observable where `_recur` was just evaluated."""
+        """(): everything observable at the state where `_recur` was last evaluated."""
         return direct(observe, VOID, self.recursion_constants, self.own_recursion_workspace, self.observation.out)
 
     @per_thread
     def _transmit(self) -> Direct:
-        """(loads): those of all hinges where `_recur` was just evaluated."""
+        """(loads): those of all hinges at the state where `_recur` was last evaluated."""
         return direct(transmitted, VOID, self.recursion_constants, self.own_recursion_workspace, MATRIX)
 
     @per_thread
     def _observe_motion(self) -> Direct:
-        """(t, y): markers, wheel loads, energy and momentum of out.rates, accelerations found elsewhere."""
+        """(t, y): markers, wheel loads, energy and momentum for the accelerations out.rates."""
         return direct(observe_motion, VOID, REAL, VECTOR, self.constants, self.own_workspace, self.observation.out)
 
     @per_thread
@@ -322,12 +322,12 @@ class Mechanics(SceneArrays):
         return self._precision(MassMatrixFactors(self.constants, made, t, y, held))
 
     def check_precision(self, t: float, y: Real, w: _Doubting, held: Constants | None = None) -> None:
-        """What an evaluation that met small pivots, w.doubt, is worth: see `_judge`."""
+        """Estimate the precision of an evaluation that met small pivots, w.doubt; see `_judge`."""
         if w.doubt[0]:
             self._judge(self._precision_at(t, y, held))
 
     def _judge(self, precision: Precision) -> None:
-        """DynamicsError where inertias are not positive definite beyond rounding, a warning where few digits stay."""
+        """DynamicsError where an inertia is not positive definite to rounding, a warning where few digits are left."""
         self.check_status(precision.status, precision.fault)
         if precision.is_low:
             warnings.warn(precision.warning, PrecisionWarning, stacklevel=4)
@@ -341,7 +341,7 @@ class Mechanics(SceneArrays):
         return Precision(status, owner, self.body_names[owner], condition.digits)
 
     def check_status(self, status: int, fault: int | None = None) -> None:
-        """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
+        """DynamicsError unless a status code is OK; `fault`: number of the body, by default from the workspace."""
         if status != OK:
             place = self.fault_name(status, int(self.own_workspace.fault[0]) if fault is None else fault)
             error = DynamicsError(Status(status).advice.format(body=f'"{place}"'))
@@ -350,7 +350,7 @@ class Mechanics(SceneArrays):
 
 
 def _owner(c: Constants, speed: int) -> int:
-    """Body whose hinge, mode or wheel has a speed."""
+    """Number of the body to whose hinge, modes or wheels a speed belongs."""
     first, modes = c.body["u_index"], c.body["etad_index"]
     of_hinge = (first <= speed) & (speed < first + c.body["nv"])
     of_modes = (modes <= speed) & (speed < modes + c.body["modes"])

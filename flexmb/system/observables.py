@@ -64,8 +64,8 @@ class Evaluation:
 
 
 def undetermined_loads(loads: Mapping[str, Real], drives: Mapping[str, Real]) -> dict[str, NDArray[np.bool_]]:
-    """By name of a hinge or closure, which components (6,) of its load are NaN, at one time or more; by "<name>.drive"
-    which (n,) of its drive loads. Only those of which some are."""
+    """Which components (6,) of the load of a hinge or closure are NaN at one time or more, by its name; and which of
+    its drive loads (n,), by "<name>.drive". Only names with such components are listed."""
     found = dict(loads) | {f"{name}.drive": values for name, values in drives.items()}
     open_ = {name: np.any(np.isnan(np.atleast_2d(values)), axis=0) for name, values in found.items()}
     return {name: each for name, each in open_.items() if np.any(each)}
@@ -73,9 +73,10 @@ def undetermined_loads(loads: Mapping[str, Real], drives: Mapping[str, Real]) ->
 
 @dataclass(frozen=True)
 class Names:
-    """Of what is observed: (body, port) of markers; hinges, wheels, closures in order; places in u of the driven.
+    """Names of the observed quantities, in the order of the arrays.
 
-    connectors: between nodes; hinge_forces: springs along hinges, then other laws.
+    markers: with (body, port) of each. driven: hinges and wheels with prescribed coordinates, with the places of these
+    in u. connectors: those between nodes. hinge_forces: springs along hinges, then other laws along hinges.
     """
 
     markers: dict[str, tuple[int, int]]
@@ -88,7 +89,7 @@ class Names:
 
 
 class Observation:
-    """The arrays that kernels fill at one state, `out`, and an `Evaluation` made of them."""
+    """The arrays that kernels fill at one state, `out`, and their conversion to an `Evaluation`."""
 
     def __init__(self, names: Names, speeds: int) -> None:
         counts = map(len, (names.markers, names.hinges, names.wheels, names.connectors, names.hinge_forces))
@@ -96,9 +97,9 @@ class Observation:
         at = np.array(list(names.markers.values()), dtype=np.int64).reshape(-1, 2)
         self.names, self._shapes, self._at = names, of, (at[:, 0].copy(), at[:, 1].copy())
         self.columns = places(of | {"drives": (speeds,), "closures": (len(names.closures), 6)})
-        """Where each part of a row lies: what `out.every` has, then drives and the loads of closures."""
+        """Place of each part in a row: those of `out.every`, then drives and the loads of closures."""
         self.width = max(place.stop for place, _ in self.columns.values())
-        """Of a row."""
+        """Length of a row."""
         self.out = self.outputs()
 
     def outputs(self) -> Outputs:
@@ -106,7 +107,7 @@ class Observation:
         return outputs(self._shapes, *self._at)
 
     def row(self, t: float, closures: Real) -> Real:
-        """(width,) What was filled last, with the loads (C,6) of closures; DynamicsError where it is not finite."""
+        """The present contents (width,) and the loads (C,6) of closures; DynamicsError if they are not finite."""
         row, every = np.empty(self.width), len(self.out.every)
         row[:every] = finite_result(self.out.every, t)
         row[every : every + len(self.out.drives)] = self.out.drives

@@ -21,11 +21,11 @@ from flexmb.typing import Index
 
 
 class SceneArrays:
-    """A checked scene as kernels take it; nothing is written into it after it is made.
+    """A checked scene as kernels take it; nothing is changed after construction.
 
-    links: the bodies, each with the hinge that holds it, base to tip. markers, closure_ports: (body, port) of each
-    marker, by name, and of both sides of each closure. signals: those that controllers drive in a run, by number among
-    the functions of time; zero outside of one.
+    links: the bodies, each with its inboard hinge, base to tip. markers, closure_ports: (body, port) of each marker, by
+    name, and of both sides of each closure. signals: the functions of time that controllers drive in a run, by their
+    numbers; they are zero outside of runs.
     """
 
     def __init__(self, scene: s.Scene, elimination: Elimination) -> None:
@@ -42,7 +42,7 @@ class SceneArrays:
 
     @property
     def kernels(self) -> Literal["general", "special"]:
-        """Which kernels run it: those that take every scene, or those compiled for its kind; see `flexmb.compile`."""
+        """The kernels that run it: general ones for every scene, or special ones; see `flexmb.compile`."""
         return "general" if GENERAL in self.constants.features() else "special"
 
     @property
@@ -60,7 +60,7 @@ class SceneArrays:
 
     @property
     def observed_names(self) -> Names:
-        """Of everything that is observed at a state, in the order of the arrays."""
+        """The names of everything that is observed at a state."""
         scene, wheels = self.scene, wheels_by_body(self.scene)
         hinges = [link.hinge.name for link in self.links]
         on_bodies = [wheel.name for link in self.links for wheel in wheels.get(link.name, ())]
@@ -80,7 +80,7 @@ class SceneArrays:
         return {name: at.start + np.flatnonzero(driven[at]) for name, at in places if np.any(driven[at])}
 
     def fault_name(self, status: int, fault: int) -> str:
-        """Name of the body, connector or closure that the number of a failure stands for."""
+        """Name of the body, connector or closure at which a failure occurred, from its number."""
         match status:
             case Status.CONNECTOR_OVERTURNED:
                 return between_nodes(self.scene)[fault].name

@@ -1,9 +1,9 @@
-"""Loads across the sections of a beam, by the momentum balance of the part beyond each: modes' stiffness is not asked.
+"""Loads across the sections of a beam, by the momentum balance of the part beyond each section.
 
-What acts on the part of a beam beyond x is what its points' accelerations need, less gravity, loads at nodes, wheels,
-connectors, and what outboard bodies and closures leave there; the rest is transmitted by the section. In statics this
-is exact with any number of modes, and at the root it is the load across the hinge. Forces by the modes' curvature
-converge slowly, if at all: no clamped eigenmode has a shear force at its tip.
+A section transmits the rate of momentum of the points beyond it, less gravity and the loads that act on that part:
+loads at nodes, wheels, connectors, outboard bodies and closures. In statics this is exact with any number of modes, and
+at the root it is the load across the hinge. Loads from the modes' curvature converge slowly, if at all: no clamped
+eigenmode has a shear force at its tip.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ class SectionLoads:
     """Loads across the sections at x (X,) m of a beam, of one state or of T times.
 
     load (...,X,6) [torque; force] of the part before the section on the part beyond it (toward x = length), about the
-    deformed axis there, in axes that turn with the section: as across a hinge. What sits at x itself counts as beyond.
+    deformed axis there, in axes that turn with the section: as across a hinge. Masses and loads at x itself count as
+    beyond it.
     The properties below have the signs of structures: what the part beyond exerts on the face that looks along +x, so
     that tension is positive. EA (X,) N, EIy, EIz, GJ (X,) N m² are the beam's there.
     """
@@ -52,7 +53,7 @@ class SectionLoads:
     GJ: Real
 
     def __post_init__(self) -> None:
-        """TypeError or ValueError for parts that do not belong together; asked once more by what works with them."""
+        """TypeError or ValueError for arrays that do not fit together; checked again before they are used."""
         self._refuse_torn()
 
     def _refuse_torn(self) -> None:
@@ -100,10 +101,10 @@ class SectionLoads:
 
 
 class AllLoads(NamedTuple):
-    """What is exerted on the bodies of a system at time t (s), and a workspace that has their motion.
+    """All loads on the bodies of a system at time t (s), `exerted`, and a workspace that has their motion.
 
-    Where the motion does not determine all of it, `changes`: other loads (6,) of hinges and closures that go with the
-    same motion, less those in `exerted`, by name; changes of `rounding` or less are none.
+    Where the motion does not determine all loads, `changes` has for each null load the changes (6,) of the loads of
+    hinges and closures by name; changes of `rounding` or less count as zero.
     """
 
     t: float
@@ -114,7 +115,7 @@ class AllLoads(NamedTuple):
 
 
 class _Outer(NamedTuple):
-    """What acts on the part beyond some of the cuts besides inertia: on the parts beyond the first `beyond` cuts."""
+    """A load on the beam; it acts on the parts beyond the first `beyond` cuts."""
 
     beyond: int
     wrench: Real  # (6,) [torque about the body's origin; force], body axes
@@ -138,7 +139,7 @@ class SectionBalance:
         self.sections = beam_sections(self._beam, self._cuts)
 
     def at(self, state: AllLoads) -> Real:
-        """Loads (X,6) as `SectionLoads` has them at a state, NaN what the motion does not determine.
+        """Loads (X,6) of `SectionLoads` at a state, NaN where the motion does not determine them.
 
         DynamicsError where a number is not finite.
         """
@@ -163,12 +164,12 @@ class SectionBalance:
         return np.where(is_open, np.nan, found)
 
     def loads(self, values: Real) -> SectionLoads:
-        """Loads (...,X,6) with what belongs to them."""
+        """`SectionLoads` with these loads (...,X,6)."""
         s, p = self.sections, self._places
         return SectionLoads(self.body, self.x, values, s.EA[p], s.EIy[p], s.EIz[p], s.GJ[p])
 
     def _inertial(self, motion: _Motion, eta: Real, etad: Real, etadd: Real) -> Real:
-        """(X,6) rate of momentum, less gravity, of the parts beyond each cut, about the body's origin, body axes."""
+        """Rate of momentum (X,6), less gravity, of the parts beyond each cut, about the body's origin, body axes."""
         s, points = self.sections, self.sections.points
         w, alpha, a = motion
         r, v, bend = _field(points.translation, s.second, "translation", eta, etad, etadd)
@@ -190,7 +191,7 @@ class SectionBalance:
         return np.cumsum(between[::-1], axis=0)[::-1][1:]
 
     def _outer(self, w: Workspace, pose: Pose, exerted: Evaluation) -> list[_Outer]:
-        """All that others exert on the beam, with where along it."""
+        """All loads on the beam, with their places along it."""
         arrays, k, scene = self._arrays, self._k, self._arrays.scene
         loads, wheels = exerted.loads, exerted.wheel_loads
         constants = arrays.constants
@@ -239,7 +240,7 @@ class SectionBalance:
         return found
 
     def _in_sections(self, wrench: Real, eta: Real) -> Real:
-        """(X,6) about the body's origin, body axes, to the deformed sections and their axes."""
+        """Wrenches (X,6) about the body's origin in body axes, referred to the deformed sections and their axes."""
         s, none = self.sections, np.zeros_like(eta)
         axis = _field(s.motion[:, :3], s.second_motion, "translation", eta, none, none)[0]
         theta = _field(s.motion[:, 3:], s.second_motion, "rotation", eta, none, none)[0]
@@ -258,7 +259,7 @@ class _Motion(NamedTuple):
 
 
 def _motion_in(pose: Pose, link: Pose, w: Workspace, k: int) -> _Motion:
-    """The motion of body k in the scene's frame of it, from that of the frame of its link."""
+    """The motion of body k in its frame of the scene, from that of its link frame."""
     turn = pose.rotation.T @ link.rotation
     r = link.rotation.T @ (pose.position - link.position)
     omega, (alpha, a) = w.body["velocity"][k, :3], w.body["accel"][k].reshape(2, 3)

@@ -1,4 +1,4 @@
-"""A compiled scene: its arrays, its state vectors, and pointwise mechanics.
+"""A compiled scene: its arrays, its states, and the mechanics at one state.
 
     system = compile(scene)
     state = system.initial_state
@@ -48,11 +48,11 @@ class System(FreeMotion):
         self._asked: Elimination = elimination
         self.rhs, self.project = articulated.rhs, coordinates.project
         self.kept: dict[Any, Any] = {}
-        """What runs find once and keep for the next one."""
+        """Results and tables that runs keep for later runs."""
         self._operators: SpatialOperators | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copied and pickled as its scene: addresses are of one process, and arrays are parts of each other."""
+        """Copies and pickles hold the scene only: addresses belong to one process, and arrays share memory."""
         return copied, (System, self.kernels, self.scene, self._asked)
 
     @property
@@ -80,7 +80,7 @@ class System(FreeMotion):
     def operators(self, state: State) -> Operators:
         """The spatial operators of Jain & Rodriguez, sections II to V, as dense arrays, World axes; all speeds free."""
         t, y = self.layout.entering(state)
-        from flexmb.jain.operators import SpatialOperators  # with SciPy slow to import: only who asks for them waits
+        from flexmb.jain.operators import SpatialOperators  # imported here, because it imports SciPy, which is slow
 
         if self._operators is None:
             self._operators = SpatialOperators(self.scene)
@@ -94,8 +94,7 @@ class System(FreeMotion):
 
             udot, status = system.accelerations_batch(q, u)     q (n,nq), u (n,nu), t (s) one or (n,)
 
-        A state that has no accelerations fails no other one: its row is NaN. Raises ValueError or TypeError for arrays
-        that do not fit.
+        The row of a state that has no accelerations is NaN. Raises ValueError or TypeError for arrays that do not fit.
         """
         return self.batch.accelerations(q, u, t, threads=threads)
 
@@ -104,7 +103,7 @@ class System(FreeMotion):
         """Any number of copies of this system."""
         found: Batch | None = self.kept.get("batch")
         if found is None:
-            from flexmb.system.batch import Batch  # lanes are for those who ask for many states
+            from flexmb.system.batch import Batch  # imported here, because only batches need lanes
 
             found = self.kept.setdefault("batch", Batch([self]))
         return found
@@ -115,7 +114,7 @@ class System(FreeMotion):
         return labels.names_of_states(self)
 
     def route(self, algorithm: Algorithm = "articulated", stabilise: float = 0.0) -> Route:
-        """The algorithm as runs see it; `stabilise` is for closed chains.
+        """What a run needs of the algorithm; `stabilise` is for closed chains.
 
         ValueError for an algorithm that is for single states, or does not apply to the scene.
         """
@@ -135,25 +134,27 @@ class System(FreeMotion):
     ) -> dict[str, Real]:
         """Total load (6,) [torque; force] across each hinge on the outboard body.
 
-        Of the free motion; with `accelerations` (nu,) what hinges transmit if these are forced, Jain & Rodriguez (44).
-        axes: "world", or those of each hinge's own frame "inboard" or "outboard". about: (body, node), a point that
-        moves with the deformation, "ground" with "origin"; by default each hinge's outboard point. ValueError for axes
-        or a node that there are not.
+        Of the free motion, or of the motion with given `accelerations` (nu,), Jain & Rodriguez (44). axes: "world", or
+        those of each hinge's own frame "inboard" or "outboard". about: (body, node), a point that moves with the
+        deformation, or ("ground", "origin"); by default each hinge's outboard point. ValueError for unknown axes or an
+        unknown node.
         """
         t, y = self.layout.entering(state)
         if accelerations is None:
-            loads, w = finite_result(self._free_loads(t, y), t), self.own_recursion_workspace
+            loads, w = np.zeros((len(self.links), 6)), self.own_recursion_workspace
+            self._follow_recursion(t, y)
+            self._transmit(loads)
         else:
             rates = self.layout.rates("accelerations", accelerations)
-            loads, w = finite_result(self._inverse(t, y, rates)[1], t), self.own_workspace
-        return referred(self, w, self._by_hinge(loads), axes, about)
+            loads, w = self._inverse(t, y, rates)[1], self.own_workspace
+        return referred(self, w, self._by_hinge(finite_result(loads, t)), axes, about)
 
     def referred_loads(
         self, state: State, loads: dict[str, Real], axes: Axes = "world", about: tuple[str, str] | None = None
     ) -> dict[str, Real]:
         """Loads of hinges and closures that were found at a state, World axes, in other axes about a node."""
         t, y = self.layout.entering(state)
-        self._inverse(t, y, np.zeros(self.nu))  # leaves poses as the equations of motion see them
+        self._inverse(t, y, np.zeros(self.nu))  # for the poses in the workspace, those of the equations of motion
         return referred(self, self.own_workspace, loads, axes, about)
 
     def section_loads(self, state: State, body: str, x: Any) -> SectionLoads:
@@ -161,14 +162,14 @@ class System(FreeMotion):
 
         By the momentum balance of the part beyond each section, not by the modes' curvature. A body of level `linear`
         is taken as `full`; at level `stiffened` the balance differs from the dynamics in the fourth order of the
-        deformation. Warns (`SceneWarning`) where the mass is lumped, which steps at nodes. NaN what redundant closures
-        leave open. ValueError for anything but a beam, and positions off it.
+        deformation. Warns (`SceneWarning`) where the mass is lumped, because the loads then jump at nodes. NaN where
+        redundant closures leave loads undetermined. ValueError for anything but a beam, and positions off it.
         """
         balance = SectionBalance(self, body, x)
         return balance.loads(balance.at(self.all_loads(state)))
 
     def all_loads(self, state: State) -> AllLoads:
-        """Of hinges, closures, wheels and connectors, with the motion of all bodies."""
+        """The loads of hinges, closures, wheels and connectors, with the motion of all bodies."""
         t, y = self.layout.entering(state)
         found = self._evaluate(t, y, "articulated")
         self._inverse(t, y, found.accelerations)
@@ -177,8 +178,8 @@ class System(FreeMotion):
     def mass_properties(self, state: State, body: str | None = None) -> MassProperties:
         """Mass, mass centre and inertia of a body with all that it carries, or of the whole scene, at a state.
 
-        Everything counts as if it were rigid where it is; a ruthless body, and where it holds others, at its rest
-        shape, as momentum has it. ValueError for a body that there is not.
+        All bodies are taken as rigid in their present shape, ruthless bodies in their undeformed shape, as in the
+        momentum. ValueError for an unknown body.
         """
         t, y = self.layout.entering(state)
         rates = self.observation.out.rates
@@ -186,15 +187,8 @@ class System(FreeMotion):
         self._observe_motion(t, y)
         inertias = self.own_workspace.body["inertia"].copy()
         if any(link.level.at_rest for link in self.links):
-            self._inverse(t, y, rates)  # leaves poses by rest shapes
+            self._inverse(t, y, rates)  # for the poses in the workspace, which have ruthless bodies undeformed
         return mass_properties(self, self.own_workspace, inertias, body)
-
-    def _free_loads(self, t: float, y: Real) -> Real:
-        """(N,6) of the free motion, World axes."""
-        loads = np.zeros((len(self.links), 6))
-        self._follow_recursion(t, y)
-        self._transmit(loads)
-        return loads
 
     def _by_hinge(self, loads: Real) -> dict[str, Real]:
         return {link.hinge.name: loads[k] for k, link in enumerate(self.links)}
@@ -240,6 +234,6 @@ class System(FreeMotion):
         row[:] = self.observation.row(t, _NO_CLOSURES)
 
 def copied(kind: type[System], kernels: Kernels, *given: Any) -> System:
-    """What a pickled system becomes again, run by the same kind of kernels."""
+    """A pickled system again, with the same kind of kernels."""
     with asking(kernels):
         return kind(*given)

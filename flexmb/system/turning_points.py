@@ -31,9 +31,8 @@ def turning(theta: Real, rate: Real, acceleration: Real) -> tuple[Real, Real, Re
     change = (A_slope * growth)[:, None, None] * T + A[:, None, None] * T_rate
     change += (B_slope * growth)[:, None, None] * squared + B[:, None, None] * (T_rate @ T + T @ T_rate)
     velocity = np.einsum("nab,nb->na", jacobian, rate)
-    return rotation_by(theta), velocity, np.einsum("nab,nb->na", jacobian, acceleration) + np.einsum(
-        "nab,nb->na", change, rate
-    )
+    turning_rate = np.einsum("nab,nb->na", jacobian, acceleration) + np.einsum("nab,nb->na", change, rate)
+    return rotation_by(theta), velocity, turning_rate
 
 
 def _series(square: Real, first: int) -> tuple[Real, Real]:

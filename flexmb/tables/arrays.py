@@ -22,7 +22,6 @@ EXPLICIT, WOODBURY, CONDENSED = range(3)
 ANGULAR_Z, LINEAR_Z, NO_AXIS = 2, 5, -1
 FORCE, TORQUE = range(2)
 WORLD_AXES, NODE_AXES = range(2)
-ALONG_LINE, BUSHING = range(2)
 BOTH, TENSION, COMPRESSION = range(3)
 ON_GROUND = -1  # body of an end that is fixed in World
 
@@ -114,12 +113,12 @@ LOAD = _record(
     ("direction", _F, (3,)),
 )
 CONNECTOR = _record(
-    ("kind", _I),  # ALONG_LINE or BUSHING
+    ("kind", _I),  # numbers of laws between frames, flexmb.connectors.catalogue
     ("acts", _I),  # BOTH, TENSION or COMPRESSION
     ("function", _I),  # of the actuator, -1 for none
     ("start", _I),  # its rows of `law`
     ("stop", _I),
-    ("row", _I),  # of `bushing`
+    ("row", _I),  # of `frame_law`, -1 for a law without parameters
     ("free_length", _F),
     ("smoothing", _F),  # length s in sqrt(d.d + s^2), see flexmb.connectors.line
     ("damping", _F),
@@ -130,7 +129,7 @@ END = _record(
     ("position", _F, (3,)),  # World, on the ground only
     ("rotation", _F, (9,)),  # R_World_port, on the ground only
 )
-BUSHING_MATRIX = _record(("stiffness", _F, (6, 6)), ("damping", _F, (6, 6)))
+FRAME_LAW = _record(("parameters", _F, (72,)))  # the law's own numbers
 HINGE_SPRING = _record(
     ("speed", _I),  # of the coordinate, place in u
     ("start", _I),  # its rows of `law`
@@ -144,7 +143,7 @@ HINGE_SPRING = _record(
     ("function", _I),  # of the actuator, -1 for none
 )
 COORDINATE_LAW = _record(
-    ("kind", _I),  # numbers of flexmb.connectors.catalogue
+    ("kind", _I),  # numbers of laws along coordinates, flexmb.connectors.catalogue
     ("speed", _I),  # of the coordinate, place in u
     ("parameters", _F, (6,)),  # the law's own numbers
 )
@@ -190,7 +189,7 @@ class Constants:
     load: Record  # (L,) LOAD
     connector: Record  # (C,) CONNECTOR
     end: Record  # (C,2) END, A then B
-    bushing: Record  # (connectors that are bushings,) BUSHING_MATRIX
+    frame_law: Record  # (connectors whose laws have parameters,) FRAME_LAW
     hinge_spring: Record  # (springs along coordinates,) HINGE_SPRING
     coordinate_law: Record  # (laws along coordinates that are no springs,) COORDINATE_LAW
     # (pieces,8) of load laws: left end, energy there, then coefficients, highest power first; the first piece of a law
@@ -267,7 +266,7 @@ PORT_STATE = _record(
 CONNECTOR_STATE = _record(
     ("load", _F, (6,)),  # [torque; force] on B about B, World axes
     ("arm", _F, (3,)),  # from A to B, World axes
-    ("upright", _F),  # of a bushing, square of the cosine of half its rotation
+    ("upright", _F),  # square of the cosine of half the rotation, where a law limits it
     ("energy", _F),
     ("power", _F),  # of all non-elastic forces
 )

@@ -43,7 +43,8 @@ LOADS = "loads"
 CONNECTORS = "connectors"  # between two nodes
 ONE_SIDED = "one-sided connectors"
 ACTUATORS = "actuators"
-BUSHINGS = "bushings"
+FRAME_LAWS = "laws between frames"  # that have parameters
+FRAME_LAW = "law between frames"  # "law between frames 0": the number of a law in flexmb.connectors.catalogue
 HINGE_SPRINGS = "hinge springs"
 HINGE_ACTUATORS = "hinge actuators"
 COORDINATE_LAWS = "laws along coordinates"  # that are no springs
@@ -59,7 +60,7 @@ MODAL_DAMPING = "modal damping"
 
 
 class SceneTables(Protocol):
-    """What of `flexmb.tables.arrays.Constants` says what a scene contains; this module stands below that one."""
+    """The tables of `flexmb.tables.arrays.Constants` from which features follow; that module imports this one."""
 
     kernels: Index
     body: Record
@@ -68,7 +69,7 @@ class SceneTables(Protocol):
     wheel: Record
     load: Record
     connector: Record
-    bushing: Record
+    frame_law: Record
     hinge_spring: Record
     coordinate_law: Record
     function: Record
@@ -134,7 +135,7 @@ def contained(c: SceneTables) -> frozenset[str]:
         CONNECTORS: len(c.connector) > 0,
         ONE_SIDED: np.any(c.connector["acts"] != 0),
         ACTUATORS: np.any(c.connector["function"] >= 0),
-        BUSHINGS: len(c.bushing) > 0,
+        FRAME_LAWS: len(c.frame_law) > 0,
         HINGE_SPRINGS: len(c.hinge_spring) > 0,
         HINGE_ACTUATORS: np.any(c.hinge_spring["function"] >= 0),
         COORDINATE_LAWS: len(c.coordinate_law) > 0,
@@ -150,6 +151,7 @@ def contained(c: SceneTables) -> frozenset[str]:
     numbered = {f"{HINGE} {n}" for n in set(body["hinge_kind"].tolist())}
     numbered |= {f"{AXIS} {n}" for n in set(body["axis"].tolist())}
     numbered |= {f"{LEVEL} {n}" for n in set(body["level"].tolist())}
+    numbered |= {f"{FRAME_LAW} {n}" for n in set(c.connector["kind"].tolist())}
     numbered |= {f"{LAW} {n}" for n in set(c.coordinate_law["kind"].tolist())}
     return frozenset(name for name, there in found.items() if there) | numbered
 

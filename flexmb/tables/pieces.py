@@ -1,7 +1,7 @@
 """Piecewise polynomials of degree five in kernels: functions of time by a table, and load laws of a displacement.
 
-A row of a table is one piece (8,): its left end, the integral up to there where anybody needs it, and six coefficients,
-highest power of the distance from the left end first.
+A row of a table is one piece (8,): its left end, the integral up to there (for load laws only), and six coefficients
+of the distance from the left end, highest power first.
 """
 
 from flexmb.jit.kernel import by_number, helper
@@ -18,7 +18,7 @@ def _one_piece(x, table, first, last):
 
 @helper
 def _a_piece_each(x, table, first, last):
-    """Of lanes, each of which may be in another piece."""
+    """The same for lanes, each of which may be in another piece."""
     found = _piece(table, first)
     for row in range(first + 1, last):
         reached, now = x >= table[row, 0], _piece(table, row)
@@ -44,4 +44,4 @@ def _piece(table, row):
 
 
 piece_at = by_number(_one_piece, _a_piece_each)
-"""(x, table, first, last): the row of table[first:last] that x is in; the first and the last one go on beyond."""
+"""(x, table, first, last): the row of table[first:last] that contains x; the outer rows also apply beyond the ends."""

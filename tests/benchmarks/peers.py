@@ -5,6 +5,7 @@ A peer that is not installed raises ModuleNotFoundError, which skips a benchmark
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -48,18 +49,29 @@ def mujoco_forward(scene: Scene) -> Call:
 
 def mujoco_steps(scene: Scene, t_end: float, steps: int) -> Call:
     """A run of equal RK4 steps by one call of `mj_step`; the result is the last state."""
+    run, found = mujoco_runs(scene, t_end), list[np.ndarray]()
+
+    def call() -> None:
+        found[:] = [run(steps)]
+
+    return Call(call, 1, lambda: found[0])
+
+
+def mujoco_runs(scene: Scene, t_end: float) -> Callable[[int], np.ndarray]:
+    """A function of the number of equal RK4 steps, which are one call of `mj_step`: the state [q, v] at t_end."""
     import mujoco
 
     model, data = _mujoco(scene)
-    model.opt.timestep = t_end / steps
     q, v = data.qpos.copy(), data.qvel.copy()
 
-    def run() -> None:
+    def run(steps: int) -> np.ndarray:
+        model.opt.timestep = t_end / steps
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = q, v
         mujoco.mj_step(model, data, steps)
+        return np.concatenate([data.qpos, data.qvel])
 
-    return Call(run, 1, lambda: np.concatenate([data.qpos, data.qvel]))
+    return run
 
 
 def mujoco_rollout(scene: Scene, copies: int, steps: int) -> Call:

@@ -38,7 +38,7 @@ def additions() -> dict[str, frozenset[str]]:
         "all levels of bodies": frozenset(f"{f.LEVEL} {n}" for n in range(len(LEVELS))) | {f.MODES, f.SECOND_ORDER},
     }
     alone = (
-        f.INBOARD_NODES, f.OUTBOARD_NODES, f.WHEELS, f.LOADS, f.CONNECTORS, f.BUSHINGS, f.HINGE_SPRINGS,
+        f.INBOARD_NODES, f.OUTBOARD_NODES, f.WHEELS, f.LOADS, f.CONNECTORS, f.FRAME_LAWS, f.HINGE_SPRINGS,
         f.COORDINATE_LAWS, f.FUNCTIONS, f.MOTORS, f.PRESCRIBED, f.SPRINGS, f.DAMPERS, f.MODAL_DAMPING,
     )  # fmt: skip
     return kinds | {name: frozenset({name}) for name in alone} | {"everything": frozenset({f.GENERAL})}

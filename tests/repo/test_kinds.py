@@ -10,7 +10,6 @@ from typing import get_args
 
 import pytest
 
-from crosscheck.drawing.draw import DRAWN_AS
 from crosscheck.engines.links import Freedom as Joint
 from crosscheck.library import time_functions
 from flexmb.control.wiring import _LAWS
@@ -109,7 +108,6 @@ def test_tables_by_kind_have_every_kind() -> None:
     functions = set(get_args(s.Function))
     assert all(set(table) == functions for table in
                (time_functions.VALUES, time_functions.TIMES, time_functions.FREQUENCIES))
-    assert set(DRAWN_AS) == set(get_args(BetweenNodes))
     assert set(_LAWS) == set(get_args(s.Controller)) - {s.UserLaw}
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from importlib.metadata import version
 
 from crosscheck.engines.basilisk.craft import NoCraft, craft_of
-from crosscheck.engines.contract import Effort, EngineMissing, Model
+from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.links import obstacle
-from crosscheck.engines.peer import PeerEngine
-from crosscheck.engines.scipy_loop import RTOL_LADDER
+from crosscheck.engines.peer import PeerEngine, needed
+from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
 from flexmb.scene.schema import Scene
 
 
@@ -25,10 +25,8 @@ class BasiliskEngine(PeerEngine):
     )
 
     def version(self) -> str:
-        try:
+        with needed("Basilisk", "more-peers"):
             import Basilisk  # noqa: F401
-        except ImportError as error:
-            raise EngineMissing("Basilisk is not installed: pip install flexmb[more-peers]") from error
         return version("bsk")
 
     def obstacle(self, scene: Scene) -> str:
@@ -44,6 +42,8 @@ class BasiliskEngine(PeerEngine):
         return RTOL_LADDER
 
     def model(self, scene: Scene) -> Model:
-        from crosscheck.engines.basilisk.model import compiled
+        from crosscheck.engines.basilisk.dynamics import CraftDynamics
+        from crosscheck.engines.basilisk.observer import BasiliskObserver
 
-        return compiled(scene)
+        dynamics = CraftDynamics(craft_of(scene), scene)
+        return ScipyModel(scene, dynamics, BasiliskObserver(dynamics, scene))

@@ -15,7 +15,8 @@ from crosscheck.engines.conventions import cross, quaternion_rate, rotate_spatia
 from crosscheck.engines.dart.forces import DartJointForces, DartLoads
 from crosscheck.engines.dart.tree import DartTree, initial_state
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Ball, Floating, Scalar
+from crosscheck.engines.links import Ball, Floating
+from crosscheck.engines.rigid_tree import scalars
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -47,9 +48,8 @@ class DartDynamics:
         self._driven_v = np.array([slot.v for slot in self.driven], dtype=np.intp)
         self._free_q = np.setdiff1d(np.arange(tree.nq), self._driven_q)
         self._free_v = np.setdiff1d(np.arange(tree.skeleton.getNumDofs()), self._driven_v)
-        scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
-        self._scalar_q = np.array([slot.q for slot in scalars], dtype=np.intp)
-        self._scalar_v = np.array([slot.v for slot in scalars], dtype=np.intp)
+        self._scalar_q = np.array([slot.q for slot in scalars(tree.slots)], dtype=np.intp)
+        self._scalar_v = np.array([slot.v for slot in scalars(tree.slots)], dtype=np.intp)
         self._balls = [slot for slot in tree.slots if isinstance(slot.freedom, Ball)]
         self._floating = [slot for slot in tree.slots if isinstance(slot.freedom, Floating)]
         self._quaternions = [slot.q for slot in self._balls] + [slot.q + 3 for slot in self._floating]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from importlib.metadata import version
 
-from crosscheck.engines.contract import Effort, EngineMissing, Model
-from crosscheck.engines.links import obstacle
-from crosscheck.engines.peer import PeerEngine
-from crosscheck.engines.scipy_loop import RTOL_LADDER
+from crosscheck.engines.contract import Effort, Model
+from crosscheck.engines.links import links, obstacle
+from crosscheck.engines.peer import PeerEngine, needed
+from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
 from flexmb.scene.schema import Scene
 
 
@@ -25,10 +25,8 @@ class DartEngine(PeerEngine):
     )
 
     def version(self) -> str:
-        try:
+        with needed("DART", "more-peers"):
             import dartpy  # noqa: F401
-        except ImportError as error:
-            raise EngineMissing("DART is not installed: pip install flexmb[more-peers]") from error
         return version("dartpy")
 
     def obstacle(self, scene: Scene) -> str:
@@ -38,9 +36,12 @@ class DartEngine(PeerEngine):
         return RTOL_LADDER
 
     def model(self, scene: Scene) -> Model:
-        from crosscheck.engines.dart.model import compiled
+        from crosscheck.engines.dart.dynamics import DartDynamics
+        from crosscheck.engines.dart.observer import DartObserver
+        from crosscheck.engines.dart.tree import build_tree
 
-        return compiled(scene)
+        dynamics = DartDynamics(build_tree(scene, links(scene)), scene)
+        return ScipyModel(scene, dynamics, DartObserver(dynamics, scene))
 
 
 def _open_loops_only(scene: Scene) -> str:

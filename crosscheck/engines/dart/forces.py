@@ -7,9 +7,8 @@ import numpy as np
 
 from crosscheck.engines.conventions import cross, rotation_vector
 from crosscheck.engines.dart.tree import DartTree
-from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Ball, Scalar, attachment
-from crosscheck.engines.rigid_tree import PointLoad
+from crosscheck.engines.links import Ball, attachment
+from crosscheck.engines.rigid_tree import PointLoad, motors, scalars
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -18,12 +17,11 @@ class DartJointForces:
     """Generalised forces (nv,) of springs, of dampers and of motors, from the scene's coordinates (nq,)."""
 
     def __init__(self, tree: DartTree) -> None:
-        scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
         balls = [slot for slot in tree.slots if isinstance(slot.freedom, Ball)]
         self._nv = tree.skeleton.getNumDofs()
-        self._springs = [slot for slot in scalars if slot.freedom.stiffness]
-        self._dampers = [slot for slot in scalars if slot.freedom.damping]
-        self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
+        self._springs = [slot for slot in scalars(tree.slots) if slot.freedom.stiffness]
+        self._dampers = [slot for slot in scalars(tree.slots) if slot.freedom.damping]
+        self._motors = motors(tree.slots)
         self._balls = [slot for slot in balls if slot.freedom.stiffness or slot.freedom.damping]
 
     def springs(self, q: Real) -> Real:

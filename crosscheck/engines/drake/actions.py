@@ -14,8 +14,8 @@ from crosscheck.engines.connections import WORLD, Along, Exerted, Moving
 from crosscheck.engines.conventions import quaternion_of, rotation_vector
 from crosscheck.engines.drake.tree import BALLAST, DrakeSlot, DrakeTree, ball_rotation
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Attachment, Scalar, attachment
-from crosscheck.engines.rigid_tree import PointLoad, TreeConnectors
+from crosscheck.engines.links import Attachment, attachment
+from crosscheck.engines.rigid_tree import PointLoad, TreeConnectors, motors, scalars
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -27,18 +27,18 @@ class JointActions:
     """
 
     def __init__(self, tree: DrakeTree, scene: Scene) -> None:
-        scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
+        single = scalars(tree.slots)
         self._connectors = TreeConnectors(scene, tree.links, tree.slots)
         self._nv = tree.plant.num_velocities()
-        self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
-        self._springs = [slot for slot in scalars if slot.freedom.stiffness < 0.0]
-        self._dampers = [slot for slot in scalars if slot.freedom.damping < 0.0]
+        self._motors = motors(tree.slots)
+        self._springs = [slot for slot in single if slot.freedom.stiffness < 0.0]
+        self._dampers = [slot for slot in single if slot.freedom.damping < 0.0]
         self._balls = [
             (k, slot)
             for k, slot in enumerate(tree.balls)
             if slot.freedom.stiffness or slot.freedom.damping < 0.0
         ]
-        self._sprung = [slot for slot in scalars if slot.freedom.stiffness]
+        self._sprung = [slot for slot in single if slot.freedom.stiffness]
 
     def __bool__(self) -> bool:
         return bool(self._motors or self._springs or self._dampers or self._balls or self._connectors.along_hinges)

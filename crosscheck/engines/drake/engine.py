@@ -5,9 +5,9 @@ from __future__ import annotations
 from importlib.metadata import version
 
 from crosscheck.engines.connections import KNOWN
-from crosscheck.engines.contract import Effort, EngineMissing, Model
+from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.links import links, obstacle
-from crosscheck.engines.peer import PeerEngine, inertia_obstacle
+from crosscheck.engines.peer import PeerEngine, inertia_obstacle, needed
 from flexmb.scene.schema import Scene
 
 
@@ -19,10 +19,8 @@ class DrakeEngine(PeerEngine):
     summary = "rigid trees in minimal coordinates, error-controlled Runge-Kutta 5"
 
     def version(self) -> str:
-        try:
+        with needed("Drake", "more-peers"):
             import pydrake  # noqa: F401
-        except ImportError as error:
-            raise EngineMissing("Drake is not installed: pip install flexmb[more-peers]") from error
         return version("drake")
 
     def obstacle(self, scene: Scene) -> str:

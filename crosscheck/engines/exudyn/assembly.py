@@ -17,8 +17,8 @@ from crosscheck.engines.exudyn.loads import along_axis
 from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
 from crosscheck.engines.exudyn.motion import AT_REST, FrameMotion, across_quaternion
 from crosscheck.engines.functions_of_time import Profile, profile
-from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.connectors import BetweenNodes
+from flexmb.scene.ends import ends
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.hinges import Free, Hinge
 from flexmb.scene.modal_data import modal_arrays
@@ -147,9 +147,7 @@ def _held_nodes(scene: Scene) -> dict[str, set[str]]:
     bodies = {body.name: body for body in scene.bodies}
     users = [(hinge.parent, hinge.parent_node) for hinge in scene.hinges if hinge.parent != GROUND]
     users += [(item.body, item.node) for item in (*scene.wheels, *scene.point_masses)]
-    ends = [(each.body_a, each.node_a) for each in scene.closures]
-    ends += [(each.body_b, each.node_b) for each in scene.closures]
-    users += [(body, node) for body, node in ends if body != GROUND]
+    users += [(end.body, end.node) for each in scene.closures for end in ends(each) if end.body != GROUND]
     for name, node in users:
         if deforming(bodies[name], node):
             held[name].add(node)
@@ -268,11 +266,9 @@ def _section_marker(shop: Workshop, parent: Placed, node: str) -> int:
 
 def _closure(shop: Workshop, placed: dict[str, Placed], closure: Closure) -> ExudynLink:
     """A joint between two frames that exist already."""
-    a = frame(closure.position_a_m, closure.quaternion_a)
-    b = frame(closure.position_b_m, closure.quaternion_b)
-    ports = []
-    for body, node, own in ((closure.body_a, closure.node_a, a), (closure.body_b, closure.node_b, b)):
-        ports.append(_end(shop, placed, body, node, own))
+    ports = [
+        _end(shop, placed, each.body, each.node, frame(each.position_m, each.quaternion)) for each in ends(closure)
+    ]
     return joints.closure(shop, closure.name, closure.type, ports, _unit(closure.axis))
 
 
@@ -286,15 +282,14 @@ def _end(shop: Workshop, placed: dict[str, Placed], body: str, node: str, own: F
 def _connect(shop: Workshop, placed: dict[str, Placed], connector: BetweenNodes) -> None:
     """A connector between two frames that exist already."""
     still = NodeShape(np.zeros(3), np.eye(3), *np.zeros((2, 3, 0)))
-    ends = []
-    for side in "ab":
-        own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
-        body, node = getattr(connector, f"body_{side}"), getattr(connector, f"node_{side}")
-        if body == GROUND:
-            ends.append(springs.ConnectorEnd(shop.ground, still, own))
+    held = []
+    for end in ends(connector):
+        own = frame(end.position_m, end.quaternion)
+        if end.body == GROUND:
+            held.append(springs.ConnectorEnd(shop.ground, still, own))
         else:
-            ends.append(springs.ConnectorEnd(placed[body].carrier, placed[body].shape(node), own))
-    springs.between(shop, connector, ends)
+            held.append(springs.ConnectorEnd(placed[end.body].carrier, placed[end.body].shape(end.node), own))
+    springs.between(shop, connector, held)
 
 
 def _connect_along(shop: Workshop, scene: Scene, kinds: Sequence[dict[str, ExudynLink]]) -> None:

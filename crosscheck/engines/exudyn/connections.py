@@ -13,8 +13,8 @@ from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.balance import coordinate, coordinate_rate
 from crosscheck.engines.exudyn.markers import marker_path
 from crosscheck.engines.exudyn.state import CarrierPath, States
-from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.connectors import BetweenNodes
+from flexmb.scene.ends import EndFrame, ends
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
 
@@ -48,7 +48,7 @@ def _between(assembly: Assembly, states: States, paths: Paths) -> dict[str, list
     found = {}
     for connector in assembly.scene.connectors:
         if isinstance(connector, BetweenNodes):
-            a, b = (_moving(assembly, connector, side, paths, len(states.times)) for side in "ab")
+            a, b = (_moving(assembly, end, paths, len(states.times)) for end in ends(connector))
             law = exerts(connector)
             found[connector.name] = [law(t, *ends) for t, *ends in zip(states.times.tolist(), a, b, strict=True)]
     return found
@@ -63,13 +63,12 @@ def _along(assembly: Assembly, times: list[float], paths: Paths) -> dict[str, li
     return found
 
 
-def _moving(assembly: Assembly, connector: BetweenNodes, side: str, paths: Paths, count: int) -> list[Moving]:
-    body = getattr(connector, f"body_{side}")
-    own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
-    if body == GROUND:
+def _moving(assembly: Assembly, end: EndFrame, paths: Paths, count: int) -> list[Moving]:
+    own = frame(end.position_m, end.quaternion)
+    if end.body == GROUND:
         return [Moving(own.position, own.rotation, np.zeros(3), np.zeros(3))] * count
-    placed = assembly.bodies[body]
-    path = marker_path(paths[placed.carrier.key], placed.shape(getattr(connector, f"node_{side}")), own.position)
+    placed = assembly.bodies[end.body]
+    path = marker_path(paths[placed.carrier.key], placed.shape(end.node), own.position)
     turns: Real = Rotation.from_quat(path.quaternion, scalar_first=True).as_matrix() @ own.rotation
     motion = zip(path.position, turns, path.velocity[:, :3], path.velocity[:, 3:], strict=True)
     return [Moving(*each) for each in motion]

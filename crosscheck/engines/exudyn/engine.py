@@ -24,8 +24,9 @@ class ExudynEngine:
         "Its own solvers in their own C++ loop, without files, messages or contacts. Linear algebra is dense for "
         "small scenes and Eigen's sparse one for large ones, whichever is faster. A sensor in Python takes the state "
         "at every sample, and functions of time are called in Python where a scene has them; both are in the timed "
-        "solve. A single free body is restarted at every sample, as its solver does not stop there by itself. Where "
-        "Newton's method does not reach the first tolerance, the solve is made again with the next, and all count."
+        "solve. A single free body is restarted at every sample, as its solver does not stop there by itself. Newton's "
+        "method keeps its Jacobian as long as it contracts. Where it does not reach the first tolerance, the solve is "
+        "made again with other settings, and only the one that is taken counts as time."
     )
 
     def version(self) -> str:

@@ -8,6 +8,7 @@ from typing import assert_never
 from crosscheck.engines.contract import Support
 from crosscheck.engines.exudyn.assembly import deforming, flexible
 from crosscheck.engines.links import first_armature, first_screw
+from flexmb.scene.ends import ends
 from flexmb.scene.hinges import Free
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import BeamBody, Body, ModalBody, RigidBody, Scene, SidBody
@@ -84,8 +85,7 @@ def _approximations(scene: Scene) -> Iterator[str]:
         if deforming(bodies[item.body], item.node):
             yield f'"{item.name}": {NOT_WORKLESS}'
     for closure in scene.closures:
-        ends = ((closure.body_a, closure.node_a), (closure.body_b, closure.node_b))
-        if any(body != GROUND and deforming(bodies[body], node) for body, node in ends):
+        if any(end.body != GROUND and deforming(bodies[end.body], end.node) for end in ends(closure)):
             yield f'closure "{closure.name}": {NOT_WORKLESS}'
     for load in scene.loads:
         turning = load.type == "torque" or load.frame == "node"

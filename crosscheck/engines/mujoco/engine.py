@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from crosscheck.engines.connections import KNOWN
-from crosscheck.engines.contract import Effort, EngineMissing, Model, Support
+from crosscheck.engines.contract import Effort, Model, Support
 from crosscheck.engines.links import links, obstacle
 from crosscheck.engines.pace import pace
-from crosscheck.engines.peer import PeerEngine, inertia_obstacle
+from crosscheck.engines.peer import PeerEngine, inertia_obstacle, needed
 from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.scene.schema import Scene
 
@@ -28,10 +28,8 @@ class MujocoEngine(PeerEngine):
     )
 
     def version(self) -> str:
-        try:
+        with needed("MuJoCo", "peers"):
             import mujoco
-        except ImportError as error:
-            raise EngineMissing("MuJoCo is not installed: pip install flexmb[peers]") from error
         return mujoco.__version__
 
     def obstacle(self, scene: Scene) -> str:

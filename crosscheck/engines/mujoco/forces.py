@@ -14,7 +14,7 @@ from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Attachment, Ball, Floating, Scalar, attachment
 from crosscheck.engines.mujoco.connections import MujocoConnections
 from crosscheck.engines.mujoco.tree import ARMATURE, MujocoSlot, MujocoTree
-from crosscheck.engines.rigid_tree import PointLoad
+from crosscheck.engines.rigid_tree import PointLoad, motors
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -27,11 +27,10 @@ class Forces:
     """
 
     def __init__(self, tree: MujocoTree, scene: Scene) -> None:
-        scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
         self.driven: list[MujocoSlot] = [slot for slot in tree.slots if slot.driven]
         self._tree = tree
         self._motions = [(slot.q, slot.v, profile(slot.freedom.prescribed)) for slot in self.driven]
-        self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
+        self._motors = motors(tree.slots)
         self._pushed: tuple[float, list[tuple[int, float]]] = np.nan, []  # the last result of `_pushes`, with its time
         self._loads = [_BodyWrench(tree, attachment(scene, tree.links, load), load) for load in scene.loads]
         self.connections = MujocoConnections(tree, scene)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pinocchio as pin
 
 from crosscheck.engines.connections import WORLD, Along, Exerted, Moving
+from crosscheck.engines.conventions import cross
 from crosscheck.engines.links import Attachment
 from crosscheck.engines.pinocchio.tree import PinocchioTree
 from crosscheck.engines.rigid_tree import TreeConnectors
@@ -27,16 +27,15 @@ class PinocchioConnections:
         """What connectors between nodes do, by name."""
         return self._connectors.exerted(t, lambda at: self._frame(at, data))
 
-    def add(self, t: float, data: pin.Data, total: pin.StdVec_Force) -> None:
-        """Add their wrenches to those of the joints."""
-        for at, load in self._connectors.loads(self.exerted(t, data)):
+    def add(self, t: float, data: pin.Data, total: pin.StdVec_Force) -> float:
+        """Add their wrenches to those of the joints; their power (W)."""
+        exerted = self.exerted(t, data)
+        for at, load in self._connectors.loads(exerted):
             joint = self._joints[at.link]
             back, arm = data.oMi[joint].rotation.T, at.frame.position
             force = back @ load[3:]
-            total[joint] = total[joint] + pin.Force(force, back @ load[:3] + np.cross(arm, force))
-
-    def power(self, t: float, data: pin.Data) -> float:
-        return sum(each.power for each in self.exerted(t, data).values())
+            total[joint] = total[joint] + pin.Force(force, back @ load[:3] + cross(arm, force))
+        return sum(each.power for each in exerted.values())
 
     def along(self, t: float, q: Real, v: Real) -> dict[str, tuple[int, Along]]:
         """By name the speed that a connector along a hinge acts on, and what it does."""

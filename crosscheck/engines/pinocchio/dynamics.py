@@ -19,6 +19,7 @@ from crosscheck.engines.pinocchio.closures import PinocchioClosures
 from crosscheck.engines.pinocchio.connections import PinocchioConnections
 from crosscheck.engines.pinocchio.forces import JointForces, PlacedLoads
 from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, initial_state, places
+from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -31,6 +32,14 @@ class PinocchioSolution(NamedTuple):
 
     acceleration: Real
     drive: Real
+    power: float
+
+
+class Acting(NamedTuple):
+    """Generalised forces (nv,), wrenches on joints and power (W) of all that acts but gravity and drives."""
+
+    tau: Real
+    wrenches: pin.StdVec_Force | None
     power: float
 
 
@@ -65,12 +74,16 @@ class Dynamics:
         turning = [slot for slot in tree.slots if not isinstance(slot.freedom, Scalar)]
         self._turning = [(slot, int(np.searchsorted(free_q, _quaternion_start(slot)))) for slot in turning]
         self._undriven = np.zeros(0)
+        self._moved = any(not isinstance(slot.freedom.prescribed, Constant) for slot in self.driven)
+        self._plain = not self.driven and not turning
 
     def initial(self) -> Real:
         q, v = initial_state(self.tree)
         return np.concatenate([q[self._free_q], v[self._free_v], [0.0]])
 
     def state(self, t: float, y: Real) -> PinocchioState:
+        if self._plain:
+            return PinocchioState(y[: self._free_count], y[self._free_count : -1], self._undriven)
         q, v = np.empty(self.tree.model.nq), np.empty(self.tree.model.nv)
         split = self._free_count
         q[self._free_q], v[self._free_v] = y[:split], y[split:-1]
@@ -88,29 +101,29 @@ class Dynamics:
 
         With driven coordinates, their rows of the inverse dynamics are the drives.
         """
+        acting = self._acting(t, state)
+        a, drive, D = self._accelerations(state, acting), self._undriven, self._driven_v
+        if self.driven:
+            drive = self.inverse(state, a, acting.wrenches)[D] - acting.tau[D]
+        return PinocchioSolution(a, drive, acting.power + float(drive @ state.v[D]))
+
+    def _acting(self, t: float, state: PinocchioState) -> Acting:
         tau, power = self.forces.springs(state.q), 0.0
         if self.forces.loses:
             lost = self.forces.dampers_and_motors(t, state.v)
-            tau, power = tau + lost, lost @ state.v
-        held = self.connections.along(t, state.q, state.v).values()
-        for speed, each in held:
+            tau, power = tau + lost, float(lost @ state.v)
+        for speed, each in self.connections.along(t, state.q, state.v).values():
             tau[speed] += each.load
-        wrenches = self._wrenches(t, state)
-        D = self._driven_v
-        if self.closures:  # nothing is driven beside them
-            a, drive = self.closures.solve(state.q, state.v, tau + self._generalised(state, wrenches)), np.zeros(0)
-        else:
-            a = self._hybrid(state, tau, wrenches)
-            drive = self.inverse(state, a, wrenches)[D] - tau[D] if self.driven else self._undriven
-        if self.driven:
-            power += drive @ state.v[D]
-        if self.loads:
-            power += self.loads.power(t, self.data)
-        for _, each in held:
             power += each.power
-        if self.connections:
-            power += self.connections.power(t, self.data)
-        return PinocchioSolution(a, drive, float(power))
+        if not (self.loads or self.connections):
+            return Acting(tau, None, power)
+        wrenches, working = self._wrenches(t, state)
+        return Acting(tau, wrenches, power + working)
+
+    def _accelerations(self, state: PinocchioState, acting: Acting) -> Real:
+        if self.closures:  # nothing is driven beside them
+            return self.closures.solve(state.q, state.v, acting.tau + self._generalised(state, acting.wrenches))
+        return self._hybrid(state, acting.tau, acting.wrenches)
 
     def _hybrid(self, state: PinocchioState, tau: Real, wrenches: pin.StdVec_Force | None) -> Real:
         """Accelerations (nv,) of a tree with driven coordinates.
@@ -118,10 +131,11 @@ class Dynamics:
         Hybrid dynamics as a limit: a driven joint has the armature `BALLAST` and the effort BALLAST * acceleration, so
         nothing else moves it. Its acceleration is off by the drive load / BALLAST, which is below round-off.
         """
-        effort = tau.copy()
-        effort[self._driven_v] = BALLAST * state.driven
+        if self.driven:
+            tau = tau.copy()
+            tau[self._driven_v] = BALLAST * state.driven
         extra = () if wrenches is None else (wrenches,)
-        return np.asarray(pin.aba(self._ballasted, self._ballasted_data, state.q, state.v, effort, *extra))
+        return np.asarray(pin.aba(self._ballasted, self._ballasted_data, state.q, state.v, tau, *extra))
 
     def _generalised(self, state: PinocchioState, wrenches: pin.StdVec_Force | None) -> Real:
         """(nv,) of wrenches on joints: constrained dynamics takes none, so they become efforts."""
@@ -138,7 +152,7 @@ class Dynamics:
 
     def resolve_loads(self, t: float, state: PinocchioState, acceleration: Real) -> None:
         """Fill `data.f` with the wrench of parent on child of every joint, in joint axes about the joint origin."""
-        wrenches = self._wrenches(t, state)
+        wrenches = self._wrenches(t, state)[0] if self.loads or self.connections else None
         if self.closures:
             closing = self.closures.on_joints()
             for joint, applied in enumerate(wrenches or ()):
@@ -147,14 +161,20 @@ class Dynamics:
         self.inverse(state, acceleration, wrenches)
 
     def rate(self, t: float, y: Real) -> Real:
-        """dy/dt."""
+        """dy/dt. The loads of drives are found only where one moves, as those of others do no work."""
         state = self.state(t, y)
-        solution = self.solve(t, state)
+        if self._moved:
+            a, _, power = self.solve(t, state)
+        else:
+            acting = self._acting(t, state)
+            a, power = self._accelerations(state, acting), acting.power
+        if self._plain:
+            return np.concatenate([state.v, a, [power]])
         qdot = np.empty(self.tree.model.nq)
         qdot[self._scalar_q] = state.v[self._scalar_v]
         for slot, first in self._turning:
             self._turning_rate(slot, y[first : first + 4], state, qdot)
-        return np.concatenate([qdot[self._free_q], solution.acceleration[self._free_v], [solution.power]])
+        return np.concatenate([qdot[self._free_q], a[self._free_v], [power]])
 
     def _turning_rate(self, slot: PinocchioSlot, own: Real, state: PinocchioState, qdot: Real) -> None:
         """Rates of ball and free-flyer coordinates; the quaternion's `own` (not normalised) value enters its rate."""
@@ -171,13 +191,11 @@ class Dynamics:
                 assert_never(slot.freedom)
         qdot[start : start + 4] = scalar_last(quaternion_rate(scalar_first(own).tolist(), omega.tolist()))
 
-    def _wrenches(self, t: float, state: PinocchioState) -> pin.StdVec_Force | None:
-        if not (self.loads or self.connections):
-            return None
+    def _wrenches(self, t: float, state: PinocchioState) -> tuple[pin.StdVec_Force, float]:
+        """Of loads at nodes and connectors between nodes, and their power (W)."""
         pin.forwardKinematics(self.tree.model, self.data, state.q, state.v)
-        wrenches = self.loads.wrenches(t, self.data)
-        self.connections.add(t, self.data, wrenches)
-        return wrenches
+        wrenches, power = self.loads.wrenches(t, self.data)
+        return wrenches, power + self.connections.add(t, self.data, wrenches)
 
 
 def _quaternion_start(slot: PinocchioSlot) -> int:

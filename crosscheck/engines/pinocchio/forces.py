@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from crosscheck.engines.conventions import rotation_vector, scalar_first
+from crosscheck.engines.conventions import cross, rotation_vector, scalar_first
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Scalar, attachment
 from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, Places, places
@@ -37,7 +37,8 @@ class JointForces:
 
     def springs(self, q: Real) -> Real:
         tau = np.zeros(self._nv)
-        tau[self._spring_v] = -self._stiffness * (q[self._spring_q] - self._rest)
+        if len(self._stiffness):
+            tau[self._spring_v] = -self._stiffness * (q[self._spring_q] - self._rest)
         for slot in self._balls:
             tau[slot.v : slot.v + 3] = -slot.freedom.stiffness * _turn(slot, q)
         return tau
@@ -64,20 +65,20 @@ class PlacedLoads:
 
     def __init__(self, tree: PinocchioTree, scene: Scene) -> None:
         self._loads = [_JointWrench(tree, scene, load) for load in scene.loads]
-        self._joints = tree.model.njoints
+        self._none = pin.StdVec_Force()
+        self._none.extend([pin.Force.Zero() for _ in range(tree.model.njoints)])
 
     def __bool__(self) -> bool:
         return bool(self._loads)
 
-    def wrenches(self, t: float, data: pin.Data) -> pin.StdVec_Force:
-        total = pin.StdVec_Force()
-        total.extend([pin.Force.Zero() for _ in range(self._joints)])
+    def wrenches(self, t: float, data: pin.Data) -> tuple[pin.StdVec_Force, float]:
+        """Of all joints, and their power (W)."""
+        total, power = pin.StdVec_Force(self._none), 0.0
         for load in self._loads:
-            total[load.joint] = total[load.joint] + load.wrench(t, data)
-        return total
-
-    def power(self, t: float, data: pin.Data) -> float:
-        return sum(load.wrench(t, data).dot(data.v[load.joint]) for load in self._loads)
+            wrench = load.wrench(t, data)
+            total[load.joint] = total[load.joint] + wrench
+            power += wrench.dot(data.v[load.joint])
+        return total, power
 
 
 class _JointWrench:
@@ -90,7 +91,7 @@ class _JointWrench:
         R = data.oMi[self.joint].rotation
         vector = self._load.in_body(t, R)
         if self._load.is_force:
-            return pin.Force(vector, np.cross(self._load.point, vector))
+            return pin.Force(vector, cross(self._load.point, vector))
         return pin.Force(np.zeros(3), vector)
 
 

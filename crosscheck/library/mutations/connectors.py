@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import msgspec
+from msgspec.structs import replace
 
 from crosscheck.library.case import CaseError
-from crosscheck.library.mutations.edits import conjugate, multiplied, on_connector
-from crosscheck.library.mutations.mutation import DROPPED, FACTOR, Mutation, MutationTarget
+from crosscheck.library.mutations.edits import conjugated, multiplied, of_connector
+from crosscheck.library.mutations.mutation import DROPPED, FACTOR, Mutation, MutationTarget, SceneChange
 from flexmb.scene.connectors import Bushing, Connector, Matrix6, SpringDamper, by_stem
 from flexmb.scene.schema import Scene
 from flexmb.scene.units import split_unit
@@ -29,38 +29,34 @@ def connectors(scene: Scene) -> Iterator[MutationTarget]:
         yield MutationTarget(each.name, kind if acts == "both" else f"{kind} in {acts}")
 
 
-def _scaled(stems: tuple[str, ...], factor: float) -> Callable[[Scene, str], Scene]:
+def _scaled(stems: tuple[str, ...], factor: float) -> SceneChange:
     """The numbers of a connector under keys with these stems, times a factor."""
 
     def changed(connector: Connector) -> Connector:
         keys = [key for key in connector.__struct_fields__ if split_unit(key)[0] in stems]
         return multiplied(connector, keys, factor)
 
-    return lambda scene, target: on_connector(scene, target, changed)
+    return of_connector(changed)
 
 
-def _both_ways(scene: Scene, target: str) -> Scene:
-    def changed(connector: Connector) -> Connector:
-        if not isinstance(connector, SpringDamper):
-            raise CaseError(f'connector "{connector.name}" acts both ways')
-        return msgspec.structs.replace(connector, acts="both")
-
-    return on_connector(scene, target, changed)
+@of_connector
+def _both_ways(connector: Connector) -> Connector:
+    if not isinstance(connector, SpringDamper):
+        raise CaseError(f'connector "{connector.name}" acts both ways')
+    return replace(connector, acts="both")
 
 
-def _of_bushing(change: Callable[[Bushing], Bushing]) -> Callable[[Scene, str], Scene]:
+def _of_bushing(change: Callable[[Bushing], Bushing]) -> SceneChange:
     def changed(connector: Connector) -> Connector:
         if not isinstance(connector, Bushing):
             raise CaseError(f'connector "{connector.name}" has no frames: a bushing has')
         return change(connector)
 
-    return lambda scene, target: on_connector(scene, target, changed)
+    return of_connector(changed)
 
 
 def _transposed(bushing: Bushing) -> Bushing:
-    return msgspec.structs.replace(
-        bushing, quaternion_a=conjugate(bushing.quaternion_a), quaternion_b=conjugate(bushing.quaternion_b)
-    )
+    return conjugated(bushing, "quaternion_a", "quaternion_b")
 
 
 def _ends_exchanged(bushing: Bushing) -> Bushing:
@@ -68,9 +64,7 @@ def _ends_exchanged(bushing: Bushing) -> Bushing:
     at = {key: getattr(bushing, key) for key in bushing.__struct_fields__}
     other = {"a": "b", "b": "a"}
     keys = ("body_{}", "node_{}", "position_{}_m", "quaternion_{}")
-    return msgspec.structs.replace(
-        bushing, **{key.format(end): at[key.format(other[end])] for key in keys for end in other}
-    )
+    return replace(bushing, **{key.format(end): at[key.format(other[end])] for key in keys for end in other})
 
 
 def _linear_first(bushing: Bushing) -> Bushing:
@@ -78,7 +72,7 @@ def _linear_first(bushing: Bushing) -> Bushing:
         order = (3, 4, 5, 0, 1, 2)
         return tuple(tuple(matrix[i][j] for j in order) for i in order)
 
-    return msgspec.structs.replace(bushing, stiffness=exchanged(bushing.stiffness), damping=exchanged(bushing.damping))
+    return replace(bushing, stiffness=exchanged(bushing.stiffness), damping=exchanged(bushing.damping))
 
 
 def _never_pressed(scene: Scene, target: str) -> str:

@@ -6,74 +6,59 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
 import msgspec
+from msgspec.structs import replace
 
 from crosscheck.library.case import CaseError
-from crosscheck.library.mutations.mutation import FACTOR, MutationTarget
-from flexmb.scene.bodies import BeamNode, Body, ModalNode, Node, Quaternion, SidBody, Vector
-from flexmb.scene.connectors import Connector
-from flexmb.scene.control import Controller, Sensor
-from flexmb.scene.events import SceneEvent
-from flexmb.scene.hinges import Closure, Hinge
-from flexmb.scene.schema import Load, PointMass, Scene, Wheel
+from crosscheck.library.mutations.mutation import FACTOR, MutationTarget, SceneChange
+from flexmb.scene.bodies import BeamBody, BeamNode, Body, ModalNode, Node, Quaternion, SidBody, Vector
+from flexmb.scene.hinges import Hinge
+from flexmb.scene.schema import Scene
 from flexmb.scene.tree import Coordinate, coordinates, with_coordinates
 
 AnyNode = Node | BeamNode | ModalNode
 Struct = TypeVar("Struct", bound=msgspec.Struct)
-Named = TypeVar(
-    "Named", Body, Hinge, Wheel, Load, Closure, Connector, PointMass, Sensor, Controller, SceneEvent
-)
 
 
-def on_body(scene: Scene, target: str, change: Callable[[Body], Body]) -> Scene:
-    return msgspec.structs.replace(scene, bodies=replaced(scene.bodies, target, change))
+def _of(collection: str) -> Callable[[Callable[[Any], Any]], SceneChange]:
+    """A decorator by which the change of one item becomes that of the item with the name `target` in a scene."""
+
+    def of_item(change: Callable[[Any], Any]) -> SceneChange:
+        def changed(scene: Scene, target: str) -> Scene:
+            return replace(scene, **{collection: replaced(getattr(scene, collection), target, change)})
+
+        return changed
+
+    return of_item
 
 
-def on_hinge(scene: Scene, target: str, change: Callable[[Hinge], Hinge]) -> Scene:
-    return msgspec.structs.replace(scene, hinges=replaced(scene.hinges, target, change))
+of_body, of_hinge, of_wheel, of_load = _of("bodies"), _of("hinges"), _of("wheels"), _of("loads")
+of_closure, of_connector, of_point_mass = _of("closures"), _of("connectors"), _of("point_masses")
+of_sensor, of_controller, of_event = _of("sensors"), _of("controllers"), _of("events")
 
 
-def on_wheel(scene: Scene, target: str, change: Callable[[Wheel], Wheel]) -> Scene:
-    return msgspec.structs.replace(scene, wheels=replaced(scene.wheels, target, change))
+def of_coordinates(change: Callable[[Coordinate], Coordinate]) -> SceneChange:
+    """The same for each scalar coordinate of a hinge."""
+    return of_hinge(lambda hinge: with_each_coordinate(hinge, change))
 
 
-def on_load(scene: Scene, target: str, change: Callable[[Load], Load]) -> Scene:
-    return msgspec.structs.replace(scene, loads=replaced(scene.loads, target, change))
+def of_node(change: Callable[[AnyNode], AnyNode]) -> SceneChange:
+    """The same for the node "body.node" (only body names may contain dots here)."""
+
+    def changed(scene: Scene, target: str) -> Scene:
+        body_name, _, node_name = target.rpartition(".")
+
+        def with_node(body: Body) -> Body:
+            if isinstance(body, SidBody):
+                raise CaseError(f'body "{body.name}" keeps its nodes in a file: this mutation needs them inline')
+            nodes = tuple(change(node) if node.name == node_name else node for node in body.nodes)
+            return replace(body, nodes=nodes)
+
+        return of_body(with_node)(scene, body_name)
+
+    return changed
 
 
-def on_closure(scene: Scene, target: str, change: Callable[[Closure], Closure]) -> Scene:
-    return msgspec.structs.replace(scene, closures=replaced(scene.closures, target, change))
-
-
-def on_connector(scene: Scene, target: str, change: Callable[[Any], Any]) -> Scene:
-    return msgspec.structs.replace(scene, connectors=replaced(scene.connectors, target, change))
-
-
-def on_sensor(scene: Scene, target: str, change: Callable[[Any], Any]) -> Scene:
-    return msgspec.structs.replace(scene, sensors=replaced(scene.sensors, target, change))
-
-
-def on_controller(scene: Scene, target: str, change: Callable[[Controller], Controller]) -> Scene:
-    return msgspec.structs.replace(scene, controllers=replaced(scene.controllers, target, change))
-
-
-def on_event(scene: Scene, target: str, change: Callable[[SceneEvent], SceneEvent]) -> Scene:
-    return msgspec.structs.replace(scene, events=replaced(scene.events, target, change))
-
-
-def on_node(scene: Scene, target: str, change: Callable[[AnyNode], AnyNode]) -> Scene:
-    """The scene with node "body.node" changed (only body names may contain dots here)."""
-    body_name, _, node_name = target.rpartition(".")
-
-    def with_node(body: Body) -> Body:
-        if isinstance(body, SidBody):
-            raise CaseError(f'body "{body.name}" keeps its nodes in a file: this mutation needs them inline')
-        nodes = tuple(change(node) if node.name == node_name else node for node in body.nodes)
-        return msgspec.structs.replace(body, nodes=nodes)
-
-    return on_body(scene, body_name, with_node)
-
-
-def replaced(items: tuple[Named, ...], target: str, change: Callable[[Named], Named]) -> tuple[Named, ...]:
+def replaced(items: tuple[Any, ...], target: str, change: Callable[[Any], Any]) -> tuple[Any, ...]:
     """The items with the one called `target` changed; CaseError lists the names."""
     if all(item.name != target for item in items):
         known = ", ".join(item.name for item in items) or "none"
@@ -138,15 +123,30 @@ def multiplied(item: Struct, keys: Iterable[str], factor: float) -> Struct:
             return None
         return scaled(value, factor) if isinstance(value, tuple) else factor * value
 
-    return msgspec.structs.replace(item, **{key: times(getattr(item, key)) for key in keys})
+    return replace(item, **{key: times(getattr(item, key)) for key in keys})
+
+
+def more(of_item: Callable[[Callable[[Any], Any]], SceneChange], *keys: str) -> SceneChange:
+    """+1 % of an item's numbers under these keys."""
+    return of_item(lambda item: multiplied(item, keys, FACTOR))
+
+
+def scaled_stations(beam: BeamBody, keys: Iterable[str]) -> BeamBody:
+    """+1 % of the numbers under these keys at every station of a beam."""
+    return replace(beam, stations=tuple(multiplied(station, keys, FACTOR) for station in beam.stations))
 
 
 def opposite(vector: Vector) -> Vector:
     return (-vector[0], -vector[1], -vector[2])
 
 
-def conjugate(quaternion: Quaternion) -> Quaternion:
-    return (quaternion[0], -quaternion[1], -quaternion[2], -quaternion[3])
+def conjugated(item: Struct, *keys: str) -> Struct:
+    """A struct with its quaternions under these keys conjugated, which transposes their rotations."""
+
+    def conjugate(quaternion: Quaternion) -> Quaternion:
+        return (quaternion[0], -quaternion[1], -quaternion[2], -quaternion[3])
+
+    return replace(item, **{key: conjugate(getattr(item, key)) for key in keys})
 
 
 def _tag(item: Body | Hinge) -> str:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-import msgspec
+from msgspec.structs import replace
 
-from crosscheck.library.mutations.edits import on_event
-from crosscheck.library.mutations.mutation import FACTOR, HUNDREDTH, LESS, Mutation, MutationTarget
+from crosscheck.library.mutations.edits import of_event
+from crosscheck.library.mutations.mutation import FACTOR, HUNDREDTH, LESS, Mutation, MutationTarget, SceneChange
 from crosscheck.library.time_functions import scaled
 from flexmb.scene.events import Action, Change, Impact, Latch, SceneEvent
 from flexmb.scene.functions import Function
@@ -23,11 +23,11 @@ def events(scene: Scene) -> Iterator[MutationTarget]:
         yield MutationTarget(each.name, "event: " + ", ".join(str(act.__struct_config__.tag) for act in each.actions))
 
 
-def _of_actions(change: Callable[[Action], Action]) -> Callable[[Scene, str], Scene]:
+def _of_actions(change: Callable[[Action], Action]) -> SceneChange:
     def changed(event: SceneEvent) -> SceneEvent:
-        return msgspec.structs.replace(event, actions=tuple(map(change, event.actions)))
+        return replace(event, actions=tuple(map(change, event.actions)))
 
-    return lambda scene, target: on_event(scene, target, changed)
+    return of_event(changed)
 
 
 def _begins(scene: Scene, event: SceneEvent) -> float:
@@ -47,9 +47,9 @@ def _begins(scene: Scene, event: SceneEvent) -> float:
 def _level(scene: Scene, target: str) -> Scene:
     def farther(event: SceneEvent) -> SceneEvent:
         way = event.level - _begins(scene, event)
-        return msgspec.structs.replace(event, level=event.level + HUNDREDTH * way)
+        return replace(event, level=event.level + HUNDREDTH * way)
 
-    return on_event(scene, target, farther)
+    return of_event(farther)(scene, target)
 
 
 def _crossing(scene: Scene, target: str) -> Scene:
@@ -57,13 +57,13 @@ def _crossing(scene: Scene, target: str) -> Scene:
 
     def changed(event: SceneEvent) -> SceneEvent:
         against = "falling" if _begins(scene, event) < event.level else "rising"
-        return msgspec.structs.replace(event, crossing=OTHER_WAY.get(event.crossing, against))
+        return replace(event, crossing=OTHER_WAY.get(event.crossing, against))
 
-    return on_event(scene, target, changed)
+    return of_event(changed)(scene, target)
 
 
 def _dropped(scene: Scene, target: str) -> Scene:
-    return msgspec.structs.replace(scene, events=tuple(each for each in scene.events if each.name != target))
+    return replace(scene, events=tuple(each for each in scene.events if each.name != target))
 
 
 def _not_held(action: Action) -> Action:
@@ -72,7 +72,7 @@ def _not_held(action: Action) -> Action:
 
 def _softer(action: Action) -> Action:
     if isinstance(action, Impact):
-        return msgspec.structs.replace(action, restitution=LESS * action.restitution)
+        return replace(action, restitution=LESS * action.restitution)
     return action
 
 
@@ -81,14 +81,12 @@ def _larger(action: Action) -> Action:
         return action
     value = action.value
     larger = scaled(value, FACTOR) if isinstance(value, Function) else FACTOR * value
-    return msgspec.structs.replace(action, value=larger)
+    return replace(action, value=larger)
 
 
-def _backwards(scene: Scene, target: str) -> Scene:
-    def changed(event: SceneEvent) -> SceneEvent:
-        return msgspec.structs.replace(event, actions=event.actions[::-1])
-
-    return on_event(scene, target, changed)
+@of_event
+def _backwards(event: SceneEvent) -> SceneEvent:
+    return replace(event, actions=event.actions[::-1])
 
 
 MUTATIONS = (

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-import msgspec
+from msgspec.structs import replace
 
 from crosscheck.library.case import CaseError
-from crosscheck.library.mutations.edits import multiplied, on_controller, on_sensor
-from crosscheck.library.mutations.mutation import FACTOR, HUNDREDTH, OPPOSITE, Mutation, MutationTarget
+from crosscheck.library.mutations.edits import multiplied, of_controller, of_sensor
+from crosscheck.library.mutations.mutation import FACTOR, HUNDREDTH, OPPOSITE, Mutation, MutationTarget, SceneChange
 from flexmb.scene.check.control import named, sensor_width
 from flexmb.scene.control import (
     Controller,
@@ -43,24 +43,24 @@ def sensors(scene: Scene) -> Iterator[MutationTarget]:
         yield MutationTarget(each.name, f"{each.__struct_config__.tag} sensor {what}".strip())
 
 
-def _scaled(keys: Keys, factor: float) -> Callable[[Scene, str], Scene]:
+def _scaled(keys: Keys, factor: float) -> SceneChange:
     """The numbers of a controller under these keys of its kind, times a factor."""
 
     def changed(controller: Controller) -> Controller:
         return multiplied(controller, keys.get(type(controller), ()), factor)
 
-    return lambda scene, target: on_controller(scene, target, changed)
+    return of_controller(changed)
 
 
-def _in_time(change: Callable[[Controller, float], dict[str, float]]) -> Callable[[Scene, str], Scene]:
+def _in_time(change: Callable[[Controller, float], dict[str, float]]) -> SceneChange:
     """A change of a sampled controller's timing by a function of its period (s)."""
 
     def changed(controller: Controller) -> Controller:
         if controller.period_s is None:
             raise CaseError(f'controller "{controller.name}" is continuous: it acts at all times')
-        return msgspec.structs.replace(controller, **change(controller, controller.period_s))
+        return replace(controller, **change(controller, controller.period_s))
 
-    return lambda scene, target: on_controller(scene, target, changed)
+    return of_controller(changed)
 
 
 def _sensor(scene: Scene, target: str) -> tuple[Sensor, int]:
@@ -80,18 +80,16 @@ def _reading(scene: Scene, target: str, instead: Callable[[int | None], tuple[st
         return instead(found.number) if found is not None and found.name == target else (reference,)
 
     return tuple(
-        msgspec.structs.replace(each, inputs=tuple(name for reference in each.inputs for name in signals(reference)))
+        replace(each, inputs=tuple(name for reference in each.inputs for name in signals(reference)))
         for each in scene.controllers
     )
 
 
-def _sensor_frame(scene: Scene, target: str) -> Scene:
-    def turned(sensor: Sensor) -> Sensor:
-        if not isinstance(sensor, MarkerSensor) or sensor.quantity == "orientation":
-            raise CaseError(f'what sensor "{sensor.name}" measures is in no axes')
-        return msgspec.structs.replace(sensor, frame="marker" if sensor.frame == "world" else "world")
-
-    return on_sensor(scene, target, turned)
+@of_sensor
+def _sensor_frame(sensor: Sensor) -> Sensor:
+    if not isinstance(sensor, MarkerSensor) or sensor.quantity == "orientation":
+        raise CaseError(f'what sensor "{sensor.name}" measures is in no axes')
+    return replace(sensor, frame="marker" if sensor.frame == "world" else "world")
 
 
 def _sensor_sign(scene: Scene, target: str) -> Scene:
@@ -113,7 +111,7 @@ def _sensor_sign(scene: Scene, target: str) -> Scene:
     def reversed_signals(number: int | None) -> tuple[str, ...]:
         return (reverse.name if number is None else f"{reverse.name}[{number}]",)
 
-    return msgspec.structs.replace(scene, controllers=(reverse, *_reading(scene, target, reversed_signals)))
+    return replace(scene, controllers=(reverse, *_reading(scene, target, reversed_signals)))
 
 
 def _sensor_component(scene: Scene, target: str) -> Scene:
@@ -125,7 +123,7 @@ def _sensor_component(scene: Scene, target: str) -> Scene:
     def exchanged(number: int | None) -> tuple[str, ...]:
         return tuple(f"{target}[{i}]" for i in (order if number is None else order[number : number + 1]))
 
-    return msgspec.structs.replace(scene, controllers=_reading(scene, target, exchanged))
+    return replace(scene, controllers=_reading(scene, target, exchanged))
 
 
 def _names(reference: str, sensor: str) -> bool:

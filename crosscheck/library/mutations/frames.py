@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import msgspec
+from msgspec.structs import replace
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import (
     AnyNode,
     closures,
-    conjugate,
+    conjugated,
     hinges,
+    more,
     nodes,
-    on_closure,
-    on_hinge,
-    on_node,
+    of_closure,
+    of_hinge,
+    of_node,
     scaled,
 )
 from crosscheck.library.mutations.mutation import LESS, Mutation
 from flexmb.scene.bodies import BeamNode, Quaternion
 from flexmb.scene.connectors import BetweenNodes
+from flexmb.scene.ends import ends
 from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.schema import Load, Marker, PointMass, Scene, Wheel
 
@@ -26,15 +28,9 @@ Mounted = Wheel | PointMass | Load | Marker
 EPS = 1e-15
 
 
-def _hinge_rotation(scene: Scene, target: str) -> Scene:
-    def transposed(hinge: Hinge) -> Hinge:
-        return msgspec.structs.replace(
-            hinge,
-            parent_quaternion=conjugate(hinge.parent_quaternion),
-            child_quaternion=conjugate(hinge.child_quaternion),
-        )
-
-    return on_hinge(scene, target, transposed)
+@of_hinge
+def _hinge_rotation(hinge: Hinge) -> Hinge:
+    return conjugated(hinge, "parent_quaternion", "child_quaternion")
 
 
 def _half_turn(*quaternions: Quaternion) -> str:
@@ -54,31 +50,16 @@ def _closure_idle(scene: Scene, target: str) -> str:
     return _half_turn(closure.quaternion_a, closure.quaternion_b)
 
 
-def _hinge_position(scene: Scene, target: str) -> Scene:
-    def farther(hinge: Hinge) -> Hinge:
-        return msgspec.structs.replace(
-            hinge,
-            parent_position_m=scaled(hinge.parent_position_m),
-            child_position_m=scaled(hinge.child_position_m),
-        )
-
-    return on_hinge(scene, target, farther)
+@of_node
+def _node_rotation(node: AnyNode) -> AnyNode:
+    return conjugated(node, "quaternion")
 
 
-def _node_rotation(scene: Scene, target: str) -> Scene:
-    def transposed(node: AnyNode) -> AnyNode:
-        return msgspec.structs.replace(node, quaternion=conjugate(node.quaternion))
-
-    return on_node(scene, target, transposed)
-
-
-def _node_position(scene: Scene, target: str) -> Scene:
-    def moved(node: AnyNode) -> AnyNode:
-        if isinstance(node, BeamNode):
-            return msgspec.structs.replace(node, x_m=LESS * node.x_m)  # inwards, where the beam is
-        return msgspec.structs.replace(node, position_m=scaled(node.position_m))
-
-    return on_node(scene, target, moved)
+@of_node
+def _node_position(node: AnyNode) -> AnyNode:
+    if isinstance(node, BeamNode):
+        return replace(node, x_m=LESS * node.x_m)  # inwards, where the beam is
+    return replace(node, position_m=scaled(node.position_m))
 
 
 def _node_idle(scene: Scene, target: str) -> str:
@@ -88,28 +69,15 @@ def _node_idle(scene: Scene, target: str) -> str:
     used = [(item.body, item.node) for item in mounted]
     used += [end for each in scene.hinges for end in ((each.parent, each.parent_node), (each.child, each.child_node))]
     between = [*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))]
-    used += [end for each in between for end in ((each.body_a, each.node_a), (each.body_b, each.node_b))]
+    used += [(end.body, end.node) for each in between for end in ends(each)]
     return "" if (body, node) in used else "nothing is mounted at the node, and no marker shows it"
 
 
-def _closure_frame(scene: Scene, target: str) -> Scene:
-    def transposed(closure: Closure) -> Closure:
-        if closure.type == "spherical":
-            raise CaseError(f'closure "{closure.name}" is spherical: its frames have no directions')
-        return msgspec.structs.replace(
-            closure, quaternion_a=conjugate(closure.quaternion_a), quaternion_b=conjugate(closure.quaternion_b)
-        )
-
-    return on_closure(scene, target, transposed)
-
-
-def _closure_position(scene: Scene, target: str) -> Scene:
-    def moved(closure: Closure) -> Closure:
-        return msgspec.structs.replace(
-            closure, position_a_m=scaled(closure.position_a_m), position_b_m=scaled(closure.position_b_m)
-        )
-
-    return on_closure(scene, target, moved)
+@of_closure
+def _closure_frame(closure: Closure) -> Closure:
+    if closure.type == "spherical":
+        raise CaseError(f'closure "{closure.name}" is spherical: its frames have no directions')
+    return conjugated(closure, "quaternion_a", "quaternion_b")
 
 
 MUTATIONS = (
@@ -121,7 +89,13 @@ MUTATIONS = (
         _hinge_rotation,
         _hinge_idle,
     ),
-    Mutation("hinge_position", "+1 % offsets of the hinge from its nodes", "a wrong figure", hinges, _hinge_position),
+    Mutation(
+        "hinge_position",
+        "+1 % offsets of the hinge from its nodes",
+        "a wrong figure",
+        hinges,
+        more(of_hinge, "parent_position_m", "child_position_m"),
+    ),
     Mutation(
         "node_rotation",
         "transposed rotation of a node",
@@ -147,6 +121,10 @@ MUTATIONS = (
         _closure_idle,
     ),
     Mutation(
-        "closure_position", "+1 % offsets of a closure from its nodes", "a wrong figure", closures, _closure_position
+        "closure_position",
+        "+1 % offsets of a closure from its nodes",
+        "a wrong figure",
+        closures,
+        more(of_closure, "position_a_m", "position_b_m"),
     ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import msgspec
+from msgspec.structs import replace
 
 from crosscheck.library.mutations.edits import opposite, scaled, whole
 from crosscheck.library.mutations.mutation import Mutation
@@ -12,20 +12,20 @@ STANDARD_TO_ROUNDED = 9.80665 / 9.81
 
 
 def _sign(scene: Scene, target: str) -> Scene:
-    return msgspec.structs.replace(scene, gravity_m_s2=opposite(scene.gravity_m_s2))
+    return replace(scene, gravity_m_s2=opposite(scene.gravity_m_s2))
 
 
 def _size(scene: Scene, target: str) -> Scene:
-    return msgspec.structs.replace(scene, gravity_m_s2=scaled(scene.gravity_m_s2, STANDARD_TO_ROUNDED))
+    return replace(scene, gravity_m_s2=scaled(scene.gravity_m_s2, STANDARD_TO_ROUNDED))
 
 
 def _axis(scene: Scene, target: str) -> Scene:
     x, y, z = scene.gravity_m_s2
-    return msgspec.structs.replace(scene, gravity_m_s2=(x, z, y))
+    return replace(scene, gravity_m_s2=(x, z, y))
 
 
 def _dropped(scene: Scene, target: str) -> Scene:
-    return msgspec.structs.replace(scene, gravity_m_s2=(0.0, 0.0, 0.0))
+    return replace(scene, gravity_m_s2=(0.0, 0.0, 0.0))
 
 
 MUTATIONS = (

@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import assert_never
 
-import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import (
     bodies,
-    conjugate,
+    conjugated,
     hinges,
     key_of,
-    on_body,
-    on_hinge,
+    multiplied,
+    of_body,
+    of_coordinates,
+    of_hinge,
+    of_wheel,
     opposite,
     scaled,
+    scaled_stations,
+    wheels,
     with_each_coordinate,
 )
-from crosscheck.library.mutations.mutation import DROPPED, FACTOR, OPPOSITE, Mutation, MutationTarget
+from crosscheck.library.mutations.mutation import DROPPED, FACTOR, OPPOSITE, Mutation, MutationTarget, SceneChange
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
 from flexmb.scene.hinges import Free, Gimbal, Hinge, Spherical
 from flexmb.scene.quaternions import rotation_matrix
@@ -33,13 +37,11 @@ DEGREE = math.pi / 180.0
 ROUNDING = 1e-15
 
 
-def _hinge_axis(scene: Scene, target: str) -> Scene:
-    def reversed_axis(hinge: Hinge) -> Hinge:
-        if not hasattr(hinge, "axis"):
-            raise CaseError(f'hinge "{hinge.name}" has no axis: control "hinge_axis" needs one')
-        return msgspec.structs.replace(hinge, axis=opposite(hinge.axis))
-
-    return on_hinge(scene, target, reversed_axis)
+@of_hinge
+def _hinge_axis(hinge: Hinge) -> Hinge:
+    if not hasattr(hinge, "axis"):
+        raise CaseError(f'hinge "{hinge.name}" has no axis: control "hinge_axis" needs one')
+    return replace(hinge, axis=opposite(hinge.axis))
 
 
 def _reversal_is_a_name(scene: Scene, target: str) -> str:
@@ -61,33 +63,26 @@ def _has_a_side(coordinate: Coordinate) -> bool:
     return coordinate.value != 0.0
 
 
-def _gimbal_order(scene: Scene, target: str) -> Scene:
-    def reversed_order(hinge: Hinge) -> Hinge:
-        if not isinstance(hinge, Gimbal):
-            raise CaseError(f'hinge "{hinge.name}" is no gimbal: control "gimbal_order" needs one')
-        return msgspec.structs.replace(hinge, sequence=hinge.sequence[::-1])
-
-    return on_hinge(scene, target, reversed_order)
+@of_hinge
+def _gimbal_order(hinge: Hinge) -> Hinge:
+    if not isinstance(hinge, Gimbal):
+        raise CaseError(f'hinge "{hinge.name}" is no gimbal: control "gimbal_order" needs one')
+    return replace(hinge, sequence=hinge.sequence[::-1])
 
 
 def _stiffness(scene: Scene, target: str) -> Scene:
     """+1 % stiffness of a flexible body, or of all springs of a hinge."""
     if any(body.name == target for body in scene.bodies):
-        return on_body(scene, target, _stiffer_body)
-    return on_hinge(scene, target, lambda hinge: _hinge_constant(hinge, "stiffness", FACTOR))
+        return of_body(_stiffer_body)(scene, target)
+    return _hinge_constant("stiffness", FACTOR)(scene, target)
 
 
 def _stiffer_body(body: Body) -> Body:
     match body:
         case BeamBody():
-            keys = ("EA_N", "EIy_Nm2", "EIz_Nm2", "GJ_Nm2")
-            stations = tuple(
-                msgspec.structs.replace(station, **{key: FACTOR * getattr(station, key) for key in keys})
-                for station in body.stations
-            )
-            return msgspec.structs.replace(body, stations=stations)
+            return scaled_stations(body, ("EA_N", "EIy_Nm2", "EIz_Nm2", "GJ_Nm2"))
         case ModalBody() if body.stiffness:
-            return msgspec.structs.replace(body, stiffness=scaled(body.stiffness))
+            return replace(body, stiffness=scaled(body.stiffness))
         case RigidBody() | ModalBody() | SidBody():
             what = f'control "stiffness" changes beams, inline modal bodies and hinge springs, not "{body.name}"'
             raise CaseError(what)
@@ -95,17 +90,17 @@ def _stiffer_body(body: Body) -> Body:
             assert_never(body)
 
 
-def _damping(factor: float) -> Callable[[Scene, str], Scene]:
+def _damping(factor: float) -> SceneChange:
     """Damping of a flexible body, or of all dampers of a hinge or wheel, times a factor."""
 
-    def of_body(body: Body) -> Body:
+    def damped_body(body: Body) -> Body:
         match body:
             case BeamBody():
                 ratio = body.modes.damping_ratio
                 less = tuple(factor * each for each in ratio) if isinstance(ratio, tuple) else factor * ratio
-                return msgspec.structs.replace(body, modes=msgspec.structs.replace(body.modes, damping_ratio=less))
+                return replace(body, modes=replace(body.modes, damping_ratio=less))
             case ModalBody() if body.damping:
-                return msgspec.structs.replace(body, damping=scaled(body.damping, factor))
+                return replace(body, damping=scaled(body.damping, factor))
             case RigidBody() | ModalBody() | SidBody():
                 raise CaseError(f'body "{body.name}" has no damping whose size this mutation can change')
             case _:
@@ -113,42 +108,29 @@ def _damping(factor: float) -> Callable[[Scene, str], Scene]:
 
     def changed(scene: Scene, target: str) -> Scene:
         if any(body.name == target for body in scene.bodies):
-            return on_body(scene, target, of_body)
+            return of_body(damped_body)(scene, target)
         if any(wheel.name == target for wheel in scene.wheels):
-            wheels = tuple(
-                msgspec.structs.replace(each, friction_Nms_rad=factor * each.friction_Nms_rad)
-                if each.name == target
-                else each
-                for each in scene.wheels
-            )
-            return msgspec.structs.replace(scene, wheels=wheels)
-        return on_hinge(scene, target, lambda hinge: _hinge_constant(hinge, "damping", factor))
+            return of_wheel(lambda wheel: multiplied(wheel, ("friction_Nms_rad",), factor))(scene, target)
+        return _hinge_constant("damping", factor)(scene, target)
 
     return changed
 
 
-def _hinge_constant(hinge: Hinge, stem: str, factor: float) -> Hinge:
-    """Every spring or damper of the hinge: of its scalar coordinates, and of the whole (spherical)."""
-    whole = [key for key in hinge.__struct_fields__ if split_unit(key)[0] == stem]
-    hinge = msgspec.structs.replace(hinge, **{key: factor * getattr(hinge, key) for key in whole})
+def _hinge_constant(stem: str, factor: float) -> SceneChange:
+    """Every spring or damper of a hinge, of its scalar coordinates and of the whole (spherical), times a factor."""
 
-    def changed(coordinate: Coordinate) -> Coordinate:
-        key = key_of(coordinate, stem)
-        return msgspec.structs.replace(coordinate, **{key: factor * getattr(coordinate, key)})
+    def changed(hinge: Hinge) -> Hinge:
+        whole = [key for key in hinge.__struct_fields__ if split_unit(key)[0] == stem]
+        return with_each_coordinate(
+            multiplied(hinge, whole, factor), lambda each: multiplied(each, (key_of(each, stem),), factor)
+        )
 
-    return with_each_coordinate(hinge, changed)
-
-
-def _armature(scene: Scene, target: str) -> Scene:
-    """Every armature of a hinge left out."""
-    return on_hinge(scene, target, lambda hinge: _hinge_constant(hinge, "armature", DROPPED))
+    return of_hinge(changed)
 
 
-def _rest(scene: Scene, target: str) -> Scene:
-    def unloaded(coordinate: Coordinate) -> Coordinate:
-        return msgspec.structs.replace(coordinate, **{key_of(coordinate, "rest"): 0.0})
-
-    return on_hinge(scene, target, lambda hinge: with_each_coordinate(hinge, unloaded))
+@of_coordinates
+def _rest(coordinate: Coordinate) -> Coordinate:
+    return replace(coordinate, **{key_of(coordinate, "rest"): 0.0})
 
 
 def _slack(scene: Scene, target: str) -> str:
@@ -157,58 +139,53 @@ def _slack(scene: Scene, target: str) -> str:
     return "" if sprung else "it has no spring that could be at rest somewhere"
 
 
-def _initial(stem: str, factor: float) -> Callable[[Scene, str], Scene]:
+def _initial(stem: str, factor: float) -> SceneChange:
     """Initial values ("place") or rates of the coordinates that are not prescribed, times a factor."""
 
     def changed(coordinate: Coordinate) -> Coordinate:
         if coordinate.prescribed is not None:
             return coordinate
         key = coordinate.KEYS.value if stem == "place" else key_of(coordinate, stem)
-        return msgspec.structs.replace(coordinate, **{key: factor * getattr(coordinate, key)})
+        return multiplied(coordinate, (key,), factor)
 
-    return lambda scene, target: on_hinge(scene, target, lambda hinge: with_each_coordinate(hinge, changed))
+    return of_coordinates(changed)
 
 
-def _initial_unit(scene: Scene, target: str) -> Scene:
-    def in_degrees(coordinate: Coordinate) -> Coordinate:
-        if not coordinate.ANGULAR or coordinate.prescribed is not None:
-            return coordinate
-        return msgspec.structs.replace(coordinate, **{coordinate.KEYS.value: DEGREE * coordinate.value})
+@of_coordinates
+def _initial_unit(coordinate: Coordinate) -> Coordinate:
+    if not coordinate.ANGULAR or coordinate.prescribed is not None:
+        return coordinate
+    return multiplied(coordinate, (coordinate.KEYS.value,), DEGREE)
 
-    return on_hinge(scene, target, lambda hinge: with_each_coordinate(hinge, in_degrees))
+
+@of_hinge
+def _rotation_sign(hinge: Hinge) -> Hinge:
+    if not isinstance(hinge, Free | Spherical):
+        return hinge
+    return replace(hinge, angular_velocity_rad_s=opposite(hinge.angular_velocity_rad_s))
 
 
 def _initial_speed_sign(scene: Scene, target: str) -> Scene:
-    def reversed_speed(hinge: Hinge) -> Hinge:
-        if not isinstance(hinge, Free | Spherical):
-            return hinge
-        return msgspec.structs.replace(hinge, angular_velocity_rad_s=opposite(hinge.angular_velocity_rad_s))
-
-    return on_hinge(_initial("rate", OPPOSITE)(scene, target), target, reversed_speed)
+    return _rotation_sign(_initial("rate", OPPOSITE)(scene, target), target)
 
 
-def _speed_axes(scene: Scene, target: str) -> Scene:
+@of_hinge
+def _speed_axes(hinge: Hinge) -> Hinge:
     """Speeds given in outboard axes read as if in inboard axes."""
-
-    def turned(hinge: Hinge) -> Hinge:
-        if not isinstance(hinge, Free | Spherical):
-            raise CaseError(f'the speeds of hinge "{hinge.name}" have no axes: "speed_axes" needs a free or ball joint')
-        R = rotation_matrix(hinge.quaternion)
-        names = {"angular_velocity_rad_s", "velocity_m_s"} & set(hinge.__struct_fields__)
-        return msgspec.structs.replace(
-            hinge, **{name: tuple(map(float, np.asarray(getattr(hinge, name)) @ R)) for name in names}
-        )
-
-    return on_hinge(scene, target, turned)
+    if not isinstance(hinge, Free | Spherical):
+        raise CaseError(f'the speeds of hinge "{hinge.name}" have no axes: "speed_axes" needs a free or ball joint')
+    R = rotation_matrix(hinge.quaternion)
+    names = {"angular_velocity_rad_s", "velocity_m_s"} & set(hinge.__struct_fields__)
+    return replace(
+        hinge, **{name: tuple(map(float, np.asarray(getattr(hinge, name)) @ R)) for name in names}
+    )
 
 
-def _attitude(scene: Scene, target: str) -> Scene:
-    def transposed(hinge: Hinge) -> Hinge:
-        if not isinstance(hinge, Free | Spherical):
-            raise CaseError(f'hinge "{hinge.name}" has no quaternion: "initial_attitude" needs a free or ball joint')
-        return msgspec.structs.replace(hinge, quaternion=conjugate(hinge.quaternion))
-
-    return on_hinge(scene, target, transposed)
+@of_hinge
+def _attitude(hinge: Hinge) -> Hinge:
+    if not isinstance(hinge, Free | Spherical):
+        raise CaseError(f'hinge "{hinge.name}" has no quaternion: "initial_attitude" needs a free or ball joint')
+    return conjugated(hinge, "quaternion")
 
 
 def _sprung(scene: Scene) -> list[MutationTarget]:
@@ -216,7 +193,7 @@ def _sprung(scene: Scene) -> list[MutationTarget]:
 
 
 def _damped(scene: Scene) -> list[MutationTarget]:
-    return [*bodies(scene), *hinges(scene), *(MutationTarget(wheel.name, "wheel") for wheel in scene.wheels)]
+    return [*bodies(scene), *hinges(scene), *wheels(scene)]
 
 
 MUTATIONS = (
@@ -233,7 +210,13 @@ MUTATIONS = (
     Mutation("spring_rest", "springs at rest at zero", "the rest value left out", hinges, _rest, _slack),
     Mutation("damping", "+1 % damping", "a wrong figure", _damped, _damping(FACTOR)),
     Mutation("damping_dropped", "no damping", "dissipation left out", _damped, _damping(DROPPED)),
-    Mutation("armature_dropped", "no armatures", "the rotors of drives left out", hinges, _armature),
+    Mutation(
+        "armature_dropped",
+        "no armatures",
+        "the rotors of drives left out",
+        hinges,
+        _hinge_constant("armature", DROPPED),
+    ),
     Mutation(
         "initial_place", "+1 % initial angle or displacement", "a wrong figure", hinges, _initial("place", FACTOR)
     ),

@@ -5,64 +5,61 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import assert_never
 
-import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from crosscheck.library.case import CaseError
-from crosscheck.library.mutations.edits import bodies, on_body, opposite, point_masses, replaced, scaled
-from crosscheck.library.mutations.mutation import FACTOR, Mutation
+from crosscheck.library.mutations.edits import (
+    bodies,
+    more,
+    multiplied,
+    of_body,
+    of_point_mass,
+    opposite,
+    point_masses,
+    scaled,
+    scaled_stations,
+)
+from crosscheck.library.mutations.mutation import FACTOR, Mutation, SceneChange
 from crosscheck.library.mutations.resting import rests
 from crosscheck.library.mutations.turning import EPS, only_axis
 from flexmb.scene.bodies import BeamBody, Body, Matrix3, ModalBody, RigidBody, SidBody
-from flexmb.scene.schema import PointMass, Scene
+from flexmb.scene.schema import Scene
 
 MILLI = 1e-3
 
 
-def _mass(scene: Scene, target: str) -> Scene:
+@of_body
+def _mass(body: Body) -> Body:
     """+1 % mass, inertia untouched (a beam: mass per length)."""
-
-    def heavier(body: Body) -> Body:
-        match body:
-            case RigidBody():
-                return msgspec.structs.replace(body, mass_kg=FACTOR * body.mass_kg)
-            case BeamBody():
-                return _scaled_stations(body, ("mass_per_length_kg_m",))
-            case ModalBody() if body.points:
-                return _scaled_points(body)
-            case ModalBody() | SidBody():
-                raise CaseError(f'body "{body.name}" keeps its mass in a file: control "mass" needs it inline')
-            case _:
-                assert_never(body)
-
-    return on_body(scene, target, heavier)
+    match body:
+        case RigidBody():
+            return replace(body, mass_kg=FACTOR * body.mass_kg)
+        case BeamBody():
+            return scaled_stations(body, ("mass_per_length_kg_m",))
+        case ModalBody() if body.points:
+            return replace(body, points=tuple(multiplied(point, ("mass_kg",), FACTOR) for point in body.points))
+        case ModalBody() | SidBody():
+            raise CaseError(f'body "{body.name}" keeps its mass in a file: control "mass" needs it inline')
+        case _:
+            assert_never(body)
 
 
-def _inertia(scene: Scene, target: str) -> Scene:
+@of_body
+def _inertia(body: Body) -> Body:
     """+1 % inertia about the mass centre."""
-
-    def stiffer_to_turn(body: Body) -> Body:
-        match body:
-            case RigidBody():
-                return _more_inertia(body)
-            case BeamBody():
-                return _scaled_stations(body, ("rotary_y_kg_m", "rotary_z_kg_m"))
-            case ModalBody() | SidBody():
-                raise CaseError(f'control "inertia" changes rigid bodies and beams, not "{body.name}"')
-            case _:
-                assert_never(body)
-
-    return on_body(scene, target, stiffer_to_turn)
+    match body:
+        case RigidBody():
+            return _more_inertia(body)
+        case BeamBody():
+            return scaled_stations(body, ("rotary_y_kg_m", "rotary_z_kg_m"))
+        case ModalBody() | SidBody():
+            raise CaseError(f'control "inertia" changes rigid bodies and beams, not "{body.name}"')
+        case _:
+            assert_never(body)
 
 
-def _point_mass(scene: Scene, target: str) -> Scene:
-    def heavier(mass: PointMass) -> PointMass:
-        return msgspec.structs.replace(mass, mass_kg=FACTOR * mass.mass_kg)
-
-    return msgspec.structs.replace(scene, point_masses=replaced(scene.point_masses, target, heavier))
-
-
-def _of_rigid(name: str, change: Callable[[RigidBody], RigidBody]) -> Callable[[Scene, str], Scene]:
+def _of_rigid(name: str, change: Callable[[RigidBody], RigidBody]) -> SceneChange:
     """A change of one rigid body; CaseError for any other."""
 
     def changed(body: Body) -> Body:
@@ -70,27 +67,27 @@ def _of_rigid(name: str, change: Callable[[RigidBody], RigidBody]) -> Callable[[
             return change(body)
         raise CaseError(f'control "{name}" changes rigid bodies, not "{body.name}"')
 
-    return lambda scene, target: on_body(scene, target, changed)
+    return of_body(changed)
 
 
 def _more_inertia(body: RigidBody) -> RigidBody:
-    return msgspec.structs.replace(body, inertia_kg_m2=scaled(body.inertia_kg_m2))
+    return replace(body, inertia_kg_m2=scaled(body.inertia_kg_m2))
 
 
 def _com(body: RigidBody) -> RigidBody:
-    return msgspec.structs.replace(body, com_m=scaled(body.com_m))
+    return replace(body, com_m=scaled(body.com_m))
 
 
 def _com_sign(body: RigidBody) -> RigidBody:
-    return msgspec.structs.replace(body, com_m=opposite(body.com_m))
+    return replace(body, com_m=opposite(body.com_m))
 
 
 def _com_unit(body: RigidBody) -> RigidBody:
-    return msgspec.structs.replace(body, com_m=scaled(body.com_m, MILLI))
+    return replace(body, com_m=scaled(body.com_m, MILLI))
 
 
 def _with(body: RigidBody, J: np.ndarray) -> RigidBody:
-    return msgspec.structs.replace(body, inertia_kg_m2=_matrix(J))
+    return replace(body, inertia_kg_m2=_matrix(J))
 
 
 def _swapped(body: RigidBody) -> RigidBody:
@@ -134,19 +131,6 @@ def _same_about_its_axis(change: Callable[[RigidBody], RigidBody]) -> Callable[[
         return "the body turns about one axis only, and the inertia about that is the same" if same else ""
 
     return idle
-
-
-def _scaled_stations(body: BeamBody, keys: tuple[str, ...]) -> BeamBody:
-    stations = tuple(
-        msgspec.structs.replace(station, **{key: FACTOR * getattr(station, key) for key in keys})
-        for station in body.stations
-    )
-    return msgspec.structs.replace(body, stations=stations)
-
-
-def _scaled_points(body: ModalBody) -> ModalBody:
-    points = tuple(msgspec.structs.replace(point, mass_kg=FACTOR * point.mass_kg) for point in body.points)
-    return msgspec.structs.replace(body, points=points)
 
 
 MUTATIONS = (
@@ -213,5 +197,5 @@ MUTATIONS = (
         bodies,
         _of_rigid("com_unit", _com_unit),
     ),
-    Mutation("point_mass", "+1 % of a point mass", "a wrong figure", point_masses, _point_mass),
+    Mutation("point_mass", "+1 % of a point mass", "a wrong figure", point_masses, more(of_point_mass, "mass_kg")),
 )

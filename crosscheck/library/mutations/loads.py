@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import msgspec
+from msgspec.structs import replace
 
 from crosscheck.library.case import CaseError
-from crosscheck.library.mutations.edits import loads, on_load, opposite
+from crosscheck.library.mutations.edits import loads, of_load, opposite
 from crosscheck.library.mutations.mirror import X, along, mirrors
 from crosscheck.library.mutations.mutation import Mutation
 from crosscheck.library.mutations.resting import is_clamped_along_world, twists_only
@@ -16,16 +14,14 @@ from flexmb.scene.schema import Load, Scene
 from flexmb.scene.tree import rest_frames
 
 
-def _of_load(change: Callable[[Load], Load]) -> Callable[[Scene, str], Scene]:
-    return lambda scene, target: on_load(scene, target, change)
-
-
+@of_load
 def _sign(load: Load) -> Load:
-    return msgspec.structs.replace(load, direction=opposite(load.direction))
+    return replace(load, direction=opposite(load.direction))
 
 
+@of_load
 def _frame(load: Load) -> Load:
-    return msgspec.structs.replace(load, frame="node" if load.frame == "world" else "world")
+    return replace(load, frame="node" if load.frame == "world" else "world")
 
 
 def _point(scene: Scene, target: str) -> Scene:
@@ -40,9 +36,9 @@ def _point(scene: Scene, target: str) -> Scene:
         other = [name for name, frame in frames.items() if frame.position != here]
         if load.type == "torque" or not other:
             raise CaseError(f'load "{load.name}" is a torque or has no other place on "{body.name}"')
-        return msgspec.structs.replace(load, node="origin" if "origin" in other else other[0])
+        return replace(load, node="origin" if "origin" in other else other[0])
 
-    return on_load(scene, target, moved)
+    return of_load(moved)(scene, target)
 
 
 def _turns_about_it(scene: Scene, target: str) -> str:
@@ -57,14 +53,14 @@ def _turns_about_it(scene: Scene, target: str) -> str:
 
 
 MUTATIONS = (
-    Mutation("load_sign", "opposite load", "action taken for reaction", loads, _of_load(_sign)),
+    Mutation("load_sign", "opposite load", "action taken for reaction", loads, _sign),
     Mutation("load_point", "force at another point of its body", "another reference point", loads, _point),
     Mutation(
         "load_frame",
         "load in World axes instead of the node's, or the other way",
         "dead load taken for follower load",
         loads,
-        _of_load(_frame),
+        _frame,
         _turns_about_it,
     ),
 )

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import assert_never
 
 from flexmb.scene.bodies import BeamBody, Body, Matrix3, ModalBody, Quaternion, RigidBody, SidBody, Vector
+from flexmb.scene.ends import ends
 from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.schema import Load, Scene, Wheel
@@ -58,10 +59,10 @@ def _is_own_image(scene: Scene, axis: int) -> bool:
 def _mounted(scene: Scene, body: str) -> set[str]:
     """The nodes of a body at which more than markers are."""
     carried: tuple[Wheel | Load, ...] = (*scene.wheels, *scene.loads)
-    ends = [(item.body, item.node) for item in carried]
-    ends += [end for each in scene.hinges for end in ((each.parent, each.parent_node), (each.child, each.child_node))]
-    ends += [end for each in scene.closures for end in ((each.body_a, each.node_a), (each.body_b, each.node_b))]
-    return {node for name, node in ends if name == body}
+    used = [(item.body, item.node) for item in carried]
+    used += [end for each in scene.hinges for end in ((each.parent, each.parent_node), (each.child, each.child_node))]
+    used += [(end.body, end.node) for each in scene.closures for end in ends(each)]
+    return {node for name, node in used if name == body}
 
 
 def _body(body: Body, axis: int, mounted: set[str]) -> bool:

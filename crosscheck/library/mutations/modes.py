@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from crosscheck.library.case import CaseError
-from crosscheck.library.mutations.edits import bodies, on_body, whole
+from crosscheck.library.mutations.edits import bodies, of_body, whole
 from crosscheck.library.mutations.mirror import along, mirrors, within
-from crosscheck.library.mutations.mutation import Mutation
+from crosscheck.library.mutations.mutation import Mutation, SceneChange
 from crosscheck.library.mutations.resting import rests, twists_only
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, ModalNode
 from flexmb.scene.schema import Scene
@@ -24,19 +24,16 @@ def _unstiffened(scene: Scene, target: str) -> Scene:
 
     def changed(body: Body) -> Body:
         wanted = target in ("", body.name) and body.level == "stiffened"
-        return msgspec.structs.replace(body, level="full") if wanted else body
+        return replace(body, level="full") if wanted else body
 
-    return msgspec.structs.replace(scene, bodies=tuple(map(changed, scene.bodies)))
+    return replace(scene, bodies=tuple(map(changed, scene.bodies)))
 
 
-def _undeformed(scene: Scene, target: str) -> Scene:
+@of_body
+def _undeformed(body: Body) -> Body:
     """Level full or stiffened becomes ruthless: inertia of the undeformed body."""
-
-    def changed(body: Body) -> Body:
-        wanted = body.level in ("full", "stiffened", "linear")
-        return msgspec.structs.replace(body, level="ruthless") if wanted else body
-
-    return on_body(scene, target, changed)
+    wanted = body.level in ("full", "stiffened", "linear")
+    return replace(body, level="ruthless") if wanted else body
 
 
 def _twists_in_place(scene: Scene, target: str) -> str:
@@ -47,7 +44,7 @@ def _twists_in_place(scene: Scene, target: str) -> str:
     return ""
 
 
-def _of_modes(name: str, change: Callable[[ModalBody], ModalBody]) -> Callable[[Scene, str], Scene]:
+def _of_modes(name: str, change: Callable[[ModalBody], ModalBody]) -> SceneChange:
     """A change of the modes of one body; a beam is made the points and modes that it stands for."""
 
     def changed(scene: Scene, target: str) -> Scene:
@@ -55,7 +52,7 @@ def _of_modes(name: str, change: Callable[[ModalBody], ModalBody]) -> Callable[[
         if not isinstance(alone, ModalBody) or not alone.points:
             raise CaseError(f'control "{name}" changes beams and inline modal bodies, not "{target}"')
         spoilt = change(alone)
-        return on_body(scene, target, lambda body: spoilt)
+        return of_body(lambda body: spoilt)(scene, target)
 
     return changed
 
@@ -64,7 +61,7 @@ def _in_modes(scene: Scene, target: str) -> Body | None:
     """The body called `target`, a beam as the points and modes that it stands for."""
     alone = next((body for body in scene.bodies if body.name == target), None)
     if isinstance(alone, BeamBody):
-        return modal_points(msgspec.structs.replace(scene, bodies=(alone,))).bodies[0]
+        return modal_points(replace(scene, bodies=(alone,))).bodies[0]
     return alone
 
 
@@ -84,13 +81,13 @@ def _sign(body: ModalBody) -> ModalBody:
     """The first mode with opposite sign in the nodes, as it was in the points."""
 
     def spoilt(node: ModalNode) -> ModalNode:
-        return msgspec.structs.replace(
+        return replace(
             node,
             translation_modes=_first_opposite(node.translation_modes),
             rotation_modes=_first_opposite(node.rotation_modes),
         )
 
-    return msgspec.structs.replace(body, nodes=tuple(map(spoilt, body.nodes)))
+    return replace(body, nodes=tuple(map(spoilt, body.nodes)))
 
 
 def _first_opposite(modes: tuple) -> tuple:
@@ -103,7 +100,7 @@ def _order(body: ModalBody) -> ModalBody:
         raise CaseError(f'body "{body.name}" has fewer than two modes to be exchanged')
     order = [1, 0, *range(2, len(body.stiffness))]
     stiffness = tuple(tuple(body.stiffness[i][j] for j in order) for i in order)
-    return msgspec.structs.replace(body, stiffness=stiffness)
+    return replace(body, stiffness=stiffness)
 
 
 def _equally_stiff(scene: Scene, target: str) -> str:
@@ -120,21 +117,19 @@ def _no_rotation(body: ModalBody) -> ModalBody:
     """The body without slopes of modes at its nodes."""
 
     def flat(node: ModalNode) -> ModalNode:
-        return msgspec.structs.replace(node, rotation_modes=tuple((0.0, 0.0, 0.0) for _ in node.rotation_modes))
+        return replace(node, rotation_modes=tuple((0.0, 0.0, 0.0) for _ in node.rotation_modes))
 
-    return msgspec.structs.replace(body, nodes=tuple(map(flat, body.nodes)))
+    return replace(body, nodes=tuple(map(flat, body.nodes)))
 
 
-def _section(scene: Scene, target: str) -> Scene:
-    def swapped(body: Body) -> Body:
-        if not isinstance(body, BeamBody):
-            raise CaseError(f'control "section_axes" changes beams, not "{body.name}"')
-        stations = tuple(
-            msgspec.structs.replace(each, EIy_Nm2=each.EIz_Nm2, EIz_Nm2=each.EIy_Nm2) for each in body.stations
-        )
-        return msgspec.structs.replace(body, stations=stations)
-
-    return on_body(scene, target, swapped)
+@of_body
+def _section(body: Body) -> Body:
+    if not isinstance(body, BeamBody):
+        raise CaseError(f'control "section_axes" changes beams, not "{body.name}"')
+    stations = tuple(
+        replace(each, EIy_Nm2=each.EIz_Nm2, EIz_Nm2=each.EIy_Nm2) for each in body.stations
+    )
+    return replace(body, stations=stations)
 
 
 MUTATIONS = (

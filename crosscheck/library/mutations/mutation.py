@@ -14,6 +14,9 @@ LESS = 2.0 - FACTOR  # for numbers that cannot be increased
 HUNDREDTH = 0.01
 DROPPED, OPPOSITE = 0.0, -1.0
 
+SceneChange = Callable[[Scene, str], Scene]
+"""The scene with a fault in the item that has a name, \"\" for the scene itself."""
+
 
 class MutationTarget(NamedTuple):
     """An item that a mutation may change: its name, "" for the scene, and its kind.
@@ -42,5 +45,5 @@ class Mutation:
     what: str
     slip: str
     targets: Callable[[Scene], Iterable[MutationTarget]]
-    change: Callable[[Scene, str], Scene]
+    change: SceneChange
     idle: Callable[[Scene, str], str] = _never

@@ -6,16 +6,15 @@ import math
 from collections.abc import Callable, Iterator
 from typing import TypeVar, assert_never
 
-import msgspec
+from msgspec.structs import replace
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import (
-    on_connector,
-    on_hinge,
-    on_load,
-    on_sensor,
-    on_wheel,
-    with_each_coordinate,
+    of_connector,
+    of_coordinates,
+    of_load,
+    of_sensor,
+    of_wheel,
 )
 from crosscheck.library.mutations.mutation import FACTOR, HUNDREDTH, OPPOSITE, Mutation, MutationTarget
 from crosscheck.library.time_functions import delayed, scaled
@@ -23,7 +22,7 @@ from flexmb.scene.connectors import Connector, HingeSpring, SpringDamper, actuat
 from flexmb.scene.control import ProfileSensor
 from flexmb.scene.freedoms import Coordinate
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
-from flexmb.scene.schema import Scene, Wheel
+from flexmb.scene.schema import Load, Scene, Wheel
 from flexmb.scene.tree import coordinates
 
 Change = Callable[[Function], Function]
@@ -70,25 +69,28 @@ def _actuators(scene: Scene) -> Iterator[tuple[SpringDamper | HingeSpring, Funct
 def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = None) -> Scene:
     """What is called `target`, with its prescribed motions changed by `motion` and all other functions by `change`."""
 
-    def of_coordinate(item: Moved) -> Moved:
+    def with_functions(item: Moved) -> Moved:
         keys = item.KEYS
         changes = {keys.effort: change, keys.prescribed: motion}
-        return msgspec.structs.replace(item, **{key: _changed(getattr(item, key), by) for key, by in changes.items()})
+        return replace(item, **{key: _changed(getattr(item, key), by) for key, by in changes.items()})
 
-    def of_spring(spring: Connector) -> Connector:
+    def with_actuator(spring: Connector) -> Connector:
         assert isinstance(spring, SpringDamper | HingeSpring)  # it has an actuator
-        return msgspec.structs.replace(spring, **{spring.ACTUATOR: _changed(actuator(spring), change)})
+        return replace(spring, **{spring.ACTUATOR: _changed(actuator(spring), change)})
+
+    def with_function(item: Load | ProfileSensor) -> Load | ProfileSensor:
+        return replace(item, function=change(item.function))
 
     if any(hinge.name == target for hinge in scene.hinges):
-        return on_hinge(scene, target, lambda hinge: with_each_coordinate(hinge, of_coordinate))
+        return of_coordinates(with_functions)(scene, target)
     if any(wheel.name == target for wheel in scene.wheels):
-        return on_wheel(scene, target, of_coordinate)
+        return of_wheel(with_functions)(scene, target)
     if any(load.name == target for load in scene.loads):
-        return on_load(scene, target, lambda load: msgspec.structs.replace(load, function=change(load.function)))
+        return of_load(with_function)(scene, target)
     if any(each.name == target for each, _ in _actuators(scene)):
-        return on_connector(scene, target, of_spring)
+        return of_connector(with_actuator)(scene, target)
     if any(isinstance(sensor, ProfileSensor) and sensor.name == target for sensor in scene.sensors):
-        return on_sensor(scene, target, lambda each: msgspec.structs.replace(each, function=change(each.function)))
+        return of_sensor(with_function)(scene, target)
     raise CaseError(f'no hinge, wheel, load, actuator or profile is called "{target}"')
 
 
@@ -113,14 +115,14 @@ def _farther(motion: Function) -> Function:
     match motion:
         case Ramp():
             start = motion.value - motion.rate * motion.start_s
-            return msgspec.structs.replace(motion, value=start, rate=FACTOR * motion.rate, start_s=0.0)
+            return replace(motion, value=start, rate=FACTOR * motion.rate, start_s=0.0)
         case Sine():
             start = motion.amplitude * math.sin(motion.phase_rad)
             offset = motion.offset + (1.0 - FACTOR) * start
-            return msgspec.structs.replace(motion, amplitude=FACTOR * motion.amplitude, offset=offset)
+            return replace(motion, amplitude=FACTOR * motion.amplitude, offset=offset)
         case SmoothStep():
             end = motion.start_value + FACTOR * (motion.end_value - motion.start_value)
-            return msgspec.structs.replace(motion, end_value=end)
+            return replace(motion, end_value=end)
         case Constant() | SpinUp() | Pulse() | Table() | ControlSignal():
             return scaled(motion, FACTOR)
         case _:
@@ -138,7 +140,7 @@ def _a_little_late(function: Function) -> Function:
         case Ramp():
             return delayed(function, HUNDREDTH)
         case SpinUp():
-            return msgspec.structs.replace(function, duration_s=FACTOR * function.duration_s)
+            return replace(function, duration_s=FACTOR * function.duration_s)
         case Table():
             raise CaseError("a table of values ends where it ends: it cannot come late")
         case Constant() | ControlSignal():  # these have no time of their own

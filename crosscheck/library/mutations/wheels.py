@@ -2,41 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import msgspec
+from msgspec.structs import replace
 
 from crosscheck.library.case import CaseError
-from crosscheck.library.mutations.edits import on_wheel, opposite, scaled, wheels
-from crosscheck.library.mutations.mutation import FACTOR, Mutation
+from crosscheck.library.mutations.edits import more, of_wheel, opposite, wheels
+from crosscheck.library.mutations.mutation import Mutation
 from flexmb.scene.schema import Scene, Wheel
 
 
-def _of_wheel(change: Callable[[Wheel], Wheel]) -> Callable[[Scene, str], Scene]:
-    return lambda scene, target: on_wheel(scene, target, change)
-
-
+@of_wheel
 def _axis(wheel: Wheel) -> Wheel:
-    return msgspec.structs.replace(wheel, axis=opposite(wheel.axis))
+    return replace(wheel, axis=opposite(wheel.axis))
 
 
+@of_wheel
 def _dropped(wheel: Wheel) -> Wheel:
     if wheel.prescribed_rad is not None:
         raise CaseError(f'the speed of wheel "{wheel.name}" is prescribed: "wheel_momentum" changes an initial one')
-    return msgspec.structs.replace(wheel, speed_rad_s=0.0)
+    return replace(wheel, speed_rad_s=0.0)
 
 
-def _inertia(wheel: Wheel) -> Wheel:
-    return msgspec.structs.replace(wheel, axial_inertia_kg_m2=FACTOR * wheel.axial_inertia_kg_m2)
-
-
+@of_wheel
 def _swapped(wheel: Wheel) -> Wheel:
     axial, transverse = wheel.axial_inertia_kg_m2, wheel.transverse_inertia_kg_m2
-    return msgspec.structs.replace(wheel, axial_inertia_kg_m2=transverse, transverse_inertia_kg_m2=axial)
-
-
-def _offset(wheel: Wheel) -> Wheel:
-    return msgspec.structs.replace(wheel, offset_m=scaled(wheel.offset_m))
+    return replace(wheel, axial_inertia_kg_m2=transverse, transverse_inertia_kg_m2=axial)
 
 
 def _reversal_is_a_name(scene: Scene, target: str) -> str:
@@ -47,17 +36,15 @@ def _reversal_is_a_name(scene: Scene, target: str) -> str:
 
 
 MUTATIONS = (
-    Mutation("wheel_axis", "opposite spin axis", "a sign", wheels, _of_wheel(_axis), _reversal_is_a_name),
-    Mutation(
-        "wheel_momentum", "wheel at rest at the start", "the wheel's momentum left out", wheels, _of_wheel(_dropped)
-    ),
-    Mutation("wheel_inertia", "+1 % axial inertia", "a wrong figure", wheels, _of_wheel(_inertia)),
+    Mutation("wheel_axis", "opposite spin axis", "a sign", wheels, _axis, _reversal_is_a_name),
+    Mutation("wheel_momentum", "wheel at rest at the start", "the wheel's momentum left out", wheels, _dropped),
+    Mutation("wheel_inertia", "+1 % axial inertia", "a wrong figure", wheels, more(of_wheel, "axial_inertia_kg_m2")),
     Mutation(
         "wheel_inertia_swapped",
         "axial and transverse inertia exchanged",
         "another order of the inertias",
         wheels,
-        _of_wheel(_swapped),
+        _swapped,
     ),
-    Mutation("wheel_offset", "+1 % offset of the wheel's centre", "a wrong figure", wheels, _of_wheel(_offset)),
+    Mutation("wheel_offset", "+1 % offset of the wheel's centre", "a wrong figure", wheels, more(of_wheel, "offset_m")),
 )

@@ -6,11 +6,10 @@ import os
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.interchange.sid.blocks import Sid, SidNode, Taylor
 from flexmb.modal.cross import cross_matrix
-from flexmb.modal.first_order import FirstOrder, first_order
+from flexmb.modal.first_order import FirstOrder, first_order, steiner, symmetric
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, SecondOrder
 from flexmb.scene.bodies import BeamBody, ModalBody
@@ -39,7 +38,11 @@ def sid_of(body: BeamBody | ModalBody, folder: str | os.PathLike[str] | None = N
     return Sid(
         mass=sums.mass,
         modes=_mode_names(model, sums.M0),
-        nodes=tuple(_node(name, node) for name, node in model.nodes.items() if model.clamped or _deforms(node)),
+        nodes=tuple(
+            _node(name, node)
+            for name, node in model.nodes.items()
+            if model.clamped or np.any(node.translation) or np.any(node.rotation_modes)
+        ),
         mdCM=Taylor(sums.s0[:, None], sums.L0.T[:, :, None]),
         J=Taylor(sums.J0, np.swapaxes(sums.E, 0, 1)),
         Ct=Taylor(sums.L0, L1.transpose(1, 0, 2)),
@@ -72,8 +75,7 @@ def _second(model: FlexibleModel) -> FirstOrder:
         L0=np.zeros((m, 3)), M0=np.zeros((m, m)),
         L1=np.einsum("p,pkna->kna", model.mass, G),
         C1=np.einsum("p,pkna->kna", model.mass, np.cross(rho[:, None, None], G)) + swung.sum(axis=0),
-        G=_spun(np.einsum("p,pkna,pb->knab", model.mass, G, rho))
-        + 0.5 * (turned + np.swapaxes(turned, -1, -2)).sum(axis=0),
+        G=steiner(np.einsum("p,pkna,pb->knab", model.mass, G, rho)) + symmetric(turned).sum(axis=0),
         M1=M1 + np.swapaxes(M1, 1, 2),
     )  # fmt: skip
 
@@ -87,11 +89,6 @@ def _moments(model: FlexibleModel) -> Real:
     return np.einsum("p,pna,pkb->nkab", model.mass, u, u, optimize=True) + np.einsum(
         "pnac,pcd,pkbd->nkab", turned, S, turned, optimize=True
     )
-
-
-def _spun(A: Real) -> Real:
-    """tr(A) 1 - sym(A): the inertia that belongs to the second moment A (...,3,3)."""
-    return np.trace(A, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - 0.5 * (A + np.swapaxes(A, -1, -2))
 
 
 def _side_by_side(matrices: Real) -> Real:
@@ -116,11 +113,6 @@ def _node(name: str, node: FlexibleNode) -> SidNode:
         AP=Taylor(node.rotation, np.swapaxes(turned, 0, 1)),
         sigma=Taylor(np.zeros((6, 1)), np.zeros((6, m, 1))),
     )
-
-
-def _deforms(node: FlexibleNode) -> bool:
-    shapes: NDArray[np.float64] = np.concatenate([node.translation, node.rotation_modes])
-    return bool(np.any(shapes))
 
 
 def _mode_names(model: FlexibleModel, M: Real) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor
 from flexmb.interchange.sid.from_body import COLUMNS, ROWS
 from flexmb.interchange.sid.reader import read_sid
 from flexmb.modal.cross import cross_matrix
+from flexmb.modal.first_order import symmetric
 from flexmb.scene.bodies import Level, ModalBody, SidBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
@@ -53,7 +54,7 @@ def imported_sid(sid: Sid, name: str, level: Level | None = None) -> ImportedSid
     body = {
         "name": name,
         "points": inertia_points(*points),
-        "stiffness": _stiffness(sid),
+        "stiffness": sid.Ke.zero + (0.0 if sid.ksigma.slope is None else sid.ksigma.slope[:, :, 0]),
         "damping": sid.De.zero if np.any(sid.De.zero) else (),
         "boundary": "clamped-free" if any(_held(node) for node in sid.nodes) else "free-free",
         "level": level or ("ruthless" if sums.at_rest_only else "full"),
@@ -96,7 +97,7 @@ class _Sums:
         spin = self.P - _trace(self.P)[..., None, None] * np.eye(3)
         self.order = _order_of_products(sid.Oe.zero, spin)
         if sid.J.first is not None:
-            _agree("J", "Gr", np.moveaxis(sid.J.first, 1, 0), -2.0 * _symmetric(spin), size)
+            _agree("J", "Gr", np.moveaxis(sid.J.first, 1, 0), -2.0 * symmetric(spin), size)
         spin_slope = None if sid.Oe.first is None else _of_six(sid.Oe.first, self.order)
         second = None if spin_slope is None else spin_slope - 0.5 * _trace(spin_slope)[..., None, None] * np.eye(3)
         self.change = np.zeros((self.m, self.m, 3, 3))
@@ -106,7 +107,7 @@ class _Sums:
             self.Q = -0.5 * Gr1 + 0.25 * _trace(Gr1)[..., None, None] * np.eye(3)
             _agree("Gr", "Me", _trace(self.Q), sid.Me.zero)
             if second is not None:
-                self.change = second - _symmetric(self.Q)
+                self.change = second - symmetric(self.Q)
         elif second is not None:
             self._separate(sid, second, notes)
         else:
@@ -202,13 +203,6 @@ def _is_body_frame(node: SidNode) -> bool:
     return node.name == "origin" and _held(node) and np.array_equal(node.AP.zero, np.eye(3))
 
 
-def _stiffness(sid: Sid) -> Real:
-    """Ke plus the slope of the forces of initial stress."""
-    if sid.ksigma.slope is None:
-        return sid.Ke.zero
-    return sid.Ke.zero + sid.ksigma.slope[:, :, 0]
-
-
 def _refuse(sid: Sid) -> None:
     """SidError for data that scenes do not support."""
     if np.any(sid.ksigma.zero):
@@ -233,7 +227,7 @@ def _order_of_products(Oe: Real, spin: Real) -> tuple[int, ...]:
     The standard has xy, yz, zx; some programs write xy, xz, yz. Gr, which is redundant, decides. SidError if neither
     order agrees with it.
     """
-    wanted = _symmetric(spin)
+    wanted = symmetric(spin)
     size = float(np.max(np.abs(wanted), initial=0.0))
     for order in ((0, 1, 2, 3, 4, 5), (0, 1, 2, 3, 5, 4)):
         if np.max(np.abs(_of_six(Oe, order) - wanted), initial=0.0) <= PRINTED * size:
@@ -267,7 +261,3 @@ def _axial(P: Real) -> Real:
 
 def _trace(A: Real) -> Real:
     return np.trace(A, axis1=-2, axis2=-1)
-
-
-def _symmetric(A: Real) -> Real:
-    return 0.5 * (A + np.swapaxes(A, -1, -2))

@@ -1,4 +1,4 @@
-"""Can this scene be simulated? Every defect and doubt is found before anything runs, with its place and its remedy."""
+"""Checks of scenes: every defect and doubtful value is found before a run, with its place and its remedy."""
 
 from __future__ import annotations
 
@@ -33,13 +33,14 @@ PHYSICS = (
 
 
 def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) -> tuple[Doubt, ...]:
-    """Raise SceneError with all problems of a scene, by its file if it was read from one; return what is doubtful.
-    Profiles must cover t_start (s), with `t_end` (s) the run from there.
+    """Raise SceneError with all defects of a scene, under the name of its file if it has one; return its doubts.
 
-    A doubtful scene runs; what its `allow` lists is not returned. `compile`, `simulate` and the command lines show the
-    same doubts as a `SceneWarning`, which `pytest -W error::flexmb.SceneWarning` and the option `--strict` turn into an
-    error. SID bodies and every fidelity level pass: `compile` decides whether they can be run. Raises TypeError for
-    anything but a Scene.
+    Tables of prescribed motions must cover t_start (s), and with `t_end` (s) the run from t_start to t_end.
+
+    A doubtful scene can be run; doubts that its `allow` lists are not returned. `compile`, `simulate` and the command
+    lines show the same doubts as a `SceneWarning`, which `pytest -W error::flexmb.SceneWarning` and the option
+    `--strict` turn into an error. SID bodies and every fidelity level are accepted: `compile` decides whether they can
+    be run. Raises TypeError for anything but a Scene.
     """
     if not isinstance(scene, Scene):
         raise TypeError(f"a Scene is needed, not {type(scene).__name__}: load_scene reads one, SceneBuilder makes one")
@@ -52,7 +53,7 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
 
 
 def check_and_warn(scene: Scene, t_end: float | None = None, t_start: float = 0.0) -> None:
-    """The same with all doubts as one SceneWarning, at the place that called the caller."""
+    """The same, with all doubts as one SceneWarning, attributed to the caller of the calling function."""
     doubts = check_scene(scene, t_end, t_start)
     if doubts:
         warnings.warn(in_short(called(scene), doubts), SceneWarning, stacklevel=3)
@@ -63,14 +64,13 @@ def _problems(scene: Scene, t_end: float | None, t_start: float) -> list[Defect]
     problems = [*_run_time(t_end, t_start)]
     problems += [problem for check in EVERYWHERE + STRUCTURE + PHYSICS for problem in check(scene)]
     problems += functions(scene, t_end, t_start)
-    if all(isinstance(each, Doubt) for each in problems):  # needs sound numbers, names and a tree to stand on
+    if all(isinstance(each, Doubt) for each in problems):  # it needs valid numbers and names, and a tree
         problems += moved_inertia(scene)
     return problems
 
 
 def check_run(scene: Scene, t_end: float, t_start: float = 0.0) -> None:
-    """Raise SceneError unless a scene that was checked before can be run from `t_start` to `t_end` (s), which its
-    profiles have to cover."""
+    """Raise SceneError unless a checked scene can be run from `t_start` to `t_end` (s), which its tables must cover."""
     problems = [*_run_time(t_end, t_start), *functions(scene, t_end, t_start)]
     if problems:
         raise SceneError(called(scene), problems)

@@ -1,4 +1,4 @@
-"""Beams: a mesh, sections that cover the length, materials that exist, and modes that the elements can provide."""
+"""Checks of beams: mesh, sections that cover the length, usual materials, and modes that the elements can represent."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _mesh(place: Place, body: BeamBody) -> Iterator[Defect]:
 
 
 def _size(place: Place, body: BeamBody) -> Iterator[Defect]:
-    """More elements than memory has room for, or than the modes need."""
+    """The elements fit into memory, and are not many more than the modes need."""
     modes = max(0, mode_count(body))
     estimate, enough = beam_estimate(body, modes), max(PLENTY, PER_MODE * modes)
     if estimate.memory > MOST_BYTES:
@@ -84,7 +84,7 @@ def _stations(place: Place, body: BeamBody) -> Iterator[Defect]:
 
 
 def _plausible(spot: Place, station: BeamStation, length: float) -> Iterator[Doubt]:
-    """What looks like a slip of units in one of the stiffnesses, or between stiffness and mass."""
+    """Stiffnesses and masses that suggest an error of units."""
     check = "check the units, a factor of 1000 for instance"
     speed = sqrt(station.EA_N / station.mass_per_length_kg_m)
     if not WAVE_SPEED[0] <= speed <= WAVE_SPEED[1]:

@@ -1,4 +1,4 @@
-"""Connectors: laws that are laws, matrices that store or dissipate, ends and coordinates that can move."""
+"""Checks of connectors: laws, matrices that are symmetric and not negative, ends and coordinates that can move."""
 
 from __future__ import annotations
 
@@ -9,48 +9,36 @@ from typing import assert_never
 
 import numpy as np
 
+from flexmb.scene import schema as s
 from flexmb.scene.check.walk import sound
-from flexmb.scene.connectors import (
-    AlongHinge,
-    AngularFriction,
-    AngularSpring,
-    Bushing,
-    Connector,
-    HingeFriction,
-    HingeSpring,
-    LinearFriction,
-    LinearSpring,
-    SpringDamper,
-    by_stem,
-)
+from flexmb.scene.connectors import AlongHinge, HingeFriction, HingeSpring, by_stem
 from flexmb.scene.problems import Defect, Doubt, Place
-from flexmb.scene.schema import Scene
 from flexmb.scene.tree import GROUND, coordinate_of
 
-HIGHEST = 4  # coefficients beside the stiffness: a law is a polynomial of degree five at most
-SYMMETRIC = 1e-9  # of the largest entry: matrices printed to ten digits are symmetric, and not negative, this well
-LOST = 0.01  # of static friction, to its smoothing
+HIGHEST = 4  # coefficients of `stiffening`: a law is a polynomial of degree five at most
+SYMMETRIC = 1e-9  # tolerance of matrices printed to ten digits, relative to the largest element
+LOST = 0.01  # fraction of static friction that may be lost by smoothing without a doubt
 NOT_NEGATIVE = ("free_length", "damping", "stop_stiffness", "stop_dissipation", "sliding", "static")
 
 
-def connectors(scene: Scene) -> Iterator[Defect]:
+def connectors(scene: s.Scene) -> Iterator[Defect]:
     """Every connector by itself, and that it acts on something that moves."""
     for place, item in sound(scene, "connectors"):
-        connector: Connector = item
+        connector: s.Connector = item
         yield from _signs(place, connector)
         match connector:
-            case SpringDamper():
+            case s.SpringDamper():
                 yield from _law(place, connector)
                 yield from _one_sided(place, connector)
                 yield from _ends(place, connector)
-            case Bushing():
+            case s.Bushing():
                 yield from _matrix(place.key("stiffness"), connector.stiffness)
                 yield from _matrix(place.key("damping"), connector.damping)
                 yield from _ends(place, connector)
-            case AngularSpring() | LinearSpring():
+            case s.AngularSpring() | s.LinearSpring():
                 yield from _law(place, connector)
                 yield from _stops(place, connector)
-            case AngularFriction() | LinearFriction():
+            case s.AngularFriction() | s.LinearFriction():
                 yield from _friction(place, connector)
             case _:
                 assert_never(connector)
@@ -61,14 +49,14 @@ def connectors(scene: Scene) -> Iterator[Defect]:
                 yield Defect(str(place.key("hinge")), str(error), "name a hinge, and its coordinate as the hinge does")
 
 
-def _signs(place: Place, connector: Connector) -> Iterator[Defect]:
+def _signs(place: Place, connector: s.Connector) -> Iterator[Defect]:
     for key, (stem, value) in zip(connector.__struct_fields__, by_stem(connector).items(), strict=True):
         if stem in NOT_NEGATIVE and isinstance(value, float) and value < 0.0:
             noun = stem.replace("_", " ")
             yield Defect(str(place.key(key)), f"negative {noun}: {value:g}", f"give a {noun} of at least zero")
 
 
-def _law(place: Place, connector: SpringDamper | HingeSpring) -> Iterator[Defect]:
+def _law(place: Place, connector: s.SpringDamper | HingeSpring) -> Iterator[Defect]:
     """A polynomial, or a table of one load for each of several increasing places, not both."""
     law = by_stem(connector)
     table, loads, stiffening = law["table"], law["loads"], law["stiffening"]
@@ -89,7 +77,7 @@ def _law(place: Place, connector: SpringDamper | HingeSpring) -> Iterator[Defect
         yield Defect(str(place), "the table's places do not increase", "sort the samples and drop repeated places")
 
 
-def _one_sided(place: Place, connector: SpringDamper) -> Iterator[Defect]:
+def _one_sided(place: Place, connector: s.SpringDamper) -> Iterator[Defect]:
     if connector.acts == "both":
         return
     if connector.table_m or connector.stiffening or connector.stiffness_N_m <= 0.0:
@@ -98,11 +86,11 @@ def _one_sided(place: Place, connector: SpringDamper) -> Iterator[Defect]:
         yield Defect(str(place.key("acts")), what, remedy)
 
 
-def _ends(place: Place, connector: SpringDamper | Bushing) -> Iterator[Defect]:
+def _ends(place: Place, connector: s.SpringDamper | s.Bushing) -> Iterator[Defect]:
     if connector.body_a == connector.body_b == GROUND:
         yield Defect(str(place), "both ends are on the ground", "name a body that moves")
     a = connector.body_a, connector.node_a, connector.position_a_m
-    if isinstance(connector, SpringDamper) and a == (connector.body_b, connector.node_b, connector.position_b_m):
+    if isinstance(connector, s.SpringDamper) and a == (connector.body_b, connector.node_b, connector.position_b_m):
         yield Defect(str(place), "both ends are one point, and no line leads from one to the other", "move an end")
 
 
@@ -144,7 +132,7 @@ def _friction(place: Place, connector: HingeFriction) -> Iterator[Defect]:
 
 
 def _peak(place: Place, law: Mapping[str, float]) -> Iterator[Doubt]:
-    """Smoothing takes away from static friction what the fall to sliding friction does not wait for."""
+    """Smoothing reduces the peak of friction, because friction falls to its sliding value before it has built up."""
     static, sliding, stribeck = law["static"], law["sliding"], law["stribeck"]
     at, peak = friction_peak(sliding, static, stribeck, law["smoothing"])
     if peak < (1.0 - LOST) * static:

@@ -6,29 +6,10 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple, assert_never
 
-from flexmb.scene.bodies import BeamBody, ModalBody
+from flexmb.scene import schema as s
 from flexmb.scene.check.profiles import MOTIONS
-from flexmb.scene.check.walk import entries, suspicious
-from flexmb.scene.columns import alike
-from flexmb.scene.control import (
-    Controller,
-    CoordinateSensor,
-    DistanceSensor,
-    DriveSensor,
-    GainTable,
-    LoadSensor,
-    MarkerSensor,
-    Pid,
-    ProfileSensor,
-    Saturation,
-    Sensor,
-    StateSpace,
-    TimeSensor,
-    UserLaw,
-)
-from flexmb.scene.functions import ControlSignal
+from flexmb.scene.check.walk import entries, holding, suspicious
 from flexmb.scene.problems import Defect, Place, closest
-from flexmb.scene.schema import Scene
 from flexmb.scene.tree import coordinates, scalar_paths
 from flexmb.scene.user_code import refusal
 
@@ -45,32 +26,32 @@ class Named(NamedTuple):
 
 
 def named(reference: str) -> Named | None:
-    """"gyro" or "gyro[2]" taken apart; None for what is neither."""
+    """A reference such as "gyro" or "gyro[2]" in its parts; None if it is neither."""
     found = REFERENCE.fullmatch(reference)
     return None if found is None else Named(found["name"], None if found["number"] is None else int(found["number"]))
 
 
-def sensor_width(scene: Scene, sensor: Sensor) -> int | None:
+def sensor_width(scene: s.Scene, sensor: s.Sensor) -> int | None:
     """Number of values of a sensor; None if it is known only after compilation, or the name does not exist."""
     match sensor:
-        case CoordinateSensor(of=of, quantity=quantity):
+        case s.CoordinateSensor(of=of, quantity=quantity):
             return _coordinates(scene, of, quantity == "rate")
-        case MarkerSensor(quantity=quantity):
+        case s.MarkerSensor(quantity=quantity):
             return 4 if quantity == "orientation" else 3
-        case LoadSensor():
+        case s.LoadSensor():
             return 6
-        case ProfileSensor() | DistanceSensor():
+        case s.ProfileSensor() | s.DistanceSensor():
             return 2
-        case DriveSensor() | TimeSensor():
+        case s.DriveSensor() | s.TimeSensor():
             return 1
         case _:
             assert_never(sensor)
 
 
-def _coordinates(scene: Scene, of: str, rates: bool) -> int | None:
+def _coordinates(scene: s.Scene, of: str, rates: bool) -> int | None:
     for hinge in scene.hinges:
         if hinge.name == of:
-            # a gimbal whose sequence does not fit its rotations has no freedoms yet, and is told so elsewhere
+            # the freedoms of a gimbal whose sequence does not fit its rotations are undefined; `hinges` reports that
             return len(coordinates(hinge)) or sum(freedom.sizes[rates] for freedom in hinge.freedoms)
     for mass in scene.point_masses:
         if mass.name == of:
@@ -78,37 +59,37 @@ def _coordinates(scene: Scene, of: str, rates: bool) -> int | None:
     return 1 if any(wheel.name == of for wheel in scene.wheels) else None
 
 
-def depends_at_once(sensor: Sensor) -> bool:
+def depends_at_once(sensor: s.Sensor) -> bool:
     """Whether the signal depends directly on forces: accelerations and loads."""
     match sensor:
-        case MarkerSensor():
+        case s.MarkerSensor():
             return sensor.quantity in AT_ONCE
-        case LoadSensor() | DriveSensor():
+        case s.LoadSensor() | s.DriveSensor():
             return True
-        case CoordinateSensor() | DistanceSensor() | TimeSensor() | ProfileSensor():
+        case s.CoordinateSensor() | s.DistanceSensor() | s.TimeSensor() | s.ProfileSensor():
             return False
         case _:
             assert_never(sensor)
 
 
-def output_width(controller: Controller, inputs: int | None) -> int | None:
+def output_width(controller: s.Controller, inputs: int | None) -> int | None:
     """Number of outputs of a controller with this number of inputs."""
     match controller:
-        case StateSpace(C=C, D=D):
+        case s.StateSpace(C=C, D=D):
             return len(C) or len(D)
-        case Pid():
+        case s.Pid():
             return 1
-        case UserLaw(outputs=outputs):
+        case s.UserLaw(outputs=outputs):
             return outputs
-        case GainTable():
+        case s.GainTable():
             return None if inputs is None else max(1, inputs - 1)
-        case Saturation():
+        case s.Saturation():
             return inputs
         case _:
             assert_never(controller)
 
 
-def widths_of(scene: Scene) -> dict[str, int | None]:
+def widths_of(scene: s.Scene) -> dict[str, int | None]:
     """Number of values of every sensor and controller; None if it is known only after compilation."""
     widths = {sensor.name: sensor_width(scene, sensor) for sensor in scene.sensors}
     for controller in scene.controllers:
@@ -119,7 +100,7 @@ def widths_of(scene: Scene) -> dict[str, int | None]:
 
 
 def one_number(place: Place, reference: str, widths: dict[str, int | None]) -> Iterator[Defect]:
-    """A signal that is one number."""
+    """A reference is known, and to one number."""
     yield from _reference(place, reference, widths, set())
     found = named(reference)
     width = None if found is None or found.number is not None else widths.get(found.name)
@@ -127,7 +108,7 @@ def one_number(place: Place, reference: str, widths: dict[str, int | None]) -> I
         yield Defect(str(place), f'"{found.name}" has {width} numbers', f'say which: "{found.name}[0]"')
 
 
-def control(scene: Scene) -> Iterator[Defect]:
+def control(scene: s.Scene) -> Iterator[Defect]:
     """All problems of sensors, controllers and signals."""
     yield from _sensors(scene)
     widths: dict[str, int | None] = {sensor.name: sensor_width(scene, sensor) for sensor in scene.sensors}
@@ -147,16 +128,16 @@ def control(scene: Scene) -> Iterator[Defect]:
     yield from _signals(scene, {each.name: widths[each.name] for each in scene.controllers})
 
 
-def _sensors(scene: Scene) -> Iterator[Defect]:
+def _sensors(scene: s.Scene) -> Iterator[Defect]:
     moving = [item.name for key in ("hinges", "wheels", "point_masses") for item in getattr(scene, key)]
-    moving += [f"{body.name}.modes" for body in scene.bodies if isinstance(body, BeamBody | ModalBody)]
+    moving += [f"{body.name}.modes" for body in scene.bodies if isinstance(body, s.BeamBody | s.ModalBody)]
     markers = [marker.name for marker in scene.markers]
     known: dict[Any, tuple[tuple[str, ...], str, list[str]]] = {
-        CoordinateSensor: (("of",), "hinge, wheel, point mass or modes", moving),
-        MarkerSensor: (("marker",), "marker", markers),
-        DistanceSensor: (("marker_a", "marker_b"), "marker", markers),
-        LoadSensor: (("hinge",), "hinge or closure", [each.name for each in (*scene.hinges, *scene.closures)]),
-        DriveSensor: (("coordinate",), "scalar coordinate", list(scalar_paths(scene))),
+        s.CoordinateSensor: (("of",), "hinge, wheel, point mass or modes", moving),
+        s.MarkerSensor: (("marker",), "marker", markers),
+        s.DistanceSensor: (("marker_a", "marker_b"), "marker", markers),
+        s.LoadSensor: (("hinge",), "hinge or closure", [each.name for each in (*scene.hinges, *scene.closures)]),
+        s.DriveSensor: (("coordinate",), "scalar coordinate", list(scalar_paths(scene))),
     }
     for place, sensor in entries(scene, "sensors"):
         if type(sensor) in known:
@@ -165,7 +146,7 @@ def _sensors(scene: Scene) -> Iterator[Defect]:
                 if getattr(sensor, key) not in names:
                     remedy = closest(getattr(sensor, key), names)
                     yield Defect(str(place.key(key)), f'there is no {what} "{getattr(sensor, key)}"', remedy)
-        if isinstance(sensor, ProfileSensor) and isinstance(sensor.function, ControlSignal):
+        if isinstance(sensor, s.ProfileSensor) and isinstance(sensor.function, s.ControlSignal):
             remedy = f'let the controller take "{sensor.function.source}" itself'
             yield Defect(str(place.key("function")), "a signal is no function of time", remedy)
 
@@ -178,7 +159,7 @@ def _width(reference: str, widths: dict[str, int | None]) -> int | None:
 
 
 def _reference(place: Place, reference: str, widths: dict[str, int | None], later: set[str]) -> Iterator[Defect]:
-    """A signal that is known here, with such a number."""
+    """A referenced signal exists, is computed before, and has a number of this index."""
     found = named(reference)
     if found is None:
         yield Defect(str(place), f'"{reference}" is no signal', 'write "name", or "name[0]" for one of its numbers')
@@ -196,7 +177,7 @@ def _reference(place: Place, reference: str, widths: dict[str, int | None], late
             yield Defect(str(place), f'"{found.name}" has no number {found.number}', remedy)
 
 
-def _instants(place: Place, controller: Controller) -> Iterator[Defect]:
+def _instants(place: Place, controller: s.Controller) -> Iterator[Defect]:
     period = controller.period_s
     if period is not None and not period > 0.0:
         yield Defect(str(place.key("period_s")), f"the period is {period:g} s", "give a positive one, or leave it out")
@@ -209,22 +190,22 @@ def _instants(place: Place, controller: Controller) -> Iterator[Defect]:
             yield Defect(str(place.key(key)), f'controller "{controller.name}" is continuous', remedy)
 
 
-def _sizes(place: Place, controller: Controller, inputs: int | None) -> Iterator[Defect]:
+def _sizes(place: Place, controller: s.Controller, inputs: int | None) -> Iterator[Defect]:
     match controller:
-        case StateSpace():
+        case s.StateSpace():
             yield from _matrices(place, controller, inputs)
-        case Pid():
+        case s.Pid():
             yield from _pid(place, controller, inputs)
-        case Saturation(lower=lower, upper=upper):
+        case s.Saturation(lower=lower, upper=upper):
             if not lower <= upper:
                 yield Defect(str(place.key("lower")), f"it is above upper, {upper:g}", "exchange the two")
-        case GainTable(points=points, values=values):
+        case s.GainTable(points=points, values=values):
             if len(points) != len(values) or not points:
                 what = f"there are {len(points)} points and {len(values)} values"
                 yield Defect(str(place.key("values")), what, "give one value for each point, and one point at least")
             if any(b <= a for a, b in zip(points, points[1:], strict=False)):
                 yield Defect(str(place.key("points")), "the points do not increase", "sort them, each once")
-        case UserLaw(function=function, outputs=outputs):
+        case s.UserLaw(function=function, outputs=outputs):
             if not ADDRESS.fullmatch(function):
                 remedy = 'write "package.module:function"'
                 yield Defect(str(place.key("function")), f'"{function}" is no name of a function', remedy)
@@ -234,11 +215,11 @@ def _sizes(place: Place, controller: Controller, inputs: int | None) -> Iterator
                 yield Defect(str(place.key("outputs")), f"it has {outputs} outputs", "give one or more")
         case _:
             assert_never(controller)
-    if inputs == 0 and not isinstance(controller, UserLaw | StateSpace):
+    if inputs == 0 and not isinstance(controller, s.UserLaw | s.StateSpace):
         yield Defect(str(place.key("inputs")), "it has no input", "name a sensor or controller")
 
 
-def _matrices(place: Place, controller: StateSpace, inputs: int | None) -> Iterator[Defect]:
+def _matrices(place: Place, controller: s.StateSpace, inputs: int | None) -> Iterator[Defect]:
     n, p = len(controller.A), output_width(controller, inputs)
     if not p:
         yield Defect(str(place), "it has no output", "give C, D or both")
@@ -258,7 +239,7 @@ def _matrices(place: Place, controller: StateSpace, inputs: int | None) -> Itera
         yield Defect(str(place.key("initial")), what, f"give one for each of the {n} states, or leave it out")
 
 
-def _pid(place: Place, pid: Pid, inputs: int | None) -> Iterator[Defect]:
+def _pid(place: Place, pid: s.Pid, inputs: int | None) -> Iterator[Defect]:
     if inputs is not None and inputs not in (0, 1, 2):
         what = f"its inputs are {inputs} numbers"
         yield Defect(str(place.key("inputs")), what, "give the measured one, and if it varies the setpoint")
@@ -274,7 +255,7 @@ def _pid(place: Place, pid: Pid, inputs: int | None) -> Iterator[Defect]:
 
 
 def _at_once(
-    place: Place, controller: Controller, immediate: set[str], widths: dict[str, int | None]
+    place: Place, controller: s.Controller, immediate: set[str], widths: dict[str, int | None]
 ) -> Iterator[Defect]:
     """No algebraic loops: a continuous output must not depend directly on a signal that it changes directly."""
     if controller.period_s is not None:
@@ -289,17 +270,17 @@ def _at_once(
         column = column + width if width is not None else column
 
 
-def _delays(controller: Controller, column: int, width: int | None) -> bool:
+def _delays(controller: s.Controller, column: int, width: int | None) -> bool:
     """Whether this input and the next ones affect the outputs only through states (no direct feedthrough)."""
-    if not isinstance(controller, StateSpace) or width is None:
+    if not isinstance(controller, s.StateSpace) or width is None:
         return False
     return not any(any(row[column : column + width]) for row in controller.D)
 
 
-def _signals(scene: Scene, widths: dict[str, int | None]) -> Iterator[Defect]:
+def _signals(scene: s.Scene, widths: dict[str, int | None]) -> Iterator[Defect]:
     """Signals name one output of a controller, and drive loads: no motion can follow what jumps."""
-    for place, key, value in suspicious(scene, _with_signals):
-        if not isinstance(value, ControlSignal) or key == "function" and place.path.startswith("$.sensors"):
+    for place, key, value in suspicious(scene, holding(s.ControlSignal)):
+        if not isinstance(value, s.ControlSignal) or key == "function" and place.path.startswith("$.sensors"):
             continue
         yield from _reference(place.key("source"), value.source, widths, set())
         found = named(value.source)
@@ -309,8 +290,4 @@ def _signals(scene: Scene, widths: dict[str, int | None]) -> Iterator[Defect]:
         if key in MOTIONS:
             remedy = "give it as torque_Nm or force_N"
             yield Defect(str(place), "a controller cannot prescribe a motion", remedy)
-
-
-def _with_signals(items: Any) -> set[int]:
-    return {owner for group in alike(items) if group.kind is ControlSignal for owner in group.owners}
 

@@ -56,7 +56,7 @@ def _names_of_stops(scene: Scene) -> Iterator[Defect]:
 def _signal(
     place: Place, reference: str, signals: dict[str, int | None], others: dict[str, str]
 ) -> Iterator[Defect]:
-    """A reference that is no time, coordinate or rate names one number of a sensor or controller."""
+    """A reference to anything but time, coordinates and rates is to one number of a sensor or controller."""
     found = named(reference)
     if found is None or found.name not in signals:
         yield Defect(str(place), f'there is no "{reference}"', closest(reference, {**others, **signals}))

@@ -1,4 +1,4 @@
-"""Coordinates of hinges, wheels and point masses: counts, springs, motors, prescribed motions; axes of closures."""
+"""Checks of coordinates (counts, springs, motors, prescribed motions), wheels, point masses, and axes of closures."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def _armature(place: Place, coordinate: Coordinate) -> Iterator[Defect]:
 
 
 def _drive(place: Place, item: Coordinate | Wheel, released: bool) -> Iterator[Defect]:
-    """Of a prescribed coordinate: where it starts, and no motor, which acts only on what an event releases."""
+    """A prescribed coordinate starts at its profile, and has no motor unless an event releases it."""
     keys = item.KEYS
     profile = getattr(item, keys.prescribed)
     if profile is None:

@@ -1,4 +1,4 @@
-"""Masses and inertia tensors that a body can have."""
+"""Checks of masses and inertia tensors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PRINTED = 1e-9
 
 
 def rigid_bodies(scene: Scene) -> Iterator[Defect]:
-    """A mass that is not negative, and a tensor that some distribution of that mass has."""
+    """Every rigid body has a nonnegative mass, and an inertia tensor that a distribution of this mass can have."""
     rigid = {i: body for i, body in enumerate(scene.bodies) if isinstance(body, RigidBody)}
     doubtful = _doubtful(list(rigid.values()))
     for place, body in sound(scene, "bodies", [i for i, doubt in zip(rigid, doubtful, strict=True) if doubt]):
@@ -30,9 +30,9 @@ def rigid_bodies(scene: Scene) -> Iterator[Defect]:
 
 
 def _doubtful(bodies: Sequence[RigidBody]) -> list[bool]:
-    """Whether the mass or the tensor of each body may be at fault: half of what `tensor` lets pass is passed."""
+    """Whether the mass or the tensor of each body may be wrong, with half of the tolerance of `tensor`."""
     m, J = column(bodies, "mass_kg"), column(bodies, "inertia_kg_m2", 3, 3)
-    J[~np.all(np.abs(J) <= LARGEST, axis=(1, 2))] = 0.0  # reported as what it is: no finite number
+    J[~np.all(np.abs(J) <= LARGEST, axis=(1, 2))] = 0.0  # reported by `finite_numbers`
     slack = 0.5 * PRINTED * np.max(np.abs(J), axis=(1, 2), initial=0.0)
     skew = np.max(np.abs(J - np.swapaxes(J, 1, 2)), axis=(1, 2), initial=0.0) > slack
     low, middle, high = np.linalg.eigvalsh(J).T

@@ -1,4 +1,4 @@
-"""Raw modal bodies: complete arrays, stiffness and modes that a structure can have; initial modal states."""
+"""Checks of raw modal bodies (complete arrays, possible stiffness and modes), and of initial modal states."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import MOST_BYTES, modes_memory
 from flexmb.typing import Real
 
-PRINTED = 1e-9  # matrices printed to ten digits are symmetric, and modes zero at the clamp, this well
+PRINTED = 1e-9  # tolerance of matrices and modes printed to ten digits, relative to the largest element
 # Lowest frequency times size (m/s). The upper limit is the wave speed in the stiffest materials, which no body's first
 # mode reaches; the lower limit is a membrane of a kilometre at a microhertz.
 SPEED = (1e-3, 20_000.0)
@@ -55,7 +55,7 @@ def modal_states(scene: Scene) -> Iterator[Defect]:
 
 
 def _count(body: BeamBody | ModalBody) -> int | None:
-    """How many modes a body has; None where that cannot be told, which is reported with the body."""
+    """Number of modes of a body; None if it is unknown because of a defect that is reported with the body."""
     match body:
         case BeamBody():
             return mode_count(body)
@@ -165,9 +165,9 @@ def _shapes(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defe
 
 
 def _is_loose(arrays: ModalArrays, floating: Real, scale: Real, slack: float) -> bool:
-    """Whether the clamp does not hold a rigid-body motion of the points that is among the modes.
+    """Whether a combination of the modes is a rigid-body motion of the points without strain energy.
 
-    Points that a mode moves as a rigid body are no fault by themselves: a lump at the tip of a beam does so.
+    Modes that move all points as a rigid body are no defect by themselves: a lump at the tip of a beam has such modes.
     """
     stiffness = arrays.stiffness * scale
     values, vectors = np.linalg.eigh(floating * scale)
@@ -204,19 +204,17 @@ def _mass_blocks(arrays: ModalArrays) -> tuple[Real, Real, Real]:
     n, _, m = arrays.translation_modes.shape
     centre = arrays.position + arrays.com_offset
     modes = arrays.translation_modes - np.cross(arrays.com_offset[:, :, None], arrays.rotation_modes, axis=1)
-    arm = -np.cross(centre[:, :, None], np.broadcast_to(np.eye(3), (n, 3, 3)), axis=1)  # w x r, column by column
-    velocity = np.concatenate([arm, np.broadcast_to(np.eye(3), (n, 3, 3)), modes], axis=2)
-    turn = np.concatenate(
-        [np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3, 3)), arrays.rotation_modes], axis=2
-    )
-    M = np.einsum("nia,n,nib->ab", velocity, arrays.mass, velocity) + np.einsum(
-        "nia,nij,njb->ab", turn, arrays.inertia, turn
-    )
+    one = np.broadcast_to(np.eye(3), (n, 3, 3))
+    arm = -np.cross(centre[:, :, None], one, axis=1)  # w x r, column by column
+    velocity = np.concatenate([arm, one, modes], axis=2)
+    turn = np.concatenate([one, np.zeros_like(one), arrays.rotation_modes], axis=2)
+    M = np.einsum("nia,n,nib->ab", velocity, arrays.mass, velocity)
+    M += np.einsum("nia,nij,njb->ab", turn, arrays.inertia, turn)
     return M[6:, 6:], M[:6, 6:], M[:6, :6]
 
 
 def _frequency(place: Place, arrays: ModalArrays, M: Real) -> Iterator[Doubt]:
-    """A slip of units between stiffness and mass shows in the lowest frequency against the body's size."""
+    """An error of units of stiffness or mass shows in the product of the lowest frequency and the body's size."""
     stiffness = (arrays.stiffness + arrays.stiffness.T) / 2.0
     from scipy.linalg import eigh  # SciPy is slow to import, and few scenes have raw modes
 

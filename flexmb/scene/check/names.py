@@ -9,7 +9,7 @@ from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
 from flexmb.scene.check.walk import entries
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.problems import Defect, Place, closest
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Closure, Scene
 from flexmb.scene.tree import GROUND, rest_frames
 
 # Hinges, wheels, point masses, closures and connectors share tables of loads, drive loads and coordinates, hence one
@@ -61,19 +61,13 @@ def references(scene: Scene) -> Iterator[Defect]:
         strange = [i for i, item in enumerate(items) if not bodies.have(item.body, item.node)]
         for place, item in entries(scene, collection, strange):
             yield from _attachment(place, bodies, ("body", item.body), ("node", item.node), ground=False)
-    for place, closure in entries(scene, "closures"):
-        for end in ("a", "b"):
+    for place, item in (*entries(scene, "closures"), *entries(scene, "connectors")):
+        for end in "ab" if isinstance(item, Closure | BetweenNodes) else ():
             body, node = f"body_{end}", f"node_{end}"
-            ends = (body, getattr(closure, body)), (node, getattr(closure, node))
+            ends = (body, getattr(item, body)), (node, getattr(item, node))
             yield from _attachment(place, bodies, *ends, ground=True)
-        if closure.body_a == closure.body_b:
-            what = f'the closure joins "{closure.body_a}" to itself'
-            yield Defect(str(place), what, "give two different bodies")
-    for place, connector in entries(scene, "connectors"):
-        for end in ("a", "b") if isinstance(connector, BetweenNodes) else ():
-            body, node = f"body_{end}", f"node_{end}"
-            ends = (body, getattr(connector, body)), (node, getattr(connector, node))
-            yield from _attachment(place, bodies, *ends, ground=True)
+        if isinstance(item, Closure) and item.body_a == item.body_b:
+            yield Defect(str(place), f'the closure joins "{item.body_a}" to itself', "give two different bodies")
     for place, state in entries(scene, "modal_states"):
         yield from _body(place.key("body"), bodies.named, state.body)
 
@@ -95,7 +89,7 @@ class Bodies:
         self._nodes: dict[str, dict[str, None]] = {}
 
     def have(self, name: str, node: str, ground: str | None = None) -> bool:
-        """Whether there is such a body, or `ground`, with such a node; of files that are not read it is unknown."""
+        """Whether there is such a body, or `ground`, with such a node; True for all nodes of SID bodies."""
         if name == ground:
             return node == "origin"
         body = self.named.get(name)

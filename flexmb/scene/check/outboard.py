@@ -7,7 +7,7 @@ massive bodies are connected to these by moving hinges.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import assert_never
 
 import numpy as np
@@ -26,13 +26,13 @@ from flexmb.scene.schema import PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, NodeFrame, ordered, rest_frames
 from flexmb.typing import Real
 
-# A moment below this share of the largest leaves no digits of the acceleration.
+# With a moment of inertia below this fraction of the largest, no digits of the acceleration are left.
 NEGLIGIBLE = 1e-12
 GAUSS = np.polynomial.legendre.leggauss(2)  # exact for a linear section times x^2
 
 
 def moved_inertia(scene: Scene) -> Iterator[Defect]:
-    """Every free coordinate of a hinge moves inertia. The scene's numbers and tree must be sound."""
+    """Every free coordinate of a hinge moves inertia. The scene's numbers and tree must be valid."""
     nodes = _Nodes(scene)
     all_freedoms = [hinge.freedoms for hinge in scene.hinges]
     free, armatures = _free_directions(all_freedoms), [_armatures(own) for own in all_freedoms]
@@ -66,7 +66,7 @@ def moved_inertia(scene: Scene) -> Iterator[Defect]:
 
 
 def _unmoved(H: Real, end: Real, cluster: Real, armature: Real) -> Iterator[tuple[int, str]]:
-    """The hinges among n along some of whose free directions H (n,6,f) no inertia moves, and what is missing there.
+    """Numbers of the hinges among n with a free direction in H (n,6,f) that moves no inertia, and what is missing.
 
     `end` (n,6,6): motion of the body's frame to that of the hinge's; `cluster` (n,6,6): inertia in the body's frame;
     `armature` (n,f): inertia of the coordinates alone.
@@ -121,8 +121,8 @@ def _beside(node: NodeFrame, R: Real, p: Real) -> tuple[Real, Real]:
 
 
 def _clusters(scene: Scene, nodes: _Nodes, ends: Real) -> tuple[list[bool], list[bool], Real]:
-    """Of every body and all that is welded to it: whether its inertia is known, whether mass hangs from these by
-    moving hinges, and the inertia (N,6,6) in the body's frame."""
+    """For every body with all bodies welded to it: whether its inertia is known, whether further massive bodies are
+    connected by moving hinges, and the inertia (N,6,6) in the body's frame."""
     known, total = _spatial_inertias(scene, nodes)
     beyond = [False] * len(known)
     massive = np.any(total != 0.0, axis=(1, 2)).tolist()
@@ -145,8 +145,8 @@ def _clusters(scene: Scene, nodes: _Nodes, ends: Real) -> tuple[list[bool], list
 
 
 def _spatial_inertias(scene: Scene, nodes: _Nodes) -> tuple[list[bool], Real]:
-    """Inertia (N,6,6) at rest in the body frame, wheels and point masses included; whether it is known: not of SID
-    bodies."""
+    """Whether the inertia of each body is known, which it is not for SID bodies; and the inertia (N,6,6) at rest in the
+    body frame, wheels and point masses included."""
     rigid = [i for i, body in enumerate(scene.bodies) if isinstance(body, RigidBody)]
     bodies = [scene.bodies[i] for i in rigid]
     total = np.zeros((len(scene.bodies), 6, 6))
@@ -155,7 +155,7 @@ def _spatial_inertias(scene: Scene, nodes: _Nodes) -> tuple[list[bool], Real]:
     for i, body in enumerate(scene.bodies):
         match body:
             case RigidBody():
-                pass  # all of them at once, above
+                pass  # done above, for all at once
             case BeamBody():
                 total[i] = _beam(body)
             case ModalBody():
@@ -176,7 +176,7 @@ def _spatial_inertias(scene: Scene, nodes: _Nodes) -> tuple[list[bool], Real]:
 
 
 def _attached(item: Wheel | PointMass) -> Real:
-    """A wheel that spins freely resists no rotation about its axis."""
+    """Spatial inertia (6,6) of a wheel or point mass; a wheel that spins freely resists no rotation about its axis."""
     match item:
         case PointMass():
             inertia = np.zeros((3, 3))
@@ -191,7 +191,8 @@ def _attached(item: Wheel | PointMass) -> Real:
 
 
 def _beam(body: BeamBody) -> Real:
-    total = _sum(_lump(t.mass_kg, np.add((t.x_m, 0.0, 0.0), t.com_m), t.inertia_kg_m2) for t in body.tip_masses)
+    lumps = (_lump(t.mass_kg, np.add((t.x_m, 0.0, 0.0), t.com_m), t.inertia_kg_m2) for t in body.tip_masses)
+    total: Real = sum(lumps, np.zeros((6, 6)))
     keys = ("mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
     for left, right in zip(body.stations, body.stations[1:], strict=False):
         half = (right.x_m - left.x_m) / 2.0
@@ -222,10 +223,6 @@ def _lump(mass: float, com: Vector | Real, inertia: ArrayLike) -> Real:
     return found
 
 
-def _sum(inertias: Iterable[Real]) -> Real:
-    return sum(inertias, np.zeros((6, 6)))
-
-
 def _motions(R: Real, p: Real) -> Real:
     """X (n,6,6): spatial velocity [w; v] of the body frame to that of the frame at R, p in it, in that frame's axes."""
     out = np.zeros((len(R), 6, 6))
@@ -243,8 +240,13 @@ def _skew(v: Real) -> Real:
 
 
 def _free_directions(freedoms: Sequence[tuple[Freedom, ...]]) -> list[Real]:
-    """By hinge, free rows (n,6) of its map at the start, outboard hinge axes; prescribed coordinates are left out."""
-    single = [i for i, own in enumerate(freedoms) if len(own) == 1 and _moves_freely(own[0])]
+    """For each hinge the rows (n,6) of its map at the start, outboard hinge axes, without prescribed coordinates."""
+    # a single free coordinate, as most hinges have
+    single = [
+        i
+        for i, own in enumerate(freedoms)
+        if len(own) == 1 and isinstance(own[0], ScalarFreedom) and own[0].coordinate.prescribed is None
+    ]
     lines = [own for i in single for own in freedoms[i] if isinstance(own, ScalarFreedom)]
     axis = column(lines, "axis", 3)
     rows = np.concatenate([column(lines, size)[:, None] * axis for size in ("turns", "shifts")], axis=1)
@@ -266,13 +268,8 @@ def _armatures(freedoms: Sequence[Freedom]) -> list[float]:
     return found
 
 
-def _moves_freely(freedom: Freedom) -> bool:
-    """Whether it is a single direction that no later freedom carries: that of most hinges."""
-    return isinstance(freedom, ScalarFreedom) and freedom.coordinate.prescribed is None
-
-
 def _directions_of(freedoms: Sequence[Freedom]) -> Real:
-    """Those of several freedoms: each is carried to the outboard frame by those that follow it."""
+    """Free rows of several freedoms; each is transformed to the outboard frame by the freedoms that follow it."""
     found = [np.zeros((0, 6))]
     R, p = np.eye(3), np.zeros(3)  # of the outboard frame, seen from where the freedom leads
     for freedom in reversed(freedoms):
@@ -298,6 +295,6 @@ def _across(freedom: Freedom) -> tuple[Real, Real, Real]:
 
 
 def _start(coordinate: Coordinate) -> float:
-    """Initial value (rad or m): the profile's where there is one."""
+    """Initial value (rad or m), that of the prescribed motion if there is one."""
     start = None if coordinate.prescribed is None else start_of(coordinate.prescribed)
     return coordinate.value if start is None else start[0]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from math import cos, sin
-from typing import Any, assert_never, get_args
+from typing import assert_never, get_args
 
 from flexmb.scene.bodies import SceneStruct
-from flexmb.scene.check.walk import non_finite, suspicious, values
-from flexmb.scene.columns import alike
+from flexmb.scene.check.walk import holding, non_finite, suspicious, values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.problems import Defect, Place
@@ -23,17 +22,13 @@ SMOOTH = "use smooth_step, spin_up, sine, ramp, constant, or a table"
 
 def functions(scene: Scene, t_end: float | None, t_start: float = 0.0) -> Iterator[Defect]:
     """Problems of every function in the scene; tables must cover t_start (s), and with `t_end` (s) reach that far."""
-    for place, key, value in suspicious(scene, _with_functions):
+    for place, key, value in suspicious(scene, holding(*get_args(Function))):
         if isinstance(value, Function) and not any(non_finite(v) for _, _, v in values(place, value)):
             yield from _well_formed(place, value)
             if isinstance(value, Table):
                 yield from _covers(place, value, t_end, t_start)
             if isinstance(value, Pulse) and key in MOTIONS:
                 yield Defect(str(place), "a pulse jumps: no body can follow it", SMOOTH)
-
-
-def _with_functions(items: Sequence[Any]) -> set[int]:
-    return {owner for group in alike(items) if group.kind in get_args(Function) for owner in group.owners}
 
 
 def start_of(function: Function) -> tuple[float, float] | None:
@@ -60,7 +55,7 @@ def start_of(function: Function) -> tuple[float, float] | None:
 def _table_start(table: Table) -> tuple[float, float] | None:
     if any((*_table(ROOT, table), *_covers(ROOT, table, None, 0.0))):
         return None
-    # here, because this import takes longer than everything else a scene without tables imports
+    # imported here, because it takes longer than all other imports of a scene without tables
     from scipy.interpolate import make_interp_spline
 
     spline = make_interp_spline(table.times_s, table.values, k=5)

@@ -1,4 +1,4 @@
-"""Raw modal bodies of level stiffened: a second-order field of points and nodes, or the stiffness it follows from."""
+"""Checks of raw modal bodies of level stiffened: a second-order field, or the stiffness from which it follows."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ FULL = 'or use level "full", which no load stiffens'
 
 
 def second_order(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defect]:
-    """Problems of the second-order data of a body and its nodes, whatever its level; that none is missing, at level
-    stiffened."""
+    """Second-order data of a body and its nodes is consistent, and at level stiffened complete."""
     for i, node in enumerate(body.nodes):
         spot = place.key("nodes", i).named(f'node "{node.name}"')
         try:

@@ -49,7 +49,7 @@ def _cycles(parents: dict[str, str]) -> list[list[str]]:
     done: set[str] = set()
     cycles = []
     for start in parents:
-        path: dict[str, int] = {}  # by body, how many were passed before it
+        path: dict[str, int] = {}  # for each body, the number of bodies before it
         name = start
         while name in parents and name not in done and name not in path:
             path[name] = len(path)

@@ -1,8 +1,9 @@
-"""Every value of a scene with its place; the checks that hold wherever a value stands: finite numbers, unit axes."""
+"""Every value of a scene with its place; checks that apply everywhere: finite numbers, unit axes and quaternions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from itertools import chain
 from math import hypot
 from operator import attrgetter
@@ -16,20 +17,20 @@ from flexmb.scene.convert import ROOT, label
 from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene
 
-# Data printed to ten digits are unit vectors to 1e-10; what is further off than this was never normalised.
+# Data printed to ten digits are unit vectors to 1e-10; vectors with a larger error than this were not normalised.
 UNIT_LENGTH = 1e-9
-# No quantity of mechanics is near it in SI units, and products of five such numbers are still finite.
+# Larger than any quantity of mechanics in SI units; products of five such numbers are still finite.
 LARGEST = 1e60
 AXES = ("axis", "direction", "directions")
 
 
 def entries(scene: Scene, collection: str, chosen: Iterable[int] | None = None) -> Iterator[tuple[Place, Any]]:
-    """The items of one of the scene's collections with their places, named; or those of the chosen numbers."""
+    """The items of one of the scene's collections with their places, all or those of the chosen numbers."""
     yield from _named_items(ROOT.key(collection), collection, getattr(scene, collection), chosen)
 
 
 def sound(scene: Scene, collection: str, chosen: Iterable[int] | None = None) -> Iterator[tuple[Place, Any]]:
-    """Like `entries`, without the items that hold a NaN or an infinity: physical checks would mean nothing there."""
+    """Like `entries`, without the items with a NaN or an infinity, for which physical checks are meaningless."""
     items = getattr(scene, collection)
     numbers = list(range(len(items)) if chosen is None else chosen)
     unsound = not_finite([items[i] for i in numbers])
@@ -37,7 +38,7 @@ def sound(scene: Scene, collection: str, chosen: Iterable[int] | None = None) ->
 
 
 def not_finite(items: Sequence[Any]) -> set[int]:
-    """Numbers of the items that hold a number `non_finite` finds."""
+    """Numbers of the items with a number that `non_finite` reports."""
     return {
         owner
         for group in alike(items)
@@ -49,7 +50,7 @@ def not_finite(items: Sequence[Any]) -> set[int]:
 
 
 def _all_finite(values: list[Any]) -> bool:
-    """Whether numbers, or nested tuples of numbers, are finite for certain; mixtures never are."""
+    """Whether numbers, or nested tuples of numbers of equal shape, are finite; False for anything else."""
     try:
         while values and isinstance(values[0], tuple):
             values = list(chain.from_iterable(values))
@@ -59,8 +60,8 @@ def _all_finite(values: list[Any]) -> bool:
 
 
 def suspicious(scene: Scene, suspects: Callable[[Sequence[Any]], Iterable[int]]) -> Iterator[tuple[Place, str, Any]]:
-    """Place, key and value of every field of the scene itself, and of those items of its collections that `suspects`
-    finds."""
+    """Place, key and value of every field of the scene itself, and of the items of its collections whose numbers
+    `suspects` returns."""
     for key in scene.__struct_fields__:
         value, spot = getattr(scene, key), ROOT.key(key)
         if isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
@@ -94,7 +95,7 @@ def non_finite(value: Any) -> tuple[tuple[int, ...], float] | None:
 
 
 def finite_numbers(scene: Scene) -> Iterator[Defect]:
-    """No NaN, no infinity and nothing whose powers are infinite, anywhere."""
+    """No number is NaN, infinite, or so large that its powers overflow."""
     for place, _, value in suspicious(scene, not_finite):
         if found := non_finite(value):
             remedy = f"give a finite number, of at most {LARGEST:g}"
@@ -103,7 +104,7 @@ def finite_numbers(scene: Scene) -> Iterator[Defect]:
 
 def unit_vectors(scene: Scene) -> Iterator[Defect]:
     """Axes and directions have unit length."""
-    for place, key, value in suspicious(scene, _off_unit_axes):
+    for place, key, value in suspicious(scene, partial(_off_unit, wanted=AXES.__contains__)):
         if key in AXES and not non_finite(value):
             several = key == "directions"
             for i, vector in enumerate(value if several else (value,)):
@@ -117,8 +118,8 @@ def unit_vectors(scene: Scene) -> Iterator[Defect]:
 
 def unit_quaternions(scene: Scene) -> Iterator[Defect]:
     """Quaternions have unit length."""
-    for place, key, value in suspicious(scene, _off_unit_quaternions):
-        if "quaternion" in key and not non_finite(value):
+    for place, key, value in suspicious(scene, partial(_off_unit, wanted=_is_quaternion)):
+        if _is_quaternion(key) and not non_finite(value):
             norm = hypot(*value)
             if norm == 0.0:
                 yield Defect(str(place), "the quaternion is zero", "for no rotation write (1, 0, 0, 0), scalar first")
@@ -126,12 +127,13 @@ def unit_quaternions(scene: Scene) -> Iterator[Defect]:
                 yield Defect(str(place), f"not a unit quaternion: its norm is {norm:.9g}", _unit(value, norm))
 
 
-def _off_unit_axes(items: Sequence[Any]) -> set[int]:
-    return _off_unit(items, lambda key: key in AXES)
+def _is_quaternion(key: str) -> bool:
+    return "quaternion" in key
 
 
-def _off_unit_quaternions(items: Sequence[Any]) -> set[int]:
-    return _off_unit(items, lambda key: "quaternion" in key)
+def holding(*kinds: type) -> Callable[[Sequence[Any]], set[int]]:
+    """For `suspicious`: finds the items that contain structs of these kinds."""
+    return lambda items: {owner for group in alike(items) if group.kind in kinds for owner in group.owners}
 
 
 def _off_unit(items: Sequence[Any], wanted: Callable[[str], bool]) -> set[int]:
@@ -150,7 +152,7 @@ def _not_unit(group: Alike, key: str) -> list[int]:
         length = np.linalg.norm(np.array(values, float), axis=-1)
     except (TypeError, ValueError, OverflowError):  # tuples of several
         return [owner for owner, value in zip(group.owners, values, strict=True) if value]
-    unit = np.abs(length - 1.0) <= 0.5 * UNIT_LENGTH  # half of it, for `hypot` rounds otherwise
+    unit = np.abs(length - 1.0) <= 0.5 * UNIT_LENGTH  # half of it, because `hypot` rounds differently
     return [group.owners[i] for i in np.flatnonzero(~unit.reshape(len(values), -1).all(axis=1)).tolist()]
 
 

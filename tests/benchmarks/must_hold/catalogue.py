@@ -13,11 +13,12 @@ from tests.benchmarks.must_hold import (
     missions,
     modes,
     runs,
+    runs_at_equal_error,
     start,
 )
 from tests.benchmarks.must_hold.row import Row
 
-SOURCES = (evaluation, runs, missions, modes, floating_frames, growth, charts, start, first_use)
+SOURCES = (evaluation, runs, runs_at_equal_error, missions, modes, floating_frames, growth, charts, start, first_use)
 
 
 @cache

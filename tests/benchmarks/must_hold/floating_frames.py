@@ -3,18 +3,16 @@
 The error is the largest distance of the tip from where it should be, of what bending does to it: the largest distance
 from the tip of the same bodies rigid. Every code is held against its own converged answer, because on the boom the two
 differ: Exudyn's joints on deforming nodes are other joints. Both run as fast as we could make them, with one sample a
-second. Native: the explicit or an implicit method, or generalised-alpha, which is Exudyn's too. Exudyn: the trapezoidal
-rule or generalised-alpha with the longest step that is accurate enough, modified Newton (two to five times faster here
-than Newton with a new Jacobian in every step), and the faster one of its linear solvers.
+second, each at the fastest of the settings in `SEARCHED` that is accurate enough.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,8 +22,8 @@ from crosscheck.running.plan import variant_scene
 from flexmb.integrate.integrator import Method
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import rigidify
-from tests.benchmarks.must_hold.row import Measured, RivalsDiffer, Row, duration, measured
-from tests.benchmarks.rivals import turns
+from tests.benchmarks.must_hold.row import Measured, Row
+from tests.benchmarks.must_hold.tuning import Setting, equal_error
 
 GROUP = "Floating frames at equal error"
 MARKER = "tip"
@@ -35,18 +33,16 @@ FINEST = (2.0**-9, 2.0**-10)  # of the trapezoidal rule, extrapolated to what Ex
 METHODS: tuple[Method, ...] = ("dop853", "exponential", "radau5")
 TOLERANCES = tuple(10.0**-k for k in range(2, 9))
 CONVERGED = 1e-12
-NEWTON, SPECTRAL_RADIUS = 1e-8, 0.9
+SPECTRAL_RADIUS = 0.9
+TIGHT = 1e-8  # tolerance of Newton's method, by which a step's own error is found
+TOLERANCES_OF_NEWTON = (1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 NATIVE_NEWTON = 1e-5  # a longer step with closer iterations costs less here than the other way round
-ROUNDS = 5
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A setting of one code with its error."""
-
-    run: Callable[[], Any]
-    label: str
-    error: float
+SEARCHED = (
+    "Exudyn: `TrapezoidalIndex2` and `GeneralizedAlpha` (spectral radius 0.9), steps of 1/8 s to 1/1024 s by halves, "
+    "Newton and modified Newton, their tolerances 1e-8, 1e-6, 1e-5, 1e-4, 1e-3 and 1e-2, dense and sparse linear "
+    "solver. Native: `dop853`, `exponential` and `radau5` at relative tolerances of 1e-2 to 1e-8, and "
+    "`generalised_alpha` with Exudyn's steps and spectral radius."
+)
 
 
 def rows() -> list[Row]:
@@ -58,35 +54,21 @@ def rows() -> list[Row]:
     return [
         Row(
             f"ffrf_{name}_{level:g}", GROUP, f"Exudyn, {what}, {seconds} s, error {level:g}", 10.0,
-            partial(_equal_error, case, seconds, level),
+            partial(_row, case, seconds, level), searched=SEARCHED,
         )
         for name, what, case, seconds in cases
         for level in LEVELS
     ]  # fmt: skip
 
 
-def _equal_error(case: str, seconds: int, level: float) -> Measured:
-    """Between the fastest settings of both codes that err by no more.
-
-    Raises RivalsDiffer where one of them never gets that close to its own converged answer.
-    """
-    native, rival = (_fastest(code, level) for code in _candidates(case, seconds))
-    times = turns(native.run, rival.run, rounds=ROUNDS)
-    mine, other = np.median(times, axis=0)
-    detail = f"{duration(mine)} ({native.label}) against {duration(other)} ({rival.label})"
-    return measured(times[:, 1] / times[:, 0], detail)
-
-
-def _fastest(candidates: Sequence[Candidate], level: float) -> Candidate:
-    good = [each for each in candidates if each.error <= level]
-    if not good:
-        raise RivalsDiffer(f"no setting errs by {level:g} or less")
-    return good[int(np.argmin(np.median(turns(*(each.run for each in good), rounds=2), axis=0)))]
+def _row(case: str, seconds: int, level: float) -> Measured:
+    native, rival = _settings(case, seconds)
+    return equal_error(native, rival, level)
 
 
 @cache
-def _candidates(case: str, seconds: int) -> tuple[Sequence[Candidate], Sequence[Candidate]]:
-    """Settings of native and of Exudyn, each as accurate as the last of LEVELS demands or less."""
+def _settings(case: str, seconds: int) -> tuple[list[Setting], list[Setting]]:
+    """Those of native and of Exudyn, each up to the accuracy that the last of LEVELS demands."""
     (found,) = resolve((case,))
     variant = found.run.variant("full")
     scene, times = variant_scene(found.scene(variant), variant), np.linspace(0.0, seconds, seconds + 1)
@@ -96,18 +78,18 @@ def _candidates(case: str, seconds: int) -> tuple[Sequence[Candidate], Sequence[
     return [*_native(system, times, exact, bending)], [*_exudyn(scene, times, bending)]
 
 
-def _native(system: fm.System, times: np.ndarray, exact: np.ndarray, bending: float) -> Iterator[Candidate]:
+def _native(system: fm.System, times: np.ndarray, exact: np.ndarray, bending: float) -> Iterator[Setting]:
     for method in METHODS:
         for rtol in TOLERANCES:
             run = partial(_simulated, system, times, method, rtol)
             error = _error(run(), exact, bending)
-            yield Candidate(run, f"{method}, rtol {rtol:g}", error)
+            yield Setting(run, f"{method}, rtol {rtol:g}", error)
             if error <= LEVELS[-1]:
                 break
     for step in STEPS:
         run = partial(_simulated, system, times, "generalised_alpha", NATIVE_NEWTON, step)
         error = _error(run(), exact, bending)
-        yield Candidate(run, f"generalised_alpha, step {1e3 * step:.3g} ms", error)
+        yield Setting(run, f"generalised_alpha, step {1e3 * step:.3g} ms", error)
         if error <= LEVELS[-1]:
             break
 
@@ -123,37 +105,62 @@ def _simulated(
     return done.markers[MARKER].position
 
 
-def _exudyn(scene: Scene, times: np.ndarray, bending: float) -> Iterator[Candidate]:
+def _exudyn(scene: Scene, times: np.ndarray, bending: float) -> Iterator[Setting]:
+    """Steps by halves; Newton's settings where the step itself is accurate enough for a level for the first time."""
     from crosscheck.engines.exudyn.assembly import assemble
 
     assembly = assemble(scene)
-    coarse, fine = (_tip(assembly, _solved(assembly, times, "TrapezoidalIndex2", step)) for step in FINEST)
+    reference = ("TrapezoidalIndex2", Newton(TIGHT, True, False))
+    coarse, fine = (_tip(assembly, _solved(assembly, times, *reference, step)) for step in FINEST)
     exact = fine + (fine - coarse) / 3.0
+
+    def setting(method: str, newton: Newton, step: float) -> Setting:
+        run = partial(_solved, assembly, times, method, newton, step)
+        error = _error(_tip(assembly, run()), exact, bending)
+        return Setting(run, f"{method}, step {1e3 * step:.3g} ms, {newton}", error)
+
     for method in ("TrapezoidalIndex2", "GeneralizedAlpha"):
+        left = list(LEVELS)
         for step in STEPS:
-            run = partial(_solved, assembly, times, method, step)
-            error = _error(_tip(assembly, run()), exact, bending)
-            yield Candidate(run, f"{method}, step {1e3 * step:.3g} ms", error)
-            if error <= LEVELS[-1]:
+            tight = setting(method, reference[1], step)
+            yield tight
+            reached = [level for level in left if tight.error <= level]
+            if reached:
+                for tolerance, modified, sparse in product(TOLERANCES_OF_NEWTON, (True, False), (False, True)):
+                    yield setting(method, Newton(tolerance, modified, sparse), step)
+            left = [level for level in left if level not in reached]
+            if not left:
                 break
 
 
-def _solved(assembly: Any, times: np.ndarray, method: str, step: float) -> Any:
+class Newton(NamedTuple):
+    """Relative and absolute tolerance; whether a Jacobian is kept as long as it contracts; the linear solver."""
+
+    tolerance: float
+    modified: bool
+    sparse: bool
+
+    def __str__(self) -> str:
+        kind, solver = "modified Newton" if self.modified else "Newton", "sparse" if self.sparse else "dense"
+        return f"{kind} to {self.tolerance:g}, {solver}"
+
+
+def _solved(assembly: Any, times: np.ndarray, method: str, newton: Newton, step: float) -> Any:
     """States at `times` by fixed steps; fewer where Exudyn gives up."""
-    from crosscheck.engines.exudyn.solve import SPARSE_FROM, Recorder
+    from crosscheck.engines.exudyn.solve import Recorder
 
     shop = assembly.shop
     settings = shop.exu.SimulationSettings()
     settings.solution.file.write = False
     settings.solution.sensors.writePeriod = float(times[1])
-    if shop.mbs.systemData.SystemSize() > SPARSE_FROM:
-        settings.linearSolver.solverType = shop.exu.LinearSolverType.EigenSparse
+    solvers = shop.exu.LinearSolverType
+    settings.linearSolver.solverType = solvers.EigenSparse if newton.sparse else solvers.EXUdense
     control = settings.timeIntegration
     control.verboseMode, control.adaptiveStep = 0, False
     control.solverType = getattr(shop.exu.DynamicSolverType, method)
     control.endTime, control.numberOfSteps = float(times[-1]), round(times[-1] / step)
-    control.newton.useModifiedNewton = True
-    control.newton.relativeTolerance = control.newton.absoluteTolerance = NEWTON
+    control.newton.useModifiedNewton = newton.modified
+    control.newton.relativeTolerance = control.newton.absoluteTolerance = newton.tolerance
     control.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
     recorder = Recorder(assembly)
 

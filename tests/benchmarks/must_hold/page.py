@@ -26,8 +26,10 @@ python -m tests.benchmarks --from-kept --write   # write this page and the pictu
 
 Rivals take turns in one process, so that a busy machine slows both, and their results are compared before they are
 timed. A figure is the median over the rounds, its spread the quartiles; of seconds of whole processes the least and the
-largest. Times are processor time; behind a ratio are the native time and the rival's. Peers run at the best settings
-that we found, without contacts, constraints, sensors or output that the scene has none of.
+largest. Times are processor time; behind a ratio are the native time and the rival's. Peers run without contacts,
+constraints, sensors or output that the scene has none of. Where codes are compared at equal error, a tuner
+(`tests/benchmarks/must_hold/tuning.py`) searches the settings of each code for the least time at that error; the grid
+stands below the table, and what was found behind each ratio.
 The same rows are pytest benchmarks: `python -m pytest tests/benchmarks/test_must_hold.py`.
 
 What these figures say is of one machine. What a change does to the work of a kernel is held without a clock by
@@ -103,7 +105,8 @@ def _table(group: str, rows: list[Row], results: Results) -> str:
         shown = word if word == "met" else f"**{word}**"
         cells = (row.what, value, spread, goal(row), shown, detail.replace("|", "/"), f"`{row.name}`")
         lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join([*lines, *_reasons(rows, results)]) + "\n"
+    searched = [f"Settings that were searched: {text}" for text in dict.fromkeys(row.searched for row in rows) if text]
+    return "\n".join([*lines, *(part for text in searched for part in ("", text)), *_reasons(rows, results)]) + "\n"
 
 
 def _reasons(rows: list[Row], results: Results) -> list[str]:

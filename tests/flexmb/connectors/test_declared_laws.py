@@ -1,4 +1,4 @@
-"""Laws along coordinates are what their files declare; what derivatives cannot go through is said when they are."""
+"""Laws of connectors are what their files declare; what derivatives cannot go through is said when they are."""
 
 import math
 from math import exp
@@ -12,8 +12,9 @@ from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import select
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import SceneStruct
-from flexmb.scene.connectors import HingeFriction, HingeSpring
+from flexmb.scene.connectors import BetweenNodes, HingeFriction, HingeSpring
 from flexmb.spatial.scalar import sqrt
+from flexmb.tables.arrays import COORDINATE_LAW, FRAME_LAW
 
 FRICTION = s.AngularFriction(name="f", hinge="h", sliding_Nm=2.0, smoothing_rad_s=1e-3)
 
@@ -33,9 +34,26 @@ def test_every_connector_along_a_coordinate_is_a_spring_or_of_one_law():
     assert len(parameters) <= MOST
 
 
-def test_a_connector_of_no_law_is_refused_by_name():
+def test_every_connector_between_frames_is_of_one_law():
+    ends = {"name": "c", "body_a": "ground", "body_b": "b"}
+    spring = s.SpringDamper(**ends, stiffness_N_m=1.0)
+    rows = tuple(tuple(float(6 * i + j) for j in range(6)) for i in range(6))
+    bushing = s.Bushing(**ends, stiffness=rows, damping=rows)
+    assert {type(each) for each in (spring, bushing)} == set(get_args(BetweenNodes))
+    assert len(catalogue.FRAME_LAWS) == 2
+    assert catalogue.frame_law_of(spring) == (0, ())
+    assert catalogue.frame_law_of(bushing) == (1, (*range(36), *range(36)))
+
+
+def test_a_law_has_no_more_parameters_than_the_table_has_room_for():
+    assert FRAME_LAW["parameters"].shape == (72,)
+    assert COORDINATE_LAW["parameters"].shape == (MOST,)
+
+
+@pytest.mark.parametrize("law_of", [catalogue.law_of, catalogue.frame_law_of], ids=["along a coordinate", "between"])
+def test_a_connector_of_no_law_is_refused_by_name(law_of):
     with pytest.raises(TypeError, match="no law of flexmb.connectors takes a MadeUp: odd"):
-        catalogue.law_of(MadeUp())
+        law_of(MadeUp())
 
 
 @helper

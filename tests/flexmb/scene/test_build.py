@@ -7,7 +7,7 @@ from typing import Unpack, get_args, get_origin, get_type_hints
 import numpy as np
 import pytest
 
-from flexmb.scene import build
+from flexmb.scene import build, options
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, angular
 from flexmb.scene.collecting import COLLECTIONS
@@ -81,7 +81,7 @@ def test_every_key_of_the_schema_is_an_argument(method):
 
 @pytest.mark.parametrize("kind", [s.AngularCoordinate, s.LinearCoordinate])
 def test_every_key_of_a_coordinate_is_an_argument(kind):
-    typed = build.Angle if kind is s.AngularCoordinate else build.Displacement
+    typed = options.Angle if kind is s.AngularCoordinate else options.Displacement
     assert {split_unit(key)[0] for key in kind.__struct_fields__} == set(typed.__annotations__)
 
 

@@ -147,7 +147,7 @@ def test_exact_kernels_of_connectors_do_too(monkeypatch):
 
 def test_connectors_are_compiled_kind_by_kind(exact):
     found = fm.compile(free_flying()).constants.features()
-    assert {features.CONNECTORS, features.ONE_SIDED, features.BUSHINGS} <= found
+    assert {features.CONNECTORS, features.ONE_SIDED, features.FRAME_LAWS} <= found
     assert not {features.ACTUATORS, features.HINGE_SPRINGS, features.COORDINATE_LAWS} & found
 
 
