@@ -183,7 +183,7 @@ class _Model:
     def _refuse_actuators(self) -> None:
         """Armatures and dampers of actuators are those of their joints, if they are at hinges or slides."""
         m = self.m
-        for i in range(m.nu):
+        for i in range(len(m.actuator_trntype)):
             own = [key for key in ("armature", "damping", "dampingpoly") if np.any(_entry(m, f"actuator_{key}", i))]
             at_joint = m.actuator_trntype[i] in JOINT_TRANSMISSIONS and m.jnt_type[m.actuator_trnid[i, 0]] in SINGLE
             if "dampingpoly" in own or (own and not at_joint):
