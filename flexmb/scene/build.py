@@ -137,8 +137,8 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         """One rotation about the unit vector `axis` (inboard hinge axes).
 
         Initial `angle` (rad) and `rate` (rad/s), spring `stiffness` (N m/rad) about `rest` (rad), `damping`
-        (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time; nodes and offsets as for
-        every hinge (`flexmb.scene.options.Placement`).
+        (N m s/rad), `armature` (kg m²), motor `torque` (N m) or `prescribed` angle (rad) as functions of time; nodes
+        and offsets as for every hinge (`flexmb.scene.options.Placement`).
         """
         return self._turning(s.Revolute, options, name=name, parent=parent, child=child, axis=axis)
 
@@ -147,9 +147,9 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
     ) -> Self:
         """One translation along the unit vector `axis` (inboard hinge axes).
 
-        Initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m), `damping` (N s/m), motor
-        `force` (N) or `prescribed` displacement (m) as functions of time; nodes and offsets as for every hinge
-        (`flexmb.scene.options.Placement`).
+        Initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m), `damping` (N s/m),
+        `armature` (kg), motor `force` (N) or `prescribed` displacement (m) as functions of time; nodes and offsets as
+        for every hinge (`flexmb.scene.options.Placement`).
         """
         o.refuse_others("a Prismatic", options, o.SlidingHinge)
         displacement, placement = _divided(options, o.Displacement)
@@ -315,3 +315,16 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         return self._append(
             s.Closure, name=name, type=type, body_a=body_a, body_b=body_b, axis=axis, **frames
         )
+
+    def coupling(
+        self, name: str, hinge: str, ratios: Mapping[str, float] | Mapping[str | tuple[str, str], float], *,
+        coordinate: str = "", offset: float = 0.0,
+    ) -> Self:  # fmt: skip
+        """A linear relation of hinge coordinates, q = `offset` + sum of ratio_i q_i: a gear, belt, rack or linkage.
+
+        q is the coordinate of `hinge`, in rad or m. `ratios` by the hinge of q_i, or by (hinge, coordinate) where the
+        hinge has several, in units of q per unit of q_i.
+        """
+        named = [((key, "") if isinstance(key, str) else key, ratio) for key, ratio in ratios.items()]
+        terms = [{"hinge": at, "coordinate": which, "ratio": ratio} for (at, which), ratio in named]
+        return self._append(s.Coupling, name=name, hinge=hinge, coordinate=coordinate, terms=terms, offset=offset)

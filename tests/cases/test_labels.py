@@ -15,8 +15,8 @@ from tests.crosscheck.sessions import shipped
 CASES = [case for case in shipped() if case.provenance is not None]
 NUMBERS = {"two": 2, "three": 3, "four": 4}
 ON_NATIVE_ALONE = 8
-"""Closed chains of flexible bodies, welded pieces of level stiffened, controllers and events, which no peer holds exactly;
-and two trees of flexible bodies that Exudyn's joints at deforming nodes move otherwise."""
+"""Closed chains of flexible bodies, welded pieces of level stiffened, controllers and events, which no peer holds
+exactly; and two trees of flexible bodies that Exudyn's joints at deforming nodes move otherwise."""
 
 
 def stored(case: Case) -> Basis:

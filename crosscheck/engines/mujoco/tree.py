@@ -4,9 +4,9 @@ Conventions of MuJoCo: quaternions wxyz; a ball's velocity in outboard axes; sli
 are in inboard axes (three slides and a ball serve on any parent, MuJoCo's free joint only on the ground).
 
 Two workarounds. (1) A prescribed coordinate has an armature so large that only the applied ARMATURE * acceleration
-moves it; its load is that of the inverse dynamics, which does not contain the armature. The error of its acceleration
-is the load / ARMATURE. (2) MuJoCo refuses principal moments of inertia below 1e-15 kg m^2: smaller ones (point masses,
-rods) are raised to `LEAST_INERTIA`.
+moves it; its load is that of the inverse dynamics, which does not contain armatures, plus what moves the scene's own.
+The error of its acceleration is the load / ARMATURE. (2) MuJoCo refuses principal moments of inertia below 1e-15 kg
+m^2: smaller ones (point masses, rods) are raised to `LEAST_INERTIA`.
 """
 
 from __future__ import annotations
@@ -37,6 +37,16 @@ class MujocoClosure:
 
 
 @dataclass(frozen=True)
+class MujocoCoupling:
+    """A fixed tendon whose length, the sum of factors times joints' coordinates, is kept at `offset`, as softly."""
+
+    name: str
+    joints: tuple[str, ...]
+    factors: tuple[float, ...]
+    offset: float
+
+
+@dataclass(frozen=True)
 class MujocoSlot(Slot):
     """A freedom with the ids of its MuJoCo body and of the first of its MuJoCo joints."""
 
@@ -54,7 +64,12 @@ class MujocoTree:
     slots: tuple[MujocoSlot, ...]
 
 
-def build_tree(links: tuple[Link, ...], gravity: Real, closures: tuple[MujocoClosure, ...] = ()) -> MujocoTree:
+def build_tree(
+    links: tuple[Link, ...],
+    gravity: Real,
+    closures: tuple[MujocoClosure, ...] = (),
+    couplings: tuple[MujocoCoupling, ...] = (),
+) -> MujocoTree:
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = gravity
@@ -73,10 +88,14 @@ def build_tree(links: tuple[Link, ...], gravity: Real, closures: tuple[MujocoClo
         body.inertia = principal
         body.iquat = quaternion_of(axes)
         for k, freedom in enumerate(link.freedoms):
-            _add_joints(body, freedom, f"{_body_name(link)}.{k}")
+            _add_joints(body, freedom, joint_name(link, k))
         bodies.append(body)
     for i, closed in enumerate(closures):
         _close(spec, bodies, closed, i)
+    for coupling in couplings:
+        _couple(spec, coupling)
+    if couplings:  # its solver stops at errors relative to the mean inertia, in which an armature would hide them
+        spec.option.tolerance = 0.0
     model = spec.compile()
     ids = np.array([model.body(_body_name(link)).id for link in links], dtype=np.intp)
     return MujocoTree(model, links, ids, _slots(model, links, ids))
@@ -113,6 +132,15 @@ def _close(spec: mujoco.MjSpec, bodies: list[mujoco.MjsBody], closed: MujocoClos
     )
 
 
+def _couple(spec: mujoco.MjSpec, coupling: MujocoCoupling) -> None:
+    tendon = spec.add_tendon(name=coupling.name)
+    for joint, factor in zip(coupling.joints, coupling.factors, strict=True):
+        tendon.wrap_joint(joint, factor)
+    data = np.zeros(mujoco.mjNEQDATA)
+    data[0] = coupling.offset
+    spec.add_equality(type=mujoco.mjtEq.mjEQ_TENDON, name1=coupling.name, data=data)
+
+
 def _add_joints(body: mujoco.MjsBody, freedom: Freedom, name: str) -> None:
     kinds = mujoco.mjtJoint
     match freedom:
@@ -123,6 +151,7 @@ def _add_joints(body: mujoco.MjsBody, freedom: Freedom, name: str) -> None:
                 joint.stiffness = [freedom.stiffness, 0.0, 0.0]
                 joint.springref = freedom.rest
                 joint.damping = [freedom.damping, 0.0, 0.0]
+                joint.armature = freedom.armature
             else:
                 joint.armature = ARMATURE
         case Ball():
@@ -167,6 +196,11 @@ def _principal(inertia: Real) -> tuple[Real, Real]:
     # A disc's moments miss the triangle inequality by round-off, and the compiler refuses it.
     moments[2] = min(moments[2], moments[0] + moments[1])
     return moments, axes
+
+
+def joint_name(link: Link, k: int) -> str:
+    """Of the joint that is freedom k of a link."""
+    return f"{_body_name(link)}.{k}"
 
 
 def _body_name(link: Link) -> str:

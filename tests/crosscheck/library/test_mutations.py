@@ -15,6 +15,7 @@ from flexmb.scene.bodies import BeamBody, BeamStation, Modes, Node, RigidBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.connectors import AngularFriction, AngularSpring, Bushing
 from flexmb.scene.control import CoordinateSensor, MarkerSensor, Pid, ProfileSensor, StateSpace
+from flexmb.scene.couplings import CoupledCoordinate, Coupling
 from flexmb.scene.events import Change, Impact, Latch, SceneEvent
 from flexmb.scene.functions import Ramp, Sine, SmoothStep
 from flexmb.scene.hinges import AngularCoordinate, Gimbal, Revolute, Spherical
@@ -125,7 +126,8 @@ PUSH = Sine(amplitude=2.0, angular_frequency_rad_s=3.0)
 def everything() -> Scene:
     """A scene with something for every mutation to change."""
     swing = AngularCoordinate(
-        angle_rad=0.3, rate_rad_s=0.2, stiffness_Nm_rad=3.0, damping_Nms_rad=0.1, rest_rad=0.1, torque_Nm=PUSH
+        angle_rad=0.3, rate_rad_s=0.2, stiffness_Nm_rad=3.0, damping_Nms_rad=0.1, rest_rad=0.1, armature_kg_m2=0.2,
+        torque_Nm=PUSH,
     )
     skew = ((0.2, 0.01, 0.02), (0.01, 0.3, 0.03), (0.02, 0.03, 0.4))
     hub = RigidBody(
@@ -158,6 +160,12 @@ def everything() -> Scene:
             Closure(
                 name="loop", type="revolute", body_a="ground", body_b="tip", node_b="port",
                 position_a_m=(1.0, 0.0, 0.0), quaternion_a=TURNED,
+            ),
+        ),
+        couplings=(
+            Coupling(
+                name="gear", hinge="end", offset=0.2,
+                terms=(CoupledCoordinate(hinge="root", coordinate="rotations[0]", ratio=1.5),),
             ),
         ),
         wheels=(
@@ -227,6 +235,9 @@ def test_every_mutation_has_a_target_and_leaves_the_rest_as_it_was(mutation: Mut
         ("bushing_ends", "mount", {f"connectors[1].{key}" for key in ("body_a", "body_b")}
             | {f"connectors[1].quaternion_{end}[{i}]" for end in "ab" for i in (0, 2)}),
         ("bushing_order", "mount", {f"connectors[1].stiffness[{i}][{i}]" for i in range(6)}),
+        ("coupling_ratio", "gear", {"couplings[0].terms[0].ratio"}),
+        ("coupling_sign", "gear", {"couplings[0].terms[0].ratio"}),
+        ("coupling_offset", "gear", {"couplings[0].offset"}),
         ("motor_sign", "spring", {"connectors[0].force_N.amplitude"}),
         ("function_size", "course", {"sensors[2].function.amplitude"}),
         ("controller_gain", "law", {"controllers[0].C[0][0]"}),

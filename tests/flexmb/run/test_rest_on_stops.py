@@ -111,7 +111,9 @@ def test_what_knows_no_closed_chains_refuses_them() -> None:
         fm.simulate(four_bar(event), 1.0, algorithm="frisch")
 
 
-@pytest.mark.parametrize(("level", "algorithm"), [("full", "articulated"), ("full", "composite"), ("linear", "frisch")])
+@pytest.mark.parametrize(
+    ("level", "algorithm"), [("full", "articulated"), ("full", "composite"), ("linear", "frisch")]
+)
 def test_a_bending_body_rests_on_a_stop(level: Any, algorithm: Any) -> None:
     """An arm on a hinge with a stop: its load, once vibrations have died out, is the moment of the weight."""
     strip = beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=8e-10, Iz=8e-10, rho=2700.0)
@@ -154,7 +156,6 @@ def test_units_change_no_event(length: float, time: float, mass: float, how: Any
 @ROUNDED
 def test_what_closures_do_not_allow_is_told_in_other_units(length: float) -> None:
     """A driven crank with a stop for its rocker; with a latch there, both stand still, exactly."""
-
     def loop(*items: Any, **crank: Any) -> fm.Scene:
         scene = fm.SceneBuilder("loop", gravity=(0.0, -9.81 * length, 0.0))
         for name, own in (("crank", 0.3), ("coupler", 1.0), ("rocker", 0.8)):
