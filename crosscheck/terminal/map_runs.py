@@ -51,7 +51,9 @@ def _run(
         def hear(what: StabilityMap, done: int, known: int) -> None:
             progress.update(task, completed=done, total=known, description=f"{name}: cells known so far")
 
-        return run_map(name, records, depth=depth, fresh=fresh, limits=limits, scheduler=scheduler, listener=hear)
+        return run_map(
+            name, records, depth=depth, fresh=fresh, limits=limits, scheduler=scheduler, listener=hear
+        )
 
 
 def _line(done: Finished, picture: Path) -> Text:

@@ -109,10 +109,12 @@ def test_an_engine_alone_needs_no_partner(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("engine", "status"), [("biased", "differ"), ("second", "agree")])
-def test_an_engine_that_the_case_does_not_know_is_held(folder: Path, tmp_path: Path, engine: str, status: str) -> None:
+def test_an_engine_that_the_case_does_not_know_is_held(
+    folder: Path, tmp_path: Path, engine: str, status: str
+) -> None:
     other = copy_of(folder, tmp_path / "case")
     text = (other / "run.toml").read_text(encoding="utf-8")
-    head, _, rest = text.partition('\n[[comparison]]\nname = "a biased one"')
+    head, _, rest = text.partition("\n[[comparison]]\nname = \"a biased one\"")
     (other / "run.toml").write_text(
         head.replace('also = ["biased", "refuser"]\n', "") + rest[rest.index("\n[reference]") :], encoding="utf-8"
     )

@@ -138,7 +138,7 @@ def test_an_energy_that_a_guest_does_not_know_is_counted_too() -> None:
 
 
 def test_what_no_guest_offers_is_not_applicable_to_them() -> None:
-    text = ONE_PAIR.replace("goals = {", 'goals = { "drive" = 1e-3,')
+    text = ONE_PAIR.replace('goals = {', 'goals = { "drive" = 1e-3,')
     guests = [*ladder("guest", {TIP: way()}), *ladder("second", {TIP: way()})]
     outcome = judged(text, guests, asked=("guest", "second"))
     assert (outcome.ok, len(outcome.all)) == (True, 1)

@@ -292,7 +292,7 @@ def test_clocks_are_compared_by_their_ratio_alone() -> None:
 
 def test_two_variants_may_be_of_two_scenes() -> None:
     text = ONE_PAIR.replace('engines = ["one", "two"]', 'engines = ["one"]').split("[[comparison]]")[0]
-    text += """
+    text += '''
 [[variant]]
 name = "other"
 engines = ["two"]
@@ -302,7 +302,7 @@ name = "across"
 a = { engine = "one", variant = "rigid" }
 b = { engine = "two", variant = "other" }
 goals = { "marker:tip.position" = 1e-3 }
-"""
+'''
     runs = ladder("two", {TIP: way()}, variant="other")
     other = [msgspec.structs.replace(run, scene="t") for run in runs]
     assert single(judged(text, [*ladder("one", {TIP: way()}), *other])).status == "agree"

@@ -133,7 +133,6 @@ def test_two_that_come_at_the_same_time_both_happen():
 
 def test_changes_at_times_are_those_of_a_pulse():
     """A force that is switched on and off by events, and the same force as a pulse."""
-
     def switch(t: float, value: float) -> fm.SceneEvent:
         change = fm.Change(path="rail.translation.force_N", value=fm.Constant(value=value))
         return fm.SceneEvent(name=f"at {t}", watch="time", level=t, actions=(change,))
@@ -240,7 +239,6 @@ def test_modes_take_their_part_of_a_latch():
 
 def test_a_closed_chain_has_events_without_impulses():
     """A motor on a loop is switched off at a time, and the run ends where a coordinate passes a level."""
-
     def loop(torque: fm.Function) -> fm.SceneBuilder:
         scene = fm.SceneBuilder("loop").rigid_body("bob", mass=1.0, com=(1.0, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
         scene.planar("slide", "ground", "bob", rotation=fm.AngularCoordinate(torque_Nm=torque))
