@@ -20,7 +20,9 @@ def held_reference(case: Case, run: RunFile) -> RecordedReference | None:
     if recipe is None or not has_reference(case.folder):
         return None
     running = [engine for variant in run.variants if variant.name == recipe.variant for engine in variant.engines]
-    asked = {engine: Asked(goals=goals, scales=scales) for engine, (goals, scales) in held(case.run, running).items()}
+    asked = {
+        engine: Asked(goals=goals, scales=scales) for engine, (goals, scales) in held(case.run, running).items()
+    }
     if not asked:
         return None
     try:

@@ -197,9 +197,7 @@ def test_a_figure_without_a_basis_is_held_against_as_it_always_was(own: None) ->
         (sizes, "LEAST_OF_SCENE"), (sizes, "LEAST_OF_FAMILY"),
     ],
 )  # fmt: skip
-@pytest.mark.filterwarnings(
-    "ignore:overflow encountered:RuntimeWarning"
-)  # of the exponents made a million times larger
+@pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning")  # of exponents a million times larger
 def test_another_rule_for_uncertainties_is_recognised(
     monkeypatch: pytest.MonkeyPatch, module: ModuleType, name: str
 ) -> None:
