@@ -18,6 +18,7 @@ from crosscheck.export.rebuild import RebuiltCase
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.find import load_case
 from crosscheck.running.plan import variant_scene
+from flexmb.output.whole import write_whole
 from flexmb.typing import Real
 
 
@@ -36,7 +37,7 @@ def rebuilt(file: str, rtol: float) -> Callable[[Real], dict[str, Real]]:
             for name, content in texts.items():
                 target = Path(place) / name
                 target.parent.mkdir(exist_ok=True)
-                target.write_text(json.dumps(content), encoding="utf-8")
+                write_whole(target, json.dumps(content))
             model = RebuiltCase(place)
         channels = model.channels(times, model.integrate(times, rtol))
         return {name: np.asarray(values) for name, values in channels.items()}

@@ -131,7 +131,9 @@ def hinge_forces(scene: Scene, snapshot: Snapshot, hinge) -> tuple[np.ndarray, n
 
 
 def _passive(coordinate) -> float:
-    named = [key for key in coordinate.__struct_fields__ if key != "given"]
+    """Of a coordinate without armature."""
+    assert getattr(coordinate, coordinate.ARMATURE) == 0.0
+    named = [key for key in coordinate.__struct_fields__ if key not in ("given", coordinate.ARMATURE)]
     value, rate, k, c, rest, motor = (getattr(coordinate, key) for key in named[:6])
     push = motor.value if isinstance(motor, Constant) else 0.0
     return push - k * (value - rest) - c * rate

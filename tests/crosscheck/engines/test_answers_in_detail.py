@@ -33,7 +33,8 @@ NAMES = {
     "hinges": "pivot", "wheels": "wheel", "closures": "loop", "point_masses": "bob", "markers": "tip",
     "connectors": "spring",
 }  # fmt: skip
-SCENE = cast(Scene, SimpleNamespace(**{kind: [SimpleNamespace(name=name)] for kind, name in NAMES.items()}))
+OWN = {kind: [SimpleNamespace(name=name)] for kind, name in NAMES.items()}
+SCENE = cast(Scene, SimpleNamespace(**OWN, constraints=OWN["closures"]))
 STEP = Effort("step", 0.5, "rk4")
 
 
@@ -232,7 +233,7 @@ def test_each_breach_is_named_with_its_place(change: dict[str, Any], text: str) 
 def test_what_is_no_run_and_what_is_long_is_named_in_short() -> None:
     with pytest.raises(BrokenContract, match=r"^simulate\(\) returned None, not a Trajectory$"):
         checked_run(None, TIMES, SCENE)
-    none = cast(Scene, SimpleNamespace(**{kind: [] for kind in NAMES}))
+    none = cast(Scene, SimpleNamespace(**{kind: [] for kind in (*NAMES, "constraints")}))
     with pytest.raises(BrokenContract, match="^markers has 'tip', and the scene has none$"):
         checked_run(GOOD, TIMES, none)
     with pytest.raises(BrokenContract) as caught:
