@@ -62,18 +62,21 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         worst = max(group, key=lambda verdict: verdict.E or 0.0)
         channels = worst.channel if len(group) == 1 else f"{len(group)} channels, worst {worst.channel}"
         where = f"{worst.case}, {worst.comparison}, {worst.pair}, {channels}"
-        yield marked("✕", "red", f"{where}: {worst.status}, expected {worst.expected}: {worst.reason}")
+        yield marked("✕", "red", f"{where}: {worst.status}, expected {worst.expected}: {_reason(worst)}")
     for line in outcome.broken:
         yield marked("✕", "red", line)
     for each in outcome.lost:
         yield marked("–", "yellow", f"{each.case}, {each.variant}, {each.engine} {each.status}: {each.reason}")
     for engine in outcome.uncompared:
         yield marked("✕", "red", f"{engine} was asked for and compared in nothing{_first_reason(outcome, engine)}")
+    for text in outcome.idle_claims:
+        yield marked("✕", "red", text)
     for case in outcome.idle:
         yield marked("–", "yellow", f"{case}: nothing was compared")
     for case in outcome.unreferenced:
         sign, colour = ("✕", "red") if outcome.strict else ("!", "yellow")
         yield marked(sign, colour, f"{case} {NO_REFERENCE.format(case)}")
+    yield from _by_claims(outcome)
     for verdict in outcome.worse:
         yield marked("!", "yellow", f"{_place(verdict)} {verdict.grown}")
     for verdict in outcome.outgrown:
@@ -83,6 +86,24 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         yield marked("!", "yellow", f"{case}: {figures} stale ({why}): accept anew by crosscheck run {case} --accept")
     for verdict in outcome.unrecorded if outcome.strict else ():
         yield marked("!", "yellow", f"{_place(verdict)} has no accepted figures")
+
+
+def _reason(verdict: Verdict) -> str:
+    """Why a verdict is not as expected, and what to do if that is known."""
+    if verdict.own_failure and verdict.status == "agree":
+        return f"you expect it to fail ({verdict.own_failure}): take that out if it is mended"
+    return f"{verdict.reason}; {verdict.advice}" if verdict.advice else verdict.reason
+
+
+def _by_claims(outcome: SessionOutcome) -> Iterator[Text]:
+    """A line for each reason by which verdicts are as expected only by claims of the user: never green in silence."""
+    loosened = Counter((verdict.goal_reason, verdict.goal) for verdict in outcome.loosened)
+    for (reason, goal), count in loosened.items():
+        verdicts = "1 verdict" if count == 1 else f"{count} verdicts"
+        yield marked("!", "yellow", f"{verdicts} by the goal {goal:.2g}, looser than the case's: {reason}")
+    failures = Counter((each.own_failure, each.status, each.expected_reason) for each in outcome.own_failures)
+    for (place, status, reason), count in failures.items():
+        yield marked("!", "yellow", f"{count} {status}, as you expect: {reason} ({place})")
 
 
 def _first_reason(outcome: SessionOutcome, engine: str) -> str:

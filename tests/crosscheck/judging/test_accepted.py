@@ -32,7 +32,8 @@ from crosscheck.library.case import CaseError, Comparison, Conservation
 from crosscheck.library.find import Case, load_case
 from crosscheck.records.kinds import RunRecord
 from crosscheck.report import ci
-from crosscheck.report.ci import write_junit, write_summary
+from crosscheck.report.ci import write_summary
+from crosscheck.report.junit import write_junit
 from crosscheck.running.plan import prescribed, sample_times, scene_basis, variant_scene
 from tests.crosscheck.made_records import ONE_PAIR, TIP, judged, ladder, single, way
 from tests.crosscheck.sessions import copy_case, shipped, sweep_here
