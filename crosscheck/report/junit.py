@@ -157,7 +157,6 @@ def _output(verdict: Verdict) -> Iterator[str]:
 
 def _properties(suite: ElementTree.Element, session: Session, case: CaseResults | None) -> None:
     """The machine and the versions of a case's session, as properties of its suite."""
-    properties = ElementTree.SubElement(suite, "properties")
     found: dict[str, str] = {}
     if session.environments:
         made = session.environments[-1]
@@ -166,6 +165,7 @@ def _properties(suite: ElementTree.Element, session: Session, case: CaseResults 
     for result in () if case is None else case.results.values():
         if result.runs and result.finest.version:
             found[f"engine {result.engine}"] = result.finest.version
+    properties = ElementTree.SubElement(suite, "properties") if found else suite
     for name, value in found.items():
         ElementTree.SubElement(properties, "property", name=name, value=value)
 

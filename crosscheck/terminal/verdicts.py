@@ -62,7 +62,7 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         worst = max(group, key=lambda verdict: verdict.E or 0.0)
         channels = worst.channel if len(group) == 1 else f"{len(group)} channels, worst {worst.channel}"
         where = f"{worst.case}, {worst.comparison}, {worst.pair}, {channels}"
-        yield marked("✕", "red", f"{where}: {worst.status}, expected {worst.expected}: {_reason(worst)}")
+        yield marked("✕", "red", f"{where}: {worst.status}, expected {worst.expected}: {_reason(worst, group)}")
     for line in outcome.broken:
         yield marked("✕", "red", line)
     for each in outcome.lost:
@@ -88,11 +88,13 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         yield marked("!", "yellow", f"{_place(verdict)} has no accepted figures")
 
 
-def _reason(verdict: Verdict) -> str:
-    """Why a verdict is not as expected, and what to do if that is known."""
+def _reason(verdict: Verdict, group: Iterable[Verdict]) -> str:
+    """Why a verdict is not as expected; and what to do for the one of its group that needs most, if that is known."""
     if verdict.own_failure and verdict.status == "agree":
         return f"you expect it to fail ({verdict.own_failure}): take that out if it is mended"
-    return f"{verdict.reason}; {verdict.advice}" if verdict.advice else verdict.reason
+    advised = [each for each in group if each.advice]
+    most = max(advised, key=lambda each: (each.U or 0.0) / each.goal, default=None)
+    return verdict.reason if most is None else f"{verdict.reason}; {most.advice}"
 
 
 def _by_claims(outcome: SessionOutcome) -> Iterator[Text]:
