@@ -12,8 +12,8 @@ from crosscheck.report.junit import write_junit
 from crosscheck.report.unfinished import UNFINISHED
 from tests.crosscheck.report.sessions import session
 
-# The elements and attributes that the strictest common schema knows, that of Jenkins' xunit plug-in (junit-10.xsd): those
-# that it demands, and all that it takes. Other readers take these, and more.
+# The elements and attributes of the strictest common schema, that of Jenkins' xunit plug-in (junit-10.xsd): those that
+# it demands, and all that it takes. Other readers take these, and more.
 ATTRIBUTES = {
     "testsuites": (set(), {"name", "time", "tests", "failures", "errors"}),
     "testsuite": (
