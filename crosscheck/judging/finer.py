@@ -12,6 +12,7 @@ from crosscheck.records.kinds import CaseRecord
 
 MOST = 6  # efforts more; if they do not do, the goal is beyond the method
 FIRST_ORDER = 1.0
+BEYOND = "more efforts will not do"
 
 
 def finer_efforts(case: CaseRecord, channel: str, goal: float, finding: Finding, results: Iterable[Result]) -> str:
@@ -35,8 +36,7 @@ def finer_efforts(case: CaseRecord, channel: str, goal: float, finding: Finding,
     more = continued("step" if kind == "step" else "tolerance", values, min(count, MOST))
     if count > MOST or len(more) < count:
         reached = float(f"{2.0 * U:.1g}")
-        what = f"--goal {worst.engine}:{channel}={min(reached, 1.0):g}"
-        return f"more efforts will not do: claim what it reaches, such as {what}"
+        return f"{BEYOND}: claim what it reaches, such as --goal {worst.engine}={min(reached, 1.0):g}"
     wanted = ",".join(f"{value:g}" for value in (*case.claims.efforts_of(worst.engine), *more))
     efforts = "a finer effort" if len(more) == 1 else "finer efforts"
     return f"add {efforts}: crosscheck run {case.case} --engine {worst.engine} --efforts {worst.engine}={wanted}"

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from rich.console import Console
 from rich.text import Text
 
+from crosscheck.judging.finer import BEYOND
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.verdict import STATUSES, Verdict
 from crosscheck.terminal.text import marked, words
@@ -94,6 +95,8 @@ def _reason(verdict: Verdict, group: Iterable[Verdict]) -> str:
         return f"you expect it to fail ({verdict.own_failure}): take that out if it is mended"
     advised = [each for each in group if each.advice]
     most = max(advised, key=lambda each: (each.U or 0.0) / each.goal, default=None)
+    if most is not None and most.advice.startswith(BEYOND):  # one goal for all of them
+        most = max((each for each in advised if each.advice.startswith(BEYOND)), key=lambda each: each.U or 0.0)
     return verdict.reason if most is None else f"{verdict.reason}; {most.advice}"
 
 

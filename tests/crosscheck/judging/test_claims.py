@@ -160,7 +160,7 @@ def test_a_finer_effort_is_advised_that_will_do() -> None:
     already = Claims(efforts=(ClaimedEfforts(engine="two", place="p", values=(1e-7, 1e-8)),))
     assert single(judged(ONE_PAIR, runs(1e-3), claims=already)).advice == command + "1e-07,1e-08,1e-09,1e-10"
     beyond = single(session(runs(1e-3), goals=(goals(1e-12),)))
-    assert "claim what it reaches, such as --goal two:marker:tip.position=0." in beyond.advice
+    assert "claim what it reaches, such as --goal two=0." in beyond.advice
     assert single(session(runs(1e-6))).advice == single(session(runs(1e-6, 0.01))).advice == ""
 
 
