@@ -14,7 +14,7 @@ from flexmb.output.whole import write_whole
 
 if TYPE_CHECKING:
     from crosscheck.library.find import Case
-    from crosscheck.verify.against_case import CsvOutcome
+    from crosscheck.verify.outcome import CsvOutcome
 
 
 @app.command()
@@ -48,12 +48,13 @@ def verify(
     `trajectory.csv` and a file like `reference.csv` will do as they are: they are compared in whatever the case sets a
     goal for.
 
-    Your own times will do too, if they rise and cover the reference's: they are interpolated, and what that leaves open
-    is added to U. `docs/verify.md` leads from a code of your own to the first verdict.
+    Your own times will do too, if they rise and cover the reference's: nothing is interpolated, but the reference is
+    computed at your times, which takes seconds. `docs/verify.md` leads from a code of your own to the first verdict.
 
-    **Shows** each channel's distance E, uncertainty U, the time at which it is worst, and what is wrong where that can
-    be guessed: thousandths, degrees, a sign, exchanged components, quaternions conjugate or scalar-last, body axes,
-    another origin, shifted times.
+    **Shows** each channel's distance E, uncertainty U, the time at which it is worst, and what is wrong, where putting
+    it right makes the channel agree: thousandths, degrees, revolutions per minute, a sign, exchanged components,
+    quaternions conjugate or scalar-last, body axes, another origin, another zero of energy, moments about another
+    point, times that are shifted or in another unit. Channels that your file lacks are listed.
 
     **Exit code**: 0 every channel in the file agrees; 1 some do not; 2 the file cannot be compared.
     """
@@ -93,6 +94,7 @@ def _show(outcome: CsvOutcome) -> int:
     console.print(words(f"Held against {outcome.against}."), soft_wrap=True)
     if outcome.interpolated:
         console.print(words(f"Your times: {outcome.interpolated}."), soft_wrap=True)
+    console.print(words(f"{outcome.inventory}."), soft_wrap=True)
     if outcome.left_out:
         console.print(words(f"Not compared: {', '.join(outcome.left_out)}"), soft_wrap=True)
     return print_outcome(console, outcome)

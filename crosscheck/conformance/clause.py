@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from crosscheck.conformance.contents import to_offer
+from crosscheck.conformance.digits import told_apart
 from crosscheck.conformance.scenes import simple_scenes
 from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Trajectory
@@ -18,6 +19,7 @@ from flexmb.typing import Real
 # Pointwise results need one linear solve. Minimal coordinates have errors of about 1e-14, redundant ones with
 # Euler parameters of about 1e-11. A wrong sign or frame changes the first digit.
 POINTWISE = 1e-9
+CONVERGED = 1e-2  # of a signal: largest distance of the last two efforts for which a clause on runs can be tested
 
 
 class ClauseBroken(AssertionError):
@@ -78,12 +80,25 @@ def equal(what: str, found: Any, expected: Any, scale: float = 1.0) -> None:
     value = np.asarray(found, dtype=float)
     allowed = POINTWISE * np.maximum(np.abs(right), scale)
     good = value.shape == right.shape and bool(np.all(np.abs(value - right) <= allowed))  # False with any NaN
-    require(good, f"{what} must be {_shown(right)} and is {_shown(value)}")
+    expected_digits, found_digits = told_apart(right, value, allowed)
+    require(good, f"{what} must be {expected_digits} and is {found_digits}")
 
 
 def within(what: str, error: float, bound: float) -> None:
     """Compare an error with its bound; NaN exceeds it."""
-    require(error <= bound, f"{what} is off by {error:.3g}, where {bound:.3g} can be explained by the engine's efforts")
+    off, most = told_apart(error, bound)
+    require(error <= bound, f"{what} is off by {off}, where {most} can be explained by the engine's efforts")
+
+
+def hold_at_samples(what: str, found: Iterable[Real], expected: Real, times: Real) -> None:
+    """Compare the last of two runs (T, k) with the expected values, within their distance from each other."""
+    rough, fine = found
+    size = float(np.abs(expected).max())
+    refinement = float(np.abs(rough - fine).max())
+    require(refinement <= CONVERGED * size, f"{what}: the last two efforts are {refinement:.3g} apart, of {size:.3g}")
+    error = np.abs(fine - expected).max(axis=1)
+    worst = int(np.argmax(error))
+    within(f"{what} at t = {times[worst]:g} s", float(error[worst]), 3.0 * refinement + 1e-7 * size)
 
 
 def offered(engine: Engine, scene: Scene) -> Model:
@@ -129,12 +144,13 @@ def finest_two(engine: Engine, scene: Scene, times: Real) -> tuple[Trajectory, T
     return coarser, finest
 
 
+def acceleration(found: Snapshot, marker: str) -> Real:
+    """[angular; linear] of a marker, which an engine may leave out."""
+    return np.asarray(given("accelerations of markers in evaluate()", found.markers[marker].acceleration))
+
+
 def given(what: str, found: Any) -> Any:
     """An optional part of an answer; NotOffered if the engine left it out."""
     if found is None:
         raise NotOffered(f"it does not offer {what}", f"give {what}")
     return found
-
-
-def _shown(values: Real) -> str:
-    return np.array2string(values, precision=9, suppress_small=False, max_line_width=1000)

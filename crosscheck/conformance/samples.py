@@ -6,12 +6,11 @@ is compared with mechanics at the position, orientation and velocity that the en
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.clause import Chapter, finest_two, given, require, within
+from crosscheck.conformance.clause import Chapter, finest_two, given, hold_at_samples
 from crosscheck.conformance.scenes import ARM, INERTIA, MASS, NONE, SECOND, G, arm
 from crosscheck.engines.contract import Engine, MarkerPath
 from crosscheck.engines.conventions import rotation_matrix
@@ -21,7 +20,6 @@ from flexmb.typing import Real
 
 SAMPLES = Chapter(physical=True)
 TIMES = np.linspace(0.0, 2.0, 41)
-CONVERGED = 1e-2  # of a signal: largest distance of the last two efforts for which a clause can be tested
 TILTED = np.array([1.0, -2.0, 2.0]) / 3.0
 FIELD = np.array([3.0, -4.0, -7.0])  # m/s^2: oblique, as is the axis, so that no component of a load is zero
 COM = np.array([0.2, -0.1, 0.3])
@@ -33,9 +31,13 @@ def a_thrown_body_flies(engine: Engine) -> None:
     rough, fine = finest_two(engine, scene, TIMES)
     origin = start + np.cross([0.4, -0.7, 1.1], COM)  # velocity of the mass centre
     exact = COM + np.outer(TIMES, origin) + 0.5 * np.outer(TIMES**2, FIELD)
-    _hold("the position (m) of the mass centre", (run.markers["com"].position for run in (rough, fine)), exact)
+    hold_at_samples(
+        "the position (m) of the mass centre", (run.markers["com"].position for run in (rough, fine)), exact, TIMES
+    )
     spins = [_spin(run.markers["com"]) for run in (rough, fine)]
-    _hold("the angular momentum (Nms) about the mass centre", spins, np.tile(spins[1][0], (len(TIMES), 1)))
+    hold_at_samples(
+        "the angular momentum (Nms) about the mass centre", spins, np.tile(spins[1][0], (len(TIMES), 1)), TIMES
+    )
 
 
 @SAMPLES.clause("The load across a hinge is the mass times the acceleration, less gravity, at every sample of a run.")
@@ -44,8 +46,8 @@ def loads_of_a_run_hold_at_every_sample(engine: Engine) -> None:
     rough, fine = finest_two(engine, turning.scene(), TIMES)
     loads = [given("the load of a revolute hinge", run.loads.get("pivot")) for run in (rough, fine)]
     expected = _loads_of_the_pivot(fine.markers["com"])
-    _hold("the torque (Nm) across the pivot", (load[:, :3] for load in loads), expected[:, :3])
-    _hold("the force (N) across the pivot", (load[:, 3:] for load in loads), expected[:, 3:])
+    hold_at_samples("the torque (Nm) across the pivot", (load[:, :3] for load in loads), expected[:, :3], TIMES)
+    hold_at_samples("the force (N) across the pivot", (load[:, 3:] for load in loads), expected[:, 3:], TIMES)
 
 
 @SAMPLES.clause("The drive load of a prescribed hinge is what its motion needs at every sample of a run.")
@@ -57,7 +59,7 @@ def drive_loads_of_a_run_hold_at_every_sample(engine: Engine) -> None:
     drives = [given("drive loads", run.drives.get("drive")) for run in (rough, fine)]
     theta = A * np.sin(w * TIMES + phase)
     expected = -SECOND * w * w * theta - MASS * G * ARM * np.cos(theta)
-    _hold("the drive load (Nm)", drives, expected[:, None])
+    hold_at_samples("the drive load (Nm)", drives, expected[:, None], TIMES)
 
 
 @SAMPLES.clause("Momentum and kinetic and gravity energy are those of the motion at every sample of a run.")
@@ -73,11 +75,11 @@ def momentum_and_energy_of_a_run_hold_at_every_sample(engine: Engine) -> None:
         given("the momentum, or kinetic and gravity energy", fine.momentum)
     for kind in offered:
         found = [run.energy[kind][:, None] for run in (rough, fine)]
-        _hold(f"the {kind} energy (J)", found, expected[kind][:, None])
+        hold_at_samples(f"the {kind} energy (J)", found, expected[kind][:, None], TIMES)
     if fine.momentum is not None and rough.momentum is not None:
         momenta = rough.momentum, fine.momentum
-        _hold("the angular momentum (Nms)", (each[:, :3] for each in momenta), about_origin)
-        _hold("the linear momentum (Ns)", (each[:, 3:] for each in momenta), linear)
+        hold_at_samples("the angular momentum (Nms)", (each[:, :3] for each in momenta), about_origin, TIMES)
+        hold_at_samples("the linear momentum (Ns)", (each[:, 3:] for each in momenta), linear, TIMES)
 
 
 @SAMPLES.clause("The load of a line is along it, by its law of the length, at every sample of a run.")
@@ -90,18 +92,7 @@ def connector_loads_of_a_run_hold_at_every_sample(engine: Engine) -> None:
     loads = [given("loads of connectors", run.connectors.get("line"))[:, 3:] for run in (rough, fine)]
     place = fine.markers["com"].position
     length = np.linalg.norm(place, axis=1)[:, None]
-    _hold("the force (N) of the line on B", loads, -60.0 * (length - 0.5) * place / length)
-
-
-def _hold(what: str, found: Iterable[Real], expected: Real) -> None:
-    """Compare the last of two runs (T, k) with the expected values, within their distance from each other."""
-    rough, fine = found
-    size = float(np.abs(expected).max())
-    refinement = float(np.abs(rough - fine).max())
-    require(refinement <= CONVERGED * size, f"{what}: the last two efforts are {refinement:.3g} apart, of {size:.3g}")
-    error = np.abs(fine - expected).max(axis=1)
-    worst = int(np.argmax(error))
-    within(f"{what} at t = {TIMES[worst]:g} s", float(error[worst]), 3.0 * refinement + 1e-7 * size)
+    hold_at_samples("the force (N) of the line on B", loads, -60.0 * (length - 0.5) * place / length, TIMES[:21])
 
 
 def _thrown() -> Scene:

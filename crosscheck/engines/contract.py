@@ -61,13 +61,14 @@ class Effort:
 class MarkerSnapshot:
     """Motion of one marker: position (3,) m, quaternion (4,), spatial velocity and acceleration (6,) [angular; linear].
 
-    The linear acceleration is the classical one of the marker point (not the spatial acceleration's linear part).
+    The linear acceleration is the classical one of the marker point (not the spatial acceleration's linear part). An
+    engine that knows no accelerations leaves them out: None.
     """
 
     position: Real
     quaternion: Real
     velocity: Real
-    acceleration: Real
+    acceleration: Real | None = None
 
 
 @dataclass(frozen=True)

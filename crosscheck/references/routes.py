@@ -23,7 +23,7 @@ from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.job import MAIN
-from crosscheck.running.plan import plan
+from crosscheck.running.plan import jobs_at, plan
 from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import Listener, run_planned
 from flexmb.run.channels import family, magnitude
@@ -106,7 +106,8 @@ def _engine_results(
         return {}
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
-        planned = plan(replace(case, run=case.run.alone(*variants)), (), provider, limits.time_s)
+        record, jobs = plan(replace(case, run=case.run.alone(*variants)), (), provider, limits.time_s)
+        planned = record, jobs_at(jobs, times)
         run_planned([planned], (), records, limits=limits, scheduler=scheduler, listener=listener)
         (results,) = collect(read(records)).cases
     return {each.name: results.get(each.name, each.engines[0], MAIN) for each in variants}

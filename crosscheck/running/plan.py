@@ -125,6 +125,14 @@ def sample_times(run: RunFile, variant: Variant) -> Real:
     return np.linspace(0.0, variant.duration_s or run.duration_s, variant.samples or run.samples)
 
 
+def jobs_at(jobs: list[Job], times: Real) -> list[Job]:
+    """The same jobs with samples at `times` (T,) s, which need not be equally spaced."""
+    return [
+        replace(job, times=times, scene_id="" if job.scene is None else scene_identity(job.scene, times))
+        for job in jobs
+    ]
+
+
 def scene_identity(scene: Scene, times: Real) -> str:
     """Digest of a scene, of the files it refers to, and of the sample times: the same runs have the same digest."""
     digest = hashlib.sha256(msgspec.json.encode(scene))

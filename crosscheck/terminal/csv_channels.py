@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from crosscheck.terminal.text import words
-from crosscheck.verify.against_case import CsvOutcome
+from crosscheck.verify.outcome import CsvOutcome
 from flexmb.output.listing import Listing, figures, names, prose
 
 

@@ -1,7 +1,9 @@
-"""Guesses why a signal differs: a correction is tried, and if the corrected signal agrees it is the likely cause.
+"""Possible causes why a signal differs: a correction is a cause only if the corrected signal agrees.
 
-The corrections tried: a factor (millimetres, degrees, a sign), components exchanged, another order or sense of
-quaternions, the axes of the body instead of the World's, another origin, times shifted by whole samples.
+The corrections tried: a factor (millimetres, degrees, revolutions, a sign), components exchanged, another order or
+sense of quaternions, the axes of a body instead of the World's, another origin, another zero of an energy, moments
+about another point (`points`), rows shifted by whole samples. Times in another unit and times shifted by any interval
+concern the whole file: `clock`.
 """
 
 from __future__ import annotations
@@ -11,6 +13,8 @@ from itertools import permutations
 
 import numpy as np
 
+from crosscheck.verify.evidence import VISIBLE, Evidence, turned
+from crosscheck.verify.points import about_other_points
 from flexmb.run.channels import distance, signal_range
 from flexmb.typing import Real
 
@@ -21,74 +25,108 @@ FACTORS = {
     "pi/180 times too small: multiplied by pi/180 once too often": 180.0 / np.pi,
     "of the wrong sign": -1.0,
 }
+OF_TURNING = {
+    "30/pi times too large: revolutions per minute instead of rad/s": np.pi / 30.0,
+    "2 pi times too small: revolutions per second instead of rad/s": 2.0 * np.pi,
+}
 AXES = "xyz"
 SHIFTS = (1, -1, 2, -2, 3, -3)  # samples
-VISIBLE = 10.0  # least range of the reference over what is allowed, else any small signal would fit
+POTENTIALS = ("energy.gravity", "energy.spring", "energy.strain")
 
 
-def likely_cause(channel: str, values: Real, reference: Real, allowed: float, markers: Mapping[str, Real]) -> str:
-    """The likely fault of `values` (T,k), in words, or "".
+def possible_causes(seen: Evidence) -> tuple[str, ...]:
+    """The possible faults of the values, in words, each of which makes them agree once it is put right."""
+    found = [*_by_corrections(seen), *about_other_points(seen)]
+    return tuple(dict.fromkeys(found)) or tuple(_shifts(seen))
 
-    The corrected values must be within `allowed` (SI) of the reference at all times. `markers`
-    are the reference's orientations (T,4) by marker.
+
+def offset_totals(differing: Mapping[str, Evidence], found: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
+    """A cause for a constant energy, such as the total: it is off by the same constant as a potential energy is.
+
+    By itself a constant that is off by a constant says nothing.
     """
-    if not signal_range(channel, reference) > VISIBLE * allowed:
-        return ""
-    for cause, corrected in _corrections(channel, values, reference, markers):
-        if np.all(distance(channel, corrected, reference) <= allowed):
-            return cause
-    return _shift(channel, values, reference, allowed)
+    named: dict[str, str] = {}
+    for channel, seen in differing.items():
+        for kind in POTENTIALS:
+            if channel.startswith("energy.") and not found.get(channel) and any(found.get(kind, ())):
+                offset = _energy_offset(differing[kind])
+                if differing[kind].agrees(differing[kind].values - offset) and seen.agrees(seen.values - offset):
+                    named[channel] = f"the energy is off by the same {offset:.6g} J as {kind} is"
+    return named
 
 
-def _corrections(
-    channel: str, values: Real, reference: Real, markers: Mapping[str, Real]
-) -> Iterator[tuple[str, Real]]:
-    if channel.endswith(".orientation"):
-        conjugate = np.array([1.0, -1.0, -1.0, -1.0])
-        scalar_first = np.roll(values, 1, axis=1)
-        yield "the quaternions are conjugate: they have to map body components to World components", values * conjugate
-        yield "the quaternions are scalar-last: the order is w, x, y, z", scalar_first
-        yield "the quaternions are scalar-last and conjugate", scalar_first * conjugate
+def _by_corrections(seen: Evidence) -> Iterator[str]:
+    if not seen.is_visible:
         return
-    for words, factor in FACTORS.items():
-        load = channel.startswith(("load:", "wheel_load:")) and factor < 0.0
-        side = ": the load on the inboard body instead of that on the outboard body?" if load else ""
-        yield f"the values are {words}{side}", factor * values
-    if values.shape[1] != len(AXES):
+    if seen.channel.endswith(".orientation"):
+        yield from (words for words, corrected in _turnings(seen.values) if seen.agrees(corrected))
         return
-    for words, factor in FACTORS.items():
-        for i, axis in enumerate(AXES):
-            yield f"component {axis} is {words}", values * np.where(np.arange(3) == i, factor, 1.0)
+    whole = [words for words, corrected in _scalings(seen) if seen.agrees(corrected)]
+    yield from whole
+    for words, corrected in _corrections(seen, components=not whole):
+        if seen.agrees(corrected):
+            yield words
+
+
+def _turnings(values: Real) -> Iterator[tuple[str, Real]]:
+    conjugate = np.array([1.0, -1.0, -1.0, -1.0])
+    scalar_first = np.roll(values, 1, axis=1)
+    yield "the quaternions are conjugate: they have to map body components to World components", values * conjugate
+    yield "the quaternions are scalar-last: the order is w, x, y, z", scalar_first
+    yield "the quaternions are scalar-last and conjugate", scalar_first * conjugate
+
+
+def _factors(seen: Evidence) -> dict[str, float]:
+    return FACTORS | OF_TURNING if seen.channel.endswith(".angular_velocity") else FACTORS
+
+
+def _scalings(seen: Evidence) -> Iterator[tuple[str, Real]]:
+    for words, factor in _factors(seen).items():
+        side = ": the load on the inboard body instead of that on the outboard body?"
+        yield f"the values are {words}{side if seen.is_load and factor < 0.0 else ''}", factor * seen.values
+
+
+def _corrections(seen: Evidence, components: bool) -> Iterator[tuple[str, Real]]:
+    """Corrections other than a factor; those of single `components` say nothing more where one of the whole agrees."""
+    if seen.channel.startswith("energy.") and seen.varies:
+        offset = _energy_offset(seen)
+        yield f"the energy is off by a constant, {offset:.6g} J: its zero is elsewhere?", seen.values - offset
+    if seen.values.shape[1] != len(AXES):
+        return
+    if components:
+        for words, factor in _factors(seen).items():
+            for i, axis in enumerate(AXES):
+                yield f"component {axis} is {words}", seen.values * np.where(np.arange(3) == i, factor, 1.0)
     for order in permutations(range(3)):
         if order != (0, 1, 2):
             given = ", ".join(AXES[order.index(i)] for i in range(3))
-            yield f"the components are in the order {given}", values[:, order]
-    if channel.endswith(".position"):
-        offset = values[0] - reference[0]
-        yield f"the origin is another one, off by ({', '.join(f'{x:.6g}' for x in offset)}) m", values - offset
+            yield f"the components are in the order {given}", seen.values[:, order]
+    if seen.channel.endswith(".position"):
+        offset = seen.values[0] - seen.reference[0]
+        off = ", ".join(f"{x:.6g}" for x in offset)
+        yield f"the origin is another one, off by ({off}) m", seen.values - offset
         return
-    own = channel.partition(":")[2].rpartition(".")[0]
-    for marker, orientation in sorted(markers.items(), key=lambda item: item[0] != own):
-        if channel.startswith(("load:", "wheel_load:")) or marker == own:
-            yield f'the components are in the axes of "{marker}", not in World axes', _turned(orientation, values)
+    for marker, orientation in seen.markers("orientation").items():
+        if seen.is_load or marker == seen.item:
+            yield f'the components are in the axes of "{marker}", not in World axes', turned(orientation, seen.values)
 
 
-def _turned(quaternions: Real, vectors: Real) -> Real:
-    """Body components (T,3) as World components, by quaternions (T,4): v + 2 w (r x v) + 2 r x (r x v)."""
-    w, r = quaternions[:, :1], quaternions[:, 1:]
-    once = np.cross(r, vectors)
-    return vectors + 2.0 * (w * once + np.cross(r, once))
+def _energy_offset(seen: Evidence) -> float:
+    """The middle of the differences (J), which is the constant that leaves the least."""
+    apart = seen.values - seen.reference
+    return float(0.5 * (np.max(apart) + np.min(apart)))
 
 
-def _shift(channel: str, values: Real, reference: Real, allowed: float) -> str:
-    """Times shifted by some samples, compared where both have samples."""
+def _shifts(seen: Evidence) -> Iterator[str]:
+    """Rows shifted by some samples, compared where both have samples."""
     for shift in SHIFTS:
-        if abs(shift) + 2 > len(values):
+        if abs(shift) + 2 > len(seen.values):
             continue
-        late, early = (values, reference) if shift > 0 else (reference, values)
-        apart = distance(channel, late[abs(shift) :], early[: -abs(shift)])
-        moving = signal_range(channel, early[: -abs(shift)]) > VISIBLE * allowed
-        if moving and np.all(apart <= allowed):
+        late, early = (seen.values, seen.reference) if shift > 0 else (seen.reference, seen.values)
+        early = early[: -abs(shift)]
+        apart = distance(seen.channel, late[abs(shift) :], early)
+        moving = signal_range(seen.channel, early) > VISIBLE * seen.allowed
+        if seen.is_visible and moving and np.all(apart <= seen.allowed):
             samples = "sample" if abs(shift) == 1 else f"{abs(shift)} samples"
-            return f"the values are {'a ' if abs(shift) == 1 else ''}{samples} too {'late' if shift > 0 else 'early'}"
-    return ""
+            yield f"the values are {'a ' if abs(shift) == 1 else ''}{samples} too {'late' if shift > 0 else 'early'}"
+            return

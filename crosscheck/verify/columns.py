@@ -12,11 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from crosscheck.judging.against_reference import shared_times
+from crosscheck.judging.against_reference import CLOCK, shared_times
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import KINDS, kind_named, part_of
 from crosscheck.library.reference import channels_by_column
-from crosscheck.verify.resample import FEWEST, resample
 from flexmb.scene.reading import MIB, Unreadable, read_text
 from flexmb.typing import Real
 
@@ -28,6 +27,7 @@ OWN_HEADER = re.compile(r"(.+) \[([^\]]*)\]")
 STORED = ("marker:", "load:", "wheel_load:", "drive:")  # prefixes of items' channels in a reference.csv
 DRIVE = "drive"
 LIMIT = 128 * MIB
+FEWEST = 8  # fewest samples at times of its own: fewer say too little about a motion
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
@@ -37,27 +37,33 @@ class VerifyError(ValueError):
     """A CSV or a request that cannot be compared; the message says what to change."""
 
 
+class TimesError(VerifyError):
+    """The times of a CSV do not fit; the numbers can be read all the same."""
+
+
 @dataclass(frozen=True)
 class Columns:
-    """Channels (T, k) of a CSV at the times asked for.
+    """Channels (T, k) of a CSV at its `times` (T,) s.
 
     `own`: it is a complete trajectory.csv of flexmb or a reference.csv, and `left_out` are its other columns.
-
-    If the file has its own times, `samples` in number, `doubts` is what interpolation adds to the U of
-    each channel (SI); else both are empty.
     """
 
     channels: dict[str, Real]
     own: bool = False
     left_out: tuple[str, ...] = ()
-    samples: int = 0
-    doubts: dict[str, float] = field(default_factory=dict)
+    times: Real = field(default_factory=lambda: np.zeros(0))
+
+    def at(self, places: np.ndarray) -> Columns:
+        """Those of its samples."""
+        return replace(
+            self, channels={name: rows[places] for name, rows in self.channels.items()}, times=self.times[places]
+        )
 
 
-def read_columns(file: Path, times: Real) -> Columns:
-    """Channels of a CSV at `times` (T,) s, rising; groups such as tip.px, tip.py, tip.pz must be whole.
+def read_columns(file: Path, times: Real, clock: float = 1.0) -> Columns:
+    """Channels of a CSV at its own times; groups such as tip.px, tip.py, tip.pz must be whole.
 
-    Its own times may be others, if they rise and cover these: then it is interpolated (see `resample`).
+    They must rise, and contain the case's `times` (T,) s or cover them. `clock` is the unit of its times, in s.
     VerifyError names file, line, column and remedy.
     """
     try:
@@ -69,9 +75,9 @@ def read_columns(file: Path, times: Real) -> Columns:
     except VerifyError as error:
         raise VerifyError(f"{file} cannot be read as a CSV of numbers with one header line: {error}") from None
     try:
-        return _columns(header, numbers, rows, times)
+        return _columns(header, numbers, rows, times, clock)
     except VerifyError as error:
-        raise VerifyError(f"{file}: {error}") from None
+        raise type(error)(f"{file}: {error}") from None
 
 
 def short_names(channel: str, width: int) -> list[str]:
@@ -130,7 +136,7 @@ def _number(cell: str, name: str, line: int) -> float:
     raise VerifyError(f"{where}: {shown} is not a number: write it like -1.25e-3")
 
 
-def _columns(header: list[str], numbers: list[int], rows: Real, times: Real) -> Columns:
+def _columns(header: list[str], numbers: list[int], rows: Real, times: Real, clock: float) -> Columns:
     places: dict[str, int] = {}
     for number, name in enumerate(header, start=1):
         if name and name in places:
@@ -139,7 +145,7 @@ def _columns(header: list[str], numbers: list[int], rows: Real, times: Real) -> 
     own, stored = OWN_HEADER.fullmatch(header[0]) is not None, any(name.startswith(STORED) for name in header)
     if header[0] not in ("t", "t [s]"):
         raise VerifyError(f'the first column must be "t"; it is "{header[0]}"')
-    given = rows[:, 0]
+    given = clock * rows[:, 0]
     _check_times(numbers, given, times)
     filled = {}
     for name, values in zip(header[1:], rows.T[1:], strict=True):
@@ -153,12 +159,11 @@ def _columns(header: list[str], numbers: list[int], rows: Real, times: Real) -> 
             raise VerifyError(f"column {header.index('') + 1} has no name: name it in the first line or leave it out")
         filled[name] = values
     found = _stored_channels(filled) if stored else _own_channels(filled) if own else Columns(_channels(filled))
-    channels, doubts = resample(found.channels, given, times)
-    return replace(found, channels=channels, doubts=doubts, samples=len(given) if doubts else 0)
+    return replace(found, times=given)
 
 
 def _check_times(numbers: list[int], given: Real, times: Real) -> None:
-    """The times must rise, and be the case's or cover them."""
+    """The times must rise, and contain the case's or cover them, up to one step of their own at either end."""
     asked = (
         f"the case has {len(times)} samples, every {times[1] - times[0]:.10g} s from 0 to {times[-1]:g} s; --template "
         "writes a file with them"
@@ -173,11 +178,14 @@ def _check_times(numbers: list[int], given: Real, times: Real) -> None:
         raise VerifyError(f"{where}: times must rise ({asked})")
     if shared_times(times, given) is not None:
         return
-    slack = 1e-9 * abs(times[-1])
-    if len(given) < FEWEST:
-        raise VerifyError(f"there are only {len(given)} rows, and not at the case's times ({asked})")
-    if given[0] > times[0] + slack or given[-1] < times[-1] - slack:
-        raise VerifyError(f"its times, {given[0]:g} to {given[-1]:g} s, do not cover the case's ({asked})")
+    slack = CLOCK * abs(times[-1])
+    inside = given[(given > times[0] - slack) & (given < times[-1] + slack)]
+    if len(inside) < FEWEST:
+        within = "" if len(inside) == len(given) else f" from {times[0]:g} to {times[-1]:g} s"
+        raise TimesError(f"there are only {len(inside)} rows{within}, and not at the case's times ({asked})")
+    step = float(np.max(np.diff(given))) + slack
+    if given[0] > times[0] + step or given[-1] < times[-1] - step:
+        raise TimesError(f"its times, {given[0]:g} to {given[-1]:g} s, do not cover the case's ({asked})")
 
 
 def _channels(filled: dict[str, Real]) -> dict[str, Real]:

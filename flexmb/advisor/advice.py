@@ -12,7 +12,7 @@ from flexmb.advisor.confirm import Confirmation, NoReference, Reference
 from flexmb.advisor.indicators import Indicators, indicators, of_level, predicted
 from flexmb.advisor.ladder import Cost, Step, cost, model_cost, rungs, step
 from flexmb.advisor.methods import RunMethod
-from flexmb.advisor.modal_response import FAMILIES, RigidRun, modal_response, rigid_run
+from flexmb.advisor.modal_response import RigidRun, modal_response, rigid_run
 from flexmb.advisor.models import BodyModel, Model, built, flexible_bodies, levels
 from flexmb.advisor.quantity import Quantity, measured, quantities, scales
 from flexmb.advisor.search import search
@@ -200,16 +200,11 @@ def _ladders(scene: Scene, known: dict[str, Indicators], tolerance: float) -> di
     found = {}
     for body in flexible_bodies(scene):
         of = known.get(body.name)
-        excited = frozenset(_excited(of, _EXCITED * tolerance)) if of else frozenset[str]()
+        excited = of.families_above(_EXCITED * tolerance) if of else frozenset[str]()
         every = rungs(scene, body, excited)
         steps = [step(scene, body.name, rung, predicted(rung, of) if of else 0.0) for rung in every]
         found[body.name] = tuple(each for each in steps if each is not None)
     return found
-
-
-def _excited(body: Indicators, least: float) -> list[str]:
-    """Families of modes that contribute more than `least`, a fraction of the scale."""
-    return [name for i, name in enumerate(FAMILIES) if np.any(body.static[body.family == i] > least)]
 
 
 def _trial(model: Model, steps: dict[tuple[str, BodyModel], Step], confirmation: Confirmation) -> Trial:

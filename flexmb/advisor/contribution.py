@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.advisor.modal_response import ModalResponse, RigidRun, mass_shapes
+from flexmb.advisor.modal_response import ModalResponse, RigidRun, momenta
 from flexmb.scene.bodies import RigidBody
 from flexmb.scene.schema import Free, Hinge, Marker, Scene
 from flexmb.scene.tree import GROUND
@@ -30,12 +30,9 @@ class Moved:
 
 
 def moved(rigid: RigidRun, response: ModalResponse) -> Moved:
-    """Momenta sum m phi and sum m r x phi of the modes, in World axes."""
-    model = response.model
-    shapes, centre = mass_shapes(model), model.position + model.com_offset
+    """Momenta of the modes in World axes."""
     position, turn = rigid.frame(response.body.name)
-    linear = np.einsum("p,pim->im", model.mass, shapes)
-    angular = np.einsum("p,pim->im", model.mass, np.cross(centre[:, :, None], shapes, axis=1))
+    linear, angular = momenta(response.model)
     return Moved(response, position, turn, turn @ linear, turn @ angular)
 
 

@@ -63,6 +63,10 @@ class Indicators:
     share: float
     mismatch: float
 
+    def families_above(self, least: float) -> frozenset[str]:
+        """Families of modes that contribute more than `least`, a fraction of the scale."""
+        return frozenset(name for i, name in enumerate(FAMILIES) if np.any(self.static[self.family == i] > least))
+
     def reason(self) -> str:
         """The relevant indicators in words."""
         parts = [f"bends by {self.deflection:.2g} of its length, {self.flexibility:.2g} of the quantity"]

@@ -110,7 +110,7 @@ def step(scene: Scene, name: str, rung: BodyModel, error: float) -> Step | None:
         whole = built(scene, ((name, rung),))
         before = {b.name for b in scene.bodies if b.name != name}
         parts = [b for b in whole.bodies if b.name not in before]
-        counts = [(_mode_count(b), b.level) for b in parts]
+        counts = [(len(_squares(b)), b.level) for b in parts]
         fastest = _fastest(next(b for b in scene.bodies if b.name == name), rung, parts)
     except ValueError:
         return None
@@ -136,24 +136,17 @@ def highest_frequency(scene: Scene, model: Model) -> float:
     return max((each.fastest for each in steps if each), default=0.0)
 
 
-def _mode_count(body: Body) -> int:
-    return len(_squares(body)) if isinstance(body, BeamBody | ModalBody) and body.level != "rigid" else 0
-
-
 def _fastest(body: Body, rung: BodyModel, parts: list[Body]) -> float:
     """Highest frequency (rad/s) of the bodies that replace one body in a rung."""
     if rung.kind == "segments" and isinstance(body, BeamBody):
         return ZIGZAG * rung.pieces**2 * _beam_rate(body)
-    return max(
-        float(np.sqrt(max(_squares(part), default=0.0)))
-        if isinstance(part, BeamBody | ModalBody) and part.level != "rigid" else 0.0
-        for part in parts
-    )  # fmt: skip
+    return max(float(np.sqrt(max(_squares(part), default=0.0))) for part in parts)
 
 
-def _squares(body: BeamBody | ModalBody) -> tuple[float, ...]:
-    """Squares of the frequencies of a body with its base fixed; cached for equal bodies of any name."""
-    return _squares_of(replace(body, name="body", level="full"))
+def _squares(body: Body) -> tuple[float, ...]:
+    """Squares of the frequencies of a body with its base fixed, none if it is rigid; cached for any name."""
+    is_flexible = isinstance(body, BeamBody | ModalBody) and body.level != "rigid"
+    return _squares_of(replace(body, name="body", level="full")) if is_flexible else ()
 
 
 @lru_cache(maxsize=4096)

@@ -25,6 +25,7 @@ from scipy.spatial.transform import Rotation
 from flexmb.advisor.methods import RunMethod, simulated
 from flexmb.closure.closures import ClosureError
 from flexmb.dense.function_jets import profile
+from flexmb.frisch.normalisation import combined
 from flexmb.modal import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
@@ -110,10 +111,9 @@ def modal_response(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody) ->
     w, alpha = _into(turn, path.velocity[:, :3]), _into(turn, path.acceleration[:, :3])
     acceleration = _into(turn, path.acceleration[:, 3:] - np.array(scene.gravity_m_s2))
     loads = tuple(_loads(rigid, scene, body, turn))
-    centre, shapes = model.position + model.com_offset, mass_shapes(model)
-    momentum = np.einsum("p,pim->im", model.mass, shapes)
-    angular = np.einsum("p,pim->im", model.mass, np.cross(centre[:, :, None], shapes, axis=1))
-    spread = np.einsum("p,pim,pj->mij", model.mass, shapes, centre)  # sum m phi_n r'
+    momentum, angular = momenta(model)
+    centre = model.position + model.com_offset
+    spread = np.einsum("p,pim,pj->mij", model.mass, mass_shapes(model), centre)  # sum m phi_n r'
     force = -(acceleration @ momentum + alpha @ angular)
     force -= np.einsum("ti,tj,mij->tm", w, w, spread) - np.sum(w**2, axis=1)[:, None] * np.einsum("mii->m", spread)
     for node, torque, push in loads:
@@ -133,8 +133,7 @@ def eigenmodes(body: BeamBody | ModalBody) -> FlexibleModel:
         return _beam(replace(body, name="beam", level="full"))
     model = flexible_model(body)
     m = model.mode_count
-    X = eigh(model.stiffness, modal_integrals(model).spatial_mass[:m, :m])[1]
-    return _combined(model, X)
+    return combined(model, eigh(model.stiffness, modal_integrals(model).spatial_mass[:m, :m])[1])
 
 
 @lru_cache(maxsize=64)
@@ -156,15 +155,11 @@ def mass_shapes(model: FlexibleModel) -> Real:
     return model.translation + np.cross(model.rotation, model.com_offset[:, :, None], axis=1)
 
 
-def _combined(model: FlexibleModel, X: Real) -> FlexibleModel:
-    nodes = {
-        name: changed(node, translation=node.translation @ X, rotation_modes=node.rotation_modes @ X)
-        for name, node in model.nodes.items()
-    }
-    return changed(
-        model, translation=model.translation @ X, rotation=model.rotation @ X, nodes=nodes,
-        stiffness=X.T @ model.stiffness @ X, damping=X.T @ model.damping @ X,
-    )  # fmt: skip
+def momenta(model: FlexibleModel) -> tuple[Real, Real]:
+    """Linear and angular momenta (3,m) of the modes about the origin, body axes: sum m phi and sum m r x phi."""
+    centre, shapes = model.position + model.com_offset, mass_shapes(model)
+    arms = np.cross(centre[:, :, None], shapes, axis=1)
+    return np.einsum("p,pim->im", model.mass, shapes), np.einsum("p,pim->im", model.mass, arms)
 
 
 def _families(model: FlexibleModel) -> NDArray[np.intp]:

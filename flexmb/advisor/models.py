@@ -7,7 +7,7 @@ A `BodyModel` is one model of one body, a rung of its ladder; a `Model` has one 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, assert_never
 
 from msgspec.structs import replace
 
@@ -80,7 +80,19 @@ def levels(body: BeamBody | ModalBody) -> tuple[Level, ...]:
 def built(scene: Scene, model: Model) -> Scene:
     """The scene with every body modelled by its rung. Raises ValueError if a rung is not possible for its body."""
     for name, rung in model:
-        scene = _applied(scene, name, rung)
+        match rung.kind:
+            case "rigid":
+                scene = rigid(scene, name)
+            case "sprung":
+                scene = spring_hinged(scene, name)
+            case "segments":
+                scene = finite_segments(scene, name, rung.pieces)
+            case "pieces":
+                scene = substructured(scene, name, rung.pieces, level=rung.level, eigenmodes=rung.modes)
+            case "modes":
+                scene = with_modes(scene, name, rung.modes, rung.level, rung.static, rung.families)
+            case _:
+                assert_never(rung.kind)
     return scene
 
 
@@ -88,16 +100,3 @@ def rigid(scene: Scene, name: str) -> Scene:
     """The scene with that body at level "rigid" and without its modal state; nothing else changes."""
     bodies = tuple(replace(b, level="rigid") if b.name == name else b for b in scene.bodies)
     return replace(scene, bodies=bodies, modal_states=tuple(s for s in scene.modal_states if s.body != name))
-
-
-def _applied(scene: Scene, name: str, rung: BodyModel) -> Scene:
-    match rung.kind:
-        case "rigid":
-            return rigid(scene, name)
-        case "sprung":
-            return spring_hinged(scene, name)
-        case "segments":
-            return finite_segments(scene, name, rung.pieces)
-        case "pieces":
-            return substructured(scene, name, rung.pieces, level=rung.level, eigenmodes=rung.modes)
-    return with_modes(scene, name, rung.modes, rung.level, rung.static, rung.families)

@@ -8,6 +8,7 @@ import numpy as np
 from msgspec.structs import replace
 from scipy.linalg import eigh
 
+from flexmb.advisor.modal_response import mass_shapes
 from flexmb.modal import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
@@ -81,7 +82,7 @@ def _raw(body: ModalBody, count: int, level: Level) -> ModalBody:
     }
     return replace(
         body, file=None, points=points, nodes=nodes, level=level,
-        stiffness=_rows(X.T @ arrays.stiffness @ X), damping=_rows(X.T @ arrays.damping @ X), **geometric,
+        stiffness=_nested(_symmetric(arrays.stiffness, X)), damping=_nested(_symmetric(arrays.damping, X)), **geometric,
     )  # fmt: skip
 
 
@@ -104,13 +105,14 @@ def _square(array: Real | None, X: Real) -> Any:
     return None if array is None else X.T @ array @ X
 
 
+def _symmetric(matrix: Real, X: Real) -> Real:
+    """`_square` of a symmetric matrix, without the asymmetry of rounding."""
+    turned = X.T @ matrix @ X
+    return (turned + turned.T) / 2.0
+
+
 def _combined(shapes: tuple[tuple[float, float, float], ...], X: Real) -> tuple[tuple[float, float, float], ...]:
     return tuple(vector(shape) for shape in X.T @ np.array(shapes))
-
-
-def _rows(matrix: Real) -> tuple[tuple[float, ...], ...]:
-    symmetric = (matrix + matrix.T) / 2.0
-    return tuple(tuple(float(value) for value in row) for row in symmetric)
 
 
 def _projected(old: BeamBody | ModalBody, new: BeamBody | ModalBody, state: ModalState) -> ModalState:
@@ -128,11 +130,7 @@ def _projected(old: BeamBody | ModalBody, new: BeamBody | ModalBody, state: Moda
 
 def _products(a: FlexibleModel, b: FlexibleModel) -> Real:
     """Inner products (m_a, m_b), in the norm of kinetic energy, of the modes of two models with the same points."""
-    moved_a, moved_b = _centres(a), _centres(b)
+    moved_a, moved_b = mass_shapes(a), mass_shapes(b)
     turning = np.einsum("pim,pij,pjn->mn", a.rotation, a.inertia, b.rotation, optimize=True)
     return np.einsum("p,pim,pin->mn", a.mass, moved_a, moved_b, optimize=True) + turning
 
-
-def _centres(model: FlexibleModel) -> Real:
-    """Mode shapes (n,3,m) of the mass centres of the points."""
-    return model.translation + np.cross(model.rotation, model.com_offset[:, :, None], axis=1)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.text import Text
 
-from flexmb.cli.terminal import EXIT_STOPPED, NoUserCode, SceneFile, console, errors, no_traceback, range_of
+from flexmb.cli.terminal import NoUserCode, SceneFile, console, no_traceback, range_of
 from flexmb.output.printable import printable
 from flexmb.output.writing import check_folder
 
@@ -63,7 +61,7 @@ def linearize(
 
         if at not in ("equilibrium", "initial"):
             raise ValueError(f"--at is equilibrium or initial, not {at!r}")
-        with _no_steady_state(), console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
+        with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
             model, missing, note = _linearised(scene, at, spin, rate, cut)
         console.print(modes_table(model, missing))
         if note:
@@ -101,18 +99,6 @@ def _linearised(
         return model, None, f"the truncation is not known; with twice the modes of every beam: {error}"
 
 
-@contextmanager
-def _no_steady_state() -> Iterator[None]:
-    """Show the error of a search for an equilibrium or a steady spin, and exit with code 1."""
-    from flexmb.linear.newton import EquilibriumError
-
-    try:
-        yield
-    except EquilibriumError as error:
-        errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
-        raise typer.Exit(EXIT_STOPPED) from None
-
-
 def campbell(
     scene: SceneFile,
     hinge: Annotated[str, typer.Argument(help="Revolute hinge or wheel that spins.", metavar="HINGE")],
@@ -145,7 +131,7 @@ def campbell(
         loaded, values = load_scene(scene), range_of("rates", rates)
         for file in (picture, *([] if csv is None else [csv])):
             check_folder(file.parent)
-        with _no_steady_state(), console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
+        with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
             result = diagram(loaded, hinge, values)
         console.print(campbell_table(result))
         written = [result.plot(picture, modes)]

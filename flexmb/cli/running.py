@@ -114,7 +114,7 @@ def _report(
     trajectory: Trajectory, out: Path, also: Sequence[str], plots: bool, sections: dict[str, list[float]]
 ) -> None:
     """Print the summary first, since a full disk then costs the files only; write the files, section loads last."""
-    from flexmb.run.section_table import write_sections
+    from flexmb.run.exports import write_sections
     from flexmb.run.summary import summary
 
     console.print(summary(trajectory))

@@ -90,9 +90,11 @@ def _messages() -> Iterator[None]:
     try:
         yield
     except (SceneError, SceneWarning, NotImplementedError, ValueError, ImportError, OSError) as error:
-        text = in_words(error) if isinstance(error, OSError) else str(error)
-        errors.print(Text("error: ", style="bold red") + Text(printable(text)), soft_wrap=True)
-        raise typer.Exit(EXIT_USAGE) from None
-    except ArithmeticError as error:  # the accelerations do not exist, or overflow
-        errors.print(Text("error: ", style="bold red") + Text(str(error)), soft_wrap=True)
-        raise typer.Exit(EXIT_STOPPED) from None
+        raise _ended(in_words(error) if isinstance(error, OSError) else str(error), EXIT_USAGE) from None
+    except ArithmeticError as error:  # there is no equilibrium, or the accelerations do not exist or overflow
+        raise _ended(str(error), EXIT_STOPPED) from None
+
+
+def _ended(message: str, code: int) -> typer.Exit:
+    errors.print(Text("error: ", style="bold red") + Text(printable(message)), soft_wrap=True)
+    return typer.Exit(code)

@@ -61,19 +61,19 @@ def normalised(model: FlexibleModel, name: str = "flexible body") -> FlexibleMod
         return model
     every = elements(model)
     M1 = particles(every, mass_centre(every)).M1 + rotary(every).M1
-    X = np.sqrt(every.mass.sum()) * _orthonormal(M1, model.stiffness, name)
+    return combined(model, np.sqrt(every.mass.sum()) * _orthonormal(M1, model.stiffness, name))
+
+
+def combined(model: FlexibleModel, X: Real) -> FlexibleModel:
+    """The body with combinations of its modes: coordinates a_old = X a_new, X (n,k)."""
     nodes = {
         key: replace(node, translation=node.translation @ X, rotation_modes=node.rotation_modes @ X)
         for key, node in model.nodes.items()
     }
     return replace(
-        model,
-        translation=model.translation @ X,
-        rotation=model.rotation @ X,
-        stiffness=X.T @ model.stiffness @ X,
-        damping=X.T @ model.damping @ X,
-        nodes=nodes,
-    )
+        model, translation=model.translation @ X, rotation=model.rotation @ X, nodes=nodes,
+        stiffness=X.T @ model.stiffness @ X, damping=X.T @ model.damping @ X,
+    )  # fmt: skip
 
 
 def _orthonormal(M1: Real, stiffness: Real, name: str) -> Real:

@@ -168,3 +168,12 @@ def recall_nothing(memory, s, known, counts):
 @handed_in
 def keep_nothing(memory, s):
     """For methods whose only memory is the numbers of `Memory`."""
+
+
+@helper
+def by_error(attempt, state_at, exponent):
+    """A method whose steps follow from its errors alone, and whose only memory is the numbers of `Memory`."""
+    return Method(
+        attempt, accept_by_error, reject_by_error, after_leap_by_error, enter_afresh, recall_nothing, keep_nothing,
+        state_at, exponent,
+    )  # fmt: skip

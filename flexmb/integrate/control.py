@@ -1,4 +1,5 @@
-"""Common parts of all integrators: checked derivatives, error norm, first step, step-size control, equal steps.
+"""Common parts of all integrators: checked derivatives and Jacobians, error norm, first step, step-size control, equal
+steps.
 
 The last components of a state y (n,) may be pure quadratures: only the first `controlled` ones enter a norm (see
 `Accuracy`).
@@ -64,6 +65,18 @@ def derivative(problem, t, y, dy, counts):
     status = problem.rhs(t, y, dy, problem.constants, problem.workspace)
     if status == OK and not all_finite(dy):
         return NONFINITE
+    return status
+
+
+@helper
+def linearisation(problem, t, y, J, counts):
+    """J = df/dy (n,n) at (t, y); returns a status code, which is not OK if the Jacobian is not finite."""
+    counts[JACOBIANS] += 1
+    status = problem.jacobian(t, y, J, problem.exact, problem.tangent)
+    if status == OK:
+        for row in J:
+            if not all_finite(row):
+                return NONFINITE
     return status
 
 

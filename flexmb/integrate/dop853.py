@@ -13,16 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.adaptive import (
-    Method,
-    accept_by_error,
-    adaptive,
-    after_leap_by_error,
-    enter_afresh,
-    keep_nothing,
-    recall_nothing,
-    reject_by_error,
-)
+from flexmb.integrate.adaptive import adaptive, by_error
 from flexmb.integrate.control import all_finite, derivative
 from flexmb.integrate.dop853_formulas import (
     END,
@@ -104,10 +95,7 @@ def dop853(problem, y, clock, accuracy, out, counts, memory, watch):
     n = y.shape[0]
     s = ExplicitStages(np.empty((STAGES_DENSE, n)), np.empty((7, n)), np.zeros(1, np.int64))
     ends = Ends(y, s.k[0], np.empty(n), s.k[END])
-    method = Method(
-        attempt, accept_by_error, reject_by_error, after_leap_by_error, enter_afresh, recall_nothing, keep_nothing,
-        state_at, ERROR_EXPONENT,
-    )  # fmt: skip
+    method = by_error(attempt, state_at, ERROR_EXPONENT)
     return adaptive(method, problem, (s, ends), clock, out, (accuracy, counts), memory, watch)
 
 

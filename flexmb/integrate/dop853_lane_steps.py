@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+from flexmb.integrate.control import copy
 from flexmb.integrate.dop853_formulas import END, ERROR_EXPONENT, combine, error_norm, error_sums, interpolant
 from flexmb.integrate.dop853_tableau import STAGES, STAGES_DENSE, A, C
 from flexmb.integrate.lane_control import RUNNING, set_times
-from flexmb.integrate.lane_problem import any_chosen, lane_copy, lane_derivative, mark_finite
+from flexmb.integrate.lane_problem import any_chosen, lane_derivative, mark_finite
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import LANES, select
 from flexmb.tables.status import OK
@@ -51,7 +52,7 @@ def attempt(problem, s, entries, control, accuracy, counts):
     for lane in range(LANES):
         entries.time[0, lane] = control.end[lane]
     problem.project(problem.stages, problem.constants)
-    lane_copy(s.trial, s.y_new)
+    copy(s.trial, s.y_new)
     for lane in range(LANES):
         entries.time[0, lane] = min(control.end[lane], control.last[lane])
     status = lane_derivative(problem, s, END, counts)
@@ -69,7 +70,7 @@ def attempt(problem, s, entries, control, accuracy, counts):
 @helper
 def first_step(problem, s, entries, control, accuracy, counts):
     """First step sizes: Hairer, Norsett, Wanner I, II.4, as `flexmb.integrate.control.initial_step`."""
-    _scaled_norms(s, accuracy)
+    s.norm[0], s.norm[1] = _squares(s, s.y, accuracy), _squares(s, s.k[0], accuracy)
     for lane in range(LANES):
         d0, d1 = _norm(entries.norm[0, lane], accuracy), _norm(entries.norm[1, lane], accuracy)
         h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
@@ -85,7 +86,7 @@ def first_step(problem, s, entries, control, accuracy, counts):
     for i in range(s.y.shape[0]):
         s.k[2, i] = s.k[1, i] - s.k[0, i]
     mark_finite(s.k[1], s.chosen)
-    _scaled_norm_of(s, s.k[2], accuracy)
+    s.norm[2] = _squares(s, s.k[2], accuracy)
     for lane in range(LANES):
         h0, d1 = control.length[lane], control.error[lane]
         d2 = _norm(entries.norm[2, lane], accuracy) / h0
@@ -102,25 +103,13 @@ def _norm(total, accuracy):
 
 
 @helper
-def _scaled_norms(s, accuracy):
-    """Sums of squares of y and of its slope k[0] over atol + rtol |y|, into s.norm[0] and s.norm[1]."""
-    state, slope = 0.0, 0.0
-    for i in range(accuracy.controlled):
-        scale = accuracy.atol + accuracy.rtol * abs(s.y[i])
-        a, b = s.y[i] / scale, s.k[0, i] / scale
-        state += a * a
-        slope += b * b
-    s.norm[0], s.norm[1] = state, slope
-
-
-@helper
-def _scaled_norm_of(s, values, accuracy):
-    """Sum of squares of values (n,) over atol + rtol |y|, into s.norm[2]."""
+def _squares(s, values, accuracy):
+    """Sum of squares of values (n,) over atol + rtol |y|."""
     total = 0.0
     for i in range(accuracy.controlled):
         a = values[i] / (accuracy.atol + accuracy.rtol * abs(s.y[i]))
         total += a * a
-    s.norm[2] = total
+    return total
 
 
 @helper

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from flexmb.integrate.control import CALM, SAMPLES
+from flexmb.integrate.control import CALM, SAMPLES, copy
 from flexmb.integrate.dop853_formulas import END, ERROR_EXPONENT, interpolate
 from flexmb.integrate.dop853_lane_steps import attempt, first_step, last_stages
 from flexmb.integrate.lane_control import RUNNING, any_running, awaits_sample, begin_segment, go_on, propose
-from flexmb.integrate.lane_problem import any_chosen, lane_copy, lane_derivative, mark_finite, set_all, store_lane
+from flexmb.integrate.lane_problem import any_chosen, lane_derivative, mark_finite, project_start, store_lane
 from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.lanes import LANES, select
 from flexmb.tables.status import NONFINITE, OK
@@ -16,10 +16,7 @@ from flexmb.tables.status import NONFINITE, OK
 def _begin(problem, s, entries, control, clock, out, counts):
     """Project the initial states, store them as first samples, and start the first segment of every lane."""
     times, segment_ends, _ = clock
-    set_all(entries.time, times[0])
-    lane_copy(s.y, s.trial)
-    problem.project(problem.stages, problem.constants)
-    lane_copy(s.trial, s.y)
+    project_start(problem, s, entries, times[0])
     for lane in range(LANES):
         store_lane(entries.y, lane, out[lane, 0])
         counts[lane, SAMPLES] = 1
@@ -34,7 +31,7 @@ def _derivative_at_start(problem, s, entries, control, counts):
     is not finite end."""
     for lane in range(LANES):
         entries.time[0, lane] = control.t[lane]
-    lane_copy(s.y, s.trial)
+    copy(s.y, s.trial)
     status = lane_derivative(problem, s, 0, counts)
     mark_finite(s.k[0], s.chosen)
     for lane in range(LANES):

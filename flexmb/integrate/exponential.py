@@ -19,19 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.adaptive import (
-    Method,
-    accept_by_error,
-    adaptive,
-    after_leap_by_error,
-    enter_afresh,
-    keep_nothing,
-    recall_nothing,
-    reject_by_error,
-)
-from flexmb.integrate.control import FACTORISATIONS, copy, derivative, scaled_norm
+from flexmb.integrate.adaptive import adaptive, by_error
+from flexmb.integrate.control import FACTORISATIONS, copy, derivative, linearisation, scaled_norm
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.integrate.settling import prepare_settling, settle
 from flexmb.integrate.watch import Ends
@@ -231,10 +221,7 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
     """
     s = scratch(y.shape[0])
     ends = Ends(y, s.f, s.y_new, s.f_new)
-    method = Method(
-        attempt, accept_by_error, reject_by_error, after_leap_by_error, enter_afresh, recall_nothing, keep_nothing,
-        state_at, _ERROR_EXPONENT,
-    )  # fmt: skip
+    method = by_error(attempt, state_at, _ERROR_EXPONENT)
     return adaptive(method, problem, (s, ends), clock, out, (accuracy, counts), memory, watch)
 
 

@@ -16,10 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.control import FACTORISATIONS, Interval, all_finite, copy, derivative, scaled_norm
+from flexmb.integrate.control import FACTORISATIONS, Interval, all_finite, copy, derivative, linearisation, scaled_norm
 from flexmb.integrate.equal_steps import FixedMethod, equal_steps
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import FACTORED, FRESH, TAKEN_UP
 from flexmb.integrate.watch import Ends

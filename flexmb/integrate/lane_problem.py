@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.control import EVALUATIONS
+from flexmb.integrate.control import EVALUATIONS, copy
 from flexmb.integrate.dop853_tableau import STAGES_DENSE
 from flexmb.jit.bundle import AnyBundle, bundle
 from flexmb.jit.kernel import helper, kernel, written_out
@@ -106,13 +106,6 @@ def lane_derivative(problem, s, stage, counts):
 
 
 @helper
-def lane_copy(source, target):
-    """target = source, for states."""
-    for i in range(target.shape[0]):
-        target[i] = source[i]
-
-
-@helper
 def set_all(row, value):
     """Set all lanes of row (1,LANES) to the same value."""
     for lane in range(LANES):
@@ -144,11 +137,17 @@ def mark_finite(values, mark):
     mark[0] = select(total == 0.0, 1.0, 0.0)
 
 
+@helper
+def project_start(problem, s, entries, t):
+    """Project the states s.y to their manifold at time t."""
+    set_all(entries.time, t)
+    copy(s.y, s.trial)
+    problem.project(problem.stages, problem.constants)
+    copy(s.trial, s.y)
+
+
 @kernel
 def first_derivative(problem, s, entries, t, counts):
     """Project the states s.y to their manifold at time t and evaluate their slopes; returns a status code."""
-    set_all(entries.time, t)
-    lane_copy(s.y, s.trial)
-    problem.project(problem.stages, problem.constants)
-    lane_copy(s.trial, s.y)
+    project_start(problem, s, entries, t)
     return lane_derivative(problem, s, 0, counts)

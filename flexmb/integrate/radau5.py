@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 
 from flexmb.integrate.adaptive import Method, adaptive
-from flexmb.integrate.control import SAFETY, SHRINK, copy, derivative, next_step, retreat, scaled_norm
+from flexmb.integrate.control import SAFETY, SHRINK, copy, derivative, linearisation, next_step, retreat, scaled_norm
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_solve
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE
 from flexmb.integrate.radau5_stages import ITERATIONS, evaluate_polynomial, factorise, guess, newton, scratch

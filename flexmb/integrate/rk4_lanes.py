@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from flexmb.integrate.control import ACCEPTED, SAMPLES, permitted, stretch
-from flexmb.integrate.lane_problem import any_chosen, lane_copy, lane_derivative, mark_finite, set_all, store_lane
-from flexmb.integrate.rk4_formulas import advance, weigh
+from flexmb.integrate.control import ACCEPTED, SAMPLES, copy, permitted, stretch
+from flexmb.integrate.lane_problem import any_chosen, lane_derivative, mark_finite, project_start, set_all, store_lane
+from flexmb.integrate.rk4 import advance, weigh
 from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.jit.lanes import LANES
 from flexmb.tables.status import NONFINITE, OK
@@ -14,7 +14,7 @@ from flexmb.tables.status import NONFINITE, OK
 def _step(problem, s, entries, t, last, h, counts):
     """s.trial = y(t + h) from s.y; no stage is later than `last`. Returns a status code."""
     set_all(entries.time, t)
-    lane_copy(s.y, s.trial)
+    copy(s.y, s.trial)
     status = lane_derivative(problem, s, 0, counts)
     set_all(entries.time, t + 0.5 * h)
     for stage in range(1, 3):
@@ -46,10 +46,7 @@ def rk4_lanes(problem, s, entries, clock, accuracy, out, counts):
     """
     times, segment_ends, _ = clock
     t = times[0]
-    set_all(entries.time, t)
-    lane_copy(s.y, s.trial)
-    problem.project(problem.stages, problem.constants)
-    lane_copy(s.trial, s.y)
+    project_start(problem, s, entries, t)
     _store(entries, 0, out, counts)
     segment = 0
     for sample in range(1, times.shape[0]):
@@ -68,7 +65,7 @@ def rk4_lanes(problem, s, entries, clock, accuracy, out, counts):
                 t = end if j == steps - 1 else start + (j + 1) * h
                 set_all(entries.time, t)
                 problem.project(problem.stages, problem.constants)
-                lane_copy(s.trial, s.y)
+                copy(s.trial, s.y)
                 for lane in range(LANES):
                     counts[lane, ACCEPTED] += 1
             if t == segment_ends[segment]:

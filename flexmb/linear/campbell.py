@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from flexmb.linear.linear_model import Complex, LinearModel, Stability
+from flexmb.linear.linear_model import Complex, LinearModel, Stability, modal_assurance
 from flexmb.linear.spin import steady_spin
 from flexmb.output.whole import whole_file
 from flexmb.scene.schema import Scene
@@ -107,7 +107,7 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
             macs.append(np.ones(len(found)))
         else:
             shapes = before[0].displacements_by(model.displacements) @ before[1]  # independent ones may differ
-            alike = _mac(model.mass, shapes, current)
+            alike = modal_assurance(model.mass, shapes, current)
             order = _followed(alike, values[-1], found)
             macs.append(alike[np.arange(len(order)), order])
             found, current = found[order], current[:, order]
@@ -132,13 +132,6 @@ def _spectrum(model: LinearModel) -> tuple[Complex, Complex]:
 
 def _dominant(model: LinearModel, shape: Complex) -> str:
     return model.displacements[int(np.argmax(np.abs(shape)))]
-
-
-def _mac(mass: Real, before: Complex, after: Complex) -> Real:
-    """Modal assurance criterion (n,n) of shapes (n,n), by kinetic energy."""
-    root = np.linalg.cholesky(mass).T
-    one, other = (x / np.linalg.norm(x, axis=0) for x in (root @ before, root @ after))
-    return np.abs(one.conj().T @ other) ** 2
 
 
 def _followed(alike: Real, before: Sequence[complex] | Complex, after: Complex) -> NDArray[np.int64]:

@@ -292,6 +292,13 @@ class LinearModel:
         return values[order], (scale[:, None] * right)[:, order], tolerance[order]
 
 
+def modal_assurance(mass: Real, one: Complex, other: Complex) -> Real:
+    """Modal assurance criterion (j,k) of shapes (n,j) with shapes (n,k), by kinetic energy: 1 for equal shapes."""
+    root = np.linalg.cholesky(mass).T
+    a, b = (x / np.linalg.norm(x, axis=0) for x in (root @ one, root @ other))
+    return np.abs(a.conj().T @ b) ** 2
+
+
 def _place(names: tuple[tuple[str, str], ...], name: str, kind: str) -> int:
     known = [found for found, _ in names]
     if name not in known:

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from flexmb.linear.linear_model import Complex, LinearModel
+from flexmb.linear.linear_model import Complex, LinearModel, modal_assurance
 from flexmb.linear.linearize import linearize
 from flexmb.modal.flexible import flexible_model
 from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
@@ -57,9 +57,10 @@ def truncation(
     candidates = [mode for mode in finer.modes if not mode.is_rigid_body]
     likeness = np.zeros((len(modes), len(candidates)))
     apart = np.ones_like(likeness)
+    shapes = np.array([other.shape for other in candidates]).reshape(len(candidates), -1).T
     for i, mode in enumerate(modes):
         if not mode.is_rigid_body:
-            likeness[i] = [_likeness(finer.mass, across @ mode.shape, other.shape) for other in candidates]
+            likeness[i] = modal_assurance(finer.mass, across @ mode.shape[:, None], shapes)
             apart[i] = [abs(other.eigenvalue - mode.eigenvalue) / abs(mode.eigenvalue) for other in candidates]
     found, change, alike = np.full(len(modes), np.nan, complex), np.full(len(modes), np.nan), np.zeros(len(modes))
     for i, j in zip(*linear_sum_assignment(NEARNESS * np.minimum(apart, 1.0) - likeness), strict=True):
@@ -134,12 +135,3 @@ def _embedding(model: LinearModel, finer: LinearModel, scene: Scene) -> Real:
     others = [name for name in finer.displacements if name not in modal]
     rows = modal | dict(zip(others, model.displacements_by(others), strict=True))
     return np.array([rows[name] for name in finer.displacements])
-
-
-def _likeness(mass: Real, one: Complex, other: Complex) -> float:
-    """Modal assurance criterion in the metric of kinetic energy."""
-
-    def product(a: Complex, b: Complex) -> complex:
-        return complex(np.vdot(a, mass @ b))
-
-    return abs(product(one, other)) ** 2 / (product(one, one).real * product(other, other).real)

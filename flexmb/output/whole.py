@@ -5,11 +5,12 @@ If the process is killed, the disk is full or writing fails, the previous file r
 
 from __future__ import annotations
 
+import csv
 import errno
 import os
 import secrets
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -54,6 +55,14 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """Write a text (UTF-8, line ends unchanged) or bytes to a file atomically."""
     with whole_file(path) as beside:
         beside.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+
+
+def write_csv(path: Path, header: Sequence[str], rows: Iterable[Iterable[float]]) -> None:
+    """Write a table of numbers as CSV, with 17 digits, which are read back exactly."""
+    with whole_file(path) as beside, beside.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(header)
+        writer.writerows([f"{value:.17g}" for value in row] for row in rows)
 
 
 def save_figure(figure: Figure, path: Path, **settings: Any) -> Path:

@@ -9,10 +9,9 @@ from msgspec import structs
 
 from flexmb.control.schedule import slack
 from flexmb.integrate.watch import Watch
-from flexmb.run.event_memory import EventMemory
 from flexmb.run.propagate import Raw
-from flexmb.run.sides import Sides
-from flexmb.scene.schema import Scene, SceneEvent
+from flexmb.run.situation import Situation
+from flexmb.scene.schema import SceneEvent
 from flexmb.scene.tree import watchable
 from flexmb.tables.status import Status
 from flexmb.typing import Real
@@ -25,26 +24,27 @@ another e beyond it, and for a margin of e / 2."""
 class Agenda:
     """The events of a scene, with a record of which have happened."""
 
-    def __init__(self, scene: Scene, sides: Sides, times: Real) -> None:
+    def __init__(self, situation: Situation, times: Real) -> None:
         """times (T,) s: output times."""
-        self._sides, self._t_end = sides, float(times[-1])
+        self.situation, self._t_end = situation, float(times[-1])
         self._together = slack(float(times[0]), self._t_end)
         """Times that differ by at most this (s) count as one instant."""
-        self._done = set[str]()
+        self.done = set[str]()
         """Names of events on time that have happened or were due before the start of the run."""
-        self._passed, self.until = set[str](), -np.inf
+        self.passed, self.until = set[str](), -np.inf
         """Names of events that happened before their instant, and the time (s) until which they are not watched."""
-        self.take(scene)
+        self.take()
 
-    def take(self, scene: Scene) -> None:
-        """Use the events of this scene, which earlier events may have changed. Sensors of coordinates or speeds are
-        replaced by the names of these."""
+    def take(self) -> None:
+        """Use the events of the present scene, which earlier events may have changed. Sensors of coordinates or speeds
+        are replaced by the names of these."""
+        scene = self.situation.system.scene
         names = watchable(scene) if scene.events else {}
-        self._events = tuple(structs.replace(each, watch=names.get(each.watch, each.watch)) for each in scene.events)
+        self.events = tuple(structs.replace(each, watch=names.get(each.watch, each.watch)) for each in scene.events)
 
     @property
     def _armed(self) -> list[SceneEvent]:
-        return [event for event in self._events if event.name not in self._passed]
+        return [event for event in self.events if event.name not in self.passed]
 
     @property
     def watched(self) -> list[SceneEvent]:
@@ -53,13 +53,13 @@ class Agenda:
 
     def due_at_start(self, t: float) -> list[SceneEvent]:
         """Events on time that are due at the start t (s) of the run; earlier ones are discarded."""
-        timed = [event for event in self._events if event.watch == "time"]
-        self._done |= {event.name for event in timed if event.level < t - self._together}
+        timed = [event for event in self.events if event.watch == "time"]
+        self.done |= {event.name for event in timed if event.level < t - self._together}
         return [event for event in timed if abs(event.level - t) <= self._together]
 
     def next_stop(self, t: float) -> tuple[float, list[SceneEvent]]:
         """The next time (s) after t at which the run has to stop, and the events on time that are due then."""
-        timed = [event for event in self._armed if event.watch == "time" and event.name not in self._done]
+        timed = [event for event in self._armed if event.watch == "time" and event.name not in self.done]
         first = min((max(event.level, t) for event in timed), default=np.inf)
         end = first if first < self._t_end - self._together else self._t_end
         stop = min(end, self.until if t < self.until else np.inf)
@@ -72,38 +72,18 @@ class Agenda:
             return []
         crossed = [self.watched[i] for i in np.flatnonzero(levels.found)] if levels is not None and raw.paused else []
         due = due if raw.t >= stop - self._together else ()
-        return [event for event in self._events if event in crossed or event in due]
+        return [event for event in self.events if event in crossed or event in due]
 
     def happened(self, event: SceneEvent) -> None:
         """Record that an event happened: events on time happen only once."""
         if event.watch == "time":
-            self._done.add(event.name)
+            self.done.add(event.name)
 
     def pass_over(self, events: Sequence[SceneEvent], t: float, early: float) -> None:
         """Stop watching events that happened at t, `early` (s) before their instant, until they lie behind."""
-        self._passed |= {event.name for event in events}
+        self.passed |= {event.name for event in events}
         self.until = t + WATCHED_AGAIN * early
 
     def watch_again(self) -> None:
         """Watch all events again."""
-        self._passed.clear()
-
-    def remember(self, scene: Scene, anew: bool, given: Scene) -> EventMemory:
-        """The present state of all events of `scene`, for a restart; see `EventMemory` for `anew` and `given`."""
-        sides = self._sides
-        side = [1 if event.name in self._done else sides.side.get(event.name, 0) for event in scene.events]
-        came = [sides.came.get(event.name, 0) for event in scene.events]
-        passed = [int(event.name in self._passed) for event in scene.events]
-        whole = (np.array(each, np.int64) for each in (side, came, passed))
-        return EventMemory(*whole, self.until, anew, 0, given)
-
-    def recall(self, memory: EventMemory) -> None:
-        """Restore the state that the resumed run had saved."""
-        self.until = memory.until
-        for i, event in enumerate(self._events):
-            if memory.passed[i]:
-                self._passed.add(event.name)
-            if event.watch != "time":
-                self._sides.side[event.name], self._sides.came[event.name] = int(memory.side[i]), int(memory.came[i])
-            elif memory.side[i]:
-                self._done.add(event.name)
+        self.passed.clear()

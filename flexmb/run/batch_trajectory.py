@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexmb.run.outputs import ending
 from flexmb.system.batch import Batch
 from flexmb.tables import arguments
 from flexmb.tables.status import OK, Status
@@ -70,8 +71,5 @@ class BatchTrajectory:
         """How the run of a copy ended, in words; ValueError or TypeError for an invalid index."""
         self._refuse_torn()
         copy = arguments.index("copy", copy, len(self.status))
-        status, t = Status(int(self.status[copy])), self.stopped_at[copy]
-        if status is Status.OK:
-            return f"finished at t = {t:g} s"
-        place = self.batch.system(copy).fault_name(status, int(self.fault[copy]))
-        return f"stopped at t = {t:g} s: " + status.advice.format(body=f'"{place}"')
+        status, fault, t = int(self.status[copy]), int(self.fault[copy]), float(self.stopped_at[copy])
+        return ending(self.batch.system(copy), Status(status), fault, t)

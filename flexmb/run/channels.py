@@ -113,17 +113,13 @@ def unit(channel: str) -> str:
     return next((symbol for ending, symbol in UNITS.items() if channel.endswith(ending)), "")
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def distance(channel: str, a: Real, b: Real) -> Real:
     """Distance of two signals at each time, (T,): the Euclidean norm of a - b, for orientations the angle between them.
 
     Quaternions q and -q are one orientation; the angle is 4 asin(|q_a - q_b| / 2), accurate for small angles. Where a
     signal is not finite, neither is the distance.
     """
-    with np.errstate(over="ignore", invalid="ignore"):
-        return _distance(channel, a, b)
-
-
-def _distance(channel: str, a: Real, b: Real) -> Real:
     if channel.endswith(".orientation"):
         chord = np.minimum(norms(a - b), norms(a + b))
         return np.where(np.isfinite(chord), 4.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)), chord)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple, assert_never
 
 import numpy as np
@@ -26,19 +25,15 @@ from flexmb.run.making import Making
 from flexmb.run.origin import Beginning
 from flexmb.run.propagate import Raw, unmoved
 from flexmb.run.restart import Restart
-from flexmb.run.resting import with_stops
 from flexmb.run.segments import Segment, SegmentEnd, Segments
 from flexmb.run.sides import DIRECTIONS, Sides
 from flexmb.run.situation import Situation
-from flexmb.run.solver import Solver
 from flexmb.run.standing import stand
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.events import EndRun
 from flexmb.scene.schema import SceneEvent
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
-from flexmb.tables.features import asking
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -63,11 +58,10 @@ class Driver:
         """times (T,) s: output times; taken_up: the events' state at the end of the run that is resumed, if any."""
         self._times, self._settings, self._taken_up, self._made_by = times, settings, taken_up, made_by
         given = None if taken_up is None else taken_up.given
-        self._situation = Situation(_with_stops(system), settings, given)
-        self._solver = Solver(self._situation, settings, algorithm, stabilise)
-        self._sides = Sides(self._situation, settings, self._solver.integration)
-        self._agenda = Agenda(self._situation.system.scene, self._sides, times)
-        self._segments = Segments(self._situation, self._agenda, self._sides, times, self._solver)
+        self._situation = Situation(system, settings, algorithm, stabilise, given)
+        self._agenda = Agenda(self._situation, times)
+        self._sides = Sides(self._agenda)
+        self._segments = Segments(self._sides, times)
         self._chattering = Chattering(times[0], times[-1], settings.atol)
         self._happened: list[EventRecord] = []
         self._whole: Trajectory | None = None
@@ -79,12 +73,12 @@ class Driver:
     @property
     def doubts(self) -> list[str]:
         """Warnings about a run that reached its end."""
-        return self._solver.doubts
+        return self._situation.doubts
 
     def __call__(self, begin: Beginning) -> Trajectory:
         """The trajectory of the run."""
         if begin.events is not None:
-            self._agenda.recall(begin.events)
+            self._sides.recall(begin.events)
         elif self._situation.system.scene.events:
             start = unmoved(begin)
             instant = self._at_instant(start, self._agenda.due_at_start(start.t))
@@ -119,11 +113,11 @@ class Driver:
         self._join(segment.part)
         levels = segment.levels
         if levels is not None and levels.kept[0]:
-            self._sides.take(watched, levels.kept_side.tolist(), levels.kept_came.tolist())
+            self._sides.take(watched, levels.kept_side, levels.kept_came)
             if segment.raw.paused:
                 self._keep_cut(segment.raw)
         if levels is not None and (segment.raw.paused or not levels.kept[0]):
-            self._sides.take(watched, levels.side.tolist(), levels.came.tolist())
+            self._sides.take(watched, levels.side, levels.came)
         return segment
 
     def _after_sample(self, segment: Segment) -> Segment:
@@ -138,21 +132,20 @@ class Driver:
         stops. Controllers that are due act later, when the next segment starts or the run ends.
         """
         y, _ = self._situation.apart(raw.y)
-        watched = self._agenda.watched
-        arrived = found if early else self._sides.arriving(watched, raw, found, levels, y)
+        arrived = found if early else self._sides.arriving(raw, found, levels, y)
         for event in arrived:
-            records = self._situation.happen(event, raw.t, y, partial(self._accelerations, raw))
+            records = self._situation.happen(event, raw, y)
             self._happened += [replace(record, early=early) for record in records]
             self._agenda.happened(event)
         raw = self._situation.with_motion(raw, y)
         if self._whole is None:  # this is the start of the run
-            self._sides.start(watched, y)
+            self._sides.start(y)
         else:
-            self._sides.move(watched, raw, found, y)
+            self._sides.move(raw, found, y)
         struck = self._stand(raw, found, y)
         raw = self._situation.with_motion(raw, y)
-        self._agenda.take(self._situation.system.scene)  # coming to rest on a stop adds an event
-        self._sides.make_known(self._agenda.watched)
+        self._agenda.take()  # coming to rest on a stop adds an event
+        self._sides.make_known()
         ends = any(isinstance(action, EndRun) for event in (*arrived, *struck) for action in event.actions)
         return AfterEvents(raw, ends)
 
@@ -162,25 +155,19 @@ class Driver:
         for event in self._agenda.watched:
             is_new = event not in found and self._sides.came[event.name] == 0
             if is_new and (self._whole is None or self._sides.side[event.name] in (0, UNKNOWN)):
-                stood = stand(
-                    self._situation, event, raw.t, y, self._sides.near(event), partial(self._sides.probe, raw),
-                    partial(self._accelerations, raw),
-                )  # fmt: skip
+                stood = stand(self._sides, event, raw, y)
                 if stood is not None:
                     self._happened += stood.records
                     self._sides.side[event.name], self._sides.came[event.name] = stood.side, stood.came
                     struck += [event] * any(record.name == event.name for record in stood.records)
         return struck
 
-    def _accelerations(self, raw: Raw, t: float, motion: Real) -> Real:
-        return self._solver.accelerations(raw, motion)
-
     def _jumped(self, raw: Raw) -> list[SceneEvent]:
         """Events on outputs of sampled controllers that jumped at the end of the run."""
         found: list[SceneEvent] = []
         if raw.controllers is None:
             return found
-        with self._solver.integration() as solve:
+        with self._situation.integration() as solve:
             assert solve.feedback is not None
             for event in self._agenda.watched:
                 if self._sides.is_signal(event) and solve.feedback.is_sampled(event.watch):
@@ -195,7 +182,7 @@ class Driver:
         outputs follow."""
         raw, ends = instant
         if any(each.period_s for each in self._situation.system.scene.controllers):
-            with self._solver.integration() as solve:
+            with self._situation.integration() as solve:
                 assert solve.feedback is not None
                 known = solve.feedback.look(self._situation.going_on(raw), acts=True, anew=True)
             raw = raw._replace(controllers=known)
@@ -210,10 +197,10 @@ class Driver:
         with an integrator without memory."""
         chatters = not ends and raw.t < self._times[-1]
         last = raw._replace(states=raw.y[None], status=Status.CHATTERING if chatters else raw.status)
-        with self._solver.integration() as solve:
+        with self._situation.integration() as solve:
             if solve.feedback is not None:
                 solve.feedback.look(self._situation.going_on(raw), acts=False)
-            part = self._solver.observed(last, np.array([raw.t]), solve)
+            part = self._situation.observed(last, np.array([raw.t]), solve)
         message = part.message
         if ends:
             message = f'ended by event "{self._happened[-1].name}" at t = {raw.t:g} s'
@@ -251,8 +238,7 @@ class Driver:
         return self._restart(raw, memory, anew)
 
     def _restart(self, raw: Raw, memory: Memory, anew: bool) -> Restart:
-        scene = self._situation.system.scene
-        events = self._agenda.remember(scene, anew, self._situation.given) if scene.events else None
+        scene, events = self._situation.system.scene, self._sides.remember(anew)
         return Restart(self._settings.method, scene, raw.t, memory, raw.controllers, events)
 
     def _keep_cut(self, raw: Raw) -> None:
@@ -263,12 +249,3 @@ class Driver:
 
     def _join(self, part: Trajectory) -> None:
         self._whole = part if self._whole is None else joined(self._whole, part)
-
-
-def _with_stops(system: System) -> System:
-    """The system with sensors for the loads of all stops on which a coordinate may come to rest."""
-    if not system.scene.events:
-        return system
-    scene = with_stops(system.scene)
-    with asking(system.kernels):
-        return system if scene == system.scene else assembled(scene)

@@ -1,4 +1,4 @@
-"""Trajectories for other programs: tables of pandas, Parquet and NumPy, datasets of xarray, recordings of rerun.
+"""Results for other programs: tables of pandas, Parquet, NumPy and CSV, datasets of xarray, recordings of rerun.
 
 These packages are optional, so each is imported where it is used. All formats contain names and units.
 """
@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexmb.output.whole import whole_file
+from flexmb.output.whole import whole_file, write_csv
 from flexmb.run.channels import channels_of, unit
 from flexmb.run.run_arrays import RunArrays
+from flexmb.system.section_loads import SectionLoads
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
@@ -23,6 +25,20 @@ if TYPE_CHECKING:
 
 AXES = {3: ("axis", ("x", "y", "z")), 4: ("component", ("w", "x", "y", "z"))}
 """By number of components: name and labels of the last dimension of vectors and quaternions."""
+
+
+SECTIONS = (
+    "t [s]", "x [m]", "axial [N]", "shear_y [N]", "shear_z [N]", "torsion [N m]", "bending_y [N m]", "bending_z [N m]"
+)  # fmt: skip
+"""Columns of section loads."""
+
+
+def write_sections(path: Path, t: Real, loads: SectionLoads) -> None:
+    """Write section loads as CSV, one row per time t (T,) and section."""
+    times, x = np.repeat(t, len(loads.x)), np.tile(loads.x, len(t))
+    parts = (loads.axial[..., None], loads.shear, loads.torsion[..., None], loads.bending)
+    values = np.concatenate(parts, axis=2).reshape(len(times), -1)
+    write_csv(path, SECTIONS, np.column_stack([times, x, values]).tolist())
 
 
 def write_npz(trajectory: RunArrays, path: Path) -> None:
@@ -37,10 +53,8 @@ def write_npz(trajectory: RunArrays, path: Path) -> None:
 
 def data_frame(trajectory: RunArrays) -> pandas.DataFrame:
     """A table with one column per channel and time as the index; `attrs` has the units by name, and the scene."""
-    try:
+    with _optional("pandas", "dataframe"):
         import pandas
-    except ImportError:
-        _missing("pandas", "dataframe")
     columns = list(trajectory.columns())
     frame = pandas.DataFrame(
         {name: values for name, _, values in columns[1:]}, index=pandas.Index(trajectory.t, name="t")
@@ -51,11 +65,9 @@ def data_frame(trajectory: RunArrays) -> pandas.DataFrame:
 
 def write_parquet(trajectory: RunArrays, path: Path) -> None:
     """Write one column per channel, its unit in the metadata of its field, the scene in the metadata of the file."""
-    try:
+    with _optional("pyarrow", "dataframe"):
         import pyarrow
         from pyarrow import parquet
-    except ImportError:
-        _missing("pyarrow", "dataframe")
     columns = list(trajectory.columns())
     fields = [pyarrow.field(name, pyarrow.float64(), metadata={"unit": unit}) for name, unit, _ in columns]
     about = {"scene": trajectory.scene, "status": json.dumps(trajectory.message)}
@@ -67,10 +79,8 @@ def write_parquet(trajectory: RunArrays, path: Path) -> None:
 def dataset(trajectory: RunArrays) -> xarray.Dataset:
     """One variable per channel, (t), (t, axis) or, for quaternions, (t, component); units in `attrs` (the convention of
     xarray)."""
-    try:
+    with _optional("xarray", "dataframe"):
         import xarray
-    except ImportError:
-        _missing("xarray", "dataframe")
     found: dict[str, Any] = {}
     for name, units, values in _channels(trajectory):
         if name.startswith("drive:"):
@@ -87,10 +97,8 @@ def dataset(trajectory: RunArrays) -> xarray.Dataset:
 
 def write_recording(trajectory: RunArrays, path: Path) -> None:
     """Write a recording for the viewer rerun: markers are moving frames with paths, all other channels are curves."""
-    try:
+    with _optional("rerun-sdk", "viewer"):
         import rerun
-    except ImportError:
-        _missing("rerun-sdk", "viewer")
     with whole_file(path) as beside:
         recording = rerun.RecordingStream("flexmb", recording_id=None)
         recording.save(str(beside), default_blueprint=_blueprint(rerun.blueprint))
@@ -147,5 +155,10 @@ def _channels(trajectory: RunArrays) -> Iterator[tuple[str, str, Real]]:
         yield name, "1" if name.endswith(".orientation") else unit(name), values
 
 
-def _missing(package: str, extra: str) -> NoReturn:
-    raise ImportError(f"{package} is not installed: pip install 'flexmb[{extra}]'") from None
+@contextmanager
+def _optional(package: str, extra: str) -> Iterator[None]:
+    """Imports of an optional package; an ImportError names the extra that installs it."""
+    try:
+        yield
+    except ImportError:
+        raise ImportError(f"{package} is not installed: pip install 'flexmb[{extra}]'") from None

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
-from flexmb.run.run_arrays import MarkerPath, RunArrays
+from flexmb.run.run_arrays import SOME, MarkerPath, RunArrays
 from flexmb.typing import Real
 
 Run = TypeVar("Run", bound=RunArrays)
@@ -34,20 +33,18 @@ def joined(first: Run, later: Run) -> Run:
     def both(a: Real, b: Real) -> Real:
         return np.concatenate([a[:kept], b])
 
-    def each(a: Mapping[str, Real], b: Mapping[str, Real]) -> dict[str, Real]:
+    def each(key: str) -> dict[str, Real]:
+        a, b = getattr(first, key), getattr(later, key)
         return {name: both(a[name], b[name]) for name in b}
 
     whole = replace(
         first,
-        t=both(first.t, later.t), q=both(first.q, later.q), u=both(first.u, later.u),
+        **{key: both(getattr(first, key), getattr(later, key)) for key in ("t", "q", "u", "momentum")},
         markers={name: _path(first.markers[name], later.markers[name], kept) for name in later.markers},
-        loads=each(first.loads, later.loads), wheel_loads=each(first.wheel_loads, later.wheel_loads),
-        drives=_of_some(first, later, kept, "drives"), energy=each(first.energy, later.energy),
-        momentum=both(first.momentum, later.momentum), connectors=each(first.connectors, later.connectors),
-        hinge_forces=each(first.hinge_forces, later.hinge_forces),
-        signals=_of_some(first, later, kept, "signals"), power=_of_some(first, later, kept, "power"),
+        **{key: each(key) for key in ("loads", "wheel_loads", "energy", "connectors", "hinge_forces")},
+        **{key: _of_some(first, later, kept, key) for key in SOME},
         work=both(first.work, later.work + counted),
-    )  # fmt: skip
+    )
     return _ended(whole, later)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from copy import copy as fresh_copy
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -136,7 +135,7 @@ class BatchRun:
         for copy in copies:
             system = self._batch.system(copy)
             if solve is None or system is not last or system.scene.closures:  # closed chains store their branch
-                last, solve = system, alone(system, self._settings.integrator)
+                last, solve = system, Alone(system, self._settings.integrator)
             [ends] = self._copies_ends([copy])
             found.counts[copy, :STOP], found.out[copy] = 0, np.nan
             clock, out, counts = Clock(self._times, ends), found.out[copy], found.counts[copy]
@@ -144,53 +143,35 @@ class BatchRun:
             found.status[copy], found.stopped_at[copy], found.fault[copy] = status, t, solve.fault
 
 
-def alone(system: System, method: Integrator) -> Alone | Controlled:
-    """An integrator for single runs of copies of one system."""
-    return Controlled(system, method) if system.scene.controllers else Alone(system, method)
-
-
-class Controlled:
-    """Single runs of a system with controllers, which are initialised for each run."""
+class Alone:
+    """Single runs of copies of one system; controllers are initialised for each run."""
 
     def __init__(self, system: System, method: Integrator) -> None:
-        self._own, self._method = fresh_copy(system), method
-        self._solve = Integration(self._own, algorithms.chosen("articulated"), self._own.route(), method)
+        self._method = method
+        self._whole: Integration | None = None
+        if system.scene.controllers or system.scene.closures or method.linearises:
+            self._own = fresh_copy(system) if system.scene.controllers else system  # controllers write into its tables
+            self._whole = Integration(self._own, algorithms.chosen("articulated"), self._own.route(), method)
+        else:  # all modes are eliminated explicitly, as in lanes, so that both give the same results
+            self._workspace = system.workspace()
+            self._problem = recursion(system.constants, self._workspace)
 
     def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
         """See `Integrator`; out (T,nq+nu+1) does not contain the states of controllers."""
+        whole, memory = self._whole, self._method.memory
+        if whole is None:
+            return self._method.run(self._problem, y, clock, accuracy, out, counts, memory(len(y)), None)
+        if whole.feedback is None:
+            return whole(y, clock, accuracy, out, counts, memory(len(y)), None)
         begin = Beginning(self._own.layout.known(float(clock.times[0]), y), y, None)
-        y, clock, accuracy = self._solve.begin(begin, clock, accuracy, counts)
+        y, clock, accuracy = whole.begin(begin, clock, accuracy, counts)
         found = np.empty((len(out), len(y)))
-        status, t = self._solve(y, clock, accuracy, found, counts, self._method.memory(len(y)), None)
-        self._solve.ended(None)
+        status, t = whole(y, clock, accuracy, found, counts, memory(len(y)), None)
+        whole.ended(None)
         out[:, :-1], out[:, -1] = found[:, : out.shape[1] - 1], found[:, -1]
         return status, t
 
     @property
     def fault(self) -> int:
         """Where an evaluation failed."""
-        return self._solve.fault
-
-
-class Alone:
-    """Single runs of a system without controllers."""
-
-    def __init__(self, system: System, method: Integrator) -> None:
-        self._method = method
-        if system.scene.closures or method.linearises:
-            algorithm = algorithms.chosen("articulated")
-            whole = Integration(system, algorithm, system.route(), method)
-            self._solve, self._workspace = whole, whole
-        else:  # all modes are eliminated explicitly, as in lanes, so that both give the same results
-            self._workspace = system.workspace()
-            self._solve = partial(method.run, recursion(system.constants, self._workspace))
-
-    def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
-        """See `Integrator`."""
-        status, t = self._solve(y, clock, accuracy, out, counts, self._method.memory(len(y)), None)
-        return status, t
-
-    @property
-    def fault(self) -> int:
-        """Where an evaluation failed."""
-        return int(np.atleast_1d(self._workspace.fault)[0])
+        return int(self._workspace.fault[0]) if self._whole is None else self._whole.fault

@@ -10,6 +10,7 @@ from flexmb.run.propagate import Integration, Raw
 from flexmb.run.run_arrays import Statistics
 from flexmb.run.trajectory import Trajectory, gathered
 from flexmb.system.algorithm import Algorithm
+from flexmb.system.free_motion import FreeMotion
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, NotFiniteError
 from flexmb.tables.status import Status
@@ -20,7 +21,7 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve:
     """The trajectory of an integration by `solve`: all observables at the samples reached, a subset of `times`."""
     start = perf_counter()
     rows, trouble = observe(solve.feedback or system, algorithm, times, raw.states, solve.batch)
-    status, stopped_at, message = raw.status, raw.t, ending(system, raw)
+    status, stopped_at, message = raw.status, raw.t, ending(system, raw.status, raw.fault, raw.t)
     if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
         status, stopped_at = _why(trouble), float(times[len(rows)])
         message = f"stopped at t = {stopped_at:g} s" + (
@@ -79,9 +80,8 @@ def doubt_about(system: System, solve: Integration) -> str | None:
     )
 
 
-def ending(system: System, raw: Raw) -> str:
-    """How a run ended, in words."""
-    if raw.status is Status.OK:
-        return f"finished at t = {raw.t:g} s"
-    place = system.fault_name(raw.status, raw.fault)
-    return f"stopped at t = {raw.t:g} s: " + raw.status.advice.format(body=f'"{place}"')
+def ending(system: FreeMotion, status: Status, fault: int, t: float) -> str:
+    """How a run ended at t (s), in words; fault: the index of the item at which an evaluation failed."""
+    if status is Status.OK:
+        return f"finished at t = {t:g} s"
+    return f"stopped at t = {t:g} s: " + status.advice.format(body=f'"{system.fault_name(status, fault)}"')

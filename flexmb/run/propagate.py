@@ -97,6 +97,12 @@ class Integration:
         self._enter: dict[bool, Any] = {}  # compiled integrators, by whether levels are watched
         self._at_first = [(array, array.copy()) for array in route.remembered(constants)]
 
+    @property
+    def size(self) -> int:
+        """Size of the state that is integrated, [q, u, work] or, with the states of controllers, [q, u, x, work]."""
+        controlled = 0 if self.feedback is None else len(self.feedback.state_names)
+        return self.system.nq + self.system.nu + controlled + 1
+
     def __call__(self, *given: Any) -> tuple[int, float]:
         """Integrate: (y, clock, accuracy, out, counts, memory, watch) of `Integrator`, all arrays in C order."""
         self.compile(*given)

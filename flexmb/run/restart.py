@@ -1,29 +1,41 @@
-"""Restarts: a run that ended can be resumed by another call, or from a file by another process."""
+"""Restarts: a run that ended can be resumed by another call, or from a file by another process.
+
+A restart may come from a damaged file or may have been altered, and kernels do not check what they are given: so types,
+shapes, finite numbers and ranges of values are checked here, as far as they do not depend on the system.
+"""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from flexmb.control.memory import LoopMemory
+from flexmb.integrate import memory as places
+from flexmb.integrate.catalogue import integrator
 from flexmb.integrate.integrator import Method
-from flexmb.integrate.memory import TAKEN_UP, TIME, Memory
+from flexmb.integrate.memory import DONE, NUMBERS, STRETCH, TAKEN_UP, TIME, Memory
 from flexmb.output.whole import whole_file
-from flexmb.run import event_memory, restart_form
+from flexmb.run import event_memory
 from flexmb.run.event_memory import EventMemory
 from flexmb.scene.npz import REAL, TEXT, unpacked
 from flexmb.scene.reading import Unreadable
 from flexmb.scene.schema import Scene
+from flexmb.tables import arguments
+from flexmb.typing import Real
 
 VERSION = 1
 """Version of the file format; files without an entry are of version 1."""
 _NUMBERS = ("version", "t", "scene", *Memory._fields, *LoopMemory._fields, *event_memory.NAMES)
 _KINDS = {"method": TEXT} | dict.fromkeys(_NUMBERS, REAL)
 """The type of each array in the file, by name."""
+
+SWITCHES = ("TAKEN_UP", "RETRIED", "RENEW", "FRESH")
+SIZES = ("STEP", "ERROR_BEFORE", "DONE", "FACTORED", "STEP_BEFORE")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,20 +99,18 @@ class Restart:
         `flexmb.run.taking_up` checks whether it belongs to a system.
         """
         self._refuse_other_parts()
-        t, memory = restart_form.memory(self.method, self.t, self.memory)
-        known = None if self.controllers is None else restart_form.controllers(self.controllers)
+        t, memory = _memory(self.method, self.t, self.memory)
+        known = None if self.controllers is None else _controllers(self.controllers)
         events = None if self.events is None else event_memory.examined(self.events, self.scene)
         return replace(self, t=t, memory=memory, controllers=known, events=events)
 
     def _refuse_other_parts(self) -> None:
         """TypeError for parts of another type than runs leave."""
-        for name, part, kind in (("scene", self.scene, Scene), ("memory", self.memory, Memory)):
-            if not isinstance(part, kind):
+        kinds = {"scene": Scene, "memory": Memory, "controllers": LoopMemory, "events": EventMemory}
+        for name, kind in kinds.items():
+            part, is_optional = getattr(self, name), name in ("controllers", "events")
+            if not (isinstance(part, kind) or (is_optional and part is None)):
                 raise TypeError(f"{name} is a {type(part).__name__}: a restart holds the {kind.__name__} of its run")
-        if not isinstance(self.controllers, LoopMemory | None):
-            raise TypeError(f"controllers is a {type(self.controllers).__name__}: a restart holds a LoopMemory")
-        if not isinstance(self.events, EventMemory | None):
-            raise TypeError(f"events is a {type(self.events).__name__}: a restart holds an EventMemory")
 
     def taken_up(self) -> Memory:
         """A copy of the memory, marked for an integrator that resumes from it."""
@@ -126,3 +136,60 @@ def _read(path: str | os.PathLike[str]) -> Restart:
     known = LoopMemory(*(file[name] for name in LoopMemory._fields)) if is_controlled else None
     events = event_memory.read(file) if scene.events else None
     return Restart(str(file["method"]), scene, float(file["t"]), memory, known, events)  # type: ignore[arg-type]  # examined
+
+
+def _memory(method: Any, t: Any, given: Memory) -> tuple[float, Memory]:
+    """Time (s) and memory of a method, copied; ValueError or TypeError for values that no run by it can have left."""
+    chosen, t = integrator(method), arguments.number("t", t)
+    y = _row("y", given.y)
+    rows = len(y) + 3 if chosen.keeps_jacobian else 0
+    found = Memory(
+        _finite("numbers", given.numbers, (NUMBERS,)), _finite("y", y, y.shape),
+        _finite("rows", given.rows, (rows, len(y))),
+    )  # fmt: skip
+    _refuse_other_numbers(found.numbers, t)
+    return t, found
+
+
+def _controllers(given: LoopMemory) -> LoopMemory:
+    """The memory of controllers, copied. Signals may be NaN, because sensors that no controller reads may give NaN."""
+    state, held = _row("state", given.state), arguments.array("held", given.held)
+    if held.ndim != 2:
+        raise ValueError(f"held has the shape {held.shape}, but must have two dimensions, with one row per sample")
+    happened = float(_finite("instants", given.instants, (1,))[0])
+    if not 0.0 <= happened < event_memory.MOST or happened != int(happened):
+        raise ValueError(f"instants is {happened:g}, but must be the number of times at which controllers have acted")
+    return LoopMemory(
+        _row("signal", given.signal).copy(), _finite("state", state, state.shape), _finite("held", held, held.shape),
+        np.array([happened]),
+    )  # fmt: skip
+
+
+def _refuse_other_numbers(numbers: Real, t: float) -> None:
+    """ValueError for values that no integrator leaves at the end t (s) of a run."""
+    by_name = {name: numbers[getattr(places, name)] for name in (*SWITCHES, *SIZES)}
+    for name, value in by_name.items():
+        if name in SWITCHES and value not in (0.0, 1.0):
+            raise ValueError(f"numbers[{name}] is {value:g}, but must be 0 or 1")
+        if value < 0.0:
+            raise ValueError(f"numbers[{name}] is {value:g}, but must not be negative")
+    done = numbers[DONE]
+    if done != np.floor(done) or done >= event_memory.MOST:
+        raise ValueError(f"numbers[DONE] is {done:g}, but must be a number of steps")
+    if not numbers[STRETCH] <= numbers[TIME] <= t:
+        raise ValueError(
+            f"numbers[STRETCH] is {numbers[STRETCH]:.17g} s, numbers[TIME] {numbers[TIME]:.17g} s and t "
+            f"{t:.17g} s: these times must be in ascending order"
+        )
+
+
+def _row(name: str, values: Any) -> Real:
+    found = arguments.array(name, values)
+    if found.ndim != 1:
+        raise ValueError(f"{name} has the shape {found.shape}, but must be a row of numbers")
+    return found
+
+
+def _finite(name: str, values: Any, shape: tuple[int, ...]) -> Real:
+    """A copy of finite values of this shape; ValueError or TypeError for others."""
+    return arguments.finite(name, arguments.shaped(name, values, shape)).copy()

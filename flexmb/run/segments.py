@@ -11,13 +11,10 @@ import numpy as np
 
 from flexmb.integrate.control import ACCEPTED, REJECTED
 from flexmb.integrate.settings import Settings
-from flexmb.integrate.watch import Watch, watch
-from flexmb.run.agenda import Agenda
+from flexmb.integrate.watch import Watch
 from flexmb.run.origin import Beginning
 from flexmb.run.propagate import Raw, integrate
 from flexmb.run.sides import Sides
-from flexmb.run.situation import Situation
-from flexmb.run.solver import Solver
 from flexmb.run.trajectory import Trajectory
 from flexmb.run.within_leaps import placed, too_near
 from flexmb.scene.events import EndRun
@@ -57,12 +54,11 @@ class Segment(NamedTuple):
 
 
 class Segments:
-    """Integrates the system of a situation segment by segment, and evaluates the outputs of the run."""
+    """Integrates the system of a run segment by segment, and evaluates the outputs of the run."""
 
-    def __init__(self, situation: Situation, agenda: Agenda, sides: Sides, times: Real, solver: Solver) -> None:
+    def __init__(self, sides: Sides, times: Real) -> None:
         """times (T,) s: output times of the run."""
-        self._situation, self._agenda, self._sides = situation, agenda, sides
-        self._times, self._solver = times, solver
+        self._sides, self._agenda, self._situation, self._times = sides, sides.agenda, sides.situation, times
         self._steps = 0
         """Number of steps of earlier segments, accepted or rejected."""
 
@@ -76,7 +72,7 @@ class Segments:
         again = begin._replace(y=begin.y.copy())
         segment = self._to(stop, begin, due)
         if due and self._situation.system.scene.closures:
-            early = too_near(self._situation, segment.raw, again.state.t, stop, self._further)
+            early = too_near(self._situation, self._left, segment.raw, again.state.t, stop)
             if early:
                 segment = self._to(stop - early, again, due)
                 segment = segment._replace(early=early if segment.raw.t == stop - early else segment.early)
@@ -87,18 +83,18 @@ class Segments:
         """Run to the next level that is watched, or to `stop` (s), where the events `due` happen."""
         times, shown = self._output(begin, stop)
         early, is_last = 0.0, stop == self._times[-1]
-        with self._solver.integration() as solve:
-            levels = self._sides.watching(self._agenda.watched, solve)
+        with self._situation.integration() as solve:
+            levels = self._sides.watching(solve)
             goes_on = not is_last or bool(due)
             raw = integrate(solve, begin, times, self._left, levels, breaks=goes_on, goes_on=goes_on)
             found = self._agenda.found(raw, levels, due, stop)
             if levels is not None:
                 if not all(isinstance(action, EndRun) for event in found for action in event.actions):
-                    raw, early = placed(self._situation, raw, levels, times, self._further)
+                    raw, early = placed(self._situation, self._left, raw, levels, times)
                 elif levels.leap[0] < raw.t < levels.leap[1]:
                     raw = raw._replace(memory=None)  # the run ends within a leap, from which it cannot be resumed
             kept = shown[: len(raw.states)]
-            part = self._solver.observed(raw._replace(states=raw.states[kept]), times[: len(kept)][kept], solve)
+            part = self._situation.observed(raw._replace(states=raw.states[kept]), times[: len(kept)][kept], solve)
         if part.status is not Status.OK or raw.interrupted:
             return Segment(SegmentEnd.FAILURE, raw, levels, part, [], early)
         if found:
@@ -118,15 +114,8 @@ class Segments:
         times = np.unique([start, *wanted, stop])
         return times, np.isin(times, wanted)
 
-    def _further(self, raw: Raw, t: float) -> Raw:
-        """Continue to a time t (s) without watching for events."""
-        begin = self._situation.going_on(raw._replace(y=raw.y.copy()))
-        with self._solver.integration() as solve:
-            nothing = watch((), (), (), (), (), (), self._sides.size(solve))
-            return integrate(solve, begin, np.array([raw.t, t]), self._left, nothing, goes_on=True)
-
     @property
     def _left(self) -> Settings:
         """The settings with the number of steps that earlier segments have left."""
-        settings = self._solver.settings
+        settings = self._situation.settings
         return replace(settings, max_steps=max(settings.max_steps - self._steps, 0))

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, TypedDict, Unpack
+from typing import NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from flexmb.integrate.settings import Settings
 from flexmb.run.driver import Driver
 from flexmb.run.interruption import Interrupted
 from flexmb.run.making import Making
-from flexmb.run.origin import Values, origin, start_time
+from flexmb.run.origin import Given, Values, origin, start_time
 from flexmb.run.outputs import observed
 from flexmb.run.propagate import integration, unmoved
 from flexmb.run.restart import Restart
@@ -99,41 +99,73 @@ def simulate(
     else:
         check_and_warn(scene, t_end, t)
     chosen = Settings(method, **settings).checked(max(abs(t), abs(t_end)))
-    stabilise = arguments.number("stabilise", stabilise)
     times = sample_times(samples, t_end, t)
     system = scene if isinstance(scene, System) else assembled(scene)
-    refuse_too_many(len(times), system)
-    if chosen.integrator.linearises:
-        refuse_without_jacobian(system, algorithm, method)
-    begin = origin(system, t, state, method)
+    return run_stages([RunPart(system, times)], state, chosen, algorithm, stabilise)
+
+
+class RunPart(NamedTuple):
+    """A part of a run: its system and its output times (T,) s, from its start to its end."""
+
+    system: System
+    times: Real
+
+
+def run_stages(
+    stages: Sequence[RunPart], state: Given, settings: Settings, algorithm: Algorithm, stabilise: float
+) -> Trajectory:
+    """The trajectory of stages, each of which starts at the last output of the one before, until one fails.
+
+    state: where the first one starts. Warnings are attributed to the line that called the caller.
+    """
+    stabilise = arguments.number("stabilise", stabilise)
+    for system, times in stages:
+        refuse_too_many(len(times), system)
+        if settings.integrator.linearises:
+            refuse_without_jacobian(system, algorithm, settings.method)
+    whole: Trajectory | None = None
+    for stage in stages:
+        start = state if whole is None else whole.values_at(-1)
+        run, warned, was_interrupted = _run(stage, start, settings, algorithm, stabilise)
+        for warning in warned:
+            warnings.warn(warning, stacklevel=3)
+        whole = run if whole is None else whole.then(run)
+        if was_interrupted or run.status is Status.INTERRUPTED:
+            raise Interrupted(whole)
+        if not run.finished:
+            break
+    assert whole is not None  # there is at least one stage
+    return whole
+
+
+def _run(
+    stage: RunPart, state: Given, settings: Settings, algorithm: Algorithm, stabilise: float
+) -> tuple[Trajectory, list[Warning], bool]:
+    """The trajectory of one stage, what there is to warn of, and whether Ctrl-C ended it."""
+    system, times = stage
+    t = float(times[0])
+    begin = origin(system, t, state, settings.method)
     start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)
     if start is not None and start.status != Status.OK:
         raw = unmoved(begin, Status(start.status), start.fault)
-        with integration(system, algorithm, stabilise, chosen.integrator) as solve:
-            return observed(system, times, raw, algorithm, solve)
-    same: dict[str, Any] = {"t_start": t, "state": state, "algorithm": algorithm, "stabilise": stabilise}
-    again = partial(_again, system, t_end, samples=times, **same)
-    made_by = None if system.scene.events else Making(system, times, chosen, again)
-    driver = Driver(system, times, chosen, algorithm, stabilise, begin.events, made_by)
+        with integration(system, algorithm, stabilise, settings.integrator) as solve:
+            return observed(system, times, raw, algorithm, solve), [], False
+    again = partial(_again, stage, state, algorithm, stabilise)
+    made_by = None if system.scene.events else Making(system, times, settings, again)
+    driver = Driver(system, times, settings, algorithm, stabilise, begin.events, made_by)
     trajectory = driver(begin)
-    for doubt in driver.doubts:
-        warnings.warn(doubt, SceneWarning, stacklevel=2)
+    warned: list[Warning] = [SceneWarning(doubt) for doubt in driver.doubts]
     if start is not None and start.is_low:
-        warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
+        warned.append(PrecisionWarning(start.warning))
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
-    if driver.was_interrupted or trajectory.status is Status.INTERRUPTED:
-        raise Interrupted(trajectory)
-    return trajectory
+    return trajectory, warned, driver.was_interrupted
 
 
-def _again(system: System, t_end: float, settings: Settings, **same: Any) -> Trajectory:
+def _again(stage: RunPart, state: Given, algorithm: Algorithm, stabilise: float, settings: Settings) -> Trajectory:
     """The same run with other settings; ValueError for a resumed run, whose restart already contains errors."""
-    if isinstance(same["state"], Restart):
+    if isinstance(state, Restart):
         raise ValueError("error_estimate() is not available for a resumed run; rerun from t_start")
-    return simulate(
-        system, t_end, settings.method, rtol=settings.rtol, atol=settings.atol, step=settings.step,
-        max_steps=settings.max_steps, spectral_radius=settings.spectral_radius, **same,
-    )  # fmt: skip
+    return run_stages([stage], state, settings.checked(float(np.max(np.abs(stage.times)))), algorithm, stabilise)
 
 
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:

@@ -50,7 +50,8 @@ def simulate_batch(
     that do not fit the copies, and KeyboardInterrupt for Ctrl-C.
     """
     refuse_unknown("simulate_batch", settings)
-    batch = copies if isinstance(copies, Batch) else _batch(copies)
+    batch = copies.batch if isinstance(copies, System) else copies
+    batch = batch if isinstance(batch, Batch) else compile_batch(batch)
     t_end = arguments.number("t_end", t_end)
     chosen = Settings(method, **settings).checked(t_end)
     if chosen.integrator.linearises:
@@ -70,10 +71,6 @@ def simulate_batch(
         if interrupted:
             raise KeyboardInterrupt
     return _gathered(batch, times, found, len(rows[0]))
-
-
-def _batch(copies: System | Sequence[Scene]) -> Batch:
-    return copies.batch if isinstance(copies, System) else compile_batch(copies)
 
 
 def _given(batch: Batch, q: Any, u: Any) -> tuple[Any, Any]:

@@ -1,10 +1,10 @@
-"""Applies the actions of events to a scene, its system and its state."""
+"""The scene of a run as altered by events, how its motion is integrated, and what the actions of events do to it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cached_property, partial
-from typing import assert_never
+from contextlib import AbstractContextManager
+from functools import cached_property
+from typing import NamedTuple, assert_never
 
 import numpy as np
 from msgspec.structs import replace
@@ -13,32 +13,70 @@ from flexmb.integrate.settings import Settings
 from flexmb.run.event_record import EventRecord
 from flexmb.run.impulses import struck
 from flexmb.run.origin import Beginning
-from flexmb.run.propagate import Raw
-from flexmb.run.resting import off_stop, on_stop
+from flexmb.run.outputs import doubt_about, observed
+from flexmb.run.propagate import Integration, Raw, integration
+from flexmb.run.trajectory import Trajectory
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release
 from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Scene, SceneEvent, Wheel
+from flexmb.scene.stops import leaves, leaving, resting, stop_sensor
 from flexmb.scene.tree import Coordinate, rate_name, scalar_paths
 from flexmb.scene.values import changed_at
+from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
 from flexmb.tables.features import asking
 from flexmb.tables.state import State
+from flexmb.tables.status import Status
 from flexmb.typing import Real
 
-Accelerations = Callable[[float, Real], Real]
-"""Accelerations (nu,) at a time (s) and y = [q, u, work]."""
+
+class EventInstant(NamedTuple):
+    """Time (s) and y = [q, u, work] at which actions happen, which change y in place; the state and the work (J) before
+    them, and their impulses so far, as in `EventRecord`."""
+
+    t: float
+    y: Real
+    before: State
+    work: float
+    impulses: dict[str, float]
+    closures: dict[str, Real]
 
 
 class Situation:
     """The scene as altered by events, and its system; systems are kept, because the same scene often recurs."""
 
-    def __init__(self, system: System, settings: Settings, given: Scene | None = None) -> None:
-        """given: for a resumed run, the scene altered by changes of values alone; see `EventMemory`."""
-        self.system = system
-        self._settings = settings
+    def __init__(
+        self, system: System, settings: Settings, algorithm: Algorithm, stabilise: float, given: Scene | None = None
+    ) -> None:
+        """stabilise (1/s): see `flexmb.simulate`. given: for a resumed run, the scene altered by changes of values
+        alone; see `EventMemory`."""
+        self.system = system = _with_stops(system)
+        self.settings, self._algorithm, self._stabilise = settings, algorithm, stabilise
         self.given = given or system.scene
         self._built = [system]
+        self.doubts: list[str] = []
+        """Warnings about integrations that did not fail."""
+
+    def integration(self) -> AbstractContextManager[Integration]:
+        """An integration of the present system for exclusive use within the context."""
+        return integration(self.system, self._algorithm, self._stabilise, self.settings.integrator)
+
+    def observed(self, raw: Raw, times: Real, solve: Integration) -> Trajectory:
+        """Outputs of an integration by `solve` at these times (T,) s."""
+        part, doubt = observed(self.system, times, raw, self._algorithm, solve), doubt_about(self.system, solve)
+        if part.status is Status.OK and doubt is not None:
+            self.doubts.append(f'scene "{self.system.scene.name}": {doubt}')
+        return part
+
+    def accelerations(self, raw: Raw, motion: Real) -> Real:
+        """Accelerations (nu,) with the controllers' outputs at the end of an integration, but with another motion
+        [q, u, work]."""
+        begin = self.going_on(self.with_motion(raw, motion))
+        with self.integration() as solve:
+            if solve.feedback is None:
+                return self.system.accelerations(begin.state, self._algorithm)
+            return solve.feedback.accelerations(begin)
 
     @cached_property
     def _paths(self) -> dict[str, str]:
@@ -70,61 +108,49 @@ class Situation:
         state = self.system.layout.known(raw.t, np.r_[self.apart(raw.y)[0][:-1], 0.0])
         return Beginning(state, raw.y, None, raw.controllers)
 
-    def happen(self, event: SceneEvent, t: float, y: Real, accelerations: Accelerations) -> list[EventRecord]:
-        """Apply the actions of an event at time t to y = [q, u, work], in place. A coordinate whose rebound is
-        negligible comes to rest on its stop."""
-        before = y.copy()
-        found = [self._recorded(event.name, t, y, [partial(self._do, action) for action in event.actions])]
-        self._become(off_stop(self.system.scene, event), t, y)
+    def happen(self, event: SceneEvent, raw: Raw, y: Real) -> list[EventRecord]:
+        """Apply the actions of an event at the end of an integration to y = [q, u, work], in place. A coordinate whose
+        rebound is negligible comes to rest on its stop."""
+        arriving, at = y.copy(), self._instant(raw.t, y)
+        for action in event.actions:
+            self._do(action, at)
+        found = [_recorded(event.name, at, self._state(at.t, at.y))]
+        self._become(self._off_stop(event), at)
         for action in event.actions:
             if isinstance(action, Impact) and action.rests:
-                push = -int(np.sign(before[self._rate_place(action.coordinate)]))
-                if self._is_spent(action.coordinate, push, t, y, accelerations):
-                    found.append(self.rest(event, action, push, t, y))
+                push = -int(np.sign(self.speed(action.coordinate, arriving)))
+                if self._is_spent(action.coordinate, push, raw, y):
+                    found.append(self.rest(event, action, push, raw.t, y))
         return found
 
     def rest(self, event: SceneEvent, impact: Impact, push: int, t: float, y: Real) -> EventRecord:
-        """Hold the coordinate of an impact at rest on its stop; push: the sign of the stop's load."""
-        rest = partial(self._rest, event, impact.coordinate, push)
-        return self._recorded(f"{event.name}: at rest", t, y, [rest])
+        """Stop the coordinate of an impact and hold it on its stop, until an event releases it before the stop would
+        pull; a motor that acts along it remains. push: the sign of the stop's load."""
+        name, at = impact.coordinate, self._instant(t, y)
+        self._strike(at, name, 0.0)
+        self._hold(at, name, leaves(event, name, push))
+        return _recorded(f"{event.name}: at rest", at, self._state(at.t, at.y))
 
     def at_rest(self, coordinate: str, t: float, y: Real) -> Real:
         """A copy of y = [q, u, work] after an impulse that makes the speed of a coordinate zero."""
         stopped = y.copy()
-        self._strike(t, stopped, coordinate, 0.0, {}, {})
+        self._strike(self._instant(t, stopped), coordinate, 0.0)
         return stopped
 
     def speed(self, coordinate: str, y: Real) -> float:
         """The speed of a scalar coordinate."""
         return float(y[self._rate_place(coordinate)])
 
-    def _recorded(self, name: str, t: float, y: Real, actions: Sequence[Callable[..., None]]) -> EventRecord:
-        before, work = self._state(t, y), float(y[-1])
-        impulses, closures = dict[str, float](), dict[str, Real]()
-        for do in actions:
-            do(t, y, impulses, closures)
-        return EventRecord(name, t, impulses, float(y[-1]) - work, before, self._state(t, y), closures)
-
-    def _is_spent(self, name: str, push: int, t: float, y: Real, accelerations: Accelerations) -> bool:
+    def _is_spent(self, name: str, push: int, raw: Raw, y: Real) -> bool:
         """Whether a rebound rises from the stop by no more than the tolerance, against the acceleration towards it.
 
         The acceleration is that of the coordinate at rest, because loads may depend on the speed of the rebound.
         """
         place = self._rate_place(name)
         rebound = push * y[place]
-        pressed = -push * accelerations(t, self.at_rest(name, t, y))[place - self.system.nq]
-        allowed = self._settings.atol + self._settings.rtol * abs(y[self.places[name]])
+        pressed = -push * self.accelerations(raw, self.at_rest(name, raw.t, y))[place - self.system.nq]
+        allowed = self.settings.atol + self.settings.rtol * abs(y[self.places[name]])
         return bool(pressed > 0.0 and rebound**2 <= 2.0 * pressed * allowed)
-
-    def _rest(
-        self, event: SceneEvent, name: str, push: int, t: float, y: Real, impulses: dict[str, float],
-        closures: dict[str, Real],
-    ) -> None:  # fmt: skip
-        """Stop a coordinate and hold it on its stop; a motor that acts along it remains."""
-        self._strike(t, y, name, 0.0, impulses, closures)
-        held = changed_at(self.system.scene, self._paths[name], self._held(y[self.places[name]], keeps_motor=True))
-        self._become(on_stop(held, event, name, push), t, y)
-        self.system.project(t, y, self.system.constants)
 
     def rate_of(self, watched: str) -> int | None:
         """Index in [q, u, work] of the rate of a coordinate; None for any other quantity."""
@@ -139,59 +165,64 @@ class Situation:
         place = self.rate_of(watched)
         return place is not None and self.system.constants.speed["prescribed"][place - self.system.nq] >= 0
 
-    def _do(
-        self, action: Action, t: float, y: Real, impulses: dict[str, float], closures: dict[str, Real]
-    ) -> None:
+    def _do(self, action: Action, at: EventInstant) -> None:
         match action:
             case Latch(coordinate=name):
-                self._strike(t, y, name, 0.0, impulses, closures)
-                held = self._held(y[self.places[name]])
-                self._become(changed_at(self.system.scene, self._paths[name], held), t, y)
-                self.system.project(t, y, self.system.constants)
+                self._strike(at, name, 0.0)
+                self._hold(at, name)
             case Impact(coordinate=name, restitution=restitution):
-                self._strike(t, y, name, -restitution, impulses, closures)
+                self._strike(at, name, -restitution)
             case Release(coordinate=name):
-                self._become(changed_at(self.system.scene, self._paths[name], self._freed(name)), t, y)
+                item = _found(self.given, self._paths[name])
+                freed = replace(item, **{item.KEYS.prescribed: None})
+                self._become(changed_at(self.system.scene, self._paths[name], lambda _: freed), at)
             case Change(path=path, value=value):
-                energy = self._energy(t, y)
-                self._become(self.system.scene.with_values({path: value}), t, y)
+                energy = self._energy(at)
+                self._become(self.system.scene.with_values({path: value}), at)
                 self.given = self.given.with_values({path: value})
-                y[-1] += self._energy(t, y) - energy
+                at.y[-1] += self._energy(at) - energy
             case EndRun():
                 pass
             case _:
                 assert_never(action)
 
-    def _strike(
-        self, t: float, y: Real, name: str, factor: float, impulses: dict[str, float], closures: dict[str, Real]
-    ) -> None:
+    def _strike(self, at: EventInstant, name: str, factor: float) -> None:
         """Apply an impulse that multiplies the speed of a coordinate by `factor`."""
-        rates = {self.places[rate_name(each, path)]: each for each, path in self._paths.items()}
-        place = self.places[rate_name(name, self._paths[name])]
-        found = struck(self.system, self._state(t, y), {place - self.system.nq: factor * y[place]})
-        y[self.system.nq : -1] = found.u
+        y, nq = at.y, self.system.nq
+        rates = {self._rate_place(each): each for each in self._paths}
+        place = self._rate_place(name)
+        found = struck(self.system, self._state(at.t, at.y), {place - nq: factor * y[place]})
+        y[nq:-1] = found.u
         y[-1] += found.energy
         for j, impulse in found.impulses.items():
-            along = rates[self.system.nq + j]
-            impulses[along] = impulses.get(along, 0.0) + impulse
+            along = rates[nq + j]
+            at.impulses[along] = at.impulses.get(along, 0.0) + impulse
         for closure, wrench in found.closures.items():
-            closures[closure] = closures.get(closure, 0.0) + wrench
+            at.closures[closure] = at.closures.get(closure, 0.0) + wrench
 
-    def _held(self, value: float, keeps_motor: bool = False):  # type: ignore[no-untyped-def]  # of a coordinate or a wheel
+    def _hold(self, at: EventInstant, name: str, leaving_stop: SceneEvent | None = None) -> None:
+        """Hold a coordinate or wheel where it is; on a stop with its motor, until the event that it leaves the stop."""
+
         def held(item: Coordinate | Wheel) -> Coordinate | Wheel:
             keys = item.KEYS
-            kept = {keys.effort: getattr(item, keys.effort) if keeps_motor else None}
-            still = {keys.value: 0.0, keys.rate: 0.0, keys.prescribed: Constant(value=float(value))}
+            kept = {keys.effort: getattr(item, keys.effort) if leaving_stop is not None else None}
+            still = {keys.value: 0.0, keys.rate: 0.0, keys.prescribed: Constant(value=float(at.y[self.places[name]]))}
             return replace(item, **still, **kept)
 
-        return held
+        scene = changed_at(self.system.scene, self._paths[name], held)
+        if leaving_stop is not None:
+            scene = replace(scene, events=(*scene.events, leaving_stop))
+        self._become(scene, at)
+        self.system.project(at.t, at.y, self.system.constants)
 
-    def _freed(self, name: str):  # type: ignore[no-untyped-def]
-        found: list[Coordinate | Wheel] = []
-        changed_at(self.given, self._paths[name], lambda item: found.append(item) or item)
-        return lambda _: replace(found[0], **{found[0].KEYS.prescribed: None})
+    def _off_stop(self, event: SceneEvent) -> Scene:
+        """The scene after an event: without it, if it was one that released a coordinate from its stop."""
+        scene = self.system.scene
+        if event.name not in {leaving(each) for each, _ in resting(scene)}:
+            return scene
+        return replace(scene, events=tuple(each for each in scene.events if each.name != event.name))
 
-    def _become(self, scene: Scene, t: float, y: Real) -> None:
+    def _become(self, scene: Scene, at: EventInstant) -> None:
         if scene == self.system.scene:
             return
         for system in self._built:
@@ -206,10 +237,35 @@ class Situation:
             from flexmb.system.closed import ClosedSystem  # imported here because trees do not need it
 
             assert isinstance(self.system, ClosedSystem) and isinstance(before, ClosedSystem)
-            self.system.closures.begin_at(t, y, before.closures)
+            self.system.closures.begin_at(at.t, at.y, before.closures)
+
+    def _instant(self, t: float, y: Real) -> EventInstant:
+        return EventInstant(t, y, self._state(t, y), float(y[-1]), {}, {})
 
     def _state(self, t: float, y: Real) -> State:
         return self.system.state(y[: self.system.nq].copy(), y[self.system.nq : -1].copy(), t)
 
-    def _energy(self, t: float, y: Real) -> float:
-        return float(np.sum(list(self.system.energy(self._state(t, y)).values())))
+    def _energy(self, at: EventInstant) -> float:
+        return float(np.sum(list(self.system.energy(self._state(at.t, at.y)).values())))
+
+
+def _recorded(name: str, at: EventInstant, after: State) -> EventRecord:
+    return EventRecord(name, at.t, at.impulses, float(at.y[-1]) - at.work, at.before, after, at.closures)
+
+
+def _found(scene: Scene, path: str) -> Coordinate | Wheel:
+    """The coordinate or wheel at a path of a scene."""
+    found: list[Coordinate | Wheel] = []
+    changed_at(scene, path, lambda item: found.append(item) or item)
+    return found[0]
+
+
+def _with_stops(system: System) -> System:
+    """The system with sensors for the loads of all stops on which a coordinate may come to rest."""
+    known = {sensor.name for sensor in system.scene.sensors}  # the scene of a resumed run has these sensors already
+    sensors = [stop_sensor(event, action) for event, action in resting(system.scene)]
+    missing = [each for each in sensors if each.name not in known]
+    if not missing:
+        return system
+    with asking(system.kernels):
+        return assembled(replace(system.scene, sensors=(*system.scene.sensors, *missing)))

@@ -7,10 +7,14 @@ from dataclasses import dataclass, field
 from typing import Any, Unpack
 
 from flexmb.integrate.integrator import Method
+from flexmb.integrate.settings import Settings
 from flexmb.run.origin import Given, start_time
-from flexmb.run.simulate import RunSettings, simulate
+from flexmb.run.samples import sample_times
+from flexmb.run.simulate import RunPart, RunSettings, refuse_unknown, run_stages
+from flexmb.run.switching import refuse_times
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.schema import Scene
+from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
@@ -37,6 +41,8 @@ def simulate_stages(
     *,
     t_start: float | None = None,
     state: Given = None,
+    algorithm: Algorithm = "articulated",
+    stabilise: float = 0.0,
     **settings: Unpack[RunSettings],
 ) -> Trajectory:
     """Simulate stages in sequence and return one trajectory, which ends with the first stage that fails.
@@ -45,26 +51,18 @@ def simulate_stages(
     the end of the last one: scenes must have the same ones, and the same markers and hinges. Controllers are
     initialised in each stage. A motion that is prescribed in a stage must start with the value and rate that the
     coordinate then has, otherwise ValueError is raised.
-    method, t_start, state and settings: see `simulate`. Raises what `simulate` raises, for an invalid scene before
-    anything runs, and ValueError for stages that do not fit each other.
+    All other arguments: see `simulate`. Raises what `simulate` raises, before anything runs for an invalid scene,
+    settings or output times of any stage, and ValueError for stages that do not fit each other.
     """
+    refuse_unknown("simulate_stages", settings)
     systems = _systems(scene, stages)
-    t = start_time(t_start, state)
-    whole: Trajectory | None = None
+    t, parts = start_time(t_start, state), list[RunPart]()
     for stage, system in zip(stages, systems, strict=True):
-        if whole is not None:
-            state = whole.values_at(-1)
-        end = t + stage.duration_s
-        run = simulate(
-            system, end, method, t_start=None if whole is None and state is not None and t_start is None else t,
-            state=state, samples=stage.samples, **settings,
-        )  # fmt: skip
-        whole = run if whole is None else whole.then(run)
-        if not run.finished:
-            break
-        t = end
-    assert whole is not None  # there is at least one stage
-    return whole
+        start, t = t, t + stage.duration_s
+        refuse_times(system, start, t)
+        parts.append(RunPart(system, sample_times(stage.samples, t, start)))
+    chosen = Settings(method, **settings).checked(max(abs(parts[0].times[0]), abs(t)))
+    return run_stages(parts, state, chosen, algorithm, stabilise)
 
 
 def _systems(scene: Scene, stages: Sequence[RunStage]) -> list[System]:

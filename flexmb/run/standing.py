@@ -10,20 +10,17 @@ stop `rests`; otherwise the event happens as soon as it drifts past the level. I
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from flexmb.run.event_record import EventRecord
-from flexmb.run.situation import Accelerations, Situation
+from flexmb.run.propagate import Raw
+from flexmb.run.sides import DIRECTIONS, Sides
+from flexmb.run.situation import Situation
 from flexmb.scene.events import Impact
 from flexmb.scene.schema import SceneEvent
 from flexmb.typing import Real
-
-Probe = Callable[[SceneEvent, float, Real], tuple[float, float]]
-"""Height of what an event watches above its level, and its rate, at a time (s) and y = [q, u, work]."""
-_FROM = {"falling": 1, "rising": -1, "either": 0}
 
 
 class Stood(NamedTuple):
@@ -34,35 +31,23 @@ class Stood(NamedTuple):
     came: int
 
 
-def stops(situation: Situation, event: SceneEvent) -> Impact | None:
-    """The impact of an event that watches a coordinate or signal: neither time nor the rate of a coordinate."""
-    is_place = event.watch != "time" and (
-        event.watch not in situation.places or situation.rate_of(event.watch) is not None
-    )
-    impacts = [action for action in event.actions if isinstance(action, Impact)]
-    return impacts[0] if is_place and impacts else None
-
-
-def stand(
-    situation: Situation, event: SceneEvent, t: float, y: Real, near: float, probe: Probe, accelerations: Accelerations
-) -> Stood | None:
-    """Process a body that is in contact with a stop, changing y in place; None if there is none.
-
-    near: the distance from the level within which it is in contact.
-    """
-    impact = stops(situation, event)
+def stand(sides: Sides, event: SceneEvent, raw: Raw, y: Real) -> Stood | None:
+    """Process a body that is in contact with a stop at the end of an integration, changing y = [q, u, work] in place;
+    None if there is none."""
+    situation = sides.situation
+    impact = _stop(situation, event)
     if impact is None or situation.is_held(event.watch) or situation.is_held(impact.coordinate):
         return None
-    height, rate = probe(event, t, y)
-    if abs(height) > near:
+    height, rate = sides.probe(raw, event, y)
+    if abs(height) > sides.near(event):
         return None
     speed = situation.speed(impact.coordinate, y)
     towards = int(np.sign(rate)) if speed else 0
-    pressed, falls = _pressed(situation, event, impact, t, y, probe, accelerations)
-    side = _FROM[event.crossing] or -pressed or towards
+    pressed, falls = _pressed(sides, event, impact, raw, y)
+    side = -DIRECTIONS[event.crossing] or -pressed or towards
     if side * towards < 0:
         _put(situation, event, y)
-        records = situation.happen(event, t, y, accelerations)
+        records = situation.happen(event, raw, y)
         moves = situation.speed(impact.coordinate, y) != 0.0 and not situation.is_held(impact.coordinate)
         return Stood(records, side if moves else 0, 0 if moves or situation.is_held(impact.coordinate) else side)
     if side * towards > 0:
@@ -71,20 +56,25 @@ def stand(
         return Stood([], 0, side)
     _put(situation, event, y)
     if impact.rests:
-        return Stood([situation.rest(event, impact, -falls, t, y)], 0, 0)
+        return Stood([situation.rest(event, impact, -falls, raw.t, y)], 0, 0)
     return Stood([], 0, side)
 
 
-def _pressed(
-    situation: Situation, event: SceneEvent, impact: Impact, t: float, y: Real, probe: Probe,
-    accelerations: Accelerations,
-) -> tuple[int, int]:  # fmt: skip
+def _stop(situation: Situation, event: SceneEvent) -> Impact | None:
+    """The impact of an event that watches a coordinate or signal: neither time nor the rate of a coordinate."""
+    is_place = event.watch not in situation.places or situation.rate_of(event.watch) is not None
+    impacts = [action for action in event.actions if isinstance(action, Impact)]
+    return impacts[0] if is_place and impacts else None
+
+
+def _pressed(sides: Sides, event: SceneEvent, impact: Impact, raw: Raw, y: Real) -> tuple[int, int]:
     """Signs of the motions of the watched quantity and of the coordinate from rest, if there were no stop."""
-    still = situation.at_rest(impact.coordinate, t, y)
-    gained, moving = accelerations(t, still), still.copy()
+    situation = sides.situation
+    still = situation.at_rest(impact.coordinate, raw.t, y)
+    gained, moving = situation.accelerations(raw, still), still.copy()
     moving[situation.system.nq : -1], still[situation.system.nq : -1] = gained, 0.0
-    _, ahead = probe(event, t, moving)
-    _, before = probe(event, t, still)
+    _, ahead = sides.probe(raw, event, moving)
+    _, before = sides.probe(raw, event, still)
     return int(np.sign(ahead - before)), int(np.sign(situation.speed(impact.coordinate, moving)))
 
 

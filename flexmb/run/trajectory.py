@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flexmb.output.whole import whole_file
+from flexmb.output.whole import write_csv
 from flexmb.run import exports
 from flexmb.run.joining import joined
 from flexmb.run.making import Making, error_estimate
@@ -139,11 +138,8 @@ class Trajectory(RunArrays):
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write all channels, one row per time, under a header "name [unit]"; 17 digits are read back exactly."""
         columns = list(self.columns())
-        with whole_file(Path(path)) as beside, beside.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow([f"{name} [{unit}]" for name, unit, _ in columns])
-            for row in zip(*(values.tolist() for _, _, values in columns), strict=True):
-                writer.writerow([f"{value:.17g}" for value in row])
+        rows = zip(*(values.tolist() for _, _, values in columns), strict=True)
+        write_csv(Path(path), [f"{name} [{unit}]" for name, unit, _ in columns], rows)
 
     def to_npz(self, path: str | os.PathLike[str]) -> None:
         """Write all channels for NumPy: `names` (n,), `units` (n,), `values` (T,n), and `scene`."""
@@ -216,5 +212,3 @@ def _continuous_quaternions(rotations: Real) -> Real:
     quaternions = quaternion_of(rotations)
     turns = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
     return quaternions * np.cumprod(np.r_[1.0, np.where(turns, -1.0, 1.0)])[:, None]
-
-

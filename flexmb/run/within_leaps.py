@@ -8,12 +8,11 @@ longest duration of a leap, which is 2^-9 of the time in which the mechanism mov
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from flexmb.integrate.watch import Watch
-from flexmb.run.propagate import Raw
+from flexmb.integrate.settings import Settings
+from flexmb.integrate.watch import Watch, watch
+from flexmb.run.propagate import Raw, integrate
 from flexmb.run.situation import Situation
 from flexmb.system.tree_system import System
 from flexmb.tables.status import Status
@@ -21,23 +20,20 @@ from flexmb.typing import Real
 
 AT_SINGULAR_POSITIONS = (Status.CLOSURE_SINGULAR, Status.BRANCH_UNKNOWN, Status.CLOSURE_OPEN)
 
-Further = Callable[[Raw, float], Raw]
-"""Continues from the end of a segment to a time (s) without watching for events."""
 
-
-def placed(situation: Situation, raw: Raw, levels: Watch, times: Real, further: Further) -> tuple[Raw, float]:
+def placed(situation: Situation, left: Settings, raw: Raw, levels: Watch, times: Real) -> tuple[Raw, float]:
     """A segment that reached a level, ended where the event happens, and how long (s) before its instant that is.
 
-    times (T,) s: output times of the segment.
+    left: settings with the number of steps that are left. times (T,) s: output times of the segment.
     """
     start, end = levels.leap.tolist()
-    if not start < raw.t < end or _goes_on(situation, raw, end - start, further):
+    if not start < raw.t < end or _goes_on(situation, left, raw, end - start):
         return raw, 0.0
     before = raw.states[times[: len(raw.states)] <= start]
     return raw._replace(states=before, y=levels.before.copy(), t=start), raw.t - start
 
 
-def too_near(situation: Situation, raw: Raw, t_start: float, due: float, further: Further) -> float:
+def too_near(situation: Situation, left: Settings, raw: Raw, t_start: float, due: float) -> float:
     """How long (s) before the time `due` its event has to happen, given the segment up to there; 0 if at that time.
 
     t_start (s): start of the segment, before which the event cannot happen.
@@ -46,19 +42,24 @@ def too_near(situation: Situation, raw: Raw, t_start: float, due: float, further
     if not longest < due - t_start:  # NaN is no length either
         return 0.0
     if raw.status is Status.OK:
-        is_near = raw.t == due and not _goes_on(situation, raw, longest, further)
+        is_near = raw.t == due and not _goes_on(situation, left, raw, longest)
     else:
         is_near = raw.status in AT_SINGULAR_POSITIONS and due - raw.t <= longest
     return longest if is_near else 0.0
 
 
-def _goes_on(situation: Situation, raw: Raw, span: float, further: Further) -> bool:
+def _goes_on(situation: Situation, left: Settings, raw: Raw, span: float) -> bool:
     """Whether a segment of length `span` (s) can start where another ended, with its speeds and with reversed ones."""
     back = raw.y.copy()
     back[situation.speeds] *= -1.0
-    return all(
-        further(raw._replace(y=y), raw.t + span).status not in AT_SINGULAR_POSITIONS for y in (raw.y, back)
-    )  # fmt: skip
+    for y in (raw.y.copy(), back):
+        begin = situation.going_on(raw._replace(y=y))
+        with situation.integration() as solve:
+            nothing = watch((), (), (), (), (), (), solve.size)  # the same compiled code as for segments
+            tried = integrate(solve, begin, np.array([raw.t, raw.t + span]), left, nothing, goes_on=True)
+        if tried.status in AT_SINGULAR_POSITIONS:
+            return False
+    return True
 
 
 def _longest_leap(system: System, raw: Raw) -> float:

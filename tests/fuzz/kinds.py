@@ -34,7 +34,7 @@ from crosscheck.stability import map_records as maps
 from crosscheck.stability.boundary import MapVerdict
 from crosscheck.stability.map import Axis
 from crosscheck.stability.verdict_file import read_verdicts
-from crosscheck.verify.columns import VerifyError, read_columns
+from crosscheck.verify.columns import TimesError, VerifyError, read_columns
 from flexmb.scene.check import check_scene
 from flexmb.scene.files import dumps, load_scene, loads
 from flexmb.scene.modal_data import modal_arrays
@@ -71,8 +71,8 @@ def kinds(folder: Path) -> dict[str, Kind]:
         "provenance": Kind("provenance.toml", grounds, toml, (CaseError,), case),
         "accepted figures": Kind("accepted.toml", (ACCEPTED,), toml, (CaseError,), _accepted),
         "readme": Kind("README.md", ((CASE / "README.md").read_bytes(),), mutate.BYTES, (CaseError,), case),
-        "verify csv": Kind("my.csv", (_csv(),), table, (VerifyError,), _csv_file),
-        "trajectory csv": Kind("trajectory.csv", (_trajectory(),), table, (VerifyError,), _csv_file),
+        "verify csv": Kind("my.csv", (_csv(),), table, (VerifyError, TimesError), _csv_file),
+        "trajectory csv": Kind("trajectory.csv", (_trajectory(),), table, (VerifyError, TimesError), _csv_file),
         "npz": Kind("panel.npz", _npz(), archive, (SceneError,), _modal, 'body "panel"'),
         "records": Kind("records.jsonl", (_records(),), records, (ValueError,), _session),
         "map records": Kind("map.jsonl", (_map(),), jsonl, (ValueError,), _cells),

@@ -41,7 +41,7 @@ SIGNS = {
     "hatchling": '"hatchling", "build"', "pyyaml": "import yaml", "mutmut": "mutmut run",
     "rerun-sdk": "import rerun", "selenium": "importorskip(\"selenium", "sphinx": "\"-m\", \"sphinx\"",
     "furo": "html_theme = \"furo\"", "myst-parser": "\"myst_parser\"",
-    "drake": "import pydrake", "bsk": "import Basilisk",
+    "drake": "import pydrake", "bsk": "import Basilisk", "cmeel-eigen": "include/eigen3",
 }  # fmt: skip
 EXTRAS = PYPROJECT["project"]["optional-dependencies"]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.frisch.elements import inertia_of
-from flexmb.frisch.normalisation import normalised
+from flexmb.frisch.normalisation import combined, normalised
 from flexmb.frisch.parameters import ModeParameters, mode_parameters
 from flexmb.modal.beam import beam_elements
 from flexmb.modal.cross import cross_matrix
@@ -97,18 +97,7 @@ def appendage(model: FlexibleModel, name: str = "appendage") -> Appendage:
 
 def with_modes(model: FlexibleModel, chosen: NDArray[np.intp]) -> FlexibleModel:
     """The same body with some of its modes, in the order of `chosen`."""
-    nodes = {
-        key: replace(node, translation=node.translation[:, chosen], rotation_modes=node.rotation_modes[:, chosen])
-        for key, node in model.nodes.items()
-    }
-    return replace(
-        model,
-        translation=model.translation[:, :, chosen],
-        rotation=model.rotation[:, :, chosen],
-        stiffness=model.stiffness[np.ix_(chosen, chosen)],
-        damping=model.damping[np.ix_(chosen, chosen)],
-        nodes=nodes,
-    )
+    return combined(model, np.eye(model.mode_count)[:, chosen])
 
 
 def appendage_of(scene: Scene, body: str, modes: int | None = None) -> Appendage:

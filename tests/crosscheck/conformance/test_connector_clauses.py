@@ -15,6 +15,7 @@ from crosscheck.conformance.connectors import CONNECTORS
 from crosscheck.conformance.trial import try_clause
 from crosscheck.engines import connections
 from crosscheck.engines.connections import Along, Exerted
+from crosscheck.engines.links import Attachment
 from crosscheck.engines.registry import engine
 from flexmb.scene.functions import Constant
 
@@ -67,7 +68,7 @@ FAULTS: dict[str, tuple[str, Callable[[Callable], Callable]]] = {
     "a-buffer-pushes-alone": ("tension_of", given(acts="both")),
     "a-table-is-met-and-continued": ("_by_table", straight),
     "a-line-reacts-on-a": ("exerts", acting_on_a(lambda found: -0.9 * found.on_b)),
-    "a-bushing-is-in-axes-of-a": ("_attached", lambda right: lambda *item: _unturned(right(*item), item[-1])),
+    "a-bushing-is-in-axes-of-a": ("closed_frames", lambda right: lambda *item: _unturned(*right(*item))),
     "a-bushing-derives-from-its-energy": ("_inverse_jacobian", lambda right: lambda turn: np.eye(3)),
     "a-bushing-reacts-on-a": ("exerts", acting_on_a(lambda found: -found.on_b)),
     "an-angular-spring-turns-back": ("_along", given(rest_rad=0.0)),
@@ -80,9 +81,9 @@ FAULTS: dict[str, tuple[str, Callable[[Callable], Callable]]] = {
 """The function of an adapter that is wrong, and what it is made of the right one."""
 
 
-def _unturned(at: Any, side: str) -> Any:
+def _unturned(a: Attachment, b: Attachment) -> tuple[Attachment, Attachment]:
     """Frame A in the axes of its body."""
-    return at if side == "b" else moved(at, frame=moved(at.frame, rotation=np.eye(3)))
+    return moved(a, frame=moved(a.frame, rotation=np.eye(3))), b
 
 
 def test_every_clause_has_its_fault() -> None:

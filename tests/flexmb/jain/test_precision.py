@@ -102,9 +102,17 @@ def test_few_digits_are_told():
 
 
 def test_a_run_with_few_digits_says_so():
-    with pytest.warns(PrecisionWarning, match="about 3 of 16 digits"):
-        trajectory = flexmb.simulate(nearly_singular(), 1e-3, "rk4", step=1e-4, samples=2)
-    assert "about 3 of 16 digits" in trajectory.message
+    """Of the line that asked for it, in one stage or several; the message has it where the last stage begins so."""
+    stages = [flexmb.RunStage(1e-3, samples=2)]
+    for run in (
+        lambda: flexmb.simulate(nearly_singular(), 1e-3, "rk4", step=1e-4, samples=2),
+        lambda: flexmb.simulate_stages(nearly_singular(), stages, "rk4", step=1e-4),
+        lambda: flexmb.simulate_stages(nearly_singular(), 2 * stages, "rk4", step=1e-4),
+    ):
+        with pytest.warns(PrecisionWarning, match="about 3 of 16 digits") as told:
+            trajectory = run()
+        assert __file__ in {each.filename for each in told}
+        assert "about 3 of 16 digits" in trajectory.message
 
 
 def test_a_run_with_many_says_nothing():

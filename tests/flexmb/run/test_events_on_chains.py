@@ -206,4 +206,4 @@ def test_a_leap_of_unknown_length_moves_no_event(monkeypatch: pytest.MonkeyPatch
     """NaN is neither shorter nor longer than the segment: the event happens when it is due, and nothing is tried."""
     monkeypatch.setattr(within_leaps, "_longest_leap", lambda *given: np.nan)
     situation, raw = SimpleNamespace(system=None), SimpleNamespace(status=fm.Status.OK, t=1.0)
-    assert within_leaps.too_near(situation, raw, 0.0, 1.0, None) == 0.0  # type: ignore[arg-type]
+    assert within_leaps.too_near(situation, None, raw, 0.0, 1.0) == 0.0  # type: ignore[arg-type]

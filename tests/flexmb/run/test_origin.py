@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+import flexmb.run.segments as segments
+import flexmb.run.simulate as simulating
 from flexmb.run.warm_up import looped
 from flexmb.scene.schema import Scene
 
@@ -164,6 +166,33 @@ def test_stages_that_do_not_fit_are_refused():
         fm.simulate_stages(arm(), [])
     with pytest.raises(ValueError, match=r"stages\[0\] lasts -1 s"):
         fm.simulate_stages(arm(), [fm.RunStage(-1.0)])
+
+
+def test_stages_are_checked_before_the_first_one_runs(monkeypatch):
+    """Its profile ends within the last stage, or its output times are none: nothing is integrated in vain."""
+    begun = []
+    monkeypatch.setattr(simulating, "origin", lambda *given: begun.append(given))
+    ending = fm.Table(times_s=(0.0, 1.0, 1.5), values=(0.0, 1.0, 0.0))
+    short = fm.RunStage(1.0, {"shoulder.rotation.torque_Nm": ending})
+    with pytest.raises(fm.SceneError, match="shoulder"):
+        fm.simulate_stages(arm(), [fm.RunStage(1.0), short])
+    with pytest.raises(ValueError, match="at least 2 output times"):
+        fm.simulate_stages(arm(), [fm.RunStage(1.0), fm.RunStage(1.0, samples=1)])
+    assert not begun
+
+
+def test_ctrl_c_in_a_stage_keeps_those_before_it(monkeypatch):
+    whole, calls = segments.integrate, []
+
+    def interrupted(*given, **options):
+        calls.append(given)
+        return whole(*given, **options)._replace(interrupted=len(calls) == 2)
+
+    monkeypatch.setattr(segments, "integrate", interrupted)
+    with pytest.raises(fm.Interrupted) as stopped:
+        fm.simulate_stages(arm(), [fm.RunStage(0.1, samples=3), fm.RunStage(0.1, samples=5), fm.RunStage(1.0)])
+    assert len(calls) == 2
+    assert stopped.value.trajectory.t == pytest.approx([0.0, 0.05, 0.1, 0.125, 0.15, 0.175, 0.2])
 
 
 def test_a_stage_that_fails_is_the_last():
