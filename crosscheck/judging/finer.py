@@ -11,6 +11,7 @@ from crosscheck.library.efforts import continued
 from crosscheck.records.kinds import CaseRecord
 
 MOST = 6  # efforts more; if they do not do, the goal is beyond the method
+NO_GOAL, FIRST_TRY = 0.1, 3  # above that part of the range nothing is resolved, and so many efforts more are a beginning
 FIRST_ORDER = 1.0
 BEYOND = "more efforts will not do"
 
@@ -33,8 +34,9 @@ def finer_efforts(case: CaseRecord, channel: str, goal: float, finding: Finding,
     ratio = values[-2] / values[-1]
     order = worst.uncertainty(channel).order if kind == "step" else FIRST_ORDER
     count = ceil(log(U / goal) / (max(order or FIRST_ORDER, FIRST_ORDER) * log(ratio)))
-    more = continued("step" if kind == "step" else "tolerance", values, min(count, MOST))
-    if count > MOST or len(more) < count:
+    unresolved = U > NO_GOAL  # no accuracy to claim: whatever more efforts reach, they come first
+    more = continued("step" if kind == "step" else "tolerance", values, min(count, FIRST_TRY if unresolved else MOST))
+    if not more or (not unresolved and len(more) < count):
         reached = float(f"{2.0 * U:.1g}")
         return f"{BEYOND}: claim what it reaches, such as --goal {worst.engine}={min(reached, 1.0):g}"
     wanted = ",".join(f"{value:g}" for value in (*case.claims.efforts_of(worst.engine), *more))

@@ -161,6 +161,8 @@ def test_a_finer_effort_is_advised_that_will_do() -> None:
     assert single(judged(ONE_PAIR, runs(1e-3), claims=already)).advice == command + "1e-07,1e-08,1e-09,1e-10"
     beyond = single(session(runs(1e-3), goals=(goals(1e-12),)))
     assert "claim what it reaches, such as --goal two=0." in beyond.advice
+    nothing_resolved = single(session(runs(1e-1), goals=(goals(1e-12),)))
+    assert nothing_resolved.advice == command + "1e-09,1e-10,1e-11"
     assert single(session(runs(1e-6))).advice == single(session(runs(1e-6, 0.01))).advice == ""
 
 

@@ -45,7 +45,7 @@ def test_an_expected_failure_is_one_with_its_reason(inside: pytest.Pytester, cas
     Path(NAME).write_text(FAILURE, encoding="utf-8")
     result = ran(inside, *on(case, "biased"), "-rx")
     result.assert_outcomes(xfailed=2, passed=3)
-    result.stdout.fnmatch_lines(["*differ, as you expect (*expected_failure[[]0]): its gravity is a thousandth too large*"])
+    result.stdout.fnmatch_lines(["*differ, as you expect (*expected_failure[[]0]): its gravity is a*"])
     result.stdout.fnmatch_lines([f"crosscheck: 1 case on biased, expectations of {NAME}, records in *"])
 
 
