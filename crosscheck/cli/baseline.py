@@ -25,7 +25,7 @@ class Baseline:
 
 
 @dataclass(frozen=True)
-class Held:
+class AgainstBaseline:
     """A session held against its baseline: what changed, or that it was stored, or why it was not."""
 
     baseline: Baseline
@@ -55,7 +55,7 @@ def read_baseline(given: Path, out: Path) -> Baseline:
         common.refuse(f"--baseline: {error}")
 
 
-def hold_against(baseline: Baseline, outcome: SessionOutcome, out: Path) -> Held:
+def hold_against(baseline: Baseline, outcome: SessionOutcome, out: Path) -> AgainstBaseline:
     """Compare the session in `out` with its baseline and add that to summary.md; without one, store it as the first."""
     from crosscheck.report.ci import add_differences
     from crosscheck.sealed.compare import compare_results
@@ -66,15 +66,15 @@ def hold_against(baseline: Baseline, outcome: SessionOutcome, out: Path) -> Held
     if baseline.results is not None:
         differences = compare_results(baseline.results, read_results(out / FILE))
         add_differences(differences, out / "summary.md")
-        return Held(baseline, differences, idle_claims=bool(outcome.idle_claims))
+        return AgainstBaseline(baseline, differences, idle_claims=bool(outcome.idle_claims))
     unfit = _unfit(outcome)
     if not unfit:
         folder(baseline.file.parent)
         write_whole(baseline.file, (out / FILE).read_bytes())
-    return Held(baseline, unfit=unfit, idle_claims=bool(outcome.idle_claims))
+    return AgainstBaseline(baseline, unfit=unfit, idle_claims=bool(outcome.idle_claims))
 
 
-def print_held(held: Held, shown: Verbosity) -> None:
+def print_held(held: AgainstBaseline, shown: Verbosity) -> None:
     """What changed since the baseline; or that there was none, and what this session excuses in later ones."""
     from crosscheck.terminal.differences import print_differences
 

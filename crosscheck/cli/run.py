@@ -16,7 +16,7 @@ from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
 
 if TYPE_CHECKING:
-    from crosscheck.cli.baseline import Held
+    from crosscheck.cli.baseline import AgainstBaseline
     from crosscheck.judging.outcome import SessionOutcome
     from crosscheck.library.find import Case
 
@@ -180,7 +180,7 @@ def _accept(cases: tuple[Case, ...], records: Path, partial: bool) -> bool:
 
 def _conclude(
     outcome: SessionOutcome, page: Path, shown: Verbosity, json_of: Path | None, open_report: bool,
-    failed: bool = False, held: Held | None = None,
+    failed: bool = False, held: AgainstBaseline | None = None,
 ) -> None:  # fmt: skip
     """Show the outcome, with the results of the folder `json_of` as JSON, and exit; with code 1 if it `failed`.
 

@@ -11,7 +11,8 @@ from crosscheck.library.efforts import continued
 from crosscheck.records.kinds import CaseRecord
 
 MOST = 6  # efforts more; if they do not do, the goal is beyond the method
-NO_GOAL, FIRST_TRY = 0.1, 3  # above that part of the range nothing is resolved, and so many efforts more are a beginning
+NO_GOAL = 0.1  # a U above this part of the range resolves nothing that could be claimed
+FIRST_TRY = 3  # efforts more, where nothing is resolved yet
 FIRST_ORDER = 1.0
 BEYOND = "more efforts will not do"
 
