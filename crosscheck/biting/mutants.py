@@ -81,7 +81,7 @@ def _no_mutant(scene: Scene, kind: MutationKind, target: str, true: Scene, what:
         return f"it makes no scene: {' '.join(str(error).split())}"
     if same_to_rounding(mutant, true):
         return f'variant "{variant.name}" does not model what it changes'
-    if kind in OF_THE_START and true.closures and _begin_alike(mutant, true):
+    if kind in OF_THE_START and true.constraints and _begin_alike(mutant, true):
         return "the closures say where it begins: the scene's value is where the search for it starts"
     return ""
 

@@ -36,6 +36,8 @@ def _parts(scene: Scene) -> Iterator[str]:
         yield f"{load.type}s in {load.frame} axes"
     for connector in scene.connectors:
         yield f"connectors: {_words(connector)}"
+    if scene.couplings:
+        yield "couplings"
 
 
 def _coordinates(hinge: object) -> Iterator[AngularCoordinate | LinearCoordinate]:

@@ -159,7 +159,7 @@ def _known(scene: Scene) -> dict[str, set[str]]:
     """For each output that is given by item, the names of the items that can have it."""
     hinges, wheels = _names(scene.hinges), _names(scene.wheels)
     return {
-        "loads": hinges | _names(scene.closures) | _names(scene.point_masses),
+        "loads": hinges | _names(scene.constraints) | _names(scene.point_masses),
         "wheel_loads": wheels,
         "drives": hinges | wheels | _names(scene.point_masses),
         "connectors": _names(each for each in scene.connectors if isinstance(each, BetweenNodes)),

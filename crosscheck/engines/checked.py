@@ -9,7 +9,7 @@ from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Su
 from crosscheck.engines.steps import USUAL_S
 from flexmb.scene.schema import Scene, UserLaw
 
-LATER = ("connectors", "controllers", "events")
+LATER = ("connectors", "couplings", "controllers", "events")
 """Collections that scenes did not have when the contract was first written; `takes` names those an adapter handles."""
 NO_START = "begins all runs at t = 0"
 

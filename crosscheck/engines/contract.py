@@ -169,10 +169,10 @@ class Engine(Protocol):
 
     Optional attributes: `summary`, one line for `crosscheck engines`; for timing reports `algorithm`, a few words, and
     `settings`, a sentence or two on how it is run: its best solver, what is switched off, whose loop steps it, and what
-    its `wall_s` contains. `takes` names what its adapter handles of "connectors", "controllers" and "events" (a scene
-    with others is refused) and "t_start" (runs that begin at another time than 0). `efforts_for(scene, duration_s)`
-    replaces `efforts` for engines with fixed steps, whose ladder depends on the duration (see
-    `crosscheck.engines.steps`).
+    its `wall_s` contains. `takes` names what its adapter handles of "connectors", "couplings", "controllers" and
+    "events" (a scene with others is refused) and "t_start" (runs that begin at another time than 0).
+    `efforts_for(scene, duration_s)` replaces `efforts` for engines with fixed steps, whose ladder depends on the
+    duration (see `crosscheck.engines.steps`).
     """
 
     name: str

@@ -108,12 +108,14 @@ class Attachment:
 
 def obstacle(
     scene: Scene, engine: str, closed_by: tuple[str, ...], connected_by: tuple[type[Connector], ...] = (),
-    screws: bool = False,
+    screws: bool = False, couplings: bool = False,
 ) -> str:  # fmt: skip
     """Why an engine of rigid trees with some types of closures and connectors cannot represent the scene, or "".
 
-    `screws`: whether the adapter offers screw joints.
+    `screws`, `couplings`: whether the adapter offers screw joints, and linear relations of coordinates.
     """
+    if scene.couplings and not couplings:
+        return f'coupling "{scene.couplings[0].name}": the adapter of {engine} relates no coordinates'
     for closure in scene.closures:
         if not closed_by:
             return f'closure "{closure.name}": {engine} closes no loops'

@@ -57,7 +57,7 @@ class NativeEngine:
         "faster. Compiling is not timed, and outputs are computed after the timed solve."
     )
 
-    takes = ("connectors", "controllers", "events", "t_start")
+    takes = ("connectors", "couplings", "controllers", "events", "t_start")
 
     def __init__(
         self,

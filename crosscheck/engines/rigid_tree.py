@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TypeVar, assert_never
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from crosscheck.engines.conventions import Frame
 from crosscheck.engines.functions_of_time import Profile, profile
 from crosscheck.engines.links import Attachment, Freedom, Link, Scalar
 from flexmb.scene.schema import Load, Scene
+from flexmb.scene.tree import coupled
 from flexmb.typing import Real
 
 
@@ -48,6 +49,53 @@ def scalar_start(freedom: Scalar) -> tuple[float, float]:
     if freedom.prescribed is None:
         return freedom.value, freedom.rate
     return profile(freedom.prescribed)(0.0)[:2]
+
+
+@dataclass(frozen=True)
+class PlacedCoupling:
+    """A coupling on the slots of a tree: sum of factors times their coordinates = `offset`, the led one first, by 1.
+
+    Its load f acts as the generalised forces factor times f along the coordinates.
+    """
+
+    name: str
+    slots: tuple[Slot, ...]
+    factors: tuple[float, ...]
+    offset: float
+
+    def row(self, speeds: int) -> Real:
+        """(nv,) of the Jacobian."""
+        found = np.zeros(speeds)
+        found[[slot.v for slot in self.slots]] = self.factors
+        return found
+
+    def load(self, size: float, axis: Real) -> Real:
+        """[torque; force] (6,) of the load f along the axis of the coordinate that is led."""
+        freedom, none = self.slots[0].freedom, np.zeros(3)
+        if not isinstance(freedom, Scalar):
+            raise TypeError(f'coupling "{self.name}" leads no scalar coordinate')
+        along = size * axis
+        match freedom.motion:
+            case "turn" | "screw":
+                return np.concatenate([along, none])
+            case "slide":
+                return np.concatenate([none, along])
+            case _:
+                assert_never(freedom.motion)
+
+
+def placed_couplings(scene: Scene, slots: Sequence[Slot]) -> tuple[PlacedCoupling, ...]:
+    """The couplings of a scene on the slots of its tree."""
+    scalars: dict[str, list[Slot]] = {}
+    for slot in slots:
+        if isinstance(slot.freedom, Scalar):
+            scalars.setdefault(slot.link.joint, []).append(slot)
+    found = []
+    for coupling in scene.couplings:
+        related = coupled(scene, coupling)
+        own = tuple(scalars[each.hinge.name][each.place] for each in related)
+        found.append(PlacedCoupling(coupling.name, own, tuple(each.factor for each in related), coupling.offset))
+    return tuple(found)
 
 
 class PointLoad:

@@ -124,7 +124,8 @@ TAKES_APART: tuple[Transform, ...] = ("segments", "substructures")
 MutationKind = Literal[
     "mass", "inertia", "com", "inertia_swapped", "inertia_products", "inertia_about_origin", "gyroscopic",
     "com_sign", "com_unit", "point_mass", "hinge_axis", "hinge_rotation", "hinge_position", "node_rotation",
-    "node_position", "closure_rotation", "closure_position", "gimbal_order", "stiffness", "spring_rest",
+    "node_position", "closure_rotation", "closure_position", "coupling_ratio", "coupling_sign", "coupling_offset",
+    "gimbal_order", "stiffness", "spring_rest",
     "damping", "damping_dropped", "initial_place", "initial_unit", "initial_rate", "initial_speed_sign",
     "speed_axes", "initial_attitude", "wheel_axis", "wheel_momentum", "wheel_inertia", "wheel_inertia_swapped",
     "wheel_offset", "gravity_sign", "gravity_size", "gravity_axis", "gravity_dropped", "load_sign", "load_point",
@@ -138,9 +139,13 @@ MutationKind = Literal[
     "event_restitution", "event_value", "event_order",
 ]  # fmt: skip
 Family = Literal["closed_form", "published", "converged", "agreed"]
-FAMILIES: dict[str, Family] = {
+ReferenceKind = Literal[
+    "published", "closed form", "independent codes", "native, two formulations", "high precision"
+]  # fmt: skip
+FAMILIES: dict[ReferenceKind, Family] = {
     "closed form": "closed_form",
     "published": "published",
+    "native, two formulations": "converged",
     "high precision": "converged",
     "independent codes": "agreed",
 }
@@ -327,12 +332,14 @@ class PublishedNumber(_CasePart, frozen=True, kw_only=True):
 class Provenance(_CasePart, frozen=True, kw_only=True):
     """provenance.toml: the origin of the case's data and of its expected outcome.
 
-    `reference` is the kind of the case's reference: a published number; a closed form; runs of high precision, by
-    two algorithms and two integrators of this library; or the agreement of independent codes. `uncertainty` states, in
-    words and numbers, how well it is known. `anchors` are published numbers that the reference must meet.
+    `reference` is the kind of the case's reference: a published number; a closed form; the agreement of independent
+    codes; or two formulations of this library alone, integrated by two methods ("high precision" is another word for
+    the last). What the routes that are stored say comes first: `crosscheck.library.basis` finds a word that does not
+    follow from them. `uncertainty` states, in words and numbers, how well it is known.
+    `anchors` are published numbers that the reference must meet.
     """
 
-    reference: Literal["published", "closed form", "high precision", "independent codes"]
+    reference: ReferenceKind
     sources: tuple[str, ...]
     uncertainty: str
     notes: str = ""

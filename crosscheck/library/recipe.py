@@ -21,6 +21,11 @@ For example::
     [[reference.route]]
     engine = "native-frisch"
 
+    [[reference.route]]
+    engine = "exudyn"                 # another code, which comes less near: it must agree, and is told with its E
+    witness = true
+    channels = ["marker:*.position"]  # [all that the reference has]
+
 Every channel needs at least two routes, which must agree within their uncertainties and be independent: a closed
 form and any other, two codes, or two of this library's engines with two integrators. The samples are some of the
 variant's: with 251 of these, 126 or 51 can be kept. `docs/references.md` has all rules.
@@ -43,15 +48,21 @@ class EffortLadder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class ReferenceRoute(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One way to the numbers: an `engine` with its `efforts`, or a closed form.
+    """One way to the numbers: an `engine` with its `efforts`, a closed form, or equations of the case's own.
 
-    `exact` names a Python file in the case's folder with a function `exact(times)` that returns channels (T, k) by
-    name; `relative_uncertainty` says how well it is evaluated, relative to each channel's range. `variant` replaces the
-    reference's variant, by another model of the same physics.
+    `exact` and `equations` name a Python file in the case's folder with a function `exact(times)` that returns channels
+    (T, k) by name: a closed form, or equations of motion that the file states and integrates by itself;
+    `relative_uncertainty` says how well they are evaluated, relative to each channel's range. `variant` replaces the
+    reference's variant, by another model of the same physics. `channels` are patterns of the channels that it gives,
+    by default all. A `witness` must agree within both uncertainties as any route must, but its distance does not enter
+    the stated uncertainty: another code that is known less well than the routes before it.
     """
 
     engine: str = ""
     exact: str = ""
+    equations: str = ""
+    channels: tuple[str, ...] = ()
+    witness: bool = False
     variant: str | None = None
     efforts: tuple[EffortLadder, ...] = ()
     relative_uncertainty: float = 1e-13

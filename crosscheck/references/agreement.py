@@ -4,6 +4,7 @@ With E = max |a - b| of the route a that gives the values and another route b, a
 
     E <= U_a + U_b, both finite, is required of all routes,      uncertainty = max(U_a, every E).
 
+where a witness, another code that is known less well, has to agree but adds nothing to the uncertainty.
 E is at least the error of a unless both routes err alike, and U_a is the estimate of the first route
 itself. The least stated uncertainty is that of 17 digits and of the rounding of one operation, eps times the
 size of the channel's family.
@@ -67,8 +68,9 @@ def _problems(channel: str, routes: Sequence[RouteSignals], until: int) -> Itera
         if other.channels[channel].shape != first.channels[channel].shape:
             yield f"[reference] {channel}: {first.title} and {other.title} give it other shapes: correct one of the two"
             return
-    if not any(first.independent_of(other) for other in others):
-        yield _alone(channel, first, routes[1:])
+    equal = [other for other in others if not other.witness]
+    if not any(first.independent_of(other) for other in equal):
+        yield _alone(channel, first, equal)
     for each in (first, *others):
         if not np.isfinite(_doubt(each, channel, until)):
             how = each.uncertainties[channel].how
@@ -83,10 +85,11 @@ def _problems(channel: str, routes: Sequence[RouteSignals], until: int) -> Itera
 def _known(channel: str, routes: Sequence[RouteSignals], until: int) -> Known:
     """The uncertainty of a channel on which routes agree."""
     first, *others = routes
-    apart = [_distance(channel, first, other, until)[0] for other in others]
+    errors = [(other, _distance(channel, first, other, until)[0]) for other in others]
+    apart = [error for other, error in errors if not other.witness]
     own = _doubt(first, channel, until)
     words = [f"U {own:.1e} of {first.name}: {first.uncertainties[channel].how}"]
-    words += [f"E {error:.1e} to {other.name}" for other, error in zip(others, apart, strict=True)]
+    words += [f"E {error:.1e} to {other.name}{_as_witness(other, channel, until)}" for other, error in errors]
     return Known(
         uncertainty=_rounded_up(max(own, *apart, _floor(channel, first.channels, until))),
         scale=float(f"{signal_range(channel, first.channels[channel][:until]):.3g}"),
@@ -94,8 +97,14 @@ def _known(channel: str, routes: Sequence[RouteSignals], until: int) -> Known:
     )
 
 
+def _as_witness(route: RouteSignals, channel: str, until: int) -> str:
+    """What is said of a witness: how well it knows the channel itself."""
+    return f", a witness known to {_doubt(route, channel, until):.1e}" if route.witness else ""
+
+
 def _wanted(routes: Sequence[RouteSignals], patterns: Sequence[str]) -> list[str]:
     """The channels of the reference, in the order of the routes; those that only one route offers if asked for."""
+    routes = [route for route in routes if not route.witness]
     offered = list(dict.fromkeys(chain.from_iterable(route.channels for route in routes)))
     if not patterns:
         twice = [name for name in offered if sum(name in route.channels for route in routes) > 1]

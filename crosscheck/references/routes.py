@@ -1,7 +1,7 @@
-"""The routes to a reference: engines that run the variant at their efforts, and closed forms of the case's folder.
+"""The routes to a reference: engines that run the variant at their efforts, and files of the case's folder.
 
-Engines run as usual, by `sweep` and its workers. A closed form is Python code of the case's folder, which is executed
-only here.
+Engines run as usual, by `sweep` and its workers. A file has a closed form, or equations of its own; it is Python code,
+which is executed only here.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from crosscheck.judging.results import Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
+from crosscheck.library import basis
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
 from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
@@ -26,7 +27,7 @@ from crosscheck.running.job import MAIN
 from crosscheck.running.plan import jobs_at, plan
 from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import Listener, run_planned
-from flexmb.run.channels import family, magnitude
+from flexmb.run.channels import family, magnitude, matches
 from flexmb.scene.user_code import user_code_is_forbidden
 from flexmb.typing import Real
 
@@ -35,8 +36,8 @@ from flexmb.typing import Real
 class RouteSignals:
     """The result of a route at the reference's times: channels (T, k) with their U, in SI and World axes.
 
-    `title` describes the route. `engine` and its integrator `method` are "" for a closed form.
-    `made_with` is the engine's version.
+    `title` describes the route. `engine` and its integrator `method` are "" for a file of the case.
+    `made_with` is the engine's version. A `witness` has to agree, and does not say how well the numbers are known.
     """
 
     name: str
@@ -47,6 +48,7 @@ class RouteSignals:
     times: Real
     channels: Mapping[str, Real]
     uncertainties: Mapping[str, Uncertainty]
+    witness: bool = False
 
     def independent_of(self, other: RouteSignals) -> bool:
         """Whether the two are of different codes, or of one code by two engines with two integrators.
@@ -69,17 +71,17 @@ def run_routes(
 ) -> list[RouteSignals]:
     """The signals of every route of the recipe at `times` (T,); CaseError if a route gives none.
 
-    Closed forms are evaluated first, since they are fast and may have errors.
+    Files are evaluated first, since they may have errors.
     """
     found = {
-        place: _closed_form(case.folder / route.exact, route, times)
+        place: _of_file(case.folder / (route.exact or route.equations), route, times)
         for place, route in enumerate(recipe.routes)
-        if route.exact
+        if not route.engine
     }
     results = _engine_results(case, recipe, times, provider, limits, scheduler, listener)
     for place, route in enumerate(recipe.routes):
         if route.engine:
-            found[place] = _of_engine(case, results[_name(place)])
+            found[place] = _of_engine(case, route, results[_name(place)])
     return [found[place] for place in sorted(found)]
 
 
@@ -127,33 +129,40 @@ def _as_variant(variant: Variant, name: str, route: ReferenceRoute, times: Real)
     )
 
 
-def _of_engine(case: Case, result: Result) -> RouteSignals:
+def _of_engine(case: Case, route: ReferenceRoute, result: Result) -> RouteSignals:
     if result.status != "finished":
         what = f"{result.variant}, {result.engine}, {result.status}: {result.message}"
         raise CaseError(f"{case.folder / 'run.toml'}: [reference] {what}: correct the route, or take another")
     efforts = [run.effort for run in result.runs if run.effort_method == result.finest.effort_method]
     return RouteSignals(
         name=result.engine,
-        title=f"{result.engine}, {', '.join(efforts)}",
+        title=basis.title(result.engine, ", ".join(efforts), route.witness),
         engine=result.engine,
         method=result.finest.effort_method,
         made_with=_version(result.finest),
         times=result.times,
-        channels={name: result.values(name) for name in result.channels},
-        uncertainties={name: result.uncertainty(name) for name in result.channels},
+        channels={name: result.values(name) for name in result.channels if _given(route, name)},
+        uncertainties={name: result.uncertainty(name) for name in result.channels if _given(route, name)},
+        witness=route.witness,
     )
+
+
+def _given(route: ReferenceRoute, channel: str) -> bool:
+    return not route.channels or any(matches(pattern, channel) for pattern in route.channels)
 
 
 def _version(run: RunRecord) -> str:
     return f"{run.engine} {run.version}".strip()
 
 
-def _closed_form(file: Path, route: ReferenceRoute, times: Real) -> RouteSignals:
-    """Channels of a closed form, with U relative to the largest size in each channel's family."""
+def _of_file(file: Path, route: ReferenceRoute, times: Real) -> RouteSignals:
+    """Channels of a closed form, or of equations of the case's own, with U relative to the largest size in each
+    channel's family."""
     exact = _function(file)
     try:
         given = exact(times.copy())
-        channels = {name: np.array(values, float).reshape(len(times), -1) for name, values in given.items()}
+        kept = {name: values for name, values in given.items() if _given(route, name)}
+        channels = {name: np.array(values, float).reshape(len(times), -1) for name, values in kept.items()}
     except Exception as error:  # the file is anybody's
         raise CaseError(f"{file}: exact(times) failed: {type(error).__name__}: {error}") from None
     for name, values in channels.items():
@@ -162,12 +171,13 @@ def _closed_form(file: Path, route: ReferenceRoute, times: Real) -> RouteSignals
     sizes: dict[str, float] = {}
     for name, values in channels.items():
         sizes[family(name)] = max(sizes.get(family(name), 0.0), magnitude(name, values))
-    how = f"closed form, evaluated to {route.relative_uncertainty:g} of its size"
+    what = basis.CLOSED_FORM if route.exact else basis.OWN_EQUATIONS
+    how = f"{what}, evaluated to {route.relative_uncertainty:g} of its size"
     doubts = {name: route.relative_uncertainty * sizes[family(name)] for name in channels}
     floors = {name: roundoff_floor(sizes[family(name)], 1) for name in channels}
     return RouteSignals(
         name=file.name,
-        title=f"{file.name}, a closed form",
+        title=basis.title(file.name, what, route.witness),
         engine="",
         method="",
         made_with="",
@@ -177,6 +187,7 @@ def _closed_form(file: Path, route: ReferenceRoute, times: Real) -> RouteSignals
             name: Uncertainty(np.full(len(times), doubts[name] + floors[name]), doubts[name] + floors[name], how)
             for name in channels
         },
+        witness=route.witness,
     )
 
 

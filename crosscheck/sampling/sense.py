@@ -76,7 +76,7 @@ def _quantities(sweep: SweepFile, scene: Scene) -> Iterator[Defect]:
 def _items(scene: Scene) -> dict[str, list[str]]:
     """The names of the scene's items by kind of channel."""
     of = {
-        "marker": scene.markers, "load": (*scene.hinges, *scene.closures), "wheel_load": scene.wheels,
+        "marker": scene.markers, "load": (*scene.hinges, *scene.constraints), "wheel_load": scene.wheels,
         "connector": scene.connectors,
     }  # fmt: skip
     return {kind: [item.name for item in items] for kind, items in of.items()}

@@ -111,7 +111,7 @@ class Confirmation:
         highest, slow = highest_frequency(scene, model), self.cost.slow / (STAGES * self.bench.t_end)
         best, least = self.finely(model), self.run(model).operations
         short = self.run(model).evaluations < _FEW_EVALUATIONS
-        for ladder in ladders(highest, slow, algorithm, not scene.closures):
+        for ladder in ladders(highest, slow, algorithm, not scene.constraints):
             if short and INTEGRATORS[ladder[0].integrator].linearises:
                 continue
             before: RunMethod | None = None

@@ -1,4 +1,4 @@
-"""The closures of one scene as a Python object: accelerations and loads of the closed chain."""
+"""The closures and couplings of one scene as a Python object: accelerations and loads of the closed chain."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWor
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.response import Response, response
 from flexmb.levels.body import LEVELS
-from flexmb.scene.schema import Closure
+from flexmb.scene.schema import Closure, Coupling
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.state import Layout
 from flexmb.tables.status import CLOSURE_SINGULAR, OUT_OF_RANGE
@@ -31,6 +31,11 @@ SAME = 1e-7  # relative difference below which loads count as equal
 
 class ClosureError(ValueError):
     """Closures cannot be closed or allow no motion; the message names the closure, the gap and the remedy."""
+
+
+def called(item: Closure | Coupling) -> str:
+    """What messages call a closure or coupling."""
+    return f'{"coupling" if isinstance(item, Coupling) else "closure"} "{item.name}"'
 
 
 class Spread(NamedTuple):
@@ -77,7 +82,7 @@ class Closures:
 
     def __init__(
         self,
-        closures: Sequence[Closure],
+        closures: Sequence[Closure | Coupling],
         constants: Constants,
         own: ClosureConstants,
         layout: Layout,
@@ -341,11 +346,13 @@ class Closures:
         i = int(self.constants[1].row["closure"][np.argmax(np.abs(errors))])
         gap, angle = self._gap(i, "rate" if rates else "value")
         s = "/s" if rates else ""
-        return f'closure "{self.scene[i].name}" (gap {gap:.3g} m{s}, angle {angle:.3g} rad{s})'
+        return f"{called(self.scene[i])} (gap {gap:.3g} m{s}, angle {angle:.3g} rad{s})"
 
     def half_turned(self) -> Iterator[tuple[str, bool]]:
         """By closure, its name and whether axes that it keeps parallel are opposite."""
         for closure, state in zip(self.scene, self._own.closure, strict=True):
+            if isinstance(closure, Coupling):
+                continue
             R = state["rotation"].reshape(3, 3)
             about = {"weld": (1, 2), "prismatic": (1, 2), "universal": (), "spherical": ()}.get(closure.type, (2,))
             yield closure.name, any(R[i, i] < 0.0 for i in about)

@@ -9,9 +9,10 @@ import numpy as np
 
 from flexmb.building.links import BodyLink, closure_sides
 from flexmb.closure import tables as t
-from flexmb.closure.groups import clusters, group_tables, path
+from flexmb.closure.groups import clusters, group_tables, path, path_of_coupling
 from flexmb.scene import schema as s
 from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.tree import coupled
 from flexmb.tables.arrays import Constants
 
 # Suppressed rotations and translations, axes of frame A; z is the axis of a closure that has one.
@@ -27,11 +28,15 @@ SUPPRESSED = {
 
 
 def closure_constants(
-    scene: s.Scene, constants: Constants, ports: Sequence[tuple[int, int]]
+    scene: s.Scene, constants: Constants, ports: Sequence[tuple[int, int]], chain: list[BodyLink]
 ) -> t.ClosureConstants:
-    """Constants of a scene's closures; `ports`: (body, port) of both sides of each closure, (-1, -1) on the ground."""
-    sides = np.zeros((len(scene.closures), 2), t.SIDE)
-    closures = np.zeros(len(scene.closures), t.CLOSURE)
+    """Constants of a scene's closures and couplings.
+
+    ports: (body, port) of both sides of each closure, (-1, -1) on the ground.
+    """
+    sides = np.zeros((len(scene.constraints), 2), t.SIDE)
+    sides["body"] = t.ON_GROUND
+    closures = np.zeros(len(scene.constraints), t.CLOSURE)
     for i, closure in enumerate(scene.closures):
         for j, side in enumerate(closure_sides(closure)):
             sides[i, j]["body"], sides[i, j]["port"] = ports[2 * i + j]
@@ -39,10 +44,14 @@ def closure_constants(
                 sides[i, j]["position"] = side.offset
                 sides[i, j]["rotation"] = (rotation_matrix(side.quaternion) @ side.turn).ravel()
     parent = constants.body["parent"].tolist()
-    paths = [path(constants, parent, bodies) for bodies in sides["body"].tolist()]
+    paths = [path(constants, parent, bodies) for bodies in sides["body"][: len(scene.closures)].tolist()]
+    terms = _terms(scene, constants, chain, closures)
+    for i in range(len(scene.closures), len(closures)):
+        bodies = terms["body"][closures["term_start"][i] : closures["term_stop"][i]].tolist()
+        paths.append(path_of_coupling(parent, bodies))
     closures["path_stop"] = np.cumsum([len(each.bodies) for each in paths])
     closures["path_start"] = closures["path_stop"] - [len(each.bodies) for each in paths]
-    own = [_rows(i, closure) for i, closure in enumerate(scene.closures)]
+    own = [_rows(scene, i, each) for i, each in enumerate(scene.constraints)]
     members = clusters(constants, paths)
     rows: list[tuple[int, int, int]] = []
     for group, i in ((number, i) for number, each in enumerate(itertools.chain(*members)) for i in each):
@@ -55,6 +64,7 @@ def closure_constants(
     return t.ClosureConstants(
         side=sides,
         closure=closures,
+        term=terms,
         row=row_table,
         path=np.array([k for each in paths for k in each.bodies], np.int64),
         group=tables.groups,
@@ -62,11 +72,29 @@ def closure_constants(
         cluster=tables.clusters,
         weight=np.where(row_table["type"] == t.ROTATION, length, 1.0),
         length=np.array([length]),
+        kernels=constants.kernels,
     )
 
 
-def _rows(i: int, closure: s.Closure) -> list[tuple[int, int, int]]:
-    """(closure, type, axis) of the rows of closure number i."""
+def _terms(scene: s.Scene, constants: Constants, chain: list[BodyLink], closures: np.ndarray) -> np.ndarray:
+    """TERM of all couplings; their ranges and offsets to `closures`, where they come after the closures."""
+    held = {link.hinge.name: k for k, link in enumerate(chain)}
+    rows: list[tuple[int, int, float, int, int]] = []
+    for i, coupling in enumerate(scene.couplings, len(scene.closures)):
+        closures["offset"][i], closures["term_start"][i] = coupling.offset, len(rows)
+        for each in coupled(scene, coupling):
+            k = held[each.hinge.name]
+            speed = int(constants.body["u_index"][k]) + each.place
+            rows.append((int(constants.speed["coordinate"][speed]), speed, each.factor, k, each.place))
+        closures["term_stop"][i] = len(rows)
+    return np.array(rows, t.TERM)
+
+
+def _rows(scene: s.Scene, i: int, closure: s.Closure | s.Coupling) -> list[tuple[int, int, int]]:
+    """(closure, type, axis) of the rows of closure or coupling number i."""
+    if isinstance(closure, s.Coupling):
+        led = coupled(scene, closure)[0].named.coordinate
+        return [(i, t.ROTATION if led.ANGULAR else t.TRANSLATION, 0)]
     rotations, translations = SUPPRESSED[closure.type]
     turning = [(i, t.ROTATION, "xyz".index(axis)) for axis in rotations]
     return turning + [(i, t.TRANSLATION, "xyz".index(axis)) for axis in translations]

@@ -5,16 +5,18 @@ With the route `Recursion`, unit loads pass through the articulated-body quantit
 
 from flexmb.closure import generalised
 from flexmb.closure.branch import at_crossing, has_started, is_further, turned_over, unresolved
+from flexmb.closure.couplings import relieve_drives
 from flexmb.closure.factor import choose_rows, entry, factorise, solve, sum_rows
-from flexmb.closure.rows import evaluate_rows, load_on_b
-from flexmb.closure.tables import Recursion
-from flexmb.closure.unit_loads import apply_load, half_solve, pass_inward
+from flexmb.closure.rows import evaluate_rows
+from flexmb.closure.tables import COUPLINGS, Recursion
+from flexmb.closure.unit_loads import apply_rows, half_solve, pass_inward
 from flexmb.jain import hinge_solve, innovations
 from flexmb.jain.explicit import about_hinge
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.loads import drive_loads, hinge_loads
 from flexmb.jain.response import clear, read_speeds, write_speeds
 from flexmb.jain.sweeps import forward_dynamics, outward
+from flexmb.jit.features import has
 from flexmb.jit.kernel import by_bundle, helper, kernel, sweep
 from flexmb.motion.coordinates import load_state
 from flexmb.spatial.spatial_vector import add6, vec6
@@ -52,7 +54,7 @@ def _accelerate(route, s):
     c, w, cc, cw = s.c, s.w, s.cc, s.cw
     clear(c, cw.response)
     for i in range(cc.closure.shape[0]):
-        apply_load(c, w, cc, cw, i, load_on_b(cc, cw, i))
+        apply_rows(c, w, cc, cw, i)
     innovations.innovations(c, w, cw.response)
     for k in range(c.body.shape[0]):
         innovations.add_to_modes(c, w, cw.response, k)
@@ -60,6 +62,8 @@ def _accelerate(route, s):
         hinge_solve.add_innovations(c, w, cw.response, k)
     outward(c, w)
     drive_loads(c, w)
+    if has(cc, COUPLINGS):
+        relieve_drives(c, w, cc, cw)
 
 
 @helper

@@ -11,8 +11,8 @@ axes of the hinge: its components along the hinge's free motions are the loads o
 """
 
 from flexmb.closure.factor import row_place, sum_rows
-from flexmb.closure.rows import evaluate_rows, load_on_b
-from flexmb.closure.unit_loads import apply_load, apply_unit_load, write_columns
+from flexmb.closure.rows import evaluate_rows
+from flexmb.closure.unit_loads import apply_rows, apply_unit_load, write_columns
 from flexmb.jain import composite, innovations
 from flexmb.jain.accelerations import acceleration_sweep
 from flexmb.jain.inverse import inverse_dynamics
@@ -166,7 +166,7 @@ def hinge_and_drive_loads(route, s):
     inverse_dynamics(c, w, tau)
     clear(c, cw.response)
     for i in range(cc.closure.shape[0]):
-        apply_load(c, s.seen, cc, cw, i, load_on_b(cc, cw, i))
+        apply_rows(c, s.seen, cc, cw, i)
     for k in range(c.body.shape[0] - 1, -1, -1):
         innovations.project(c, s.seen, cw.response, k)
         F = vec6(cw.response.body[k].force, 0)

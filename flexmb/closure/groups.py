@@ -46,6 +46,16 @@ def path(c: Constants, parent: Sequence[int], bodies: Sequence[int]) -> LoadPath
     return LoadPath(frozenset((one | other) - carriers), frozenset(carriers))
 
 
+def path_of_coupling(parent: Sequence[int], bodies: Sequence[int]) -> LoadPath:
+    """The load path of a coupling of coordinates of the hinges that hold these bodies.
+
+    Carriers are the bodies that carry all of these hinges: their motion does not change the coordinates.
+    """
+    held = [_ancestors(parent, k) for k in bodies]
+    carriers = frozenset.intersection(*(frozenset(each - {k}) for each, k in zip(held, bodies, strict=True)))
+    return LoadPath(frozenset(_union(held)) - carriers, carriers)
+
+
 def _ancestors(parent: Sequence[int], k: int) -> set[int]:
     """A body and all bodies that carry it; bodies are numbered from the ground outward."""
     found = set()

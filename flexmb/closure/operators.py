@@ -16,7 +16,8 @@ class ClosureOperators:
 
         Lambda_inverse f = -opening,    udot = udot_0 + M^-1 J'f,    f = `loads`
 
-    rows (G,)               "<closure>.rotation.x" and so on, axes of frame A turned so that the closure's axis is z
+    rows (G,)               "<closure>.rotation.x" and so on, axes of frame A turned so that the closure's axis is z;
+                            "<coupling>.coordinate", the coordinate that is led less what leads it
     J (G,nu)                rates of the rows are J u, of all speeds
     Lambda_inverse (G,G)    J M^-1 J' of the free speeds, the inverse of the effective inertia of the tree at the
                             closures: row accelerations under unit row loads. Computed as B'B by the recursion
@@ -46,4 +47,8 @@ def _names(closures: Closures) -> tuple[str, ...]:
     kinds = ["rotation" if kind == ROTATION else "translation" for kind in own.row["type"]]
     owners = [closures.scene[i].name for i in own.row["closure"]]
     axes = ["xyz"[axis] for axis in own.row["axis"]]
-    return tuple(".".join(each) for each in zip(owners, kinds, axes, strict=True))
+    coupled = own.closure["term_stop"][own.row["closure"]] > 0
+    return tuple(
+        f"{owner}.coordinate" if one else f"{owner}.{kind}.{axis}"
+        for owner, kind, axis, one in zip(owners, kinds, axes, coupled, strict=True)
+    )

@@ -10,8 +10,10 @@ so that near R_AB = 1 the row is the component of the relative rotation about th
 R_AB b x a.
 """
 
-from flexmb.closure.tables import ON_GROUND, ROTATION
+from flexmb.closure.couplings import evaluate_coupling, is_coupling, measure_coupling
+from flexmb.closure.tables import COUPLINGS, ON_GROUND, ROTATION
 from flexmb.jain.ports import port_acceleration, port_velocity
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.spatial_vector import ZERO6, sub6, times6, times6_t
 from flexmb.spatial.vector import (
@@ -73,10 +75,14 @@ def evaluate_rows(c, w, cc, cw, accelerated):
     for j in range(w.u.shape[0]):
         fastest = max(fastest, abs(w.u[j]))
     for i in range(cc.closure.shape[0]):
-        p_WA, V_WA, V_WB = evaluate_closure(c, w, cc, cw, i, accelerated)
-        cw.closure[i].size = cc.length[0] + norm1(p_WA)
-        turns = norm1(V_WA[0]) + norm1(V_WB[0])
-        cw.closure[i].speed = norm1(V_WA[1]) + norm1(V_WB[1]) + cc.length[0] * (turns + fastest)
+        if has(cc, COUPLINGS) and is_coupling(cc, i):
+            evaluate_coupling(c, w, cc, cw, i, accelerated)
+            measure_coupling(w, cc, cw, i, fastest)
+        else:
+            p_WA, V_WA, V_WB = evaluate_closure(c, w, cc, cw, i, accelerated)
+            cw.closure[i].size = cc.length[0] + norm1(p_WA)
+            turns = norm1(V_WA[0]) + norm1(V_WB[0])
+            cw.closure[i].speed = norm1(V_WA[1]) + norm1(V_WB[1]) + cc.length[0] * (turns + fastest)
 
 
 @helper

@@ -11,16 +11,22 @@ Loads cancel in one more case. If a body's hinge is at a node that deforms, the 
 minus the reaction of the hinge. So the modal response to a unit load at the hinge is included; without it, the
 supported node of a flexible body would count as one that moves.
 
+The coordinates of a coupling take the place of ports: the scale of its row is the response to the load along each of
+them alone.
+
 Responses change little during a motion, compared with the seven decades between rounding and the threshold of
 independence (`flexmb.closure.factor.DEPENDENT`): they are computed when rows are counted, and kept for the run.
 """
 
 from math import sqrt
 
+from flexmb.closure.couplings import is_coupling
 from flexmb.closure.factor import norm, own_columns
 from flexmb.closure.forces import pass_load
+from flexmb.closure.tables import COUPLINGS
 from flexmb.closure.unit_loads import at_port, clear_path
 from flexmb.jain.ports import mode_motion
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.spatial_vector import dot6
 
@@ -34,16 +40,28 @@ def measure_ports(s):
     cc, cw = s.cc, s.cw
     for i in range(cc.closure.shape[0]):
         total = 0.0
-        for axis in _AXES:
-            for side in range(2):
-                total += (cc.length[0] * _response(s, i, cc.side[i, side], (axis, _ZERO))) ** 2
-                total += _response(s, i, cc.side[i, side], (_ZERO, axis)) ** 2
-            for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
-                if s.c.body[cc.path[j]].outboard_port >= 0:
-                    total += (cc.length[0] * _reaction(s, i, cc.path[j], (axis, _ZERO))) ** 2
-                    total += _reaction(s, i, cc.path[j], (_ZERO, axis)) ** 2
+        if has(cc, COUPLINGS) and is_coupling(cc, i):
+            for n in range(cc.closure[i].term_start, cc.closure[i].term_stop):
+                total += (cc.weight[cc.closure[i].row_start] * _of_term(s, i, n)) ** 2
+        else:
+            for axis in _AXES:
+                for side in range(2):
+                    total += (cc.length[0] * _response(s, i, cc.side[i, side], (axis, _ZERO))) ** 2
+                    total += _response(s, i, cc.side[i, side], (_ZERO, axis)) ** 2
+                for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
+                    if s.c.body[cc.path[j]].outboard_port >= 0:
+                        total += (cc.length[0] * _reaction(s, i, cc.path[j], (axis, _ZERO))) ** 2
+                        total += _reaction(s, i, cc.path[j], (_ZERO, axis)) ** 2
         for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
             cw.size[r] = sqrt(total)
+
+
+@helper
+def _of_term(s, i, n):
+    """|x| of the load along term n of coupling i alone."""
+    clear_path(s.c, s.cc, s.cw, i)
+    s.cw.response.speed[s.cc.term[n].speed] = s.cc.term[n].factor
+    return _passed(s, i)
 
 
 @helper

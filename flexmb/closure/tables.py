@@ -1,7 +1,8 @@
 """The arrays of closures: constants of a scene, and the workspace of one evaluation.
 
-C closures with G suppressed motions ("rows") in all, on N bodies with at most m modes and nu speeds. Frame A is on
-body_a (the inboard side), frame B on body_b, both turned so that an axis is z; rows are in A axes.
+C closures and couplings with G suppressed motions ("rows") in all, on N bodies with at most m modes and nu speeds.
+Frame A is on body_a (the inboard side), frame B on body_b, both turned so that an axis is z; rows are in A axes. A
+coupling, whose one row is a linear relation of coordinates, has terms in place of frames; couplings come last.
 
 Closures form K groups by the bodies that their loads move, and groups form L clusters by the bodies that carry them
 (`flexmb.closure.groups`); Lambda^-1 is block diagonal with a block for each cluster. Rows are numbered group by group,
@@ -16,11 +17,14 @@ import numpy as np
 from flexmb.jain.places import Matrices
 from flexmb.jain.response import Response, response
 from flexmb.jit.bundle import bundle
+from flexmb.jit.features import GENERAL
 from flexmb.tables.arrays import Constants, Workspace
+from flexmb.tables.features import EVERYTHING
 from flexmb.typing import Index, Real, Record
 
 ROTATION, TRANSLATION = range(2)
 ON_GROUND = -1  # body of a frame that is fixed in World
+COUPLINGS = "couplings"  # a feature of the constants, see `flexmb.jit.features`
 
 _F, _I = np.float64, np.int64
 
@@ -41,6 +45,16 @@ CLOSURE = _record(
     ("path_start", _I),  # range of `path`
     ("path_stop", _I),
     ("group", _I),
+    ("term_start", _I),  # of a coupling, range of `term`, the coordinate that is led first; empty for a closure
+    ("term_stop", _I),
+    ("offset", _F),  # of a coupling, rad or m
+)
+TERM = _record(
+    ("coordinate", _I),  # index in q
+    ("speed", _I),  # index in u
+    ("factor", _F),  # of the coordinate in the relation: 1 for the one that is led, minus the ratio for the others
+    ("body", _I),  # that the hinge holds
+    ("place", _I),  # number of the speed in the hinge
 )
 GROUP = _record(
     ("row_start", _I),  # range of rows, also in the order of pivots
@@ -59,7 +73,7 @@ CLUSTER = _record(
 )
 ROW = _record(
     ("closure", _I),
-    ("type", _I),  # ROTATION or TRANSLATION
+    ("type", _I),  # ROTATION or TRANSLATION; of a coupling, whether the coordinate that is led is an angle
     ("axis", _I),  # 0, 1, 2
 )
 
@@ -68,8 +82,9 @@ ROW = _record(
 class ClosureConstants:
     """Constants of a run."""
 
-    side: Record  # (C,2) SIDE, A then B
+    side: Record  # (C,2) SIDE, A then B; without meaning for couplings
     closure: Record  # (C,) CLOSURE
+    term: Record  # TERM, of all couplings
     row: Record  # (G,) ROW
     path: Index  # bodies between a closure and the ground, outermost first
     group: Record  # (K,) GROUP
@@ -77,11 +92,18 @@ class ClosureConstants:
     cluster: Record  # (L,) CLUSTER
     weight: Real  # (G,) to compare rows: 1 for translations, `length` for rotations
     length: Real  # (1,) m, a length of the scene
+    kernels: Index  # (1,) of the tree, `flexmb.tables.features`
+
+    def features(self) -> frozenset[str]:
+        """Whether kernels for these constants contain couplings; general ones do."""
+        if self.kernels[0] == EVERYTHING:
+            return frozenset({GENERAL})
+        return frozenset({COUPLINGS}) if len(self.term) else frozenset()
 
 
 ROW_STATE = _record(
-    ("direction", _F, (3,)),  # unit load of the row: torque or force on B, A axes
-    ("value", _F),  # g: 0 where the closure is closed (m, or sine of an angle)
+    ("direction", _F, (3,)),  # unit load of the row: torque or force on B, A axes; of a coupling in axes of the body
+    ("value", _F),  # g: 0 where the closure is closed (m, or sine of an angle; of a coupling m or rad)
     ("rate", _F),  # J u
     ("acceleration", _F),  # J udot + Jdot u
     ("load", _F),  # constraint load along `direction`
@@ -89,7 +111,7 @@ ROW_STATE = _record(
 CLOSURE_STATE = _record(
     ("rotation", _F, (9,)),  # R_A_B
     ("position", _F, (3,)),  # of B in A
-    ("world", _F, (9,)),  # R_World_A
+    ("world", _F, (9,)),  # R_World_A; of a coupling that of the body on the hinge that is led
     ("size", _F),  # m, scale of row values: the scene's length and the distance from the origin
     ("speed", _F),  # m/s, scale of row rates: speeds of the ports, and the fastest of the scene
     ("former_speed", _F),  # `speed` at the last accepted state, `flexmb.closure.branch`

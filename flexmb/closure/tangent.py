@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexmb.closure.couplings import evaluate_coupling, is_coupling
 from flexmb.closure.rows import evaluate_closure, load_on_b
-from flexmb.closure.tables import CLOSURE_STATE, ON_GROUND, ROW_STATE, ClosureConstants
+from flexmb.closure.tables import CLOSURE_STATE, COUPLINGS, ON_GROUND, ROW_STATE, ClosureConstants
 from flexmb.jain.balance import power
 from flexmb.jain.forces import add_port_force
 from flexmb.jain.kinematics import pose_sweep
@@ -26,6 +27,7 @@ from flexmb.jain.loads import drive_loads
 from flexmb.jain.sweeps import bodies, inward, outward
 from flexmb.jit.bundle import bundle
 from flexmb.jit.duals import DUAL, rate, seeded
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.jit.lanes import LANES
 from flexmb.jit.wide_arrays import as_duals
@@ -106,24 +108,36 @@ def evaluate(c, w, cc, cw):
         return status
     pose_sweep(c, w)
     for i in range(cc.closure.shape[0]):
-        evaluate_closure(c, w, cc, cw, i, False)
+        _row_motion(c, w, cc, cw, i, False)
         _apply(c, w, cc, cw, i)
     if not inward(c, w):
         return NOT_POSITIVE_DEFINITE
     outward(c, w)
     for i in range(cc.closure.shape[0]):
-        evaluate_closure(c, w, cc, cw, i, True)
+        _row_motion(c, w, cc, cw, i, True)
     drive_loads(c, w)
     store_slope(c, w, power(c, w), w.slope)
     return OK
 
 
 @helper
+def _row_motion(c, w, cc, cw, i, accelerated):
+    if has(cc, COUPLINGS) and is_coupling(cc, i):
+        evaluate_coupling(c, w, cc, cw, i, accelerated)
+    else:
+        evaluate_closure(c, w, cc, cw, i, accelerated)
+
+
+@helper
 def _apply(c, w, cc, cw, i):
-    """Add the loads of closure i to the body of B, and the opposite ones to that of A."""
-    F = load_on_b(cc, cw, i)
-    _add_load(c, w, cc.side[i, 1], times6_t(mat3(cw.closure[i].rotation, 0), F))
-    _add_load(c, w, cc.side[i, 0], scale6(-1.0, shift_force(F, vec3(cw.closure[i].position, 0))))
+    """Add the loads of closure i to the body of B, and the opposite ones to that of A; of a coupling to its speeds."""
+    if has(cc, COUPLINGS) and is_coupling(cc, i):
+        for n in range(cc.closure[i].term_start, cc.closure[i].term_stop):
+            w.speed[cc.term[n].speed].applied += cc.term[n].factor * cw.row[cc.closure[i].row_start].load
+    else:
+        F = load_on_b(cc, cw, i)
+        _add_load(c, w, cc.side[i, 1], times6_t(mat3(cw.closure[i].rotation, 0), F))
+        _add_load(c, w, cc.side[i, 0], scale6(-1.0, shift_force(F, vec3(cw.closure[i].position, 0))))
 
 
 @helper

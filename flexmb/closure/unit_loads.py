@@ -6,10 +6,13 @@ innovations of J'f are x = D^-1/2 (1 - H Psi K) J'f, Jain & Rodriguez (55), foun
 J M^-1 J' = B'B from unit loads, without M, and a load passes only the bodies between its node and the ground.
 """
 
+from flexmb.closure.couplings import apply_to_speeds, is_coupling
 from flexmb.closure.factor import row_place
-from flexmb.closure.tables import ON_GROUND, ROTATION
+from flexmb.closure.rows import load_on_b
+from flexmb.closure.tables import COUPLINGS, ON_GROUND, ROTATION
 from flexmb.jain.innovations import innovate
 from flexmb.jain.response import clear_body, push
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.spatial_vector import scale6, shift_force, times6, times6_t
 from flexmb.spatial.vector import mat3, vec3
@@ -54,8 +57,20 @@ def clear_path(c, cc, cw, i):
 def apply_unit_load(c, w, cc, cw, i, r):
     """Set the forces to the unit load of row r of closure i alone."""
     clear_path(c, cc, cw, i)
-    direction, zero = vec3(cw.row[r].direction, 0), (0.0, 0.0, 0.0)
-    apply_load(c, w, cc, cw, i, (direction, zero) if cc.row[r].type == ROTATION else (zero, direction))
+    if has(cc, COUPLINGS) and is_coupling(cc, i):
+        apply_to_speeds(cc, cw.response, i, 1.0)
+    else:
+        direction, zero = vec3(cw.row[r].direction, 0), (0.0, 0.0, 0.0)
+        apply_load(c, w, cc, cw, i, (direction, zero) if cc.row[r].type == ROTATION else (zero, direction))
+
+
+@helper
+def apply_rows(c, w, cc, cw, i):
+    """Add the loads of the rows of closure i to the forces."""
+    if has(cc, COUPLINGS) and is_coupling(cc, i):
+        apply_to_speeds(cc, cw.response, i, cw.row[cc.closure[i].row_start].load)
+    else:
+        apply_load(c, w, cc, cw, i, load_on_b(cc, cw, i))
 
 
 @helper

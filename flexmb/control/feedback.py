@@ -72,7 +72,7 @@ class Feedback:
             where[a.MARKERS], where[a.TREE], where[a.TREE_WORKSPACE], _ = addresses(
                 sense_markers, VOID, REAL, VECTOR, self._tree, self._tree_workspace, self._outputs
             )
-        if algorithm.observing is not None and not plant.scene.closures:
+        if algorithm.observing is not None and not plant.scene.constraints:
             where[a.OBSERVING], *_ = addresses(algorithm.observing, VOID, constants, workspace, self._outputs)
         self._leaping = route.leaping
         if route.leaping is not None:
@@ -83,7 +83,7 @@ class Feedback:
         self._called = self._callbacks()
         self._loads, self._drives = self._outputs.loads, self._outputs.drives
         if np.any(self._wiring.sensor["kind"] >= a.LOAD) and not where[a.OBSERVING]:
-            self._loads = np.zeros((len(plant.observation.names.hinges) + len(plant.scene.closures), 6))
+            self._loads = np.zeros((len(plant.observation.names.hinges) + len(plant.scene.constraints), 6))
             self._called.append(Called(self._find_loads, ()))
             where[a.ASKING] = self._called[-1].address
         self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # else set by Python

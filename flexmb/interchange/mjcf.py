@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming
+from flexmb.interchange.mjcf_couplings import JOINT, TENDON, MjcfCouplings, tendon_that_acts
 from flexmb.interchange.mjcf_text import refuse_bad_text
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.quaternions import rotation_matrix
@@ -25,11 +26,12 @@ FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
 def read_mjcf(path: str | os.PathLike[str]) -> ImportedScene:
     """The rigid tree of an MJCF file (or of a URDF file, as MuJoCo reads it), at its reference pose and at rest.
 
-    Springs and dampers of joints are included. Contacts, limits, dry friction, actuators and sensors are omitted, and
-    the notes list them. Raises ImportError without MuJoCo; ModelError for a file that MuJoCo refuses, for numbers that
+    Springs and dampers of joints are included; linear equality constraints between joints or of fixed tendons become
+    couplings. Contacts, limits, dry friction, actuators, sensors and tendons without springs are omitted, and the notes
+    list them. Raises ImportError without MuJoCo; ModelError for a file that MuJoCo refuses, for numbers that
     are not finite, which MuJoCo would replace by defaults (`flexmb.interchange.mjcf_text`), and for elements that
-    change the motion and have no counterpart in a scene: equality constraints, tendons, rotor inertia, fluids, flexible
-    parts.
+    change the motion and have no counterpart in a scene: other equality constraints, tendons with springs, rotor
+    inertia, fluids, flexible parts.
     """
     try:
         import mujoco
@@ -50,12 +52,14 @@ class _Model:
     def __init__(self, file: str, m: Any) -> None:
         self.file, self.m = file, m
         self._refuse()
+        self.couplings = MjcfCouplings(m, [self._joint_name(j) for j in range(m.njnt)], self._fail)
 
     def scene(self) -> ImportedScene:
         m = self.m
         builder = SceneBuilder(Path(self.file).stem, gravity=m.opt.gravity)
         for k in range(1, m.nbody):
             self._body(builder, k)
+        self.couplings.couple(builder)
         return ImportedScene(builder.scene(), tuple(self._notes()))
 
     def _body(self, builder: SceneBuilder, k: int) -> None:
@@ -94,7 +98,10 @@ class _Model:
         place = int(m.jnt_qposadr[j])
         rest = float(m.qpos_spring[place] - m.qpos0[place])
         make = builder.prismatic if kind == SLIDE else builder.revolute
-        make(name, parent, child, axis=m.jnt_axis[j], stiffness=stiffness, rest=rest, damping=damping, **frames)
+        make(
+            name, parent, child, axis=m.jnt_axis[j], stiffness=stiffness, rest=rest, damping=damping,
+            prescribed=self.couplings.held.get(j), **frames,
+        )  # fmt: skip
 
     def _body_name(self, k: int) -> str:
         if k == 0:
@@ -109,13 +116,15 @@ class _Model:
         """ModelError for elements that change the motion and have no counterpart in a scene."""
         m = self.m
         for count, what, remedy in (
-            (m.neq, "equality constraints", "remove them, and add closures to the scene"),
-            (m.ntendon, "tendons", "remove them, or give the joints springs"),
+            (int(np.sum((m.eq_type != JOINT) & (m.eq_type != TENDON))), "equality constraints between bodies",
+             "remove them, and add closures to the scene"),
             (getattr(m, "nflex", 0), "flexible parts", "remove them, and add flexible bodies to the scene"),
             (m.npluginstate, "plugins", "remove them"),
         ):
             if count:
                 self._fail(f"it has {count} {what}, which scenes do not support", remedy)
+        if acts := tendon_that_acts(m):
+            self._fail(f"{acts}, which scenes do not support", "remove it, or give the joints springs")
         for dof in np.flatnonzero(m.dof_armature):
             joint = self._joint_name(int(m.dof_jntid[dof]))
             self._fail(
@@ -144,6 +153,12 @@ class _Model:
             found.append(f"limits of joints are left out: {listed(limited)}")
         if rough := [joints[j] for j in sorted({int(m.dof_jntid[i]) for i in np.flatnonzero(m.dof_frictionloss)})]:
             found.append(f"dry friction is left out: {listed(rough)}")
+        if idle := [str(m.tendon(k).name) or f"tendon {k}" for k in range(m.ntendon)]:
+            found.append(f"limits, friction and actuators of tendons are left out: {listed(idle)}")
+        if self.couplings.count:
+            found.append("equality constraints of coordinates are exact here, and springs and dampers in MuJoCo")
+        if self.couplings.inactive:
+            found.append(f"inactive equality constraints are left out: {listed(self.couplings.inactive)}")
         if m.nu:
             found.append(f"{m.nu} actuators are left out, with the forces of servos at zero control")
         if moved := [joints[j] for j in range(m.njnt) if m.jnt_type[j] > BALL and m.qpos0[m.jnt_qposadr[j]] != 0.0]:

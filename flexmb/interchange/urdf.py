@@ -12,11 +12,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NoReturn
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming, usable
+from flexmb.interchange.urdf_mimic import Mimics
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.options import Placement
 from flexmb.scene.quaternions import about, quaternion_of
@@ -39,8 +41,9 @@ def read_urdf(
     The root link is welded to the ground, or free with `free_base`; its initial frame is that of the World. Many
     published robots have inertia tensors that no body can have. They raise a SceneError, or with `repair` are changed
     by the least amount that makes them possible, and a note lists them. Limits, damping, friction, shapes and
-    transmissions are omitted; notes list limits, damping and friction. Raises ModelError for a file that is not URDF,
-    has no unique root, or has mimic joints; SceneError for impossible inertia; OSError.
+    transmissions are omitted; notes list limits, damping and friction. Mimic joints become couplings, and start where
+    the joints that they mimic are at zero. Raises ModelError for a file that is not URDF or has no unique root;
+    SceneError for impossible inertia; OSError.
     """
     with naming(str(path)):
         return _Robot(str(path), _parsed(Path(path)), repair).scene(gravity, free_base)
@@ -51,16 +54,24 @@ def _parsed(path: Path) -> ElementTree.Element:
         text = read_text(path)
         if "<!ENTITY" in text:
             raise ModelError(f"{path}: it declares entities, which no URDF needs: remove them")
-        root = ElementTree.fromstring(text)
+        root = _elements(text)
     except Unreadable as error:
         raise ModelError(f"{path}: {error}") from None
-    except ElementTree.ParseError as error:
+    except expat.ExpatError as error:
         raise ModelError(f"{path}: not XML ({error}): correct it there") from None
-    if any(each.tag.startswith("{") and "xacro" in each.tag for each in root.iter()):
+    if any(each.tag.startswith("xacro:") for each in root.iter()):
         raise ModelError(f"{path}: it has xacro macros: expand them first, by the command xacro")
     if root.tag != "robot":
         raise ModelError(f'{path}: the outermost element is "{root.tag}", not "robot": is it a URDF file?')
     return root
+
+
+def _elements(text: str) -> ElementTree.Element:
+    """The outermost element. Names keep their prefixes: many files have extensions whose prefix they do not declare."""
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.Parse(text, True)
+    return builder.close()
 
 
 class _Robot:
@@ -70,6 +81,7 @@ class _Robot:
         self.file, self.robot, self.repair = file, robot, repair
         self.links = self._named("link")
         self.joints = self._named("joint")
+        self.mimics = Mimics(self.joints, self._fail)
         self.ignored: dict[str, list[str]] = {}
         self.repaired: list[str] = []
 
@@ -85,6 +97,7 @@ class _Robot:
         (builder.free if free_base else builder.weld)(base, GROUND, self._body_of(root))
         for name, joint in self.joints.items():
             self._hinge(builder, name, joint)
+        self.mimics.couple(builder)
         return ImportedScene(builder.scene(), tuple(self._notes()))
 
     def _named(self, tag: str) -> dict[str, ElementTree.Element]:
@@ -144,9 +157,6 @@ class _Robot:
     def _hinge(self, builder: SceneBuilder, name: str, joint: ElementTree.Element) -> None:
         place, kind = f'joint "{name}"', joint.get("type", "")
         parent, child = (self._body_of(self._link_of(name, joint, end)) for end in ("parent", "child"))
-        if joint.find("mimic") is not None:
-            what = "it mimics another joint, which hinges of a scene cannot do"
-            self._fail(place, what, "prescribe both coordinates, or close the mechanism by a closure")
         R, p = self._origin(place, joint)
         at: Placement = {"parent_position": p, "parent_quaternion": quaternion_of(R)}
         axis = self._axis(place, joint) if kind in ("revolute", "continuous", "prismatic", "planar") else Z
@@ -154,9 +164,9 @@ class _Robot:
             case "fixed":
                 builder.weld(name, parent, child, **at)
             case "revolute" | "continuous":
-                builder.revolute(name, parent, child, axis=axis, **at)
+                builder.revolute(name, parent, child, axis=axis, angle=self.mimics.value(name), **at)
             case "prismatic":
-                builder.prismatic(name, parent, child, axis=axis, **at)
+                builder.prismatic(name, parent, child, axis=axis, position=self.mimics.value(name), **at)
             case "floating":
                 builder.free(name, parent, child, **at)
             case "planar":  # in the plane across the axis: z of turned frames on both sides
@@ -211,6 +221,8 @@ class _Robot:
             yield f"elements that URDF does not define are left out: {listed(others)}"
         if self.repaired:
             yield f"impossible inertia tensors were changed by the least amount: {listed(self.repaired)}"
+        if fixed := self.mimics.on_fixed:
+            yield f"fixed joints mimic nothing: {listed(fixed)}"
         if empty := [name for name, link in self.links.items() if link.find("inertial") is None]:
             yield f"links without inertia are bodies without mass: {listed(empty)}"
 

@@ -50,7 +50,7 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     """
     prescribed = np.flatnonzero(system.constants.speed["prescribed"] >= 0).tolist()
     places = sorted({*prescribed, *speeds})
-    rows = _rows(system, state) if system.scene.closures else None
+    rows = _rows(system, state) if system.scene.constraints else None
     along = np.eye(system.nu)[places] if rows is None else np.vstack([np.eye(system.nu)[places], rows.jacobian])
     change = -along @ state.u
     change[: len(places)] = [speeds.get(j, state.u[j]) - state.u[j] for j in places]
@@ -71,7 +71,8 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     if rows is None:
         return Struck(u, dict(zip(places, held.tolist(), strict=True)), energy, {})
     others = np.linalg.svd(half / size)[2][rank:] / size  # impulses that change no speed
-    wrenches = np.array([rows.wrenches(each[len(places) :]) for each in others]).reshape(len(others), -1, 6)
+    changes = [rows.wrenches(each[len(places) :]) for each in others]
+    wrenches = np.array(changes).reshape(len(others), len(system.scene.constraints), 6)
     rounding = SAME * float(np.max(np.abs(others), initial=0.0))
     closures = _determined(rows.wrenches(impulses[len(places) :]), wrenches, rounding)
     held = _determined(held, others[:, : len(places)], rounding)
@@ -101,7 +102,7 @@ def _sizes(half: Real, coordinates: int) -> Real:
 
 
 def _by_name(system: System, wrenches: Real) -> dict[str, Real]:
-    return {closure.name: wrench for closure, wrench in zip(system.scene.closures, wrenches, strict=True)}
+    return {closure.name: wrench for closure, wrench in zip(system.scene.constraints, wrenches, strict=True)}
 
 
 def _unavoidable(moved: Real, moving: float, opening: Real) -> float:

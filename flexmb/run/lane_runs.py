@@ -134,7 +134,7 @@ class BatchRun:
         last, solve = None, None
         for copy in copies:
             system = self._batch.system(copy)
-            if solve is None or system is not last or system.scene.closures:  # closed chains store their branch
+            if solve is None or system is not last or system.scene.constraints:  # closed chains store their branch
                 last, solve = system, Alone(system, self._settings.integrator)
             [ends] = self._copies_ends([copy])
             found.counts[copy, :STOP], found.out[copy] = 0, np.nan
@@ -149,7 +149,7 @@ class Alone:
     def __init__(self, system: System, method: Integrator) -> None:
         self._method = method
         self._whole: Integration | None = None
-        if system.scene.controllers or system.scene.closures or method.linearises:
+        if system.scene.controllers or system.scene.constraints or method.linearises:
             self._own = fresh_copy(system) if system.scene.controllers else system  # controllers write into its tables
             self._whole = Integration(self._own, algorithms.chosen("articulated"), self._own.route(), method)
         else:  # all modes are eliminated explicitly, as in lanes, so that both give the same results

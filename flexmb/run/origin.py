@@ -74,7 +74,7 @@ def _taken_up(system: System, restart: Restart, method: str) -> Beginning:
     restart = fitting(system, restart, method)
     y = restart.memory.y.copy()
     t, motion = system.layout.whole(restart.since, np.r_[y[: system.nq + system.nu], y[-1]])
-    if system.scene.closures:
+    if system.scene.constraints:
         _count_rows(system, t, motion)
     is_anew = restart.events is not None and restart.events.anew
     return Beginning(

@@ -90,7 +90,7 @@ class Integration:
             route.leaping.watch_steps(constants, not integrator.linearises)
         self.batch: Sampler | None = None
         """Evaluates the outputs of many samples at once, in compiled code."""
-        self._batched = algorithm.observing is not None and not system.scene.closures
+        self._batched = algorithm.observing is not None and not system.scene.constraints
         if self._batched and self.feedback is None:
             moving = route.rhs, constants, self._workspace
             self.batch = batch(system, moving, algorithm.observing, system.nq + system.nu + 1)

@@ -49,7 +49,7 @@ def refuse_too_many(samples: int, system: System) -> None:
 def sample_bytes(system: System) -> int:
     """Upper bound (bytes) of the memory for one output time of a run."""
     scene = system.scene
-    loaded = (scene.hinges, scene.wheels, scene.closures, scene.point_masses, scene.connectors)
+    loaded = (scene.hinges, scene.wheels, scene.constraints, scene.point_masses, scene.connectors)
     places = sum(map(len, loaded))
     numbers = system.nq + 3 * system.nu + 24 * len(scene.markers) + 6 * places + 11
     return _NUMBER_BYTES * numbers + _SAMPLE_BYTES

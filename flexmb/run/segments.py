@@ -71,7 +71,7 @@ class Segments:
         stop, due = self._agenda.next_stop(begin.state.t)
         again = begin._replace(y=begin.y.copy())
         segment = self._to(stop, begin, due)
-        if due and self._situation.system.scene.closures:
+        if due and self._situation.system.scene.constraints:
             early = too_near(self._situation, self._left, segment.raw, again.state.t, stop)
             if early:
                 segment = self._to(stop - early, again, due)

@@ -171,7 +171,7 @@ def _again(stage: RunPart, state: Given, algorithm: Algorithm, stabilise: float,
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
     """NotImplementedError if a method that needs Jacobians is used where there are none."""
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
-    if system.scene.closures:
+    if system.scene.constraints:
         from flexmb.system.closed import ClosedSystem  # imported here because trees do not need it
 
         assert isinstance(system, ClosedSystem)

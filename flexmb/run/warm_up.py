@@ -77,7 +77,7 @@ def warm_up(
     for each in scenes:
         if isinstance(each, Scene):
             with asking("special"):
-                system = _compile(each, "closed" if each.closures else "tree", methods, algorithms)
+                system = _compile(each, "closed" if each.constraints else "tree", methods, algorithms)
             note_warm(contained(system.constants))
         else:
             with asking("general"):
@@ -108,7 +108,7 @@ def _runs(kind: Kind, algorithm: Algorithm, method: Method) -> bool:
 def _pointwise(system: System) -> None:
     state = system.initial_state
     rates = system.accelerations(state)
-    if not system.scene.closures:
+    if not system.scene.constraints:
         system.inverse_dynamics(state, rates)
     system.mass_matrix(state)
 

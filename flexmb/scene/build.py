@@ -315,3 +315,16 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         return self._append(
             s.Closure, name=name, type=type, body_a=body_a, body_b=body_b, axis=axis, **frames
         )
+
+    def coupling(
+        self, name: str, hinge: str, ratios: Mapping[str, float] | Mapping[str | tuple[str, str], float], *,
+        coordinate: str = "", offset: float = 0.0,
+    ) -> Self:  # fmt: skip
+        """A linear relation of hinge coordinates, q = `offset` + sum of ratio_i q_i: a gear, belt, rack or linkage.
+
+        q is the coordinate of `hinge`, in rad or m. `ratios` by the hinge of q_i, or by (hinge, coordinate) where the
+        hinge has several, in units of q per unit of q_i.
+        """
+        named = [((key, "") if isinstance(key, str) else key, ratio) for key, ratio in ratios.items()]
+        terms = [{"hinge": at, "coordinate": which, "ratio": ratio} for (at, which), ratio in named]
+        return self._append(s.Coupling, name=name, hinge=hinge, coordinate=coordinate, terms=terms, offset=offset)

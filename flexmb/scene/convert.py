@@ -15,7 +15,8 @@ Struct = TypeVar("Struct")
 
 ROOT = Place()
 KINDS = {
-    "bodies": "body", "hinges": "hinge", "closures": "closure", "connectors": "connector", "wheels": "wheel",
+    "bodies": "body", "hinges": "hinge", "closures": "closure", "couplings": "coupling", "connectors": "connector",
+    "wheels": "wheel",
     "point_masses": "point mass", "loads": "load", "markers": "marker", "modal_states": "modal state of body",
     "nodes": "node", "sensors": "sensor", "controllers": "controller", "events": "event",
 }  # fmt: skip

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
-from flexmb.scene import connectors, hinges
+from flexmb.scene import connectors, couplings, hinges
 from flexmb.scene.bodies import (
     ZERO,
     BeamBody,
@@ -48,6 +48,8 @@ from flexmb.scene.control import (
     TimeSensor,
     UserLaw,
 )
+from flexmb.scene.couplings import *  # noqa: F403
+from flexmb.scene.couplings import Coupling
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
 from flexmb.scene.freedoms import AngularCoordinate, Freedom, LinearCoordinate, MotionKeys, ScalarFreedom
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
@@ -167,6 +169,7 @@ class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
     bodies: tuple[Body, ...]
     hinges: tuple[Hinge, ...]
     closures: tuple[Closure, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
     connectors: tuple[Connector, ...] = ()
     wheels: tuple[Wheel, ...] = ()
     point_masses: tuple[PointMass, ...] = ()
@@ -176,6 +179,11 @@ class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
     sensors: tuple[Sensor, ...] = ()
     controllers: tuple[Controller, ...] = ()
     events: tuple[SceneEvent, ...] = ()
+
+    @property
+    def constraints(self) -> tuple[Closure | Coupling, ...]:
+        """All that makes a tree a closed chain: closures, then couplings."""
+        return (*self.closures, *self.couplings)
 
     def with_values(self, values: Mapping[str, Any]) -> Scene:
         """The scene with other values, for sweeps and stages: `scene.with_values({"rod.mass_kg": 2.0})`.
@@ -196,3 +204,4 @@ __all__ = [
 ]  # fmt: skip
 __all__ += hinges.__all__
 __all__ += connectors.__all__
+__all__ += couplings.__all__

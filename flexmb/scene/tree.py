@@ -11,6 +11,7 @@ from flexmb.scene import control as c
 from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, SidBody, Vector
 from flexmb.scene.columns import struct_keys
 from flexmb.scene.connectors import AlongHinge, AngularFriction
+from flexmb.scene.couplings import CoupledCoordinate, Coupling
 from flexmb.scene.events import Impact
 from flexmb.scene.freedoms import AngularCoordinate, Coordinate, LinearCoordinate
 from flexmb.scene.hinges import Hinge
@@ -168,6 +169,39 @@ def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMas
     if names:
         raise ValueError(f'"{item.name}" has more than one {sort}, {", ".join(names)}: say which coordinate is meant')
     raise ValueError(f'"{item.name}" has no {sort} "{connector.coordinate}"'.replace(' ""', ""))
+
+
+class Coupled(NamedTuple):
+    """A coordinate in a relation: its hinge, its number among the hinge's scalar ones, and its factor in the relation
+    sum of factor_i q_i = offset."""
+
+    hinge: Hinge
+    place: int
+    named: NamedCoordinate
+    factor: float
+
+
+def coupled(scene: Scene, coupling: Coupling) -> tuple[Coupled, ...]:
+    """The coordinates of a coupling, the one that is led first; ValueError where one is not determined."""
+    hinges = {hinge.name: hinge for hinge in scene.hinges}
+    led = _coupled(hinges, coupling, 1.0)
+    return led, *(_coupled(hinges, term, -term.ratio) for term in coupling.terms)
+
+
+def _coupled(hinges: dict[str, Hinge], item: Coupling | CoupledCoordinate, factor: float) -> Coupled:
+    hinge = hinges.get(item.hinge)
+    if hinge is None:
+        raise ValueError(f'there is no hinge "{item.hinge}"')
+    scalar = coordinates(hinge)
+    found = [(n, each) for n, each in enumerate(scalar) if item.coordinate in ("", each.name)]
+    if len(found) == 1:
+        return Coupled(hinge, *found[0], factor)
+    names = ", ".join(each.name for each in scalar)
+    if not scalar:
+        raise ValueError(f'hinge "{item.hinge}" of type {hinge.__struct_config__.tag} has no scalar coordinate')
+    if found:
+        raise ValueError(f'hinge "{item.hinge}" has more than one coordinate, {names}: say which is meant')
+    raise ValueError(f'hinge "{item.hinge}" has no coordinate "{item.coordinate}"; it has {names}')
 
 
 def watches_signals(scene: Scene) -> bool:

@@ -91,7 +91,7 @@ class Batch:
         self.shares_constants = len(self.systems) == 1
         first = self.systems[0]
         self.layout, self.nq, self.nu = first.layout, first.nq, first.nu
-        self.in_lanes = not first.scene.closures
+        self.in_lanes = not first.scene.constraints
         self._constants: list[Constants] = [first.constants]
         self._spare: list[LaneTables] = []
         if self.in_lanes and not self.shares_constants:
@@ -241,10 +241,10 @@ def _refuse_other_structure(i: int, system: FreeMotion, first: FreeMotion) -> No
         raise ValueError(
             f"scene {i} has another structure than scene 0: they differ in the coordinates of {', '.join(strange[:3])}"
         )
-    if system.scene.closures or first.scene.closures:
-        if system.scene.closures and first.scene.closures:
+    if system.scene.constraints or first.scene.constraints:
+        if system.scene.constraints and first.scene.constraints:
             return
-        raise ValueError(f"scene {i} has another structure than scene 0: only one of them has closures")
+        raise ValueError(f"scene {i} has another structure than scene 0: only one of them has closures or couplings")
     difference = structural_difference(first.constants, system.constants)
     if difference is not None:
         raise ValueError(f"scene {i} has another structure than scene 0: they differ in {difference}")

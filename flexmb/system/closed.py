@@ -16,7 +16,7 @@ from flexmb.closure import jacobian as closed_jacobian
 from flexmb.closure.asked import NOTHING_ASKED, AskedFor
 from flexmb.closure.assembly import consistent
 from flexmb.closure.branch import noticed, watch_steps
-from flexmb.closure.closures import ClosedMotion, ClosureError, Closures, Spread
+from flexmb.closure.closures import ClosedMotion, ClosureError, Closures, Spread, called
 from flexmb.closure.constants import closure_constants, slowest_mode
 from flexmb.closure.jacobian import chain_tangent
 from flexmb.closure.leap import back, beside, leap
@@ -58,9 +58,9 @@ class ClosedSystem(System):
 
     def __init__(self, scene: s.Scene) -> None:
         super().__init__(scene)
-        own = closure_constants(scene, self.constants, self.closure_ports)
+        own = closure_constants(scene, self.constants, self.closure_ports, self.links)
         slowest = slowest_mode(self.links)
-        tree = scene.closures, self.constants, own, self.layout, self.workspace, slowest
+        tree = scene.constraints, self.constants, own, self.layout, self.workspace, slowest
         self._closures = self.own.closures = Closures(*tree, self.check_status)  # for this thread
         self._start: State | None = None
 
@@ -147,7 +147,8 @@ class ClosedSystem(System):
     def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
         """Raises NotImplementedError: evaluators are for trees only."""
         raise NotImplementedError(
-            f'scene "{self.scene.name}" has closures, and evaluators are for trees only: use accelerations(state)'
+            f'scene "{self.scene.name}" has closures or couplings, and evaluators are for trees only: '
+            "use accelerations(state)"
         )
 
     def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
@@ -201,7 +202,7 @@ class ClosedSystem(System):
 
     def _by_load(self, hinges: NDArray[Any], closures: NDArray[Any]) -> dict[str, NDArray[Any]]:
         """Rows for hinges (N,6) and closures (C,6) by their names."""
-        names = [closure.name for closure in self.scene.closures]
+        names = [closure.name for closure in self.scene.constraints]
         return self._by_hinge(hinges) | dict(zip(names, closures, strict=True))
 
     def _changes(self, spread: Spread) -> list[dict[str, Real]]:
@@ -258,7 +259,7 @@ class ClosedSystem(System):
         The others, in overconstrained mechanisms of rigid bodies, are NaN wherever loads are given (`evaluate`).
         """
         hinges, closures = self.closures.determined(*self.layout.entering(state))
-        names = [link.hinge.name for link in self.links], [closure.name for closure in self.scene.closures]
+        names = [link.hinge.name for link in self.links], [closure.name for closure in self.scene.constraints]
         return dict(zip(names[0], hinges, strict=True)) | dict(zip(names[1], closures, strict=True))
 
     def closure_operators(self, state: State) -> ClosureOperators:
@@ -278,8 +279,9 @@ class ClosedSystem(System):
 
     def _for_trees(self, what: str) -> NotImplementedError:
         return NotImplementedError(
-            f'scene "{self.scene.name}" has closures, and {what} are for trees only: closure_operators(state) gives '
-            "the terms that closures add, and flexmb.System(scene) is the tree alone, which moves differently"
+            f'scene "{self.scene.name}" has closures or couplings, and {what} are for trees only: '
+            "closure_operators(state) gives the terms that closures add, and flexmb.System(scene) is the tree alone, "
+            "which moves differently"
         )
 
     def closure_gaps(self, state: State) -> dict[str, tuple[float, float]]:
@@ -316,7 +318,7 @@ class ClosedSystem(System):
         if motion is None:
             known = " or ".join(f'"{name}"' for name in algorithms.ON_CHAINS)
             raise NotImplementedError(
-                f'scene "{self.scene.name}" has closures, and algorithm {algorithm!r} is for trees only: '
+                f'scene "{self.scene.name}" has closures or couplings, and algorithm {algorithm!r} is for trees only: '
                 f"use algorithm={known}"
             )
         return motion
@@ -326,9 +328,9 @@ class ClosedSystem(System):
             self.initial_state  # noqa: B018 - determines the rank
         locked = self.closures.mobility == 0 < self.closures.rank  # a tree of welds is not locked by its closures
         if locked and not np.any(self.constants.speed["prescribed"] >= 0):
-            names = ", ".join(f'"{closure.name}"' for closure in self.scene.closures)
+            names = ", ".join(map(called, self.scene.constraints))
             raise ClosureError(
-                f"closures {names} leave none of the {self.nu} free speeds: the mechanism is locked. Free a "
+                f"{names} leave none of the {self.nu} free speeds: the mechanism is locked. Free a "
                 "hinge, or let bodies deform"
             )
 

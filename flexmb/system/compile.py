@@ -49,7 +49,7 @@ def assembled(scene: Scene, elimination: Elimination = "fastest") -> System:
     """The system of a scene that has been checked."""
     arguments.one_of("elimination", elimination, get_args(Elimination))
     scene = _read(scene)
-    if scene.closures:
+    if scene.constraints:
         from flexmb.system.closed import ClosedSystem  # imported here, because trees do not need it
 
         with collector_paused():

@@ -79,6 +79,7 @@ def deformed(at: FlexibleNode, eta: Real) -> tuple[Real, Real]:
 def hinge_frames(arrays: SceneArrays, w: Workspace) -> dict[str, HingeFrames]:
     """The frames of every hinge and point mass, and of closures: frames A and B, and the origin of B."""
     found = {link.hinge.name: hinge_frames_of(arrays, w, k) for k, link in enumerate(arrays.links)}
+    found |= {coupling.name: found[coupling.hinge] for coupling in arrays.scene.couplings}
     closures = enumerate(arrays.scene.closures)
     return found | {closure.name: closure_frames_of(arrays, w, i) for i, closure in closures}
 

@@ -64,7 +64,7 @@ class SceneArrays:
         scene, wheels = self.scene, wheels_by_body(self.scene)
         hinges = [link.hinge.name for link in self.links]
         on_bodies = [wheel.name for link in self.links for wheel in wheels.get(link.name, ())]
-        closures = [closure.name for closure in scene.closures]
+        closures = [closure.name for closure in scene.constraints]
         between = [each.name for each in between_nodes(scene)]
         along_hinges = [each for each in scene.connectors if isinstance(each, AlongHinge)]
         along_hinges.sort(key=lambda each: not isinstance(each, HingeSpring))  # springs come first, as in the tables
@@ -85,7 +85,7 @@ class SceneArrays:
             case Status.CONNECTOR_OVERTURNED:
                 return between_nodes(self.scene)[fault].name
             case Status.CLOSURE_SINGULAR | Status.CLOSURE_OPEN | Status.BRANCH_UNKNOWN:
-                return self.scene.closures[fault].name
+                return self.scene.constraints[fault].name
         return self.links[fault].name
 
 

@@ -119,7 +119,7 @@ class System(FreeMotion):
         ValueError for an algorithm that is for single states, or does not apply to the scene.
         """
         if arguments.number("stabilise", stabilise) != 0.0:
-            raise ValueError(f"stabilise is {stabilise:g}, but the scene has no closures: leave it out")
+            raise ValueError(f"stabilise is {stabilise:g}, but the scene has no closures or couplings: leave it out")
         made = algorithms.chosen(algorithm, algorithms.RUNNING).route
         assert made is not None  # of those that run
         return made(self)

@@ -8,6 +8,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from crosscheck.library.basis import basis
+from crosscheck.library.cite import cite
 from crosscheck.library.find import Case, shipped_cases
 from crosscheck.library.reference import has_reference, load_reference
 from tests.repo.project import ROOT
@@ -16,16 +18,20 @@ PAGE = ROOT / "docs" / "cases.md"
 FAMILIES = {
     "closed_form": "Closed form: a formula gives the motion or a part of it.",
     "published": "Published: numbers of a paper or a benchmark.",
-    "converged": "Converged: two algorithms and two integrators of this library agree at high accuracy.",
-    "agreed": "Agreed: independent codes agree.",
+    "agreed": "Agreed: independent codes agree, or a code and equations of the case's own.",
+    "converged": "Native alone: two formulations with two integrators of this library agree.",
 }
 INTRODUCTION = """# Cases
 
 Every case with what anchors it. This page is generated from the folders in `cases`: `python -m tests.repo.catalogue`.
 `crosscheck run NAME` runs a case, `crosscheck verify NAME my.csv` holds your own code's results against it.
 
-The last column of the tables is the least and the largest uncertainty of the stored numbers, relative to each channel's
-range.
+*Rests on* is read from the stored routes: the closed form and the codes that agree, or native alone with its
+formulations.
+*Known to* is the least and the largest uncertainty of the stored numbers, relative to each channel's range.
+
+The data are licensed under CC BY 4.0 (`cases/LICENSE`); *Cite* is how a case is cited. `crosscheck export
+cases` writes them for those who use other programs: [the library without our code](export.md).
 """
 
 
@@ -36,7 +42,7 @@ def page() -> str:
     for family, meaning in FAMILIES.items():
         members = [case for case in cases if case.provenance is not None and case.provenance.family == family]
         rows = [_row(case) for case in members]
-        head = ["| case | what | engines | known to |", "|---|---|---|---|"]
+        head = ["| case | what | engines | rests on | known to |", "|---|---|---|---|---|"]
         name, _, text = meaning.partition(": ")
         parts += [f"## {name}\n\n{text[0].upper()}{text[1:]}\n", "\n".join([*head, *rows]) + "\n"]
     parts += ["## What each case shows\n", *(section for case in cases for section in _section(case))]
@@ -45,7 +51,13 @@ def page() -> str:
 
 def _row(case: Case) -> str:
     engines = dict.fromkeys(engine for variant in case.run.variants for engine in variant.engines)
-    return f"| [{case.name}](#{_anchor(case.name)}) | {case.run.title} | {', '.join(engines)} | {_known(case)} |"
+    link = f"[{case.name}](#{_anchor(case.name)})"
+    return f"| {link} | {case.run.title} | {', '.join(engines)} | {_basis(case)} | {_known(case)} |"
+
+
+def _basis(case: Case) -> str:
+    """What the stored reference rests on."""
+    return basis(load_reference(case.folder).knowledge.routes).words if has_reference(case.folder) else "–"
 
 
 def _known(case: Case) -> str:
@@ -71,7 +83,8 @@ def _section(case: Case) -> Iterator[str]:
     yield f"### {case.name}\n"
     yield f"**{case.run.title}.** Tags: {', '.join(case.run.tags) or 'none'}. Known: {case.provenance.uncertainty}.\n"
     yield f"{text.strip()}\n"
-    yield f"Sources: {'; '.join(case.provenance.sources)}\n"
+    yield f"Rests on: {_basis(case)}. Sources: {'; '.join(case.provenance.sources)}\n"
+    yield f"Cite: {cite(case)}\n"
 
 
 def main() -> None:

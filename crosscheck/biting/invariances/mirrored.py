@@ -26,8 +26,8 @@ from flexmb.scene.connectors import BetweenNodes, Bushing
 from flexmb.scene.freedoms import Coordinate, ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import WITH_AXIS, Closure, Hinge
-from flexmb.scene.schema import Load, PointMass, Scene, Wheel
-from flexmb.scene.tree import coordinate_of, coordinates, with_coordinates
+from flexmb.scene.schema import Coupling, Load, PointMass, Scene, Wheel
+from flexmb.scene.tree import coordinate_of, coordinates, coupled, with_coordinates
 from flexmb.surrogate import modal_points
 from flexmb.typing import Real
 
@@ -69,7 +69,20 @@ def _mirrored(scene: Scene) -> Counterpart:
             for name, rows in found.items()
         }
 
-    return Counterpart(_reflected(scene), back)
+    return Counterpart(msgspec.structs.replace(_reflected(scene), couplings=_couplings(scene)), back)
+
+
+def _couplings(scene: Scene) -> tuple[Coupling, ...]:
+    """Relations of the coordinates as the mirror counts them."""
+    found = []
+    for coupling in scene.couplings:
+        led, *leading = (_signs(each.hinge)[each.place] for each in coupled(scene, coupling))
+        terms = tuple(
+            msgspec.structs.replace(term, ratio=led * own * term.ratio)
+            for term, own in zip(coupling.terms, leading, strict=True)
+        )
+        found.append(msgspec.structs.replace(coupling, terms=terms, offset=led * coupling.offset + 0.0))
+    return tuple(found)
 
 
 def _reflected(item: Any) -> Any:

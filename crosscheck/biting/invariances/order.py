@@ -8,7 +8,8 @@ from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, N
 from flexmb.scene.schema import Scene
 
 COLLECTIONS = (
-    "bodies", "hinges", "closures", "connectors", "wheels", "point_masses", "loads", "markers", "modal_states",
+    "bodies", "hinges", "closures", "couplings", "connectors", "wheels", "point_masses", "loads", "markers",
+    "modal_states",
 )  # fmt: skip
 
 

@@ -26,8 +26,8 @@ from flexmb.scene.connectors import (
     SpringDamper,
 )
 from flexmb.scene.functions import Function
-from flexmb.scene.schema import Load, ModalState, Scene, Waiver
-from flexmb.scene.tree import coordinates
+from flexmb.scene.schema import Coupling, Load, ModalState, Scene, Waiver
+from flexmb.scene.tree import coordinates, coupled
 from flexmb.scene.units import split_unit
 from flexmb.surrogate import modal_points
 from flexmb.system.closed import ClosedSystem
@@ -66,6 +66,7 @@ def _blocks(turning: Dimension, mixed: Dimension, moving: Dimension) -> Each:
 NUMBER = Dimension()
 FORCE, ENERGY = Dimension(1, 1, -2), Dimension(2, 1, -2)
 EFFORT = {True: ENERGY, False: FORCE}  # along an angle, along a displacement
+OF_COORDINATE = {True: NUMBER, False: Dimension(1)}
 OF_UNIT = {
     "": NUMBER, "rad": NUMBER, "s": Dimension(time=1), "m": Dimension(1), "kg": Dimension(mass=1),
     "N": FORCE, "N m": ENERGY, "N m²": Dimension(3, 1, -2), "m/s": Dimension(1, 0, -1),
@@ -104,13 +105,27 @@ def _rescaled(scene: Scene) -> Counterpart:
     def back(times: Real, channels: Channels) -> Channels:
         return {name: rows / _factor(name, drives) for name, rows in channels.items() if name not in left_out}
 
-    return Counterpart(msgspec.structs.replace(_in_units(scene), allow=UNUSUAL), back, clock=TIME)
+    other = msgspec.structs.replace(_in_units(scene), couplings=_couplings(scene), allow=UNUSUAL)
+    return Counterpart(other, back, clock=TIME)
+
+
+def _couplings(scene: Scene) -> tuple[Coupling, ...]:
+    """Offsets in the unit of the coordinate that is led, ratios in that unit per unit of the coordinate that leads."""
+    found = []
+    for coupling in scene.couplings:
+        led, *leading = (OF_COORDINATE[each.named.coordinate.ANGULAR].factor for each in coupled(scene, coupling))
+        terms = tuple(
+            msgspec.structs.replace(term, ratio=term.ratio * led / own)
+            for term, own in zip(coupling.terms, leading, strict=True)
+        )
+        found.append(msgspec.structs.replace(coupling, terms=terms, offset=coupling.offset * led))
+    return tuple(found)
 
 
 def _undetermined(scene: Scene) -> set[str]:
     """Channels of loads that the motion leaves open, in overconstrained mechanisms: the least ones, which an engine may
     take, are others in other units."""
-    if not scene.closures:
+    if not scene.constraints:
         return set()
     with asking("general"):
         system = compile(scene)

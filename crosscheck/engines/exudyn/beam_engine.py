@@ -75,7 +75,7 @@ def _refusals(scene: Scene) -> Iterator[str]:
         yield "it takes scenes with one beam and nothing else"
         return
     beam, hinge = scene.bodies[0], scene.hinges[0]
-    if scene.wheels or scene.point_masses or scene.closures or scene.connectors or beam.tip_masses:
+    if scene.wheels or scene.point_masses or scene.constraints or scene.connectors or beam.tip_masses:
         yield "it takes a bare beam: no wheels, point masses, tip masses, closures or connectors"
     for load in scene.loads:
         if load.frame != "world":

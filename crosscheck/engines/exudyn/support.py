@@ -32,6 +32,8 @@ def _refusals(scene: Scene) -> Iterator[str]:
     for closure in scene.closures:
         if closure.body_b == GROUND:
             yield f'closure "{closure.name}": its load is read on body_b, which is the ground here: exchange a and b'
+    for coupling in scene.couplings:
+        yield f'coupling "{coupling.name}": bodies have coordinates of their own here, and hinges none to relate'
     screw = first_screw(scene)
     if screw:
         yield f'hinge "{screw}" is a screw: the adapter of Exudyn offers no such joint'

@@ -11,14 +11,16 @@ from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.scene.schema import Scene
 
 _RUNGS = 4
-_SOFT = "closures are springs and dampers (its defaults): loops open by 1e-4 to 1e-3 of their size under load"
+_SOFT = (
+    "closures and couplings are springs and dampers (its defaults): loops open by 1e-4 to 1e-3 of their size under load"
+)
 
 
 class MujocoEngine(PeerEngine):
     """Rigid trees with RK4, exact but for two artifices whose errors are at round-off (see `mujoco.tree`)."""
 
     name = "mujoco"
-    takes = ("connectors",)
+    takes = ("connectors", "couplings")
     summary = "rigid trees in minimal coordinates, fixed steps"
     algorithm = "composite bodies, sparse factors"
     settings = (
@@ -33,12 +35,12 @@ class MujocoEngine(PeerEngine):
         return mujoco.__version__
 
     def obstacle(self, scene: Scene) -> str:
-        reason = obstacle(scene, "MuJoCo", ("spherical",), KNOWN)
+        reason = obstacle(scene, "MuJoCo", ("spherical",), KNOWN, couplings=True)
         return reason or inertia_obstacle(links(scene), "MuJoCo")
 
     def supports(self, scene: Scene) -> Support:
         support = super().supports(scene)
-        return Support("surrogate", _SOFT) if support.kind == "exact" and scene.closures else support
+        return Support("surrogate", _SOFT) if support.kind == "exact" and scene.constraints else support
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
         return self.efforts_for(scene, USUAL_S)

@@ -13,12 +13,13 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
-from crosscheck.engines.links import closed_frames, links
+from crosscheck.engines.links import Link, Scalar, closed_frames, links
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.observer import MujocoObserver
-from crosscheck.engines.mujoco.tree import MujocoClosure, build_tree, initial_state
+from crosscheck.engines.mujoco.tree import MujocoClosure, MujocoCoupling, build_tree, initial_state, joint_name
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
+from flexmb.scene.tree import coupled
 from flexmb.typing import Real
 
 _INTEGRATORS = {  # method of an effort: MuJoCo's constant, evaluations per step
@@ -35,7 +36,8 @@ class MujocoModel:
         closures = tuple(
             MujocoClosure(closure.name, *closed_frames(scene, chain, closure)) for closure in scene.closures
         )
-        self._tree = build_tree(chain, np.array(scene.gravity_m_s2, dtype=float), closures)
+        gravity = np.array(scene.gravity_m_s2, dtype=float)
+        self._tree = build_tree(chain, gravity, closures, _couplings(scene, chain))
         self._forces = Forces(self._tree, scene)
         self._observer = MujocoObserver(self._tree, self._forces, scene, closures)
         self._functions = scene_functions(scene)
@@ -94,6 +96,20 @@ class MujocoModel:
                 if end in wanted:
                     states.append((data.qpos.copy(), data.qvel.copy()))
         return states, total, ""
+
+
+def _couplings(scene: Scene, chain: tuple[Link, ...]) -> tuple[MujocoCoupling, ...]:
+    """Couplings by the names of the joints that they relate."""
+    found = []
+    for coupling in scene.couplings:
+        related, joints = coupled(scene, coupling), []
+        for each in related:
+            link = next(link for link in chain if link.kind == "body" and link.joint == each.hinge.name)
+            scalars = [k for k, freedom in enumerate(link.freedoms) if isinstance(freedom, Scalar)]
+            joints.append(joint_name(link, scalars[each.place]))
+        factors = tuple(each.factor for each in related)
+        found.append(MujocoCoupling(coupling.name, tuple(joints), factors, coupling.offset))
+    return tuple(found)
 
 
 def _is_bad(data: mujoco.MjData) -> bool:

@@ -11,7 +11,7 @@ from crosscheck.engines.conventions import cross, quaternion_of, shift_wrench
 from crosscheck.engines.links import Attachment, attachment, by_motion
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.tree import MujocoClosure, MujocoTree
-from crosscheck.engines.rigid_tree import by_joint, of_kind
+from crosscheck.engines.rigid_tree import by_joint, of_kind, placed_couplings
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -31,7 +31,7 @@ class MujocoObserver:
         self._forces = forces
         self._gravity = np.array(scene.gravity_m_s2, dtype=float)
         self._names = [(link.kind, link.joint) for link in tree.links]
-        self._closures = closures
+        self._closures, self._couplings = closures, placed_couplings(scene, tree.slots)
         self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
 
     def observe(self, data: mujoco.MjData) -> Snapshot:
@@ -70,13 +70,28 @@ class MujocoObserver:
         return shift_wrench(data.cfrc_int[bodies], self._pole(bodies, data) - data.xpos[bodies])
 
     def _closed(self, data: mujoco.MjData) -> dict[str, Real]:
-        """[torque; force] of every closure on body_b about frame B: along World's axes, of A less B."""
-        rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-        forces = data.efc_force[: data.nefc][rows].reshape(-1, 3)
-        return {
+        """[torque; force] of every closure on body_b about frame B, and of every coupling along what it leads.
+
+        The three rows of a closure are along World's axes, of A less B; the only row of a coupling is its load.
+        """
+        forces = self._rows(data)
+        of_closures = forces[: 3 * len(self._closures)].reshape(-1, 3)
+        found = {
             closed.name: np.concatenate([np.zeros(3), -force])
-            for closed, force in zip(self._closures, forces, strict=True)
+            for closed, force in zip(self._closures, of_closures, strict=True)
         }
+        for coupling, size in zip(self._couplings, self._held(data).tolist(), strict=True):
+            found[coupling.name] = coupling.load(size, data.xaxis[coupling.slots[0].joint].copy())
+        return found
+
+    def _rows(self, data: mujoco.MjData) -> Real:
+        """Forces of the rows of all closures, then of all couplings."""
+        rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+        return data.efc_force[: data.nefc][rows]
+
+    def _held(self, data: mujoco.MjData) -> Real:
+        """Loads of the couplings."""
+        return self._rows(data)[3 * len(self._closures) :]
 
     def _marker(self, at: Attachment, data: mujoco.MjData) -> MarkerSnapshot:
         body = self._tree.bodies[at.link]
@@ -118,5 +133,8 @@ class MujocoObserver:
             passive = freedom.stiffness * (freedom.rest - data.qpos[slot.q]) - freedom.damping * data.qvel[slot.v]
             along = self._forces.connections.along(data.time, data).values()
             passive += sum(held.load for v, held in along if v == slot.v)
+            for coupling, size in zip(self._couplings, self._held(data).tolist(), strict=True):
+                own = zip(coupling.slots, coupling.factors, strict=True)
+                passive += sum(factor * size for each, factor in own if each.v == slot.v)
             found.append(half @ data.xaxis[slot.joint] - passive)
         return by_joint(self._forces.driven, found)

@@ -37,6 +37,16 @@ class MujocoClosure:
 
 
 @dataclass(frozen=True)
+class MujocoCoupling:
+    """A fixed tendon whose length, the sum of factors times joints' coordinates, is kept at `offset`, as softly."""
+
+    name: str
+    joints: tuple[str, ...]
+    factors: tuple[float, ...]
+    offset: float
+
+
+@dataclass(frozen=True)
 class MujocoSlot(Slot):
     """A freedom with the ids of its MuJoCo body and of the first of its MuJoCo joints."""
 
@@ -54,7 +64,12 @@ class MujocoTree:
     slots: tuple[MujocoSlot, ...]
 
 
-def build_tree(links: tuple[Link, ...], gravity: Real, closures: tuple[MujocoClosure, ...] = ()) -> MujocoTree:
+def build_tree(
+    links: tuple[Link, ...],
+    gravity: Real,
+    closures: tuple[MujocoClosure, ...] = (),
+    couplings: tuple[MujocoCoupling, ...] = (),
+) -> MujocoTree:
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = gravity
@@ -73,10 +88,14 @@ def build_tree(links: tuple[Link, ...], gravity: Real, closures: tuple[MujocoClo
         body.inertia = principal
         body.iquat = quaternion_of(axes)
         for k, freedom in enumerate(link.freedoms):
-            _add_joints(body, freedom, f"{_body_name(link)}.{k}")
+            _add_joints(body, freedom, joint_name(link, k))
         bodies.append(body)
     for i, closed in enumerate(closures):
         _close(spec, bodies, closed, i)
+    for coupling in couplings:
+        _couple(spec, coupling)
+    if couplings:  # its solver stops at errors relative to the mean inertia, in which an armature would hide them
+        spec.option.tolerance = 0.0
     model = spec.compile()
     ids = np.array([model.body(_body_name(link)).id for link in links], dtype=np.intp)
     return MujocoTree(model, links, ids, _slots(model, links, ids))
@@ -111,6 +130,15 @@ def _close(spec: mujoco.MjSpec, bodies: list[mujoco.MjsBody], closed: MujocoClos
     spec.add_equality(
         type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE, name1=names[0], name2=names[1]
     )
+
+
+def _couple(spec: mujoco.MjSpec, coupling: MujocoCoupling) -> None:
+    tendon = spec.add_tendon(name=coupling.name)
+    for joint, factor in zip(coupling.joints, coupling.factors, strict=True):
+        tendon.wrap_joint(joint, factor)
+    data = np.zeros(mujoco.mjNEQDATA)
+    data[0] = coupling.offset
+    spec.add_equality(type=mujoco.mjtEq.mjEQ_TENDON, name1=coupling.name, data=data)
 
 
 def _add_joints(body: mujoco.MjsBody, freedom: Freedom, name: str) -> None:
@@ -167,6 +195,11 @@ def _principal(inertia: Real) -> tuple[Real, Real]:
     # A disc's moments miss the triangle inequality by round-off, and the compiler refuses it.
     moments[2] = min(moments[2], moments[0] + moments[1])
     return moments, axes
+
+
+def joint_name(link: Link, k: int) -> str:
+    """Of the joint that is freedom k of a link."""
+    return f"{_body_name(link)}.{k}"
 
 
 def _body_name(link: Link) -> str:

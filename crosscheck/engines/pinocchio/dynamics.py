@@ -17,6 +17,7 @@ from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.closures import PinocchioClosures
 from crosscheck.engines.pinocchio.connections import PinocchioConnections
+from crosscheck.engines.pinocchio.couplings import PinocchioCouplings
 from crosscheck.engines.pinocchio.forces import JointForces, PlacedLoads
 from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, initial_state, places
 from flexmb.scene.functions import Constant
@@ -60,6 +61,7 @@ class Dynamics:
         self.closures = PinocchioClosures(tree, scene)
         self.connections = PinocchioConnections(tree, scene)
         self.driven: list[PinocchioSlot] = [slot for slot in tree.slots if slot.driven]
+        self.couplings = PinocchioCouplings(tree, scene, [slot.v for slot in self.driven])
         self._motions = [profile(slot.freedom.prescribed) for slot in self.driven]
         driven_q, driven_v = [slot.q for slot in self.driven], [slot.v for slot in self.driven]
         free_q = np.setdiff1d(np.arange(tree.model.nq), driven_q)
@@ -108,6 +110,14 @@ class Dynamics:
         return PinocchioSolution(a, drive, acting.power + float(drive @ state.v[D]))
 
     def _acting(self, t: float, state: PinocchioState) -> Acting:
+        """With the loads of couplings, whose power is zero."""
+        acting = self._applied(t, state)
+        if not self.couplings:
+            return acting
+        efforts = self.couplings.efforts(state.q, self._accelerations(state, acting))
+        return acting._replace(tau=acting.tau + efforts)
+
+    def _applied(self, t: float, state: PinocchioState) -> Acting:
         tau, power = self.forces.springs(state.q), 0.0
         if self.forces.loses:
             lost = self.forces.dampers_and_motors(t, state.v)

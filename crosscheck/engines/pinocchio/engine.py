@@ -17,7 +17,7 @@ class PinocchioEngine(PeerEngine):
     """Rigid trees, exact: articulated-body accelerations, hybrid dynamics where coordinates are prescribed."""
 
     name = "pinocchio"
-    takes = ("connectors", "t_start")
+    takes = ("connectors", "couplings", "t_start")
     summary = "rigid trees in minimal coordinates"
     algorithm = "articulated bodies, O(N)"
     settings = (
@@ -36,7 +36,7 @@ class PinocchioEngine(PeerEngine):
     def obstacle(self, scene: Scene) -> str:
         if len(scene.hinges) > MOST_JOINTS:
             return f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
-        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), KNOWN, screws=True)
+        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), KNOWN, screws=True, couplings=True)
         return reason or (_beside_closures(scene) if scene.closures else "")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
@@ -50,6 +50,8 @@ class PinocchioEngine(PeerEngine):
 
 def _beside_closures(scene: Scene) -> str:
     """What this adapter does not combine with closed loops, "" if there is nothing."""
+    if scene.couplings:
+        return f'coupling "{scene.couplings[0].name}": not beside closures in the adapter of Pinocchio'
     for link in links(scene):
         if not link.freedoms:
             return f'hinge "{link.joint}" is a weld, which takes a prescribed joint here: not beside closures'

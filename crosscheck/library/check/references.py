@@ -36,6 +36,12 @@ def check_reference(run: RunFile, recipe: ReferenceRecipe, place: Place) -> Iter
     if len(recipe.routes) < 2:
         text = f"a reference comes by two independent routes at least, and this one has {len(recipe.routes)}"
         yield problem(place.key("route"), text, "add a [[reference.route]] with another engine, or a closed form")
+    if sum(not route.witness for route in recipe.routes) < 2 <= len(recipe.routes):
+        text = "fewer than two routes are no witnesses, and only these say how well the numbers are known"
+        yield problem(place.key("route"), text, "take `witness` out of the others")
+    elif recipe.routes and recipe.routes[0].witness:
+        text = "the first route gives the numbers, so that it cannot be a witness"
+        yield problem(place.key("route", 0), text, "put another route before it")
     for i, route in enumerate(recipe.routes):
         yield from _route(run, recipe, route, place.key("route", i))
 
@@ -74,17 +80,21 @@ def _times(run: RunFile, recipe: ReferenceRecipe, variant: Variant, place: Place
 
 
 def _route(run: RunFile, recipe: ReferenceRecipe, route: ReferenceRoute, place: Place) -> Iterator[Defect]:
-    if bool(route.engine) == bool(route.exact):
-        yield problem(place, "a route is either an engine or a closed form", 'give engine = "..." or exact = "..."')
+    if sum(map(bool, (route.engine, route.exact, route.equations))) != 1:
+        text = "a route is an engine or a closed form, or equations of the case's own, and only one of them"
+        yield problem(place, text, 'give engine = "...", exact = "..." or equations = "..."')
     name = route.variant or recipe.variant
     variant = find_variant(run, name)
     if variant is None:
         yield no_variant(name, [each.name for each in run.variants], place.key("variant"))
         return
-    if route.exact and (route.efforts or route.variant):
-        yield problem(place, "a closed form has no efforts and no variant", "take them out")
-    if "/" in route.exact or "\\" in route.exact:
-        yield problem(place.key("exact"), "a closed form lies in the case's folder", "name just the file")
+    for key, file in (("exact", route.exact), ("equations", route.equations)):
+        if file and (route.efforts or route.variant):
+            yield problem(place, "a file of the case has no efforts and no variant", "take them out")
+        if "/" in file or "\\" in file:
+            yield problem(place.key(key), "a file of the case lies in the case's folder", "name just the file")
+    for pattern in route.channels:
+        yield from check_pattern(pattern, place.key("channels"))
     yield from check_within(route.relative_uncertainty, RELATIVE, place.key("relative_uncertainty"))
     for i, ladder in enumerate(route.efforts):
         where = place.key("efforts", i)

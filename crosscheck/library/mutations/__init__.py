@@ -9,6 +9,7 @@ from __future__ import annotations
 from crosscheck.library.case import CaseError, MutationKind
 from crosscheck.library.mutations import (
     connectors,
+    couplings,
     events,
     feedback,
     frames,
@@ -23,9 +24,12 @@ from crosscheck.library.mutations import (
 from crosscheck.library.mutations.mutation import Mutation, MutationTarget
 from flexmb.scene.schema import Scene
 
+ROOMS = (
+    inertia, frames, couplings, hinges, connectors, wheels, gravity, loads, modes, time_courses, feedback, events,
+)  # fmt: skip
 CATALOGUE: dict[MutationKind, Mutation] = {
     each.name: each
-    for room in (inertia, frames, hinges, connectors, wheels, gravity, loads, modes, time_courses, feedback, events)
+    for room in ROOMS
     for each in room.MUTATIONS
 }
 

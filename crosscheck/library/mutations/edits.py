@@ -33,6 +33,7 @@ def _of(collection: str) -> Callable[[Callable[[Any], Any]], SceneChange]:
 
 of_body, of_hinge, of_wheel, of_load = _of("bodies"), _of("hinges"), _of("wheels"), _of("loads")
 of_closure, of_connector, of_point_mass = _of("closures"), _of("connectors"), _of("point_masses")
+of_coupling = _of("couplings")
 of_sensor, of_controller, of_event = _of("sensors"), _of("controllers"), _of("events")
 
 

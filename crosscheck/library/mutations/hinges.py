@@ -47,7 +47,8 @@ def _hinge_axis(hinge: Hinge) -> Hinge:
 def _reversal_is_a_name(scene: Scene, target: str) -> str:
     """Reversing the sign of a coordinate has no effect if nothing depends on the sign."""
     hinge = next(hinge for hinge in scene.hinges if hinge.name == target)
-    if any(getattr(each, "hinge", "") == target for each in scene.connectors):
+    coupled = {each.hinge for each in scene.couplings} | {term.hinge for each in scene.couplings for term in each.terms}
+    if target in coupled or any(getattr(each, "hinge", "") == target for each in scene.connectors):
         return ""
     for _, coordinate in coordinates(hinge):
         driven = coordinate.effort is not None or coordinate.prescribed is not None

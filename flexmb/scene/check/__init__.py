@@ -9,6 +9,7 @@ from math import isfinite
 from flexmb.scene.check.beams import beams
 from flexmb.scene.check.connectors import connectors
 from flexmb.scene.check.control import control
+from flexmb.scene.check.couplings import couplings
 from flexmb.scene.check.events import events
 from flexmb.scene.check.hinges import closures, hinges, point_masses, wheels
 from flexmb.scene.check.inertia import rigid_bodies
@@ -27,8 +28,8 @@ from flexmb.scene.schema import Scene
 EVERYWHERE = (finite_numbers, unit_vectors, unit_quaternions)
 STRUCTURE = (unique_names, references, tree)
 PHYSICS = (
-    rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, wheels, point_masses, connectors, control,
-    events,
+    rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, couplings, wheels, point_masses, connectors,
+    control, events,
 )  # fmt: skip
 
 

@@ -132,11 +132,12 @@ def _sensors(scene: s.Scene) -> Iterator[Defect]:
     moving = [item.name for key in ("hinges", "wheels", "point_masses") for item in getattr(scene, key)]
     moving += [f"{body.name}.modes" for body in scene.bodies if isinstance(body, s.BeamBody | s.ModalBody)]
     markers = [marker.name for marker in scene.markers]
+    loaded = [each.name for each in (*scene.hinges, *scene.constraints)]
     known: dict[Any, tuple[tuple[str, ...], str, list[str]]] = {
         s.CoordinateSensor: (("of",), "hinge, wheel, point mass or modes", moving),
         s.MarkerSensor: (("marker",), "marker", markers),
         s.DistanceSensor: (("marker_a", "marker_b"), "marker", markers),
-        s.LoadSensor: (("hinge",), "hinge or closure", [each.name for each in (*scene.hinges, *scene.closures)]),
+        s.LoadSensor: (("hinge",), "hinge, closure or coupling", loaded),
         s.DriveSensor: (("coordinate",), "scalar coordinate", list(scalar_paths(scene))),
     }
     for place, sensor in entries(scene, "sensors"):

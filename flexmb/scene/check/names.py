@@ -12,10 +12,10 @@ from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Closure, Scene
 from flexmb.scene.tree import GROUND, rest_frames
 
-# Hinges, wheels, point masses, closures and connectors share tables of loads, drive loads and coordinates, hence one
-# set of names.
+# Hinges, wheels, point masses, closures, couplings and connectors share tables of loads, drive loads and coordinates,
+# hence one set of names.
 NAMESPACES = (
-    ("bodies",), ("hinges", "wheels", "point_masses", "closures", "connectors"), ("loads",), ("markers",),
+    ("bodies",), ("hinges", "wheels", "point_masses", "closures", "couplings", "connectors"), ("loads",), ("markers",),
     ("sensors", "controllers"), ("events",),
 )  # fmt: skip
 IMPLICIT: dict[type, tuple[str, ...]] = {RigidBody: ("origin",), BeamBody: ("origin", "root", "tip")}

@@ -25,6 +25,7 @@ from flexmb.scene.schema import Scene, Screw
 from flexmb.surrogate import modal_points
 from tests.crosscheck.engines.random_scenes import LATER_KINDS
 from tests.crosscheck.engines.random_scenes import random_scene as random_rigid
+from tests.crosscheck.engines.test_couplings import machine
 from tests.repo.project import ROOT
 from tests.trees import random_scene as random_flexible
 
@@ -121,6 +122,20 @@ def test_nothing_changes_in_a_scene_of_connectors(name: str) -> None:
     counterpart = BY_NAME[name].of(connected())
     assert counterpart.scene != connected()
     assert strangers(connected(), counterpart) == []
+
+
+@pytest.mark.parametrize("name", ["turned", "moved", "reordered", "rescaled", "mirrored"])
+def test_nothing_changes_in_a_scene_of_couplings(name: str) -> None:
+    counterpart = BY_NAME[name].of(machine())
+    assert counterpart.scene != machine()
+    assert strangers(machine(), counterpart) == []
+
+
+@pytest.mark.parametrize("name", ["rescaled", "mirrored"])
+def test_ratios_that_stay_what_they_were_are_noticed(name: str) -> None:
+    counterpart = BY_NAME[name].of(machine())
+    wrong = msgspec.structs.replace(counterpart.scene, couplings=machine().couplings)
+    assert strangers(machine(), replace(counterpart, scene=wrong))
 
 
 @cache

@@ -45,7 +45,7 @@ class Lasting(Fake):
 
 def having(**collections: list[Any]) -> Any:
     """A scene as far as `supports` looks at it."""
-    return SimpleNamespace(**{"connectors": (), "controllers": (), "events": ()} | collections)
+    return SimpleNamespace(**{"connectors": (), "couplings": (), "controllers": (), "events": ()} | collections)
 
 
 def test_the_name_is_the_engines() -> None:
@@ -61,12 +61,12 @@ def test_an_adapter_that_ignores_the_start_is_refused_at_other_starts_alone() ->
     assert CheckedEngine(Taking("fine", takes=("events",)), t_start=2.0).supports(having()) == refusal
 
 
-@pytest.mark.parametrize("collection", ["connectors", "controllers", "events"])
+@pytest.mark.parametrize("collection", ["connectors", "couplings", "controllers", "events"])
 def test_collections_of_which_an_adapter_does_not_speak_are_refused(collection: str) -> None:
     scene = having(**{collection: [SimpleNamespace(name="first"), SimpleNamespace(name="second")]})
     refusal = Support("no", f'"first": the adapter of engine fine knows no {collection}')
     assert CheckedEngine(Fake("fine")).supports(scene) == refusal
-    others = tuple({"connectors", "controllers", "events"} - {collection})
+    others = tuple({"connectors", "couplings", "controllers", "events"} - {collection})
     assert CheckedEngine(Taking("fine", takes=others)).supports(scene) == refusal
     assert CheckedEngine(Taking("fine", takes=(collection,))).supports(scene).reason == "asked"
 

@@ -15,6 +15,7 @@ from flexmb.scene.bodies import BeamBody, BeamStation, Modes, Node, RigidBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.connectors import AngularFriction, AngularSpring, Bushing
 from flexmb.scene.control import CoordinateSensor, MarkerSensor, Pid, ProfileSensor, StateSpace
+from flexmb.scene.couplings import CoupledCoordinate, Coupling
 from flexmb.scene.events import Change, Impact, Latch, SceneEvent
 from flexmb.scene.functions import Ramp, Sine, SmoothStep
 from flexmb.scene.hinges import AngularCoordinate, Gimbal, Revolute, Spherical
@@ -160,6 +161,12 @@ def everything() -> Scene:
                 position_a_m=(1.0, 0.0, 0.0), quaternion_a=TURNED,
             ),
         ),
+        couplings=(
+            Coupling(
+                name="gear", hinge="end", offset=0.2,
+                terms=(CoupledCoordinate(hinge="root", coordinate="rotations[0]", ratio=1.5),),
+            ),
+        ),
         wheels=(
             Wheel(
                 name="wheel", body="hub", offset_m=(0.1, 0.0, 0.0), axis=(0.0, 0.0, 1.0), mass_kg=1.0,
@@ -227,6 +234,9 @@ def test_every_mutation_has_a_target_and_leaves_the_rest_as_it_was(mutation: Mut
         ("bushing_ends", "mount", {f"connectors[1].{key}" for key in ("body_a", "body_b")}
             | {f"connectors[1].quaternion_{end}[{i}]" for end in "ab" for i in (0, 2)}),
         ("bushing_order", "mount", {f"connectors[1].stiffness[{i}][{i}]" for i in range(6)}),
+        ("coupling_ratio", "gear", {"couplings[0].terms[0].ratio"}),
+        ("coupling_sign", "gear", {"couplings[0].terms[0].ratio"}),
+        ("coupling_offset", "gear", {"couplings[0].offset"}),
         ("motor_sign", "spring", {"connectors[0].force_N.amplitude"}),
         ("function_size", "course", {"sensors[2].function.amplitude"}),
         ("controller_gain", "law", {"controllers[0].C[0][0]"}),

@@ -40,6 +40,25 @@ def test_the_uncertainty_is_no_less_than_what_a_route_knows_of_itself_and_than_a
     assert near[FORCE].uncertainty == pytest.approx(1e-6)
 
 
+def test_a_witness_has_to_agree_and_says_nothing_of_the_uncertainty() -> None:
+    witness = replace(route("mujoco", off=5e-7, doubt=1e-6), witness=True)
+    found = agree([route(), route("pinocchio"), witness], ()).known[POSITION]
+    assert found.uncertainty == pytest.approx(1e-9)
+    assert "E 5.0e-07 to mujoco, a witness known to 1.0e-06" in found.how
+    with pytest.raises(CaseError, match="are 5e-07 m apart"):
+        agree([route(), route("pinocchio"), replace(witness, uncertainties=route("mujoco").uncertainties)], ())
+    with pytest.raises(CaseError, match="an uncertainty|uncertainty of mujoco is none"):
+        agree([route(), route("pinocchio"), replace(route("mujoco", doubt=np.inf), witness=True)], ())
+
+
+def test_a_witness_does_not_make_a_route_independent_nor_a_channel_known() -> None:
+    witness = replace(route("mujoco"), witness=True)
+    with pytest.raises(CaseError, match="no route is independent of native"):
+        agree([route(), route(), witness], ())
+    alone = replace(route("pinocchio"), channels={POSITION: PATH})
+    assert set(agree([route(), alone, witness], ()).known) == {POSITION}
+
+
 def test_even_equal_routes_leave_the_rounding_of_the_file() -> None:
     known = agree([route(doubt=0.0), route("pinocchio", doubt=0.0)], ()).known
     assert 1e-16 < known[POSITION].uncertainty < 1e-15

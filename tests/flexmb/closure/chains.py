@@ -56,8 +56,21 @@ def suppressed(closure: s.Closure) -> tuple[list[tuple[Array, Array]], list[Arra
     return turns, {"prismatic": [x, y], "cylindrical": [x, y], "planar": [ez]}.get(closure.type, [ex, ey, ez])
 
 
-def rows(dense: DenseSystem, closure: s.Closure, motion: Motions) -> Array:
+def relation(dense: DenseSystem, coupling: s.Coupling) -> tuple[Array, Array]:
+    """(nq,) and (nu,) factors of coordinates and speeds in a coupling of hinges with one scalar coordinate each."""
+    at = {x.owner: x for x in dense.tree.scalars}
+    of_q, of_u = np.zeros(dense.nq), np.zeros(dense.nu)
+    for hinge, factor in [(coupling.hinge, 1.0), *((term.hinge, -term.ratio) for term in coupling.terms)]:
+        of_q[at[hinge].q] = of_u[at[hinge].u] = factor
+    return of_q, of_u
+
+
+def rows(dense: DenseSystem, closure: s.Closure | s.Coupling, motion: Motions) -> Array:
     """(3,B,G) values, rates, accelerations of what a closure keeps zero: products of axes, components of position."""
+    if isinstance(closure, s.Coupling):
+        of_q, of_u = relation(dense, closure)
+        value = np.full(len(motion.u), of_q @ motion.q - closure.offset)
+        return np.array([value, motion.u @ of_u, motion.rates @ of_u])[:, :, None]
     B = relative_frame(dense, closure, motion)
     turns, steps = suppressed(closure)
     found = [
@@ -122,8 +135,8 @@ def constrained(scene: s.Scene, q: Array, u: Array, t: float = 0.0) -> Constrain
     q, u = dense.on_profile(q, u, t)
     unit = Motions(q, np.eye(dense.nu), np.zeros((dense.nu, dense.nu)))
     moving = Motions(q, u[None], np.zeros((1, dense.nu)))
-    J = np.concatenate([rows(dense, closure, unit)[1] for closure in scene.closures], axis=1).T
-    value, rate, gamma = np.concatenate([rows(dense, c, moving)[:, 0] for c in scene.closures], axis=1)
+    J = np.concatenate([rows(dense, closure, unit)[1] for closure in scene.constraints], axis=1).T
+    value, rate, gamma = np.concatenate([rows(dense, c, moving)[:, 0] for c in scene.constraints], axis=1)
     free = np.ones(dense.nu, dtype=bool)
     free[[x.u for x in dense.tree.scalars if x.prescribed is not None]] = False
     rates = np.zeros(dense.nu)

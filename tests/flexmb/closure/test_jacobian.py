@@ -12,6 +12,7 @@ from flexmb.closure.tangent import closed_jacobian
 from flexmb.scene import schema as s
 from tests.flexmb.closure import loops
 from tests.flexmb.closure import mechanisms as m
+from tests.flexmb.closure.coupled import coupled_tree
 from tests.flexmb.entry.test_tangent import extrapolated
 
 UNIT_ROUNDOFF = 2.0**-53
@@ -47,6 +48,8 @@ MOVING = {
     "slider-crank": lambda: m.slider_crank(0.3, 0.8, angle=0.7, modes=1),
     "Bennett": m.bennett,
     "windows": lambda: m.windows(2, 1.5),
+    "coupled": lambda: coupled_tree("full"),
+    "coupled and closed": lambda: coupled_tree("rigid", ("spherical",)),
 } | {f"random loops {seed}": lambda seed=seed: loops.random_loops(seed) for seed in (4, 5, 8, 13, 20)}
 
 

@@ -53,6 +53,59 @@ def test_accelerations_are_those_of_pinocchio(robot, tmp_path):
         assert backward_error(M, found, M @ expected, terms) < algebra(system.nu, 9)
 
 
+MIMICS = {"axis4": ("axis2", -1.3, 0.2), "axis6": ("axis4", 0.7, 0.0), "axis3": ("axis5", 0.05, -0.1)}
+
+
+def mimicking() -> str:
+    """The arm with joints that mimic others, one of them a joint that mimics, one a slide that mimics an angle."""
+    text = arm()
+    for name, (other, multiplier, offset) in MIMICS.items():
+        start = text.index(f'<joint name="{name}"')
+        end = text.index("</joint>", start)
+        given = f'multiplier="{multiplier}"' + (f' offset="{offset}"' if offset else "")
+        text = f'{text[:end]}<mimic joint="{other}" {given}/>{text[end:]}'
+    return text
+
+
+def test_mimic_joints_move_as_the_equations_of_pinocchio_reduced_by_their_relations(tmp_path):
+    """q = T r + c: T'M T r'' = -T'(M T' r' + nle) with the mass matrix and the bias of the free tree."""
+    pin = pytest.importorskip("pinocchio")
+    text = mimicking()
+    system = fm.compile(read(text, tmp_path, gravity=GRAVITY).scene)
+    model = pin.buildModelFromXML(text)
+    model.gravity.linear = np.array(GRAVITY)
+    data, names = model.createData(), list(model.names)[1:]
+    rng = np.random.default_rng(3)
+    free = [name for name in names if name not in MIMICS]
+    of = {name: (name, 1.0) for name in free}
+    for name, (other, multiplier, _) in sorted(MIMICS.items(), key=lambda each: each[0] == "axis6"):
+        of[name] = of[other][0], multiplier * of[other][1]
+    T = np.array([[factor * (leader == each) for each in free] for leader, factor in map(of.get, names)])
+    for _ in range(3):
+        values, rates = ({name: float(rng.normal()) for name in free} for _ in range(2))
+        for name, (other, multiplier, offset) in sorted(MIMICS.items(), key=lambda each: each[0] == "axis6"):
+            values[name], rates[name] = multiplier * values[other] + offset, multiplier * rates[other]
+        q, u, theirs, v = np.zeros(system.nq), np.zeros(system.nu), np.zeros(model.nq), np.zeros(model.nv)
+        for name in names:
+            each = model.joints[model.getJointId(name)]
+            q[system.coordinate(name)], u[system.speed(name)] = values[name], rates[name]
+            circle = np.cos(values[name]), np.sin(values[name])
+            theirs[each.idx_q : each.idx_q + each.nq] = circle if each.nq == 2 else values[name]
+            v[each.idx_v] = rates[name]
+        M = pin.crba(model, data, theirs)
+        M, bias = np.triu(M) + np.triu(M, 1).T, pin.nle(model, data, theirs, v)
+        found = system.accelerations(system.state(q, u))[[system.speed(name).start for name in names]]
+        assert np.max(np.abs(found - T @ found[[names.index(name) for name in free]])) < 1e-12 * np.max(np.abs(found))
+        terms = np.abs(T.T) @ (np.abs(M) @ np.abs(found) + np.abs(bias))
+        assert backward_error(T.T @ M, found, -T.T @ bias, terms) < algebra(system.nu, 9)
+
+
+def test_mimic_joints_start_where_those_that_they_mimic_are_at_zero(tmp_path):
+    system = fm.compile(read(mimicking(), tmp_path).scene)
+    at = {name: system.initial_state.q[system.coordinate(name)][0] for name in (*MIMICS, "axis2", "axis5")}
+    assert at == {"axis4": 0.2, "axis6": 0.7 * 0.2, "axis3": -0.1, "axis2": 0.0, "axis5": 0.0}
+
+
 class Theirs(NamedTuple):
     """Pinocchio's coordinates and speeds; its accelerations are turn @ ours[order] + swept."""
 
@@ -123,15 +176,39 @@ def test_what_is_left_out_is_said(tmp_path):
     assert any("bodies without mass: base, flange" in note for note in notes)
 
 
+def test_prefixes_of_extensions_need_no_declaration(tmp_path):
+    text = SINGLE.replace("<axis", '<limit drake:acceleration="2"/><axis').replace("</robot>", "<drake:x/></robot>")
+    assert any("drake:x" in note for note in read(text, tmp_path).notes)
+
+
+def test_a_fixed_joint_that_mimics_is_fixed(tmp_path):
+    text = SINGLE.replace('"revolute"', '"fixed"').replace("<axis", '<mimic joint="j"/><axis')
+    imported = read(text, tmp_path)
+    assert imported.scene.couplings == ()
+    assert "fixed joints mimic nothing: j" in imported.notes
+
+
 def test_a_scene_goes_to_a_file_and_runs(tmp_path):
-    scene = read(quadruped(), tmp_path, free_base=True).scene
-    fm.save_scene(scene, tmp_path / "quadruped.toml")
-    assert fm.load_scene(tmp_path / "quadruped.toml") == scene
+    for text, name in ((quadruped(), "quadruped.toml"), (mimicking(), "mimicking.toml")):
+        scene = read(text, tmp_path, free_base=True).scene
+        fm.save_scene(scene, tmp_path / name)
+        assert fm.load_scene(tmp_path / name) == scene
 
 
 SINGLE = f'<robot name="r">{link("a", 1)}{link("b", 2)}{joint("j", "revolute", "a", "b", 1)}</robot>'
 BAD = {
     "mimic": (SINGLE.replace("<axis", '<mimic joint="k"/><axis'), 'joint "j": it mimics'),
+    "mimic without multiplier": (
+        SINGLE.replace("<axis", '<mimic joint="j" multiplier="0"/><axis'), "its multiplier is zero",
+    ),
+    "mimic of itself": (SINGLE.replace("<axis", '<mimic joint="j" multiplier="2"/><axis'), "it mimics itself"),
+    "mimic by a word": (SINGLE.replace("<axis", '<mimic joint="j" offset="one"/><axis'), "offset of its mimic element"),
+    "mimic of a weld": (
+        SINGLE.replace("<axis", '<mimic joint="k"/><axis').replace(
+            "</robot>", link("c", 3) + joint("k", "fixed", "b", "c", 2) + "</robot>"
+        ),
+        '"k" of type "fixed" has no single coordinate',
+    ),
     "kind": (SINGLE.replace('"revolute"', '"screw"'), 'its type is "screw"'),
     "loop": (
         SINGLE.replace("</robot>", joint("k", "fixed", "b", "a", 2) + "</robot>"),

@@ -12,6 +12,7 @@ import pytest
 import flexmb as fm
 from flexmb.run import within_leaps
 from tests.flexmb.closure.mechanisms import windows
+from tests.repo.project import ROOT
 
 Z = (0.0, 0.0, 1.0)
 
@@ -46,6 +47,16 @@ def test_an_impact_turns_a_mechanism_of_one_freedom_over():
     assert event.impulses["c.rotation"] == pytest.approx(-(1.0 + e) * energy / before[2], rel=1e-9)
     assert event.energy_change == pytest.approx(-0.5 * (1.0 - e**2) * energy, rel=1e-9)
     assert np.abs(run.energy_drift).max() < 1e-9 * run.energy_scale
+
+
+def test_a_latch_where_all_rows_are_independent():
+    """A slider-crank in space, closed by a ball joint: all its kinetic energy goes, and the impulse is determined."""
+    scene = fm.load_scene(ROOT / "cases" / "closed_chains" / "slider_crank" / "scene.toml")
+    latch = on("time", 0.1, fm.Latch(coordinate="drive.rotation"))
+    event = fm.simulate(msgspec.structs.replace(scene, events=(latch,)), 0.2, samples=5).events[0]
+    energy = event.before.u @ fm.System(scene).mass_matrix(event.before) @ event.before.u
+    assert event.energy_change == pytest.approx(-0.5 * energy, rel=1e-9)
+    assert np.all(np.isfinite(event.closures["wristpin"])) and np.any(event.closures["wristpin"])
 
 
 def test_closures_pass_their_part_of_an_impulse_on():

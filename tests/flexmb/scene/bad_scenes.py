@@ -46,6 +46,7 @@ def satellite() -> SceneBuilder:
         .marker("eye", "boom", node="tip")
         .modal_state("boom", coordinates=(0.01, 0.0, 0.0))
         .closure("loop", "spherical", "bob", "slider")
+        .coupling("gear", "rail", {("cardan", "rotations[1]"): 0.2}, offset=0.1)
     )  # fmt: skip
 
 
@@ -135,14 +136,38 @@ BAD = {
     "closure with a zero axis": (
         both(put("closures", 0, "type", "revolute"), put("closures", 0, "axis", [0.0, 0.0, 0.0])),
         ["$.closures[0].axis"], ["zero"], ["unit vector"]),
+    # couplings
+    "coupling of an unknown hinge": (put("couplings", 0, "hinge", "rial"), ["$.couplings[0]", 'coupling "gear"'],
+                                     ['no hinge "rial"'], ["name a hinge"]),
+    "coupling of a free hinge": (put("couplings", 0, "hinge", "base"), ["$.couplings[0]"],
+                                 ['hinge "base" of type free has no scalar coordinate'], ["angles or displacements"]),
+    "coupling of one of two": (put("couplings", 0, "terms", 0, "coordinate", ""), ["$.couplings[0]"],
+                               ["more than one coordinate, rotations[0], rotations[1]"], ["name a hinge"]),
+    "coupling of a third of two": (put("couplings", 0, "terms", 0, "coordinate", "rotations[2]"), ["$.couplings[0]"],
+                                   ['no coordinate "rotations[2]"', "rotations[0], rotations[1]"], ["name a hinge"]),
+    "coupling without ratio": (put("couplings", 0, "terms", 0, "ratio", 0.0), ["$.couplings[0].terms[0].ratio"],
+                               ["zero"], ["leave"]),
+    "coupling with an infinite ratio": (put("couplings", 0, "terms", 0, "ratio", INF),
+                                        ["$.couplings[0].terms[0].ratio"], ["inf"], ["finite"]),
+    "coupling with itself": (put("couplings", 0, "terms", [{"hinge": "rail", "ratio": 0.5}]), ["$.couplings[0]"],
+                             ['"translation" of hinge "rail" is named twice'], ["once"]),
+    "coupling of nothing": (put("couplings", 0, "terms", []), ["$.couplings[0].terms"], ["no coordinate leads"],
+                            ["prescribed, or a weld"]),
+    "coupling of what is prescribed": (
+        both(put("couplings", 0, "hinge", "root"), put("couplings", 0, "terms", [{"hinge": "rail", "ratio": 1.0}]),
+             put("hinges", 4, "translation", {"prescribed_m": {"kind": "constant", "value": 0.0}})),
+        ["$.couplings[0]"], ["all its coordinates are prescribed"], ["leave the coupling out"]),
+    "coupling named like a closure": (put("couplings", 0, "name", "loop"), ["$.couplings[0].name"], ['"loop"'],
+                                      ["rename"]),
     # the tree
     "cycle": (put("hinges", 0, "parent", "bob"), ["$.hinges"], ["cycle", "boom -> bob -> hub -> boom"], ["ground"]),
     "self hinge": (put("hinges", 4, "parent", "slider"), ["$.hinges[4]", 'hinge "rail"'], ["itself"], ["different"]),
-    "body without hinge": (drop("hinges", 4), ["$.bodies[4]", 'body "slider"'], ["not the child"], ["free hinge"]),
+    "body without hinge": (both(drop("hinges", 4), put("couplings", [])), ["$.bodies[4]", 'body "slider"'],
+                           ["not the child"], ["free hinge"]),
     "two inboard hinges": (append("hinges", kind="weld", name="again", parent="bob", child="slider"), ["$.hinges[5]"],
                            ['"again"', '"slider"', '"rail"'], ["closure"]),
     "no bodies": (both(put("bodies", []), *(put(key, []) for key in (
-        "hinges", "wheels", "point_masses", "loads", "markers", "modal_states", "closures"))),
+        "hinges", "wheels", "point_masses", "loads", "markers", "modal_states", "closures", "couplings"))),
         ["$.bodies"], ["no body"], ["add"]),
     # numbers
     "NaN": (put("bodies", 0, "com_m", 1, NAN), ["$.bodies[0].com_m[1]", 'body "hub"'], ["nan"], ["finite"]),

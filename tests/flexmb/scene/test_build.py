@@ -48,6 +48,7 @@ METHODS = {
     "revolute": s.Revolute, "screw": s.Screw, "prismatic": s.Prismatic, "cylindrical": s.Cylindrical,
     "universal": s.Universal,
     "gimbal": s.Gimbal, "spherical": s.Spherical, "planar": s.Planar, "free": s.Free, "closure": s.Closure,
+    "coupling": s.Coupling,
     "wheel": s.Wheel, "point_mass": s.PointMass, "force": s.Load, "torque": s.Load, "marker": s.Marker,
     "modal_state": s.ModalState, "spring_damper": s.SpringDamper, "bushing": s.Bushing,
     "angular_spring": s.AngularSpring, "linear_spring": s.LinearSpring, "angular_friction": s.AngularFriction,
@@ -58,9 +59,10 @@ METHODS = {
     "state_space": s.StateSpace, "pid": s.Pid, "saturation": s.Saturation, "gain_table": s.GainTable,
     "user_law": s.UserLaw,
 }  # fmt: skip
-# Keys that a method says in its own way: the section of a beam, the one coordinate of a hinge, the type of a load.
+# Keys that a method says in its own way: the section of a beam, the one coordinate of a hinge, the type of a load,
+# the terms of a coupling.
 REPLACED = {"beam": {"stations"}, "revolute": {"rotation"}, "screw": {"rotation"}, "prismatic": {"translation"},
-            "force": {"type"}, "torque": {"type"}}  # fmt: skip
+            "force": {"type"}, "torque": {"type"}, "coupling": {"terms"}}  # fmt: skip
 
 
 def test_every_kind_has_a_method():

@@ -1,0 +1,8 @@
+"""The equations of motion rebuilt from the exported data by NumPy, integrated by SciPy: eight stiffened pieces.
+
+They have the points, modes and second-order field of `model.json` and `modal/*.json`, and nothing of flexmb's dynamics.
+"""
+
+from crosscheck.export.equations import rebuilt
+
+exact = rebuilt(__file__, rtol=1e-9)

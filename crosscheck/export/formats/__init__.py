@@ -1,0 +1,1 @@
+"""The rigid trees of the library in the formats of other programs, each only where it holds the mechanism exactly."""

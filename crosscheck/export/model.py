@@ -1,0 +1,170 @@
+"""A scene as the numbers of its equations of motion: bodies, joints of elementary freedoms, loads, markers.
+
+Everything is by name and in SI. What a scene leaves to the reader of its schema is written out here: every joint is a
+list of turns, slides, ball joints and free flights between two frames, wheels and point masses are bodies with a joint
+of their own, and a beam is its modes and inertia points (`crosscheck.export.modal`). docs/export.md explains each key.
+"""
+
+from __future__ import annotations
+
+from typing import Any, assert_never
+
+import msgspec
+import numpy as np
+
+from crosscheck.engines.conventions import rotation_matrix
+from crosscheck.export.modal import modal_data
+from crosscheck.library.case_error import CaseError
+from flexmb.modal.flexible import flexible_model
+from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, SidBody, Vector
+from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
+from flexmb.scene.functions import Function
+from flexmb.scene.hinges import Hinge
+from flexmb.scene.schema import PointMass, Scene, Wheel
+from flexmb.scene.tree import ordered, rest_frames
+from flexmb.surrogate.lumping import rigid_equivalent
+
+FORMAT = "crosscheck export 1"
+AS_IN_THE_SCENE = ("closures", "connectors", "sensors", "controllers", "events")
+"""Parts whose keys are those of the scene file: `schemas/scene.schema.json` explains them."""
+
+Data = dict[str, Any]
+
+
+def model_data(scene: Scene) -> tuple[Data, dict[str, Data]]:
+    """The content of `model.json`, and of `modal/<body>.json` by the name of each flexible body.
+
+    CaseError for a body that a SID file describes, and for one of level "linear" or "ruthless", whose truncated mass
+    matrix these numbers do not say.
+    """
+    modal = {
+        body.name: modal_data(flexible_model(body), body.level)
+        for body in scene.bodies
+        if isinstance(body, BeamBody | ModalBody) and _deforms(body)
+    }
+    branches = ordered(scene)
+    bodies = [_body(branch.body, modal) for branch in branches]
+    joints = [_hinge(branch.hinge) for branch in branches]
+    for wheel in scene.wheels:
+        bodies.append(_wheel_body(wheel))
+        joints.append(_leaf(wheel, f"wheel {wheel.name}", "wheel"))
+    for point in scene.point_masses:
+        bodies.append(_rigid(f"mass {point.name}", point.mass_kg, ZERO, np.zeros((3, 3)), {}))
+        joints.append(_leaf(point, f"mass {point.name}", "point mass"))
+    data: Data = {
+        "format": FORMAT,
+        "name": scene.name,
+        "description": scene.description,
+        "gravity_m_s2": scene.gravity_m_s2,
+        "bodies": bodies,
+        "joints": joints,
+        "modal_states": {
+            state.body: {"coordinates": state.coordinates, "rates": state.rates} for state in scene.modal_states
+        },
+        "loads": _plain(scene.loads),
+        "markers": _plain(scene.markers),
+    }
+    return data | {part: _plain(getattr(scene, part)) for part in AS_IN_THE_SCENE}, modal
+
+
+def _deforms(body: BeamBody | ModalBody) -> bool:
+    match body.level:
+        case "rigid":
+            return False
+        case "full" | "stiffened":
+            return True
+        case "linear" | "ruthless":
+            what = f'body "{body.name}" is of level "{body.level}"'
+            raise CaseError(f'{what}, whose truncated mass matrix an export cannot say: take level "full"')
+        case _:
+            assert_never(body.level)
+
+
+def _body(body: Body, modal: dict[str, Data]) -> Data:
+    if isinstance(body, SidBody):
+        raise CaseError(f'body "{body.name}" is described by a SID file: convert it by `flexmb import`')
+    if body.name in modal:
+        return {"name": body.name, "kind": "modal", "file": modal_file(body.name)}
+    rest = {name: (frame.position, frame.quaternion) for name, frame in rest_frames(body).items()}
+    if isinstance(body, RigidBody):
+        return _rigid(body.name, body.mass_kg, body.com_m, np.array(body.inertia_kg_m2), rest)
+    same = rigid_equivalent(body)
+    return _rigid(body.name, same.mass_kg, same.com_m, np.array(same.inertia_kg_m2), rest)
+
+
+def modal_file(body: str) -> str:
+    """The file of a flexible body beside `model.json`; characters that a path must not have are replaced."""
+    return f"modal/{''.join(c if c.isalnum() or c in '-_.' else '_' for c in body)}.json"
+
+
+def _rigid(
+    name: str, mass: float, com: Vector, inertia: np.ndarray, nodes: dict[str, tuple[Vector, Quaternion]]
+) -> Data:
+    return {
+        "name": name, "kind": "rigid", "mass_kg": mass, "mass_centre_m": com, "inertia_kg_m2": inertia.tolist(),
+        "nodes": {node: _frame(position, quaternion) for node, (position, quaternion) in nodes.items()},
+    }  # fmt: skip
+
+
+def _wheel_body(wheel: Wheel) -> Data:
+    axis = np.array(wheel.axis, dtype=float)
+    transverse = wheel.transverse_inertia_kg_m2
+    inertia = transverse * np.eye(3) + (wheel.axial_inertia_kg_m2 - transverse) * np.outer(axis, axis)
+    return _rigid(f"wheel {wheel.name}", wheel.mass_kg, ZERO, inertia, {})
+
+
+def _frame(position: Vector, quaternion: Quaternion) -> Data:
+    return {"position_m": position, "rotation": rotation_matrix(quaternion).tolist()}
+
+
+def _hinge(hinge: Hinge) -> Data:
+    kind = str(hinge.__struct_config__.tag)
+    return {
+        "name": hinge.name, "kind": kind,
+        "parent": hinge.parent, "parent_node": hinge.parent_node,
+        "parent_offset": _frame(hinge.parent_position_m, hinge.parent_quaternion),
+        "child": hinge.child, "child_node": hinge.child_node,
+        "child_offset": _frame(hinge.child_position_m, hinge.child_quaternion),
+        "freedoms": [_freedom(each) for each in hinge.freedoms],
+    }  # fmt: skip
+
+
+def _leaf(item: Wheel | PointMass, body: str, kind: str) -> Data:
+    """The joint of a wheel or a point mass, whose body has its frame at the joint."""
+    return {
+        "name": item.name, "kind": kind, "parent": item.body, "parent_node": item.node,
+        "parent_offset": _frame(item.offset_m, IDENTITY), "child": body, "child_node": "origin",
+        "child_offset": _frame(ZERO, IDENTITY), "freedoms": [_freedom(each) for each in item.freedoms],
+    }  # fmt: skip
+
+
+def _freedom(freedom: Freedom) -> Data:
+    match freedom:
+        case ScalarFreedom(name=name, axis=axis, coordinate=coordinate, pitch=pitch):
+            stiffness, damping, rest = coordinate.spring
+            return {
+                "motion": freedom.motion, "name": name, "axis": axis, "pitch_m_rad": pitch,
+                "value": coordinate.value, "rate": coordinate.rate,
+                "stiffness": stiffness, "damping": damping, "rest": rest,
+                "effort": _function(coordinate.effort), "prescribed": _function(coordinate.prescribed),
+            }  # fmt: skip
+        case Ball(quaternion=quaternion, angular_velocity=omega, stiffness=stiffness, damping=damping):
+            return {
+                "motion": "ball", "quaternion": quaternion, "angular_velocity_rad_s": omega,
+                "stiffness_Nm_rad": stiffness, "damping_Nms_rad": damping,
+            }  # fmt: skip
+        case Floating(position=position, quaternion=quaternion, angular_velocity=omega, velocity=velocity):
+            return {
+                "motion": "free", "position_m": position, "quaternion": quaternion,
+                "angular_velocity_rad_s": omega, "velocity_m_s": velocity,
+            }  # fmt: skip
+        case _:
+            assert_never(freedom)
+
+
+def _function(function: Function | None) -> Any:
+    return None if function is None else _plain(function)
+
+
+def _plain(item: Any) -> Any:
+    return msgspec.to_builtins(item)

@@ -1,0 +1,94 @@
+"""Mimic joints of a URDF file: q = multiplier q_other + offset, a coupling of the two hinges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NoReturn
+from xml.etree import ElementTree
+
+from flexmb.interchange.imported import usable
+from flexmb.scene.build import SceneBuilder
+
+SCALAR = ("revolute", "continuous", "prismatic")
+"""Types of joints that have one coordinate."""
+
+Fail = Callable[[str, str, str], NoReturn]
+"""Raises the error for a place, what is wrong there and the remedy."""
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """What a joint mimics; in rad or m of the joint itself, and of the other one."""
+
+    joint: str
+    other: str
+    multiplier: float
+    offset: float
+
+
+class Mimics:
+    """The mimic joints of a robot, by name."""
+
+    def __init__(self, joints: Mapping[str, ElementTree.Element], fail: Fail) -> None:
+        self._joints, self._fail = joints, fail
+        self._of: dict[str, Mimic] = {}
+        for name, joint in joints.items():
+            element = joint.find("mimic")
+            if element is not None and joint.get("type") != "fixed":
+                self._of[name] = self._mimic(name, element)
+        self._values = {name: self._value(name) for name in self._of}
+
+    @property
+    def on_fixed(self) -> list[str]:
+        """Fixed joints that are said to mimic others: they have no coordinate that could."""
+        return [name for name, joint in self._joints.items()
+                if joint.find("mimic") is not None and joint.get("type") == "fixed"]  # fmt: skip
+
+    def value(self, joint: str) -> float:
+        """The coordinate of a joint where those that mimic none are zero."""
+        return self._values.get(joint, 0.0)
+
+    def couple(self, builder: SceneBuilder) -> None:
+        """Add the couplings, named after the joints that they lead."""
+        taken = set(self._joints)
+        for each in self._of.values():
+            name = next(name for name in (f"{each.joint}.mimic{end}" for end in ("", *range(99))) if name not in taken)
+            builder.coupling(name, each.joint, {each.other: each.multiplier}, offset=each.offset)
+
+    def _mimic(self, name: str, element: ElementTree.Element) -> Mimic:
+        place, other = f'joint "{name}"', element.get("joint", "")
+        if other not in self._joints:
+            self._fail(place, f'it mimics "{other}", which is not a joint', "give the name of a joint")
+        for each in (name, other):
+            kind = self._joints[each].get("type", "")
+            if kind not in SCALAR:
+                what = f'it mimics "{other}", and "{each}" of type "{kind}" has no single coordinate'
+                self._fail(place, what, f"mimic joints are {', '.join(SCALAR)}")
+        found = {key: self._number(place, element, key, usual) for key, usual in (("multiplier", 1.0), ("offset", 0.0))}
+        if found["multiplier"] == 0.0:
+            what = "its multiplier is zero: it follows no joint"
+            self._fail(place, what, "make the joint fixed, at its offset")
+        return Mimic(name, other, found["multiplier"], found["offset"])
+
+    def _number(self, place: str, element: ElementTree.Element, key: str, usual: float) -> float:
+        text = element.get(key)
+        try:
+            value = usual if text is None else float(text) if text.isascii() and "_" not in text else math.nan
+        except ValueError:
+            value = math.nan
+        if not usable(value):
+            self._fail(place, f"{key} of its mimic element is {text!r}", "give a number in SI units")
+        return value
+
+    def _value(self, name: str) -> float:
+        chain = [self._of[name]]
+        while chain[-1].other in self._of:
+            chain.append(self._of[chain[-1].other])
+            if chain[-1].joint in {each.joint for each in chain[:-1]} | {name}:
+                self._fail(f'joint "{name}"', "it mimics itself, by way of others", "let one of them mimic none")
+        value = 0.0
+        for each in reversed(chain):
+            value = each.multiplier * value + each.offset
+        return value
