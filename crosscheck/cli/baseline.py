@@ -80,7 +80,8 @@ def print_held(held: AgainstBaseline, shown: Verbosity) -> None:
 
     file = held.baseline.file
     if held.differences is not None:
-        print_differences(common.console, held.differences, shown)
+        if shown is not Verbosity.QUIET:
+            print_differences(common.console, held.differences, shown)
         kept = "Worse than the baseline" if held.differences.regressed else "Nothing is worse than the baseline"
         colour = "red" if held.differences.regressed else "green"
         common.console.print(words(f"{kept} {file}", f"bold {colour}"), soft_wrap=True)

@@ -80,6 +80,7 @@ def test_patterns_of_the_library() -> None:
 
 
 PATTERN = "no_such_family/*"
+BESIDES = {"csv": ["x.csv"], "out": ["--out", "new"]}  # for what else a command demands
 
 
 def readers() -> dict[str, list[str]]:
@@ -89,7 +90,10 @@ def readers() -> dict[str, list[str]]:
         assert command.callback is not None
         hints = inspect.get_annotations(command.callback, eval_str=True)
         if any(hint in (CaseWords, CaseWord) for hint in hints.values()):
-            found[command.name or command.callback.__name__] = ["x.csv"] if "csv" in hints else []
+            taken = inspect.signature(command.callback).parameters.items()
+            needed = [name for name, each in taken if each.default is each.empty]
+            name = command.name or command.callback.__name__
+            found[name] = [word for each in needed for word in BESIDES.get(each, [])]
     return found
 
 
