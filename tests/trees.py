@@ -16,10 +16,12 @@ from scipy.spatial.transform import Rotation
 
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, angular, linear
+from flexmb.scene.check import check_scene
 from flexmb.scene.convert import plain
 from flexmb.scene.hinges import WITH_AXIS
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.shapes import beam_section
+from flexmb.scene.tree import coordinates, with_coordinates
 
 STRUCTS = {struct.__struct_config__.tag: struct for struct in get_args(s.Hinge)}
 # A new kind is none of these, so that the random scenes of a seed stay what they are; it is drawn by `LATER_KINDS`.
@@ -39,7 +41,8 @@ class Recipe:
     `carriers`: kinds of bodies, drawn in turn: "rigid", "modal" (raw, clamped), "floating" (raw, free-free), "beam",
     "masses" (raw, clamped, points without inertia). `at_clamps`: hinges sit where the modes of the outboard body are
     clamped, unless it floats. `conservative` leaves out dampers, motors, loads and prescribed motion.
-    `hinges`: kinds drawn in turn.
+    `hinges`: kinds drawn in turn. `armatures`: two of three coordinates of hinges and point masses have one, of the
+    size of the bodies' inertia; they are drawn apart, so that all else of a scene is the same without them.
     """
 
     bodies: int = 10
@@ -55,6 +58,7 @@ class Recipe:
     beam_points: tuple[str, ...] = ("section", "rotary", "line")
     deformation: float = 0.1
     at_clamps: bool = False
+    armatures: bool = False
 
 
 RIGID = Recipe(carriers=("rigid",))
@@ -64,6 +68,8 @@ LINEAR = Recipe(levels=("linear",))
 STIFFENED = Recipe(levels=("stiffened", "full", "stiffened"))
 MIXED = Recipe(levels=("full", "ruthless", "rigid"))
 EVERY_LEVEL = Recipe(levels=("linear", "full", "linear", "ruthless", "rigid"))
+ARMED = replace(EVERY_LEVEL, armatures=True, hinges=(*KINDS, *LATER_KINDS))
+ARMED_RIGID = replace(RIGID, armatures=True, hinges=(*KINDS, *LATER_KINDS))
 LATER = Recipe(hinges=(*LATER_KINDS, "spherical", *LATER_KINDS, "prismatic"))
 CONSERVATIVE = Recipe(conservative=True, prescribed=False)
 FREE_FLYING = replace(CONSERVATIVE, grounded=False)
@@ -92,7 +98,25 @@ def random_scene(seed: int, recipe: Recipe = FULL) -> s.Scene:
     _point_masses(scene, rng, nodes, recipe)
     if not recipe.conservative:
         _loads(scene, rng, nodes)
-    return scene.scene()
+    return with_armatures(scene.scene(), seed) if recipe.armatures else scene.scene()
+
+
+def with_armatures(scene: s.Scene, seed: int) -> s.Scene:
+    """The scene with armatures of two of three scalar coordinates."""
+    rng = np.random.default_rng((seed, 27))
+
+    def armed(item: Any) -> Any:
+        drawn = [
+            msgspec.structs.replace(each, **{each.ARMATURE: float(rng.uniform(0.05, 1.0) * (rng.random() < 2.0 / 3.0))})
+            for _, each in coordinates(item)
+        ]
+        return with_coordinates(item, drawn)
+
+    found = msgspec.structs.replace(
+        scene, hinges=tuple(map(armed, scene.hinges)), point_masses=tuple(map(armed, scene.point_masses))
+    )
+    check_scene(found)
+    return found
 
 
 def vector(rng: Generator, size: float) -> np.ndarray:

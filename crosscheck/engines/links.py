@@ -35,7 +35,7 @@ from flexmb.scene.schema import (
     SidBody,
     Wheel,
 )
-from flexmb.scene.tree import GROUND, ordered
+from flexmb.scene.tree import GROUND, coordinates, ordered
 from flexmb.surrogate.lumping import Inertia, combine, inertia_of, rigid_equivalent
 from flexmb.typing import Real
 
@@ -48,8 +48,8 @@ T = TypeVar("T")
 class Scalar:
     """A joint of one coordinate about or along `axis`, in the axes that the freedoms before it have carried along.
 
-    Units rad or m, N m or N. A screw turns, and shifts by `pitch` (m/rad) times its angle. `effort` is the motor,
-    `prescribed` the motion of a driven coordinate.
+    Units rad or m, N m or N, kg m^2 or kg. A screw turns, and shifts by `pitch` (m/rad) times its angle. `effort` is
+    the motor, `prescribed` the motion of a driven coordinate.
     """
 
     motion: JointMotion
@@ -60,6 +60,7 @@ class Scalar:
     stiffness: float
     damping: float
     rest: float
+    armature: float
     effort: Function | None
     prescribed: Function | None
 
@@ -108,11 +109,12 @@ class Attachment:
 
 def obstacle(
     scene: Scene, engine: str, closed_by: tuple[str, ...], connected_by: tuple[type[Connector], ...] = (),
-    screws: bool = False, couplings: bool = False,
+    screws: bool = False, couplings: bool = False, armatures: bool = False,
 ) -> str:  # fmt: skip
     """Why an engine of rigid trees with some types of closures and connectors cannot represent the scene, or "".
 
-    `screws`, `couplings`: whether the adapter offers screw joints, and linear relations of coordinates.
+    `screws`, `couplings`, `armatures`: whether the adapter offers screw joints, linear relations of coordinates, and
+    armatures of coordinates.
     """
     if scene.couplings and not couplings:
         return f'coupling "{scene.couplings[0].name}": the adapter of {engine} relates no coordinates'
@@ -128,6 +130,9 @@ def obstacle(
     screw = "" if screws else first_screw(scene)
     if screw:
         return f'hinge "{screw}" is a screw: the adapter of {engine} offers no such joint'
+    armed = "" if armatures else first_armature(scene)
+    if armed:
+        return f'coordinate "{armed}" has an armature: the adapter of {engine} offers none'
     for body in scene.bodies:
         if isinstance(body, SidBody):
             return f'body "{body.name}": its SID file is read by flexmb alone: convert it by flexmb import'
@@ -141,6 +146,15 @@ def first_screw(scene: Scene) -> str:
     for hinge in scene.hinges:
         if any(isinstance(each, ScalarFreedom) and each.motion == "screw" for each in hinge.freedoms):
             return hinge.name
+    return ""
+
+
+def first_armature(scene: Scene) -> str:
+    """The first coordinate of a hinge or a point mass that has an armature, "" where there is none."""
+    for item in (*scene.hinges, *scene.point_masses):
+        for name, coordinate in coordinates(item):
+            if coordinate.armature:
+                return f"{item.name}.{name}"
     return ""
 
 
@@ -198,7 +212,7 @@ def freedoms(item: Hinge | PointMass | Wheel) -> tuple[Freedom, ...]:
 
 def _scalar(freedom: ScalarFreedom) -> Scalar:
     c, axis = freedom.coordinate, np.array(freedom.axis, dtype=float)
-    return Scalar(freedom.motion, axis, freedom.pitch, c.value, c.rate, *c.spring, c.effort, c.prescribed)
+    return Scalar(freedom.motion, axis, freedom.pitch, c.value, c.rate, *c.spring, c.armature, c.effort, c.prescribed)
 
 
 def _disc(wheel: Wheel) -> Inertia:

@@ -82,6 +82,9 @@ class _Columns:
         beyond = self._moves[:, owners]
         upper = np.einsum("ia,jik,kj->aj", self._motion, self._carried, self._motion) * beyond
         self._mass = np.where(beyond, upper, upper.T)
+        for column, freedom in enumerate(self._freedoms):
+            if isinstance(freedom, Scalar):
+                self._mass[column, column] += freedom.armature
 
     def swinging(self, gravity: float) -> float:
         """sqrt(m g r / I) of the fastest pendulum (rad/s): everything beyond one axis, at any angle at t = 0."""

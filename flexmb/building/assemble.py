@@ -86,7 +86,8 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     connected = connector_arrays(scene, at.connectors, numbering, functions.number)
     function, table = pack(functions.all())
     port, wheel = _ports(ports, port_rows), _wheels(wheels, at.wheels, numbering)
-    speed["doubtful"] = DOUBTFUL * moved_inertia(body, port, inertia["mff"], wheel, len(speed))
+    moved = moved_inertia(body, port, inertia["mff"], wheel, len(speed))
+    speed["doubtful"] = DOUBTFUL * (moved + speed["armature"])
     constants = a.Constants(
         gravity=np.array(scene.gravity_m_s2, float),
         body=body,
@@ -171,7 +172,7 @@ def _loads(loads: list[s.Load], ports: list[int], functions: Functions) -> a.Rec
 def _speeds(
     chain: list[BodyLink], wheels: list[s.Wheel], numbering: Numbering, functions: Functions, body: a.Record
 ) -> a.Record:
-    """Springs, dampers, motors and prescribed motion by speed; isotropic springs of spherical hinges by body."""
+    """Springs, dampers, armatures, motors, given motion by speed; isotropic springs of spherical hinges by body."""
     out = np.zeros(numbering.nu, a.SPEED)
     for name in ("coordinate", "motor", "prescribed"):
         out[name] = -1
@@ -182,12 +183,12 @@ def _speeds(
             body["ball_spring"][k], out["damping"][u : u + 3] = stiffness, damping
         for n, (_, c) in enumerate(link.scalar):
             at.append(u + n)
-            rows.append((q + n, functions.number(c.effort), functions.number(c.prescribed), *c.spring))
+            rows.append((q + n, functions.number(c.effort), functions.number(c.prescribed), *c.spring, c.armature))
     for wheel in wheels:
         at.append(numbering.u[wheel.name].start)
         motor, motion = functions.number(wheel.torque_Nm), functions.number(wheel.prescribed_rad)
-        rows.append((numbering.q[wheel.name].start, motor, motion, 0.0, wheel.friction_Nms_rad, 0.0))
-    keys = ("coordinate", "motor", "prescribed", "stiffness", "damping", "rest")
+        rows.append((numbering.q[wheel.name].start, motor, motion, 0.0, wheel.friction_Nms_rad, 0.0, 0.0))
+    keys = ("coordinate", "motor", "prescribed", "stiffness", "damping", "rest", "armature")
     for key, values in zip(keys, np.array(rows, float).reshape(-1, len(keys)).T, strict=True):
         out[key][at] = values
     return out

@@ -103,12 +103,21 @@ class DenseSystem:
         return InertiaPoints(np.where(truncated, 0.0, self.points.mass), inertia, self.points.member)
 
     def mass_matrix(self, q: Real) -> Real:
-        """M (nu,nu) = sum over points m v'v + w' J w, and S' M_m S of bodies of level linear."""
+        """M (nu,nu) = sum over points m v'v + w' J w, S' M_m S of bodies of level linear, and armatures."""
         J, now = self._jacobian(q), self._at(q)
         M = np.einsum("p,pai,paj->ij", self._summed.mass, J.linear, J.linear)
         M += np.einsum("pai,pab,pbj->ij", J.angular, _turned(self._summed, now.points), J.angular)
         S = self._body_jacobians(q)
-        return M + sum((S[k].T @ body.M @ S[k] for k, body in now.first_order.items()), start=np.zeros_like(M))
+        M += sum((S[k].T @ body.M @ S[k] for k, body in now.first_order.items()), start=np.zeros_like(M))
+        return M + np.diag(self.armature)
+
+    @cached_property
+    def armature(self) -> Real:
+        """(nu,) inertia along each speed alone, kg m^2 or kg."""
+        found = np.zeros(self.nu)
+        for x in self.tree.scalars:
+            found[x.u] = x.armature
+        return found
 
     def bias(self, q: Real, u: Real, t: float = 0.0) -> Real:
         """c (nu,) in M udot + c = tau.
@@ -188,7 +197,7 @@ class DenseSystem:
         """Total load (6,) [torque; force] on the outboard body about the outboard hinge point, by hinge.
 
         Newton and Euler for everything outboard of the hinge: inertia minus gravity minus loads at nodes and of
-        connectors.
+        connectors. Armatures are no mass of the bodies.
         """
         q, u = self.on_profile(q, u, t)
         now = self._seen(q, u, rates)
@@ -243,6 +252,7 @@ class DenseSystem:
         mass, inertia = self._summed.mass, _turned(self._summed, frames)
         first_moment = mass @ frames.position.value + sum((body.mass_moment() for body in bodies), start=np.zeros(3))
         kinetic = 0.5 * float(mass @ (v * v).sum(axis=1) + np.einsum("pa,pab,pb->", w, inertia, w))
+        kinetic += 0.5 * float(self.armature @ u**2)
         spring = sum(0.5 * x.stiffness * (q[x.q] - x.rest) ** 2 for x in self.tree.scalars)
         strain = 0.0
         for member in self.tree.members:

@@ -80,6 +80,7 @@ class ScalarSpeed:
     stiffness: float
     damping: float
     rest: float
+    armature: float
     motor: s.Function | None
     prescribed: s.Function | None
 
@@ -143,7 +144,7 @@ def _append(
         slice(q, q + nq), slice(u, u + nu), slice(q + nq, q + nq + m), slice(u + nu, u + nu + m),
     )  # fmt: skip
     scalars = [
-        ScalarSpeed(hinge.name, q + n, u + n, *c.spring, c.effort, c.prescribed)
+        ScalarSpeed(hinge.name, q + n, u + n, *c.spring, c.armature, c.effort, c.prescribed)
         for n, (_, c) in enumerate(coordinates(hinge))
     ]
     return replace(
@@ -154,7 +155,7 @@ def _append(
 def _append_wheel(tree: DenseTree, wheel: s.Wheel, seat: Seat) -> DenseTree:
     rotor = Rotor(wheel, len(tree.members) - 1, seat, tree.nq, tree.nu)
     friction, motor, prescribed = wheel.friction_Nms_rad, wheel.torque_Nm, wheel.prescribed_rad
-    scalar = ScalarSpeed(wheel.name, tree.nq, tree.nu, 0.0, friction, 0.0, motor, prescribed)
+    scalar = ScalarSpeed(wheel.name, tree.nq, tree.nu, 0.0, friction, 0.0, 0.0, motor, prescribed)
     return replace(
         tree, rotors=[*tree.rotors, rotor], scalars=[*tree.scalars, scalar], nq=tree.nq + 1, nu=tree.nu + 1
     )

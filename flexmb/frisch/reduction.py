@@ -6,10 +6,12 @@ and (138) premultiply by q' and h' only.
 """
 
 from flexmb.frisch.tables import ONE_SIDED
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.linear_algebra import cholesky_rows, cholesky_solve
 from flexmb.spatial.pivots import is_small
 from flexmb.spatial.vector import store3, vec3
+from flexmb.tables.features import ARMATURES
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 
 
@@ -17,7 +19,8 @@ from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 def reduce(c, w):
     """Matrix and right-hand side of the scalar equations (136), (138), (141) in the speeds.
 
-    They contain no constraint loads (135).
+    They contain no constraint loads (135). Armatures, which the paper does not have, are inertia along their own speeds
+    alone, and enter the diagonal.
     """
     _bias(c, w)
     _times(w, w.x, w.y)
@@ -35,6 +38,8 @@ def reduce(c, w):
             r = c.entry_row[e]
             force += w.S[e] * (w.eta[r] - w.y[r])
         w.right[i] = force
+        if has(c, ARMATURES):
+            w.M[i, i] += c.speed[i].armature
         if not one_sided:
             for j in range(i, nu):
                 w.M[j, i] = w.M[i, j]

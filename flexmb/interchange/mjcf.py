@@ -17,21 +17,26 @@ from flexmb.interchange.imported import ImportedScene, ModelError, listed, namin
 from flexmb.interchange.mjcf_couplings import JOINT, TENDON, MjcfCouplings, tendon_that_acts
 from flexmb.interchange.mjcf_text import refuse_bad_text
 from flexmb.scene.build import SceneBuilder
+from flexmb.scene.functions import Constant
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.tree import GROUND
+from flexmb.typing import Real
 
 FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
+SINGLE = (SLIDE, HINGE)
+JOINT_TRANSMISSIONS = (0, 1)  # mjtTrn: joint, jointinparent, which are the same for hinges and slides
 
 
 def read_mjcf(path: str | os.PathLike[str]) -> ImportedScene:
     """The rigid tree of an MJCF file (or of a URDF file, as MuJoCo reads it), at its reference pose and at rest.
 
-    Springs and dampers of joints are included; linear equality constraints between joints or of fixed tendons become
-    couplings. Contacts, limits, dry friction, actuators, sensors and tendons without springs are omitted, and the notes
-    list them. Raises ImportError without MuJoCo; ModelError for a file that MuJoCo refuses, for numbers that
-    are not finite, which MuJoCo would replace by defaults (`flexmb.interchange.mjcf_text`), and for elements that
-    change the motion and have no counterpart in a scene: other equality constraints, tendons with springs, rotor
-    inertia, fluids, flexible parts.
+    Springs, dampers and armatures of joints are included, those of actuators at joints too, and gravity compensation.
+    Linear equality constraints between joints or of fixed tendons become couplings. Contacts, limits, dry friction,
+    forces of actuators, tendons that only measure or pull, and sensors are omitted, and the notes list them. Raises
+    ImportError without MuJoCo; ModelError for a file that MuJoCo refuses, for numbers that are not finite, which MuJoCo
+    would replace by defaults (`flexmb.interchange.mjcf_text`), and for elements that change the motion and have no
+    counterpart in a scene: other equality constraints, tendons with springs, dampers or armatures, armatures of free
+    and ball joints, nonlinear springs and dampers, fluids, flexible parts.
     """
     try:
         import mujoco
@@ -53,10 +58,14 @@ class _Model:
         self.file, self.m = file, m
         self._refuse()
         self.couplings = MjcfCouplings(m, [self._joint_name(j) for j in range(m.njnt)], self._fail)
+        self._armature, self._damping = self._along_dofs("armature"), self._along_dofs("damping")
+        if self._switched_off("DAMPER"):
+            self._damping[:] = 0.0
 
     def scene(self) -> ImportedScene:
         m = self.m
-        builder = SceneBuilder(Path(self.file).stem, gravity=m.opt.gravity)
+        self.gravity = np.zeros(3) if self._switched_off("GRAVITY") else np.array(m.opt.gravity)
+        builder = SceneBuilder(Path(self.file).stem, gravity=self.gravity)
         for k in range(1, m.nbody):
             self._body(builder, k)
         self.couplings.couple(builder)
@@ -67,7 +76,16 @@ class _Model:
         m, name = self.m, self._body_name(k)
         R = rotation_matrix(m.body_iquat[k])
         inertia = R @ np.diag(m.body_inertia[k]) @ R.T
-        builder.rigid_body(name, mass=float(m.body_mass[k]), com=m.body_ipos[k], inertia=0.5 * (inertia + inertia.T))
+        lift = -float(m.body_gravcomp[k] * m.body_mass[k]) * self.gravity
+        builder.rigid_body(
+            name, mass=float(m.body_mass[k]), com=m.body_ipos[k], inertia=0.5 * (inertia + inertia.T),
+            nodes={"mass centre": m.body_ipos[k]} if np.any(lift) else (),
+        )  # fmt: skip
+        if np.any(lift):
+            size = float(np.linalg.norm(lift))
+            builder.force(
+                f"{name}.gravcomp", name, node="mass centre", direction=lift / size, function=Constant(value=size)
+            )
         parent = self._body_name(int(m.body_parentid[k]))
         at = {"parent_position": m.body_pos[k], "parent_quaternion": m.body_quat[k]}
         joints = range(m.body_jntadr[k], m.body_jntadr[k] + m.body_jntnum[k])
@@ -91,7 +109,7 @@ class _Model:
             "parent_position": at["parent_position"] + rotation_matrix(at["parent_quaternion"]) @ anchor,
             "child_position": anchor,
         }
-        damping, stiffness = float(m.dof_damping[dof]), float(m.jnt_stiffness[j])
+        damping, stiffness = float(self._damping[dof]), self._stiffness(j)
         if kind == BALL:
             builder.spherical(name, parent, child, stiffness=stiffness, damping=damping, **frames)
             return
@@ -100,8 +118,27 @@ class _Model:
         make = builder.prismatic if kind == SLIDE else builder.revolute
         make(
             name, parent, child, axis=m.jnt_axis[j], stiffness=stiffness, rest=rest, damping=damping,
-            prescribed=self.couplings.held.get(j), **frames,
+            prescribed=self.couplings.held.get(j),
+            armature=float(self._armature[dof]), **frames,
         )  # fmt: skip
+
+    def _along_dofs(self, what: str) -> Real:
+        """(nv,) armature or damping of joints, and what actuators at joints add to it: gear^2 times their own."""
+        m = self.m
+        found = np.array(getattr(m, f"dof_{what}"), float)
+        for i, own in enumerate(getattr(m, f"actuator_{what}", ())):
+            if own:  # at a hinge or a slide, see `_refuse`
+                found[m.jnt_dofadr[m.actuator_trnid[i, 0]]] += m.actuator_gear[i, 0] ** 2 * own
+        return found
+
+    def _stiffness(self, j: int) -> float:
+        return 0.0 if self._switched_off("SPRING") else float(self.m.jnt_stiffness[j])
+
+    def _switched_off(self, flag: str) -> bool:
+        """Whether an option of the model disables gravity, springs or dampers."""
+        import mujoco
+
+        return bool(self.m.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}"))
 
     def _body_name(self, k: int) -> str:
         if k == 0:
@@ -125,23 +162,39 @@ class _Model:
                 self._fail(f"it has {count} {what}, which scenes do not support", remedy)
         if acts := tendon_that_acts(m):
             self._fail(f"{acts}, which scenes do not support", "remove it, or give the joints springs")
-        for dof in np.flatnonzero(m.dof_armature):
-            joint = self._joint_name(int(m.dof_jntid[dof]))
-            self._fail(
-                f'joint "{joint}" has the rotor inertia {m.dof_armature[dof]:g} (armature)',
-                "add a wheel to the scene, and set it to zero",
-            )
+        self._refuse_actuators()
+        self._refuse_nonlinear_joints()
         if m.opt.density or m.opt.viscosity or np.any(m.opt.wind):
             self._fail("option has density, viscosity or wind, and scenes have no fluid", "set them to zero")
-        for k in np.flatnonzero(m.body_gravcomp):
-            self._fail(f'body "{self._body_name(int(k))}" has gravity compensation', "remove gravcomp, or add a force")
         for j in range(m.njnt):
             first, place = int(m.jnt_dofadr[j]), int(m.jnt_qposadr[j])
+            if m.jnt_type[j] in (FREE, BALL) and m.dof_armature[first]:
+                what = f'the free or ball joint "{self._joint_name(j)}" has the armature {m.dof_armature[first]:g}'
+                self._fail(what, "set it to zero: in scenes, only coordinates of hinges with axes have armatures")
             if m.jnt_type[j] == FREE and (m.jnt_stiffness[j] or np.any(m.dof_damping[first : first + 6])):
                 self._fail(f'free joint "{self._joint_name(j)}" has a spring or damper', "remove it")
             turned = not np.array_equal(m.qpos_spring[place : place + 4], m.qpos0[place : place + 4])
             if m.jnt_type[j] == BALL and m.jnt_stiffness[j] and turned:
                 self._fail(f'the spring of ball joint "{self._joint_name(j)}" is at rest elsewhere', "turn its body")
+
+    def _refuse_actuators(self) -> None:
+        """Armatures and dampers of actuators are those of their joints, if they are at hinges or slides."""
+        m = self.m
+        for i in range(len(m.actuator_trntype)):
+            own = [key for key in ("armature", "damping", "dampingpoly") if np.any(_entry(m, f"actuator_{key}", i))]
+            at_joint = m.actuator_trntype[i] in JOINT_TRANSMISSIONS and m.jnt_type[m.actuator_trnid[i, 0]] in SINGLE
+            if "dampingpoly" in own or (own and not at_joint):
+                name = str(m.actuator(i).name) or f"actuator {i}"
+                what = f'actuator "{name}" has {own[-1].removesuffix("poly")}'
+                self._fail(what, "give armature and linear damping to joints, or to actuators of hinges and slides")
+
+    def _refuse_nonlinear_joints(self) -> None:
+        m = self.m
+        for j in range(m.njnt):
+            powers = _entry(m, "jnt_stiffnesspoly", j), _entry(m, "dof_dampingpoly", m.jnt_dofadr[j])
+            if any(map(np.any, powers)) or (m.jnt_stiffness[j] and _entry(m, "jnt_springyield", j)):
+                what = f'joint "{self._joint_name(j)}" has a nonlinear spring or damper, or a spring that yields'
+                self._fail(what, "leave one number for each")
 
     def _notes(self) -> list[str]:
         m = self.m
@@ -167,3 +220,8 @@ class _Model:
 
     def _fail(self, what: str, remedy: str) -> NoReturn:
         raise ModelError(f"{self.file}: {what}: {remedy}")
+
+
+def _entry(m: Any, key: str, i: int) -> Any:
+    """An entry of one of MuJoCo's arrays; zero in versions that do not have the array."""
+    return getattr(m, key)[i] if hasattr(m, key) else 0.0

@@ -15,6 +15,7 @@ from flexmb.spatial.rotation import rotation_vector
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, shift_force, times6, vec6
 from flexmb.spatial.vector import add, axpy, dot, mat3, scale, times, vec3
 from flexmb.tables.features import (
+    ARMATURES,
     BALL_SPRINGS,
     CONNECTORS,
     COORDINATE_LAWS,
@@ -33,8 +34,8 @@ KINETIC, STRAIN, SPRING, GRAVITY = range(4)
 def energy_and_momentum(c, w, energy, momentum):
     """energy (4,) kinetic, strain, spring, gravity in J; momentum (6,) [angular about the World origin; linear].
 
-    Needs the velocity and pose sweeps of this state. Overwrites w.body.inertia, w.body.force, w.pff, w.pfr, w.zf, and
-    what connectors write.
+    Armatures have kinetic energy, but no momentum. Needs the velocity and pose sweeps of this state. Overwrites
+    w.body.inertia, w.body.force, w.pff, w.pfr, w.zf, and what connectors write.
     """
     for i in range(4):
         energy[i] = 0.0
@@ -43,6 +44,9 @@ def energy_and_momentum(c, w, energy, momentum):
     for k in range(c.body.shape[0]):
         body_inertia(c, w, k)
         _body(c, w, k, energy, momentum)
+    if has(c, ARMATURES):
+        for j in range(w.u.shape[0]):
+            energy[KINETIC] += 0.5 * c.speed[j].armature * w.u[j] * w.u[j]
     if has(c, SPRINGS):
         for j in range(w.u.shape[0]):
             i = c.speed[j].coordinate

@@ -5,7 +5,8 @@ body k needs the force X = R H'. It is passed inward through the bodies that car
 of their speeds are the elements of M (50). A body passes on the forces of all speeds that it carries in one loop over
 contiguous columns, for which M has the depth-first order of `flexmb.jain.places` in place of that of u.
 
-A wheel is one more speed of its body, whose force is the torque I q on its node.
+A wheel is one more speed of its body, whose force is the torque I q on its node. The armature of a hinge's speed is
+inertia along this speed alone: it is on the diagonal of M.
 """
 
 from flexmb.jain import inverse
@@ -13,6 +14,7 @@ from flexmb.jain.explicit import inertia_to_parent, refer_to_hinge
 from flexmb.jain.kinematics import motion_column, velocity_sweep
 from flexmb.jain.ports import mode_motion
 from flexmb.jain.wheels import spin_axis
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
 from flexmb.levels.body import body_inertia
 from flexmb.levels.range import is_out_of_range
@@ -23,6 +25,7 @@ from flexmb.spatial.pivots import is_small
 from flexmb.spatial.rows import column3
 from flexmb.spatial.spatial_vector import vec6
 from flexmb.spatial.vector import dot, mat3, scale, vec3
+from flexmb.tables.features import ARMATURES
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
 
 TILE = 16
@@ -155,10 +158,12 @@ def _own_forces(c, w, m, k):
 
 @helper
 def _hinge_rows(c, w, m, k):
-    """M(k, j) = H X(j) for the hinge's speeds and all speeds j that the hinge carries."""
+    """M(k, j) = H X(j) for the hinge's speeds and all speeds j that the hinge carries; armatures on the diagonal."""
     for n in range(c.body[k].nv):
         place = m.hinge[k] + n
         _project(motion_column(c, w, k, n), m.X, m.M[place], place, m.stop[k])
+        if has(c, ARMATURES):
+            m.M[place, place] += c.speed[c.body[k].u_index + n].armature
 
 
 @helper

@@ -231,8 +231,8 @@ def refer_rigid(c, w, k):
 def to_parent(c, w, k, P, F, row):
     """Add P_R^+ and F = z_R^+ to the parent: P += A Gamma A', z += A z_R^+.
 
-    Behind a hinge with a single axis P_R^+ has no inertia along it: row `row` of P_R^+ is zero, and its rotation skips
-    it. For other hinges `row` is negative.
+    Behind a hinge with a single axis and no armature P_R^+ has no inertia along the axis: row `row` of P_R^+ is zero,
+    and its rotation skips it. For other hinges `row` is negative.
     """
     R, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
     rotated = rotate_inertia(R, P) if row < 0 else rotate_without(R, P, row)

@@ -10,6 +10,9 @@ is the outward half. The other functions solve with the same factors for a `Resp
     synthesise    T = L y + H z                    z^+ = z + G L y            inward, undoes `innovate`
     excite        y = L' x + (G L)'alpha^+         alpha = alpha^+ + H' x     outward, undoes `solve`
 
+The armatures J of the hinge's speeds, which the paper does not have, enter D_R = H P_R H' + J and nothing else: the
+rotor turns with its own speed only, so that what the parent feels of it is in G.
+
 The response holds T, y and x in one array `speed`, in which each overwrites the one it is computed from. H has no rows
 for prescribed speeds, which are zero in y and x.
 
@@ -32,7 +35,7 @@ from flexmb.spatial.pivots import is_inertia, is_small
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, less6, scale6, store6, sum6, vec6
 from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z, NO_AXIS
-from flexmb.tables.features import PRESCRIBED, SEVERAL
+from flexmb.tables.features import ARMATURES, PRESCRIBED, SEVERAL
 
 SINGLE = -1  # in `free_count`: the hinge was eliminated by its single axis, and w.hinge was not written
 
@@ -80,6 +83,9 @@ def eliminate(c, w, k):
     PH = inertia_column(P, row)
     D = along(c, k, PH)
     before = w.body[k].inertia[2 if turns(c, k) else 17]  # diagonal of this row before the modes were eliminated
+    if has(c, ARMATURES):
+        D += c.speed[j].armature
+        before += c.speed[j].armature
     if is_small(c, w, j, D, before):
         sound = is_inertia(D, before)
         if not some(sound):
@@ -93,6 +99,8 @@ def eliminate(c, w, k):
     G = scale6(s, PH)
     store6(w.body[k].gain, 0, G)
     if c.body[k].parent >= 0:
+        if has(c, ARMATURES) and some(c.speed[j].armature != 0.0):
+            row = NO_AXIS  # P_R^+ keeps inertia along the axis, in series with the armature
         to_parent(c, w, k, less_outer(P, G, PH), axpy6(epsilon, G, z), row)
     return True
 
@@ -113,6 +121,8 @@ def _eliminate_several(c, w, k, P, z):
         residual[a] = less6(w.speed[c.body[k].u_index + n].applied, H, z)
         for b in range(a + 1):
             D[a, b] = dot6(PH, motion_column(c, w, k, w.hinge[k].free_speed[b]))
+        if has(c, ARMATURES):
+            D[a, a] += c.speed[c.body[k].u_index + n].armature
     if not cholesky(D, free):
         return False
     note_hinge(c, w, k, D, 0)

@@ -1,8 +1,8 @@
 """Inverse dynamics tau = M udot + c of trees, O(N): Jain & Rodriguez (44), (45).
 
-tau contains inertia, gravity, elasticity, node loads and connectors between nodes, but not the springs, dampers and
-motors of hinges: tau is what these have to supply. Its modal rows vanish if the accelerations are a motion that the
-structure performs without forces on its modes.
+tau contains inertia, armatures, gravity, elasticity, node loads and connectors between nodes, but not the springs,
+dampers and motors of hinges: tau is what these have to supply. Its modal rows vanish if the accelerations are a motion
+that the structure performs without forces on its modes.
 """
 
 from flexmb.jain.accelerations import acceleration_sweep
@@ -18,7 +18,7 @@ from flexmb.levels.body import body_inertia
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, plus6, shift_force, store6, vec6
 from flexmb.spatial.vector import axpy, dot, scale, vec3
-from flexmb.tables.features import CONNECTORS
+from flexmb.tables.features import ARMATURES, CONNECTORS
 from flexmb.tables.status import OK
 
 
@@ -80,7 +80,10 @@ def _project_force(c, w, k, tau):
             row -= dot6(mode_motion(w, i, n), F)
         tau[c.body[k].etad_index + n] = row
     for n in range(c.body[k].nv):
-        tau[c.body[k].u_index + n] = dot6(motion_column(c, w, k, n), F)
+        j = c.body[k].u_index + n
+        tau[j] = dot6(motion_column(c, w, k, n), F)
+        if has(c, ARMATURES):
+            tau[j] += c.speed[j].armature * w.speed[j].acceleration
     store6(w.body[k].load, 0, F)
     if c.body[k].parent >= 0:
         force_to_parent(c, w, w, k, F)

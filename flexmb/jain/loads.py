@@ -1,6 +1,7 @@
 """Loads across hinges, at wheel bearings, and of drives, from the accelerations of the sweeps.
 
-A load is the total load (constraint, spring and motor) on the outboard part, about the outboard hinge point O.
+A load is the total load (constraint, spring and motor) on the outboard part, about the outboard hinge point O. Along a
+free speed with an armature, it is the force of spring, damper and motor less what accelerates the armature.
 """
 
 from flexmb.jain.accelerations import hinge_acceleration
@@ -13,7 +14,7 @@ from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.spatial_vector import dot6, store6, sum6, vec6
 from flexmb.spatial.vector import add, axpy, cross, dot, scale, sub
-from flexmb.tables.features import PRESCRIBED, WHEELS
+from flexmb.tables.features import ARMATURES, PRESCRIBED, WHEELS
 
 
 @helper
@@ -36,7 +37,10 @@ def hinge_load(c, w, k):
 
 @helper
 def drive_loads(c, w):
-    """Write the load of the drive of every prescribed speed, H F less its spring and damper, to w.speed.drive."""
+    """Write the load of the drive of every prescribed speed to w.speed.drive.
+
+    It is H F, plus what accelerates the armature, less spring and damper.
+    """
     if has(c, PRESCRIBED):
         for k in range(c.body.shape[0]):
             _drive_loads(c, w, k)
@@ -50,6 +54,8 @@ def _drive_loads(c, w, k):
         if c.speed[j].prescribed >= 0:
             hinge_load(c, w, k)
             w.speed[j].drive = dot6(motion_column(c, w, k, n), vec6(w.body[k].load, 0)) - w.speed[j].applied
+            if has(c, ARMATURES):
+                w.speed[j].drive += c.speed[j].armature * w.speed[j].acceleration
     if has(c, WHEELS):
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             j = c.wheel[i].u_index

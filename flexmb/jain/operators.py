@@ -42,6 +42,7 @@ class Operators:
     a_m, b_m (nbar,)    Coriolis and centrifugal accelerations (25); gyroscopic forces (37), less all external forces,
                         gravity among them, plus modal damping
     K_m (nbar,nbar)     modal stiffness (38), to act on `deformation` (nbar,) = [eta; 0] of every body
+    J (n,)              armatures of the speeds, which the paper does not have: M = H Phi M_m Phi' H' + diag(J)
     chi (n,)            generalised speeds (4), with etad = 0 at level ruthless
     V_m (nbar,)         modal spatial velocities Phi' H' chi (20)
     """
@@ -57,6 +58,7 @@ class Operators:
     b_m: Real
     K_m: Real
     deformation: Real
+    J: Real
     chi: Real
     V_m: Real
 
@@ -77,14 +79,14 @@ class Operators:
         return arguments.representable(self.Phi @ forces)
 
     def inverse_dynamics(self, chi_dot: Real) -> Real:
-        """T (n,) (41)."""
-        return arguments.representable(self.H @ self.f_m(chi_dot))
+        """T (n,) (41), with the armatures J chi_dot."""
+        return arguments.representable(self.H @ self.f_m(chi_dot) + self.J * chi_dot)
 
     @cached_property
     def M(self) -> Real:
         """Mass matrix (n,n), Newton-Euler factorisation (43)."""
         H_Phi = self.H @ self.Phi
-        return H_Phi @ self.M_m @ H_Phi.T
+        return H_Phi @ self.M_m @ H_Phi.T + np.diag(self.J)
 
     @cached_property
     def C(self) -> Real:
@@ -113,7 +115,7 @@ class Operators:
         for k in reversed(range(len(self.parent))):
             rows, columns = self.rows[k], self.columns[k]
             H, P_k = self.H[rows, columns], P[columns, columns]
-            factor = cho_factor(H @ P_k @ H.T)
+            factor = cho_factor(H @ P_k @ H.T + np.diag(self.J[rows]))
             D_inverse[np.ix_(rows, rows)] = cho_solve(factor, np.eye(len(rows)))
             G_k = cho_solve(factor, H @ P_k).T
             G[columns, rows] = G_k
@@ -128,8 +130,8 @@ class Operators:
 
     @cached_property
     def D(self) -> Real:
-        """H P H' (n,n), block diagonal (52)."""
-        return self.H @ self.P @ self.H.T
+        """H P H' + diag(J) (n,n), block diagonal (52)."""
+        return self.H @ self.P @ self.H.T + np.diag(self.J)
 
     @property
     def D_inverse(self) -> Real:
@@ -203,6 +205,7 @@ class Operators:
             self,
             rows=tuple(place[rows[~prescribed[rows]]] for rows in self.rows),
             H=self.H[~prescribed],
+            J=self.J[~prescribed],
             chi=self.chi[~prescribed],
             a_m=self.a_m + self.H[prescribed].T @ rates[prescribed],
         )
@@ -254,7 +257,7 @@ class SpatialOperators:
         none, nbar = np.zeros(ends[-1]), np.zeros((ends[-1], ends[-1]))
         kinematics = Operators(
             tuple(member.name for member in members), tuple(member.parent for member in members), columns, rows,
-            value(E_Phi), value(H), nbar, none, none, nbar, none, now.u, none,
+            value(E_Phi), value(H), nbar, none, none, nbar, none, self._dense.armature, now.u, none,
         )  # fmt: skip
         V_m = kinematics.Phi.T @ (kinematics.H.T @ now.u)
         M_m, b_m = self._inertia(now, columns, V_m)

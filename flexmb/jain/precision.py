@@ -5,23 +5,26 @@ small the remainder is: about u s_i s_j in element i, j, where s_i^2 is the diag
 u the unit roundoff. Referred to the parent, s becomes t = |phi(arm)| |R| s, because terms that cancel in a shift are
 rounded, too. In a motion x (nu,) of the speeds, rounding errors therefore amount to the energy u |S x|^2,
 
-    |S x|^2 = sum over bodies  sum_i t_i^2 A_i^2  +  sum over hinge speeds  sum_i s_i^2 h_i^2 x_j^2
+    |S x|^2 = sum over bodies  sum_i t_i^2 A_i^2  +  sum over hinge speeds  (sum_i s_i^2 h_i^2 + J_j) x_j^2
             + sum over modes (D_nn + sum_i s_i^2 Pi_in^2) x_n^2,
 
-with A the acceleration of the point of the parent where the body is hinged, h a column of H, and Pi_n the motion by
-mode n of a node that carries O. The true energy is x'M x = |F'x|^2. The largest ratio of the two, kappa =
-|S F'^-1|^2, is a condition number of M that does not depend on units; u kappa bounds the relative error of the
-accelerations in the norm of S. Where u kappa reaches 1, there is a motion whose inertia is all rounding error.
+with A the acceleration of the point of the parent where the body is hinged, h a column of H, J_j the armature of a
+speed, and Pi_n the motion by mode n of a node that carries O. The true energy is x'M x = |F'x|^2. The largest ratio of
+the two, kappa = |S F'^-1|^2, is a condition number of M that does not depend on units; u kappa bounds the relative
+error of the accelerations in the norm of S. Where u kappa reaches 1, there is a motion whose inertia is all rounding
+error.
 """
 
 from flexmb.jain.innovations import innovations, respond
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.ports import mode_motion
 from flexmb.jain.response import clear_body, port_response, push
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.spatial_vector import add6, scale6, vec6
 from flexmb.spatial.vector import add, mat3, times, vec3
+from flexmb.tables.features import ARMATURES
 
 
 @helper
@@ -34,7 +37,11 @@ def weigh(c, w, x):
         s = _size(c, w, k)
         _weigh_modes(c, w, x, k, s)
         for n in range(c.body[k].nv):
-            x.speed[c.body[k].u_index + n] *= _squares(s, motion_column(c, w, k, n))
+            j = c.body[k].u_index + n
+            size = _squares(s, motion_column(c, w, k, n))
+            if has(c, ARMATURES):
+                size += c.speed[j].armature
+            x.speed[j] *= size
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             x.speed[c.wheel[i].u_index] *= c.wheel[i].axial
         if c.body[k].parent >= 0:

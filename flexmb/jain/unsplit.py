@@ -12,10 +12,12 @@ from flexmb.jain.kinematics import motion_column
 from flexmb.jain.sweeps import bodies
 from flexmb.jain.wheels import wheel_acceleration
 from flexmb.jit.bundle import bundle
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, outer_inertia, store_inertia
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, less6, plus6, store6, sub6, sum6, vec6
 from flexmb.tables.arrays import NO_AXIS
+from flexmb.tables.features import ARMATURES
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 from flexmb.typing import Real
 
@@ -71,6 +73,8 @@ def _eliminate(c, w, x, k):
             D[n, i] = dot6(vec6(gain[i], 0), H)
         for i in range(nm, n + 1):
             D[n, i] = dot6(F, motion_column(c, w, k, w.hinge[k].free_speed[i - nm]))
+        if has(c, ARMATURES):
+            D[n, n] += c.speed[c.body[k].u_index + j].armature
     if not cholesky(D, rows):
         return False
     for n in range(nm):

@@ -137,8 +137,8 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         """One rotation about the unit vector `axis` (inboard hinge axes).
 
         Initial `angle` (rad) and `rate` (rad/s), spring `stiffness` (N m/rad) about `rest` (rad), `damping`
-        (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time; nodes and offsets as for
-        every hinge (`flexmb.scene.options.Placement`).
+        (N m s/rad), `armature` (kg m²), motor `torque` (N m) or `prescribed` angle (rad) as functions of time; nodes
+        and offsets as for every hinge (`flexmb.scene.options.Placement`).
         """
         return self._turning(s.Revolute, options, name=name, parent=parent, child=child, axis=axis)
 
@@ -147,9 +147,9 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
     ) -> Self:
         """One translation along the unit vector `axis` (inboard hinge axes).
 
-        Initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m), `damping` (N s/m), motor
-        `force` (N) or `prescribed` displacement (m) as functions of time; nodes and offsets as for every hinge
-        (`flexmb.scene.options.Placement`).
+        Initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m), `damping` (N s/m),
+        `armature` (kg), motor `force` (N) or `prescribed` displacement (m) as functions of time; nodes and offsets as
+        for every hinge (`flexmb.scene.options.Placement`).
         """
         o.refuse_others("a Prismatic", options, o.SlidingHinge)
         displacement, placement = _divided(options, o.Displacement)

@@ -29,6 +29,7 @@ class _ScalarCoordinate(SceneStruct, frozen=True, kw_only=True):
     ANGULAR: ClassVar[bool]
     UNIT: ClassVar[str]
     SPRING: ClassVar[tuple[str, str, str]]
+    ARMATURE: ClassVar[str]
 
     @property
     def value(self) -> float:
@@ -58,9 +59,17 @@ class _ScalarCoordinate(SceneStruct, frozen=True, kw_only=True):
         stiffness, damping, rest = (float(getattr(self, key)) for key in self.SPRING)
         return stiffness, damping, rest
 
+    @property
+    def armature(self) -> float:
+        """Inertia of the drive that moves with the coordinate (kg m^2 or kg)."""
+        return float(getattr(self, self.ARMATURE))
+
 
 class AngularCoordinate(_ScalarCoordinate, frozen=True, kw_only=True):
-    """One angle: initial value and rate, spring, damper, motor, or prescribed motion.
+    """One angle: initial value and rate, spring, damper, armature, motor, or prescribed motion.
+
+    The armature is the inertia of the rotor of a drive, as the coordinate feels it: with a gear ratio n and a rotor of
+    moment of inertia I it is n^2 I. Its kinetic energy is half of it times the square of the rate; it has no momentum.
 
     With closures, initial values other than zero are kept exactly if the other coordinates can be chosen to close the
     loops, and are changed with a warning if they contradict each other. With `given = true`, both must be kept, also if
@@ -72,6 +81,7 @@ class AngularCoordinate(_ScalarCoordinate, frozen=True, kw_only=True):
     ANGULAR: ClassVar[bool] = True
     UNIT: ClassVar[str] = "rad"
     SPRING: ClassVar[tuple[str, str, str]] = ("stiffness_Nm_rad", "damping_Nms_rad", "rest_rad")
+    ARMATURE: ClassVar[str] = "armature_kg_m2"
 
     angle_rad: float = 0.0
     rate_rad_s: float = 0.0
@@ -79,20 +89,22 @@ class AngularCoordinate(_ScalarCoordinate, frozen=True, kw_only=True):
     stiffness_Nm_rad: float = 0.0
     damping_Nms_rad: float = 0.0
     rest_rad: float = 0.0
+    armature_kg_m2: float = 0.0
     torque_Nm: Function | None = None
     prescribed_rad: Function | None = None
 
 
 class LinearCoordinate(_ScalarCoordinate, frozen=True, kw_only=True):
-    """One displacement: initial value and rate, spring, damper, motor, or prescribed motion.
+    """One displacement: initial value and rate, spring, damper, armature, motor, or prescribed motion.
 
-    `given` as of an angle.
+    `given` and the armature as of an angle.
     """
 
     KEYS: ClassVar[MotionKeys] = MotionKeys("position_m", "rate_m_s", "force_N", "prescribed_m")
     ANGULAR: ClassVar[bool] = False
     UNIT: ClassVar[str] = "m"
     SPRING: ClassVar[tuple[str, str, str]] = ("stiffness_N_m", "damping_Ns_m", "rest_m")
+    ARMATURE: ClassVar[str] = "armature_kg"
 
     position_m: float = 0.0
     rate_m_s: float = 0.0
@@ -100,6 +112,7 @@ class LinearCoordinate(_ScalarCoordinate, frozen=True, kw_only=True):
     stiffness_N_m: float = 0.0
     damping_Ns_m: float = 0.0
     rest_m: float = 0.0
+    armature_kg: float = 0.0
     force_N: Function | None = None
     prescribed_m: Function | None = None
 

@@ -34,8 +34,8 @@ class Placement(TypedDict, total=False):
 
 class Angle(TypedDict, total=False):
     """An angular coordinate: initial `angle` (rad) and `rate` (rad/s), `given` if closures must keep both, spring
-    `stiffness` (N m/rad) about `rest` (rad), `damping` (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as
-    functions of time."""
+    `stiffness` (N m/rad) about `rest` (rad), `damping` (N m s/rad), `armature` (kg m²), motor `torque` (N m) or
+    `prescribed` angle (rad) as functions of time."""
 
     angle: float
     rate: float
@@ -43,14 +43,15 @@ class Angle(TypedDict, total=False):
     stiffness: float
     damping: float
     rest: float
+    armature: float
     torque: s.Function | None
     prescribed: s.Function | None
 
 
 class Displacement(TypedDict, total=False):
     """A linear coordinate: initial `position` (m) and `rate` (m/s), `given` if closures must keep both, spring
-    `stiffness` (N/m) about `rest` (m), `damping` (N s/m), motor `force` (N) or `prescribed` displacement (m) as
-    functions of time."""
+    `stiffness` (N/m) about `rest` (m), `damping` (N s/m), `armature` (kg), motor `force` (N) or `prescribed`
+    displacement (m) as functions of time."""
 
     position: float
     rate: float
@@ -58,6 +59,7 @@ class Displacement(TypedDict, total=False):
     stiffness: float
     damping: float
     rest: float
+    armature: float
     force: s.Function | None
     prescribed: s.Function | None
 

@@ -154,6 +154,7 @@ SPEED = _record(
     ("stiffness", _F),
     ("damping", _F),
     ("rest", _F),
+    ("armature", _F),  # inertia along the speed alone, beside that of the bodies
     ("doubtful", _F),  # pivots below this, relative to all that the speed moves, may be rounding errors
 )
 FUNCTION = _record(

@@ -55,6 +55,7 @@ PRESCRIBED = "prescribed"
 SPRINGS = "springs"
 BALL_SPRINGS = "ball springs"
 DAMPERS = "dampers"
+ARMATURES = "armatures"
 MODAL_DAMPING = "modal damping"
 
 
@@ -144,6 +145,7 @@ def contained(c: SceneTables) -> frozenset[str]:
         SPRINGS: np.any(speed["stiffness"] != 0.0),
         BALL_SPRINGS: np.any(body["ball_spring"] != 0.0),
         DAMPERS: np.any(speed["damping"] != 0.0),
+        ARMATURES: np.any(speed["armature"] != 0.0),
         MODAL_DAMPING: np.any(c.damping != 0.0),
     }
     numbered = {f"{HINGE} {n}" for n in set(body["hinge_kind"].tolist())}

@@ -99,6 +99,35 @@ def test_the_compound_pendulum() -> None:
     assert off(m.exact(times)["marker:corner.position"], corner) < WITHIN
 
 
+def test_the_geared_pendulum() -> None:
+    """The rotor is a body of its own about the shaft, whose gear turns it by the ratio: Lagrange's equation.
+
+    The load on the arm is its rate of momentum less its weight, by differences of the closed form's own momentum.
+    """
+    m = closed_form("pendulums/geared")
+    of_arm = m.AXIS @ m.INERTIA @ m.AXIS + m.MASS * np.sum(np.cross(m.AXIS, m.COM) ** 2)
+
+    def rate(t: float, y: Real) -> Real:
+        com = Rotation.from_rotvec(y[0] * m.AXIS).apply(m.COM)
+        moment = m.AXIS @ np.cross(com, m.MASS * m.GRAVITY)
+        return np.array([y[1], moment / (of_arm + m.ROTOR * m.RATIO**2)])
+
+    times = np.linspace(0.0, 6.0, 13)
+    angle, speed = integrate(rate, np.array([m.ANGLE, m.RATE]), times).T
+    found = m.exact(times)
+    tip = Rotation.from_rotvec(angle[:, None] * m.AXIS).apply(m.TIP) + m.PIVOT
+    assert off(found["marker:tip.position"], tip) < WITHIN
+    rotor_speed = m.RATIO * speed
+    assert off(found["energy.kinetic"], 0.5 * of_arm * speed**2 + 0.5 * m.ROTOR * rotor_speed**2) < WITHIN
+    h = 1e-4
+    later, before = m.exact(times + h), m.exact(times - h)
+    com = Rotation.from_rotvec(angle[:, None] * m.AXIS).apply(m.COM)
+    rate_of_momentum = (later["momentum.angular"] - before["momentum.angular"]) / (2.0 * h)
+    weight = np.cross(m.PIVOT + com, m.MASS * m.GRAVITY)
+    load = found["load:shaft.torque"] + np.cross(m.PIVOT, found["load:shaft.force"])
+    assert off(load, rate_of_momentum - weight) < 1e-6  # differences of second order
+
+
 def turning(inertia: Real, rotor: Real, weight: Real, start: Rotation, omega: Real, times: Real) -> Rotation:
     """Attitudes of a body about a fixed point or its mass centre: Euler's equations with a rotor's momentum.
 

@@ -24,7 +24,7 @@ class DrakeEngine(PeerEngine):
         return version("drake")
 
     def obstacle(self, scene: Scene) -> str:
-        reason = _open_loops_only(scene) or obstacle(scene, "Drake", (), KNOWN)
+        reason = _open_loops_only(scene) or obstacle(scene, "Drake", (), KNOWN, armatures=True)
         return reason or inertia_obstacle(links(scene), "Drake")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:

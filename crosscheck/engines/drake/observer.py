@@ -18,7 +18,7 @@ from flexmb.typing import Real
 
 
 class DrakeObserver:
-    """Reads a plant without rotors: Drake counts theirs in energies and inverse dynamics.
+    """Reads a plant whose rotors are armatures alone: Drake counts rotors in energies and inverse dynamics.
 
     Drake's reaction is what a joint's constraint and its forces together do to the child body, about the child's frame
     and in its axes, which here are those of the link.
@@ -34,7 +34,7 @@ class DrakeObserver:
         self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
 
     def observe(self, t: float, state: DrakeState, acceleration: Real) -> Snapshot:
-        """`acceleration` (nv,) is that of the plant with rotors in the same state."""
+        """`acceleration` (nv,) is that of the plant with the drives' rotors in the same state."""
         plant, context = self._tree.plant, self._context
         context.SetTime(t)
         place(self._tree, context, state)

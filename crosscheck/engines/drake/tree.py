@@ -4,11 +4,13 @@ Conventions of Drake: quaternions wxyz; spatial vectors [angular; linear]; the v
 are those of the outboard frame in the *inboard* one, in inboard axes; a floating joint's coordinates are quaternion,
 then position. Spatial inertias are taken about the body origin, as multiples of the mass.
 
-Two workarounds. (1) A prescribed coordinate has a rotor with inertia `BALLAST`, so that only the applied
-BALLAST * acceleration moves it; the error of its acceleration is the load / BALLAST, below round-off. Its load is that
-of a second plant without rotors. (2) Drake's only ball joint has roll, pitch and yaw, which are singular at a pitch of
-pi/2. Its inboard frame F is a parameter of the context: when the pitch is large, F is rotated to the joint's present
-orientation and the angles restart at zero.
+An armature is the inertia of a rotor with the gear ratio 1.
+
+Two workarounds. (1) A prescribed coordinate has a rotor with inertia `BALLAST` in place of its armature, so that only
+the applied BALLAST * acceleration moves it; the error of its acceleration is the load / BALLAST, below round-off. Its
+load is that of a second plant without these rotors. (2) Drake's only ball joint has roll, pitch and yaw, which are
+singular at a pitch of pi/2. Its inboard frame F is a parameter of the context: when the pitch is large, F is rotated to
+the joint's present orientation and the angles restart at zero.
 """
 
 from __future__ import annotations
@@ -79,7 +81,7 @@ class DrakeState(NamedTuple):
 
 
 def build_tree(scene: Scene, chain: tuple[Link, ...], *, ballasted: bool) -> DrakeTree:
-    """A finished plant; `ballasted` gives the prescribed coordinates their rotors."""
+    """A finished plant; `ballasted` gives the prescribed coordinates rotors that nothing but their drives moves."""
     plant = MultibodyPlant(0.0)
     plant.mutable_gravity_field().set_gravity_vector(np.array(scene.gravity_m_s2, dtype=float))
     bodies: list[RigidBody] = []
@@ -182,9 +184,10 @@ def _equip(plant: MultibodyPlant, joint: Joint, freedom: Freedom, ballasted: boo
     if freedom.stiffness > 0.0:
         spring = by_motion(freedom, RevoluteSpring, PrismaticSpring)
         plant.AddForceElement(spring(joint, freedom.rest, freedom.stiffness))
-    if ballasted and freedom.prescribed is not None:
+    inertia = BALLAST if ballasted and freedom.prescribed is not None else freedom.armature
+    if inertia:
         rotor = plant.AddJointActuator(joint.name(), joint)
-        rotor.set_default_rotor_inertia(BALLAST)
+        rotor.set_default_rotor_inertia(inertia)
         rotor.set_default_gear_ratio(1.0)
 
 

@@ -7,7 +7,7 @@ from typing import assert_never
 
 from crosscheck.engines.contract import Support
 from crosscheck.engines.exudyn.assembly import deforming, flexible
-from crosscheck.engines.links import first_screw
+from crosscheck.engines.links import first_armature, first_screw
 from flexmb.scene.ends import ends
 from flexmb.scene.hinges import Free
 from flexmb.scene.modal_data import modal_arrays
@@ -37,6 +37,9 @@ def _refusals(scene: Scene) -> Iterator[str]:
     screw = first_screw(scene)
     if screw:
         yield f'hinge "{screw}" is a screw: the adapter of Exudyn offers no such joint'
+    armed = first_armature(scene)
+    if armed:
+        yield f'coordinate "{armed}" has an armature: the adapter of Exudyn offers none'
     bodies = {body.name: body for body in scene.bodies}
     for body in scene.bodies:
         yield from _body_refusals(body)

@@ -35,7 +35,7 @@ class MujocoEngine(PeerEngine):
         return mujoco.__version__
 
     def obstacle(self, scene: Scene) -> str:
-        reason = obstacle(scene, "MuJoCo", ("spherical",), KNOWN, couplings=True)
+        reason = obstacle(scene, "MuJoCo", ("spherical",), KNOWN, couplings=True, armatures=True)
         return reason or inertia_obstacle(links(scene), "MuJoCo")
 
     def supports(self, scene: Scene) -> Support:

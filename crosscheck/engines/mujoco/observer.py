@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import cross, quaternion_of, shift_wrench
-from crosscheck.engines.links import Attachment, attachment, by_motion
+from crosscheck.engines.links import Attachment, Scalar, attachment, by_motion
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.tree import MujocoClosure, MujocoTree
 from crosscheck.engines.rigid_tree import by_joint, of_kind, placed_couplings
@@ -32,6 +32,10 @@ class MujocoObserver:
         self._gravity = np.array(scene.gravity_m_s2, dtype=float)
         self._names = [(link.kind, link.joint) for link in tree.links]
         self._closures, self._couplings = closures, placed_couplings(scene, tree.slots)
+        self._armature = np.zeros(tree.model.nv)
+        for slot in tree.slots:
+            if isinstance(slot.freedom, Scalar):
+                self._armature[slot.v] = slot.freedom.armature
         self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
 
     def observe(self, data: mujoco.MjData) -> Snapshot:
@@ -110,7 +114,7 @@ class MujocoObserver:
         )
 
     def _motion(self, data: mujoco.MjData) -> tuple[float, Real]:
-        """Kinetic energy and momentum by summing bodies: MuJoCo's own energy would count the drives' armature."""
+        """Kinetic energy and momentum by summing bodies: MuJoCo's own energy would count what moves the drives."""
         model = self._tree.model
         pole = self._pole(np.arange(model.nbody), data)
         w = data.cvel[:, :3]
@@ -120,10 +124,11 @@ class MujocoObserver:
         p = model.body_mass[:, None] * v
         about_com = np.einsum("bij,bj->bi", axes, model.body_inertia * spin)
         kinetic = 0.5 * (np.sum(p * v) + np.sum(model.body_inertia * spin**2))
+        kinetic += 0.5 * np.sum(self._armature * data.qvel**2)
         return float(kinetic), np.concatenate([np.sum(about_com + cross(data.xipos, p), axis=0), p.sum(axis=0)])
 
     def _drives(self, data: mujoco.MjData, loads: dict[tuple[str, str], Real]) -> dict[str, Real]:
-        """Load across the joint along the prescribed axis, less what spring and damper already give."""
+        """Load across the joint along the prescribed axis and on the armature, less what spring and damper give."""
         found = []
         for slot in self._forces.driven:
             load = loads[slot.link.kind, slot.link.joint]
@@ -136,5 +141,6 @@ class MujocoObserver:
             for coupling, size in zip(self._couplings, self._held(data).tolist(), strict=True):
                 own = zip(coupling.slots, coupling.factors, strict=True)
                 passive += sum(factor * size for each, factor in own if each.v == slot.v)
-            found.append(half @ data.xaxis[slot.joint] - passive)
+            rotor = freedom.armature * data.qacc[slot.v]
+            found.append(half @ data.xaxis[slot.joint] + rotor - passive)
         return by_joint(self._forces.driven, found)

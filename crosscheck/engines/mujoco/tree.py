@@ -4,9 +4,9 @@ Conventions of MuJoCo: quaternions wxyz; a ball's velocity in outboard axes; sli
 are in inboard axes (three slides and a ball serve on any parent, MuJoCo's free joint only on the ground).
 
 Two workarounds. (1) A prescribed coordinate has an armature so large that only the applied ARMATURE * acceleration
-moves it; its load is that of the inverse dynamics, which does not contain the armature. The error of its acceleration
-is the load / ARMATURE. (2) MuJoCo refuses principal moments of inertia below 1e-15 kg m^2: smaller ones (point masses,
-rods) are raised to `LEAST_INERTIA`.
+moves it; its load is that of the inverse dynamics, which does not contain armatures, plus what moves the scene's own.
+The error of its acceleration is the load / ARMATURE. (2) MuJoCo refuses principal moments of inertia below 1e-15 kg
+m^2: smaller ones (point masses, rods) are raised to `LEAST_INERTIA`.
 """
 
 from __future__ import annotations
@@ -151,6 +151,7 @@ def _add_joints(body: mujoco.MjsBody, freedom: Freedom, name: str) -> None:
                 joint.stiffness = [freedom.stiffness, 0.0, 0.0]
                 joint.springref = freedom.rest
                 joint.damping = [freedom.damping, 0.0, 0.0]
+                joint.armature = freedom.armature
             else:
                 joint.armature = ARMATURE
         case Ball():

@@ -36,7 +36,8 @@ class PinocchioEngine(PeerEngine):
     def obstacle(self, scene: Scene) -> str:
         if len(scene.hinges) > MOST_JOINTS:
             return f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
-        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), KNOWN, screws=True, couplings=True)
+        offers = {"screws": True, "couplings": True, "armatures": True}
+        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), KNOWN, **offers)
         return reason or (_beside_closures(scene) if scene.closures else "")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:

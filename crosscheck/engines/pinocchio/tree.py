@@ -19,7 +19,7 @@ from crosscheck.engines.rigid_tree import Slot, scalar_start
 from flexmb.scene.functions import Constant
 from flexmb.typing import Real
 
-_HELD = Scalar("turn", np.array([0.0, 0.0, 1.0]), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, None, Constant(value=0.0))
+_HELD = Scalar("turn", np.array([0.0, 0.0, 1.0]), *(0.0,) * 7, None, Constant(value=0.0))
 
 
 Places = slice | NDArray[np.intp]
@@ -67,6 +67,10 @@ def build_tree(links: tuple[Link, ...], gravity: Real) -> PinocchioTree:
             joint = model.addJoint(joint, _joint(freedom), at, f"{link.joint}.{k}")
             at = pin.SE3.Identity()
             made = model.joints[joint]
+            if isinstance(freedom, Scalar):
+                armature = model.armature
+                armature[made.idx_v] = freedom.armature
+                model.armature = armature
             slots.append(PinocchioSlot(freedom, link, made.idx_q, made.idx_v, not link.freedoms))
         own = link.inertia
         model.appendBodyToJoint(joint, pin.Inertia(own.mass, own.com, own.inertia), pin.SE3.Identity())

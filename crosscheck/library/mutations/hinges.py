@@ -212,6 +212,13 @@ MUTATIONS = (
     Mutation("damping", "+1 % damping", "a wrong figure", _damped, _damping(FACTOR)),
     Mutation("damping_dropped", "no damping", "dissipation left out", _damped, _damping(DROPPED)),
     Mutation(
+        "armature_dropped",
+        "no armatures",
+        "the rotors of drives left out",
+        hinges,
+        _hinge_constant("armature", DROPPED),
+    ),
+    Mutation(
         "initial_place", "+1 % initial angle or displacement", "a wrong figure", hinges, _initial("place", FACTOR)
     ),
     Mutation("initial_unit", "initial angle times pi/180", "degrees expected, radians given", hinges, _initial_unit),

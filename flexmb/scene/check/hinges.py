@@ -20,6 +20,7 @@ from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.schema import Scene, Wheel
 from flexmb.scene.tree import coordinates
 
+ARMATURES = ("armature_kg_m2", "armature_kg")
 USUALLY_POSITIVE = ("stiffness_Nm_rad", "stiffness_N_m", "damping_Nms_rad", "damping_Ns_m", "friction_Nms_rad")
 
 
@@ -33,13 +34,13 @@ def hinges(scene: Scene) -> Iterator[Defect]:
 
 
 def _to_examine(scene: Scene) -> set[int]:
-    """Numbers of the gimbals, and of hinges with a negative spring or damper or a prescribed motion."""
+    """Numbers of the gimbals, and of hinges with a negative spring, damper or armature or a prescribed motion."""
     found: set[int] = set()
     for kind, owners, structs in alike(scene.hinges):
         if kind is Gimbal:
             found.update(owners)
         for key in kind.__struct_fields__:
-            if key in USUALLY_POSITIVE:
+            if key in (*USUALLY_POSITIVE, *ARMATURES):
                 found.update(owners[i] for i in np.flatnonzero(column(structs, key) < 0.0).tolist())
             elif key in MOTIONS and any(profiles := list(map(attrgetter(key), structs))):
                 found.update(owner for owner, profile in zip(owners, profiles, strict=True) if profile is not None)
@@ -103,7 +104,14 @@ def _coordinates(place: Place, item: Any, released: set[str]) -> Iterator[Defect
     for name, coordinate in coordinates(item):
         spot = Place(f"{place.path}.{name}", place.names)
         yield from _springs(spot, coordinate)
+        yield from _armature(spot, coordinate)
         yield from _drive(spot, coordinate, f"{item.name}.{name}" in released)
+
+
+def _armature(place: Place, coordinate: Coordinate) -> Iterator[Defect]:
+    if coordinate.armature < 0.0:
+        what = f"the armature is {coordinate.armature:g}"
+        yield Defect(str(place.key(coordinate.ARMATURE)), what, "give at least zero: it is the inertia of a rotor")
 
 
 def _drive(place: Place, item: Coordinate | Wheel, released: bool) -> Iterator[Defect]:

@@ -1,8 +1,8 @@
 """Outboard inertia of hinges: a freedom that moves no inertia has no defined acceleration.
 
-A gimbal with aligned axes has such a freedom, whatever the gimbal carries. All other hinges are checked only where no
-kinematics is needed: for the child and everything welded to it, unless further massive bodies are connected to these by
-moving hinges.
+A gimbal with aligned axes has such a freedom, whatever the gimbal carries, unless its coordinates have armatures. All
+other hinges are checked only where no kinematics is needed: for the child and everything welded to it, unless further
+massive bodies are connected to these by moving hinges.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ GAUSS = np.polynomial.legendre.leggauss(2)  # exact for a linear section times x
 def moved_inertia(scene: Scene) -> Iterator[Defect]:
     """Every free coordinate of a hinge moves inertia. The scene's numbers and tree must be valid."""
     nodes = _Nodes(scene)
-    free = _free_directions(scene.hinges)
+    all_freedoms = [hinge.freedoms for hinge in scene.hinges]
+    free, armatures = _free_directions(all_freedoms), [_armatures(own) for own in all_freedoms]
     ends = _motions(*nodes.frames(scene.hinges, "child"))
     known, beyond, inertia = _clusters(scene, nodes, ends)
     of_child = [nodes.number[hinge.child] for hinge in scene.hinges]
@@ -42,7 +43,9 @@ def moved_inertia(scene: Scene) -> Iterator[Defect]:
     for freedoms in set(map(len, free)) - {0}:
         hinges = np.array([i for i, H in enumerate(free) if len(H) == freedoms])
         H = np.swapaxes(np.array([free[i] for i in hinges]), 1, 2)
-        locked = np.linalg.svd(H, compute_uv=False)[:, -1] <= NEGLIGIBLE
+        armature = np.array([armatures[i] for i in hinges])
+        resisted = np.concatenate([H, np.eye(freedoms) * (armature > 0.0)[:, None]], axis=1)
+        locked = np.linalg.svd(resisted, compute_uv=False)[:, -1] <= NEGLIGIBLE
         for i in hinges[locked]:
             what = "the hinge starts where its axes align (gimbal lock): one of its freedoms is lost"
             faults[int(i)] = what, "start elsewhere, choose another sequence, or use a spherical hinge"
@@ -52,23 +55,25 @@ def moved_inertia(scene: Scene) -> Iterator[Defect]:
             if not lock and known[of_child[i]] and not beyond[of_child[i]]
         ]
         bodies = [of_child[i] for i in hinges[tested]]
-        for n, noun in _unmoved(H[tested], ends[hinges[tested]], inertia[bodies]):
+        for n, noun in _unmoved(H[tested], ends[hinges[tested]], inertia[bodies], armature[tested]):
             i = int(hinges[tested[n]])
             child = scene.hinges[i].child
             what = f'body "{child}" and what is welded to it have no {noun} a free direction of this hinge'
-            faults[i] = what, f"give them {noun.split()[0]}, weld the hinge, or prescribe the coordinate"
+            remedy = f"give them {noun.split()[0]}, weld the hinge, or prescribe the coordinate or give it an armature"
+            faults[i] = what, remedy
     for (place, _), i in zip(entries(scene, "hinges", faults), sorted(faults), strict=True):
         yield Defect(str(place), *faults[i])
 
 
-def _unmoved(H: Real, end: Real, cluster: Real) -> Iterator[tuple[int, str]]:
+def _unmoved(H: Real, end: Real, cluster: Real, armature: Real) -> Iterator[tuple[int, str]]:
     """Numbers of the hinges among n with a free direction in H (n,6,f) that moves no inertia, and what is missing.
 
-    `end` (n,6,6): motion of the body's frame to that of the hinge's; `cluster` (n,6,6): inertia in the body's frame.
+    `end` (n,6,6): motion of the body's frame to that of the hinge's; `cluster` (n,6,6): inertia in the body's frame;
+    `armature` (n,f): inertia of the coordinates alone.
     """
     X = np.linalg.inv(end)
     inertia = np.swapaxes(X, 1, 2) @ cluster @ X
-    D = np.swapaxes(H, 1, 2) @ inertia @ H
+    D = np.swapaxes(H, 1, 2) @ inertia @ H + armature[:, None] * np.eye(H.shape[2])
     diagonal = np.diagonal(D, axis1=1, axis2=2)
     mass, moment = inertia[:, 5, 5], np.trace(inertia[:, :3, :3], axis1=1, axis2=2)
     angular = np.any(H[:, :3] != 0.0, axis=1)
@@ -234,9 +239,8 @@ def _skew(v: Real) -> Real:
     return out
 
 
-def _free_directions(hinges: Sequence[Hinge]) -> list[Real]:
+def _free_directions(freedoms: Sequence[tuple[Freedom, ...]]) -> list[Real]:
     """For each hinge the rows (n,6) of its map at the start, outboard hinge axes, without prescribed coordinates."""
-    freedoms = [hinge.freedoms for hinge in hinges]
     # a single free coordinate, as most hinges have
     single = [
         i
@@ -248,6 +252,20 @@ def _free_directions(hinges: Sequence[Hinge]) -> list[Real]:
     rows = np.concatenate([column(lines, size)[:, None] * axis for size in ("turns", "shifts")], axis=1)
     by_number = dict(zip(single, rows[:, None], strict=True))
     return [by_number[i] if i in by_number else _directions_of(own) for i, own in enumerate(freedoms)]
+
+
+def _armatures(freedoms: Sequence[Freedom]) -> list[float]:
+    """Armatures of the freedoms of one hinge, by the rows of `_free_directions`."""
+    found: list[float] = []
+    for freedom in freedoms:
+        match freedom:
+            case ScalarFreedom(coordinate=coordinate):
+                found += [coordinate.armature] if coordinate.prescribed is None else []
+            case Ball() | Floating():
+                found += [0.0] * freedom.sizes[1]
+            case _:
+                assert_never(freedom)
+    return found
 
 
 def _directions_of(freedoms: Sequence[Freedom]) -> Real:

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 from crosscheck.engines.contract import EngineMissing, Snapshot
+from crosscheck.engines.links import first_armature
 from crosscheck.engines.registry import engines
+from flexmb.scene.schema import Scene
 from tests.crosscheck.engines.random_scenes import KINDS, LATER_KINDS, random_scene
+from tests.trees import with_armatures
 
 ENGINES = engines()
 
@@ -14,6 +17,7 @@ ENGINES = engines()
 ACCELERATION = 1e-10
 LOAD = 1e-9
 REDUNDANT = {"exudyn": 100.0}
+NO_ARMATURES = ("basilisk", "dart", "exudyn")
 
 
 def _snapshot(name: str, scene) -> Snapshot:
@@ -28,15 +32,19 @@ def _snapshot(name: str, scene) -> Snapshot:
     return engine.compile(scene).evaluate()
 
 
-def _compare(scene, name: str) -> None:
-    worse = REDUNDANT.get(name, 1.0)
-    ours, theirs = _snapshot("pinocchio", scene), _snapshot(name, scene)
+def _equal_motion(ours: Snapshot, theirs: Snapshot, bound: float) -> None:
     for kind in ("position", "quaternion", "velocity", "acceleration"):
         ours_all = np.array([getattr(m, kind) for m in ours.markers.values()])
         theirs_all = np.array([getattr(theirs.markers[key], kind) for key in ours.markers])
         if kind == "quaternion":
             theirs_all *= np.sign(np.sum(ours_all * theirs_all, axis=1))[:, None]
-        assert np.abs(ours_all - theirs_all).max() <= worse * ACCELERATION * np.abs(ours_all).max(), kind
+        assert np.abs(ours_all - theirs_all).max() <= bound * np.abs(ours_all).max(), kind
+
+
+def _compare(scene, name: str) -> None:
+    worse = REDUNDANT.get(name, 1.0)
+    ours, theirs = _snapshot("pinocchio", scene), _snapshot(name, scene)
+    _equal_motion(ours, theirs, worse * ACCELERATION)
     for kind in ("loads", "wheel_loads"):
         a, b = getattr(ours, kind), getattr(theirs, kind)
         assert a.keys() <= b.keys()  # an engine may know more: loads on point masses
@@ -64,6 +72,27 @@ def test_random_tree(name, seed):
 def test_random_tree_with_prescribed_coordinates(name, seed):
     rng = np.random.default_rng(100 + seed)
     _compare(random_scene(rng, ("revolute", *rng.choice(KINDS[:-1], 7)), driven=True), name)
+
+
+@pytest.mark.parametrize("name", [name for name in ENGINES if name != "pinocchio"])
+@pytest.mark.parametrize("driven", [False, True], ids=["free", "driven"])
+def test_random_tree_with_armatures(name, driven):
+    """Pinocchio, MuJoCo and Drake have armatures; the others refuse the first one by its name."""
+    rng = np.random.default_rng(200 + driven)
+    scene = random_scene(rng, ("revolute" if driven else "free", *rng.choice(KINDS[:-1], 8)), driven=driven)
+    armed = with_armatures(scene, seed=1)
+    if name in NO_ARMATURES:
+        reason = ENGINES[name].supports(armed).reason
+        assert "has an armature" in reason and first_armature(armed) in reason
+    else:
+        _compare(armed, name)
+        _notices_armatures(scene, armed, name)
+
+
+def _notices_armatures(scene: Scene, armed: Scene, name: str) -> None:
+    """Without armatures the motion is another."""
+    with pytest.raises(AssertionError, match="acceleration"):
+        _equal_motion(_snapshot(name, scene), _snapshot(name, armed), ACCELERATION)
 
 
 @pytest.mark.parametrize("name", [

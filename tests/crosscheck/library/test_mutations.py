@@ -126,7 +126,8 @@ PUSH = Sine(amplitude=2.0, angular_frequency_rad_s=3.0)
 def everything() -> Scene:
     """A scene with something for every mutation to change."""
     swing = AngularCoordinate(
-        angle_rad=0.3, rate_rad_s=0.2, stiffness_Nm_rad=3.0, damping_Nms_rad=0.1, rest_rad=0.1, torque_Nm=PUSH
+        angle_rad=0.3, rate_rad_s=0.2, stiffness_Nm_rad=3.0, damping_Nms_rad=0.1, rest_rad=0.1, armature_kg_m2=0.2,
+        torque_Nm=PUSH,
     )
     skew = ((0.2, 0.01, 0.02), (0.01, 0.3, 0.03), (0.02, 0.03, 0.4))
     hub = RigidBody(

@@ -21,6 +21,7 @@ RECIPES = {
     "linear": replace(trees.LINEAR, prescribed=False, deformation=0.01), "free-flying": trees.FREE_FLYING,
     "ruthless": replace(trees.RUTHLESS, prescribed=False), "every level": replace(trees.EVERY_LEVEL, deformation=0.01),
     "stiffened": replace(trees.STIFFENED, prescribed=False),
+    "armatures": replace(trees.ARMED, prescribed=False, deformation=0.01),
 }  # fmt: skip
 PAIRS = [("weld", "spherical"), ("revolute", "universal"), ("prismatic", "planar"), ("cylindrical", "revolute")]
 CASES = [(recipe, types, seed) for recipe in RECIPES for seed, types in enumerate(PAIRS)]

@@ -26,6 +26,7 @@ RECIPES = {
     "levels mixed": replace(SMALL, levels=("linear", "ruthless", "rigid")),
     "free-flying": replace(SMALL, grounded=False, prescribed=False, conservative=True),
     "chain": replace(SMALL, branching=False, bodies=12),
+    "armatures": replace(SMALL, armatures=True),
 }
 
 

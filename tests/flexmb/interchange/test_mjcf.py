@@ -4,173 +4,124 @@ from __future__ import annotations
 
 import os
 import re
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import flexmb as fm
 from flexmb.interchange.imported import ModelError
-from flexmb.interchange.mjcf import BALL, FREE, read_mjcf
-from flexmb.scene.quaternions import rotation_matrix
 from tests.bounds import algebra, backward_error
 from tests.flexmb.interchange.made_robots import MJCF
+from tests.flexmb.interchange.mjcf_motion import compiled, random_motion, read
 
 mujoco = pytest.importorskip("mujoco")
 
 
-def read(text: str, folder):
-    (folder / "creature.xml").write_text(text)
-    return read_mjcf(folder / "creature.xml")
+ARMED = MJCF.replace('name="pitch"', 'name="pitch" armature="0.3"').replace(
+    'name="reach"', 'name="reach" armature="1.5"'
+)
 
 
-def test_accelerations_are_those_of_mujoco(tmp_path):
-    model, data, system = compiled(MJCF, tmp_path)
+def with_actuators(actuators: str) -> str:
+    return ARMED.replace("</mujoco>", f"<actuator>{actuators}</actuator></mujoco>")
+
+
+def flagged(flag: str) -> str:
+    return ARMED.replace('gravity="0.3 -0.2 -9.81"/>', f'gravity="0.3 -0.2 -9.81"><flag {flag}="disable"/></option>')
+
+
+MODELS = {
+    "as it is": MJCF,
+    "armatures": ARMED,
+    "armature of an actuator": with_actuators('<motor joint="pitch" gear="3" armature="0.1"/>'),
+    "damping of an actuator": with_actuators('<motor joint="reach" gear="-2" damping="0.7"/>'),
+    "two actuators": with_actuators(2 * '<motor joint="roll" gear="0.5" armature="0.2" damping="0.1"/>'),
+    "gravity compensated": ARMED.replace('name="ankle"', 'name="ankle" gravcomp="1"').replace(
+        'name="foot"', 'name="foot" gravcomp="-0.3"'
+    ),
+    "without gravity": flagged("gravity"),
+    "without springs": flagged("spring"),
+    "without dampers": flagged("damper"),
+    "a tendon that measures": ARMED.replace(
+        "</mujoco>", '<tendon><fixed range="-1 1"><joint joint="roll" coef="1"/></fixed></tendon></mujoco>'
+    ),
+}
+"""What the reader represents exactly."""
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_accelerations_and_masses_are_those_of_mujoco(name, tmp_path):
+    _held_against(MODELS[name], read(MODELS[name], tmp_path).scene)
+
+
+def _held_against(text: str, scene: fm.Scene) -> None:
+    """Accelerations and mass matrix of MuJoCo's model of the text, at a random state, are those of the scene."""
+    model, data, system = compiled(text, scene)
     (q, u), theirs = random_motion(model, data, system)
     mujoco.mj_forward(model, data)
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
-    found = theirs.turned @ system.accelerations(system.state(q, u, 0.0))[theirs.order] + theirs.swept
+    state, to_theirs = system.state(q, u, 0.0), theirs.turned @ np.eye(system.nu)[theirs.order]
+    found = to_theirs @ system.accelerations(state) + theirs.swept
     terms = np.abs(M) @ np.abs(data.qacc) + np.abs(data.qfrc_bias) + np.abs(data.qfrc_passive)
-    assert backward_error(M, found, M @ data.qacc, terms) < algebra(system.nu, 6)
+    bound = algebra(system.nu, 6)
+    assert backward_error(M, found, M @ data.qacc, terms) < bound
+    ours, expected = system.mass_matrix(state), to_theirs.T @ M @ to_theirs
+    assert np.max(np.abs(ours - expected)) < bound * np.max(np.abs(expected))
 
 
-COUPLED = MJCF.replace(
-    "</mujoco>",
-    """<tendon><fixed name="cable"><joint joint="reach" coef="2"/><joint joint="roll" coef="-0.3"/></fixed>
-    <fixed name="strap"><joint joint="twist" coef="1.5"/></fixed></tendon>
-    <equality><joint name="mesh" joint1="roll" joint2="pitch" polycoef="0.1 -1.5 0 0 0"/>
-    <tendon tendon1="cable" tendon2="strap" polycoef="0.05 0.4 0 0 0"/>
-    <joint joint1="reach" joint2="roll" active="false"/></equality></mujoco>""",
-).replace('<joint type="hinge" axis="0 0.3 1"', '<joint name="twist" type="hinge" axis="0 0.3 1"')
-
-
-def test_equality_constraints_of_coordinates_are_couplings(tmp_path):
-    """The equations without them, M a + bias = J' f, and J a = 0 exactly: MuJoCo itself keeps them softly."""
-    model, data, system = compiled(COUPLED, tmp_path)
-    assert [each.name for each in system.scene.couplings] == ["mesh", "equality 1"]
-    (q, u), theirs = random_motion(model, data, system)
-    value, rate = ({name: x[at(name).start] for name in ("roll", "pitch", "reach", "twist")}
-                   for x, at in ((q, system.coordinate), (u, system.speed)))  # fmt: skip
-    for x, constant in ((value, 1.0), (rate, 0.0)):  # roll = 0.1 - 1.5 pitch, 2 reach - 0.3 roll = 0.05 + 0.6 twist
-        x["roll"] = 0.1 * constant - 1.5 * x["pitch"]
-        x["reach"] = 0.5 * (0.05 * constant + 0.6 * x["twist"] + 0.3 * x["roll"])
-    for name in value:
-        q[system.coordinate(name)], u[system.speed(name)] = value[name], rate[name]
-        data.joint(name).qpos[0] = model.qpos0[model.joint(name).qposadr[0]] + value[name]
-        data.joint(name).qvel[0] = rate[name]
-    mujoco.mj_forward(model, data)
-    M = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, M)
-    J = np.zeros((2, model.nv))
-    at = {name: model.joint(name).dofadr[0] for name in value}
-    J[0, [at["roll"], at["pitch"]]] = 1.0, 1.5
-    J[1, [at["reach"], at["roll"], at["twist"]]] = 2.0, -0.3, -0.6
-    system.initial_state  # noqa: B018 - counts the rows
-    found = theirs.turned @ system.accelerations(system.state(q, u, 0.0))[theirs.order] + theirs.swept
-    assert np.max(np.abs(J @ found)) < 1e-12 * np.max(np.abs(found))
-    missing = M @ found + data.qfrc_bias - data.qfrc_passive
-    left = missing - J.T @ np.linalg.lstsq(J.T, missing, rcond=None)[0]
-    terms = np.abs(M) @ np.abs(found) + np.abs(data.qfrc_bias) + np.abs(data.qfrc_passive)
-    assert np.max(np.abs(left)) < 4.0 * algebra(system.nu, 6) * np.max(terms)
-
-
-def test_a_joint_that_is_kept_at_a_constant_is_prescribed(tmp_path):
-    text = COUPLED.replace('joint1="roll" joint2="pitch" polycoef="0.1 -1.5 0 0 0"', 'joint1="pitch" polycoef="0.2"')
-    scene = read(text, tmp_path).scene
-    pitch = next(hinge for hinge in scene.hinges if hinge.name == "pitch")
-    assert pitch.rotation.prescribed_rad == fm.schema.Constant(value=0.2)
-
-
-class Theirs(NamedTuple):
-    """MuJoCo's accelerations are turned @ ours[order] + swept."""
-
-    order: np.ndarray
-    turned: np.ndarray
-    swept: np.ndarray
-
-
-def compiled(text: str, folder):
-    """A model in MuJoCo, without contacts, limits and equality constraints, and its scene."""
-    model = mujoco.MjModel.from_xml_string(text)
-    off = mujoco.mjtDisableBit
-    model.opt.disableflags |= off.mjDSBL_CONTACT | off.mjDSBL_LIMIT | off.mjDSBL_EQUALITY
-    return model, mujoco.MjData(model), fm.compile(read(text, folder).scene)
-
-
-def random_motion(model, data, system):
-    """A random motion of every joint, as (q, u) of ours and in `data`."""
-    rng = np.random.default_rng(5)
-    q, u = fm.System(system.scene).initial_state.q.copy(), np.zeros(system.nu)
-    theirs = Theirs(np.zeros(model.nv, dtype=int), np.eye(model.nv), np.zeros(model.nv))
-    order, turned, swept = theirs
-    data.qpos[:], data.qvel[:] = model.qpos0, rng.normal(size=model.nv)
-    for j in range(model.njnt):
-        name = model.joint(j).name or "tail.joint 5"
-        at, speed = system.coordinate(name), system.speed(name)
-        a, v = int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j])
-        if model.jnt_type[j] == FREE:
-            quaternion = rng.normal(size=4)
-            data.qpos[a : a + 7] = np.r_[rng.normal(size=3), quaternion / np.linalg.norm(quaternion)]
-            # ours from the reference pose, speeds [angular; linear] in carried axes; theirs linear in World axes
-            R0, R = rotation_matrix(model.qpos0[a + 3 : a + 7]), rotation_matrix(data.qpos[a + 3 : a + 7])
-            q[at] = np.r_[R0.T @ (data.qpos[a : a + 3] - model.qpos0[a : a + 3]), _quaternion(R0.T @ R)]
-            linear, w = R.T @ data.qvel[v : v + 3], data.qvel[v + 3 : v + 6]
-            u[speed] = np.r_[w, linear]
-            order[v : v + 6] = np.r_[speed.start + 3 : speed.start + 6, speed.start : speed.start + 3]
-            turned[v : v + 3, v : v + 3], swept[v : v + 3] = R, R @ np.cross(w, linear)
-        elif model.jnt_type[j] == BALL:
-            quaternion = rng.normal(size=4)
-            data.qpos[a : a + 4] = q[at] = quaternion / np.linalg.norm(quaternion)
-            u[speed], order[v : v + 3] = data.qvel[v : v + 3], np.arange(speed.start, speed.stop)
-        else:
-            q[at] = rng.normal() * 0.3
-            data.qpos[a] = model.qpos0[a] + q[at][0]
-            u[speed], order[v] = data.qvel[v], speed.start
-    return (q, u), theirs
-
-
-def _quaternion(R: np.ndarray) -> np.ndarray:
-    found = np.zeros(4)
-    mujoco.mju_mat2Quat(found, R.ravel())
-    return found
+def test_armatures_are_read_as_they_are(tmp_path):
+    """Negative control of the comparison above: without them the mass matrix is another."""
+    hinges = {each.name: each for each in read(MODELS["armature of an actuator"], tmp_path).scene.hinges}
+    assert hinges["pitch"].rotation.armature_kg_m2 == pytest.approx(0.3 + 3.0**2 * 0.1, rel=1e-15)
+    assert hinges["reach"].translation.armature_kg == 1.5
+    assert hinges["roll"].rotation.armature_kg_m2 == 0.0
+    with pytest.raises(AssertionError):
+        _held_against(MODELS["armature of an actuator"], read(ARMED, tmp_path).scene)
 
 
 def test_what_is_left_out_is_said(tmp_path):
-    text = COUPLED.replace("</mujoco>", '<actuator><motor joint="roll"/></actuator></mujoco>')
+    text = MODELS["a tendon that measures"].replace("</mujoco>", '<actuator><motor joint="roll"/></actuator></mujoco>')
     notes = " | ".join(read(text.replace('name="pitch"', 'name="pitch" frictionloss="0.1"'), tmp_path).notes)
     for words in (
-        "contacts", "equality constraints of coordinates are exact here",
-        "inactive equality constraints are left out: equality 2", "actuators of tendons are left out: cable, strap",
-        "limits of joints are left out: twist", "dry friction is left out: pitch", "1 actuators",
-        "count from the reference position, not from zero: twist",
+        "contacts", "actuators of tendons are left out: tendon 0", "limits of joints are left out: tail.joint 5",
+        "dry friction is left out: pitch", "1 actuators",
+        "count from the reference position, not from zero: tail",
     ):  # fmt: skip
         assert words in notes
 
 
 BAD = {
-    "armature": (
-        MJCF.replace('name="pitch"', 'name="pitch" armature="0.1"'),
-        'joint "pitch" has the rotor inertia 0.1',
+    "armature of a free joint": (
+        MJCF.replace('<freejoint name="float"/>', '<joint type="free" name="float" armature="0.1"/>'),
+        'the free or ball joint "float" has the armature 0.1',
     ),
+    "armature of a ball": (
+        MJCF.replace('name="ball"', 'name="ball" armature="0.1"'),
+        'the free or ball joint "ball" has the armature 0.1',
+    ),
+    "armature at a tendon": (
+        MJCF.replace(
+            "</mujoco>",
+            '<tendon><fixed name="t"><joint joint="roll" coef="1"/></fixed></tendon>'
+            '<actuator><motor name="m" tendon="t" armature="0.1"/></actuator></mujoco>',
+        ),
+        'actuator "m" has armature',
+    ),
+    "armature at a ball": (with_actuators('<motor joint="ball" damping="0.1"/>'), 'actuator "actuator 0" has damping'),
+    "powers of an actuator": (with_actuators('<motor joint="roll" damping="0 0.1"/>'), 'actuator "actuator 0" has da'),
+    "powers of a damper": (MJCF.replace('name="pitch"', 'name="pitch" damping="0 1"'), 'joint "pitch" has a nonlinear'),
+    "powers of a spring": (MJCF.replace('stiffness="3"', 'stiffness="3 1"'), 'joint "roll" has a nonlinear'),
+    "yield": (MJCF.replace('stiffness="3"', 'stiffness="3" springyield="0.1"'), 'joint "roll" has a nonlinear'),
     "equality": (
         MJCF.replace("</mujoco>", '<equality><weld body1="foot" body2="tail"/></equality></mujoco>'),
         "1 equality",
     ),
     "tendon": (
-        COUPLED.replace('name="strap"', 'name="strap" stiffness="2"'),
-        'tendon "strap" has stiffness',
-    ),
-    "polynomial": (
-        COUPLED.replace("0.1 -1.5 0 0 0", "0.1 -1.5 0 0.2 0"),
-        'equality constraint "mesh" is a polynomial of higher degree',
-    ),
-    "nothing": (
-        COUPLED.replace('joint1="roll" joint2="pitch" polycoef="0.1 -1.5 0 0 0"', 'joint1="roll" joint2="roll"'),
-        "MuJoCo refuses",
+        MODELS["a tendon that measures"].replace("<fixed range", '<fixed stiffness="1" range'),
+        'tendon "0" has stiffness',
     ),
     "fluid": (MJCF.replace("<option", '<option density="1.2"'), "no fluid"),
-    "levity": (MJCF.replace('name="foot"', 'name="foot" gravcomp="1"'), 'body "foot" has gravity compensation'),
     "no model": ("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "MuJoCo refuses"),
     "no xml": ("hello", "not XML"),
 }

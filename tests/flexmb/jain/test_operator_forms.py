@@ -50,7 +50,9 @@ def as_two(o: Operators, modes_outboard: bool = True) -> Operators:
         a_m[inner], b_m[outer], deformation[outer] = o.a_m[at], o.b_m[at], o.deformation[at]
     names = tuple(name + part for name in o.bodies for part in ("'", ""))
     V_m = np.linalg.solve(np.eye(nbar) - E_Phi.T, H.T @ o.chi)
-    return Operators(names, tuple(parent), columns, tuple(rows), E_Phi, H, M_m, a_m, b_m, K_m, deformation, o.chi, V_m)
+    return Operators(
+        names, tuple(parent), columns, tuple(rows), E_Phi, H, M_m, a_m, b_m, K_m, deformation, o.J, o.chi, V_m
+    )
 
 
 def close(a: Real, b: Real, n: int, size: float) -> bool:

@@ -23,6 +23,7 @@ RECIPES = {
     "every level": trees.EVERY_LEVEL,
     "conservative": trees.CONSERVATIVE,
     "free": trees.FREE_FLYING,
+    "armatures": trees.ARMED,
 }
 
 
@@ -160,7 +161,7 @@ def varied(seed: int, recipe: trees.Recipe, n: int) -> list[fm.Scene]:
 _NUMBERS = {
     "mass_kg", "inertia_kg_m2", "gravity_m_s2", "parent_position_m", "child_position_m", "com_m", "angle_rad",
     "rate_rad_s", "stiffness_Nm_rad", "damping_Nms_rad", "stiffness_N_m", "damping_Ns_m", "rest_angle_rad", "amplitude",
-    "end_value", "duration_s", "axial_inertia_kg_m2", "transverse_inertia_kg_m2",
+    "end_value", "duration_s", "axial_inertia_kg_m2", "transverse_inertia_kg_m2", "armature_kg_m2", "armature_kg",
 }  # fmt: skip
 
 
@@ -179,7 +180,7 @@ def _times(value, factor):
     return [_times(each, factor) for each in value] if isinstance(value, list | tuple) else factor * value
 
 
-@pytest.mark.parametrize("recipe", ["rigid", "full", "every level"])
+@pytest.mark.parametrize("recipe", ["rigid", "full", "every level", "armatures"])
 def test_copies_with_numbers_of_their_own(recipe):
     scenes = varied(3, RECIPES[recipe], 11)
     batch = compile_batch(scenes)

@@ -49,7 +49,9 @@ def test_a_chain_has_hardly_anything(exact):
 def test_each_thing_has_its_name(exact):
     assert features.SPRINGS in fm.compile(chain(stiffness=2.0).scene()).constants.features()
     assert features.DAMPERS in fm.compile(chain(damping=2.0).scene()).constants.features()
-    scenes = random_scene(0, EVERYTHING), random_scene(0, Recipe(levels=("stiffened",))), connected()
+    armed = chain(armature=2.0).scene()
+    assert features.ARMATURES in fm.compile(armed).constants.features()
+    scenes = random_scene(0, EVERYTHING), random_scene(0, Recipe(levels=("stiffened",))), connected(), armed
     found = frozenset.union(*(fm.compile(scene).constants.features() for scene in scenes))
     named = {name: value for name, value in vars(features).items() if not name.startswith("_") and name.isupper()}
     names = {value for value in named.values() if isinstance(value, str)}
