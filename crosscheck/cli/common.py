@@ -95,12 +95,15 @@ def _complete_engine(begun: str) -> list[str]:
 CaseWords = Annotated[
     list[str],
     typer.Argument(
-        help="Case names, a tag such as `canonical`, `all`, or folders that hold a run.toml.",
+        help="Case names, patterns such as `'pendulums/*'`, a family, a tag such as `canonical`, `all`, or folders "
+        "that hold a run.toml; behind a `!` what to leave out.",
         autocompletion=_complete_case,
     ),
 ]
-CaseList = Annotated[list[str], typer.Argument(help="Case names, a tag, `all`, or folders that hold a run.toml.")]
-CaseWord = Annotated[str, typer.Argument(help="Case name or folder.", autocompletion=_complete_case)]
+CaseWord = Annotated[
+    str,
+    typer.Argument(help="Case name, a pattern that one case has, or its folder.", autocompletion=_complete_case),
+]
 EngineWords = Annotated[
     list[str], typer.Argument(metavar="ENGINE...", help="Names of engines.", autocompletion=_complete_engine)
 ]
@@ -118,6 +121,26 @@ Json = Annotated[
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show the last line only, and errors.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every comparison and every run.")]
 
+Goals = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--goal", metavar="ENGINE[:CHANNELS]=NUMBER",
+        help="A goal that the engine claims instead of the case's, the largest U relative to the range (repeat it).",
+    ),
+]  # fmt: skip
+Efforts = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--efforts", metavar="ENGINE=NUMBER,NUMBER...",
+        help="Steps (s) or relative tolerances besides the engine's own, or those of the case (repeat it).",
+    ),
+]  # fmt: skip
+Expect = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="What you claim and expect of your engine; by default `crosscheck-expect.toml`, if there."
+    ),
+]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")]
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for records, verdicts and report.")]
 TimeLimit = Annotated[
@@ -159,6 +182,25 @@ def found(words: tuple[str, ...]) -> tuple[Case, ...]:
 
     try:
         return resolve(words)
+    except CaseError as error:
+        refuse(str(error))
+
+
+def claimed(
+    cases: tuple[Case, ...],
+    expect: Path | None,
+    goals: list[str] | None,
+    efforts: list[str] | None,
+    asked: tuple[str, ...],
+) -> tuple[Case, ...]:
+    """The cases with what is claimed and expected of engines, or the end of the program with exit code 2."""
+    from crosscheck.library.with_claims import expect_file, with_claims
+
+    file = expect_file(expect)
+    if file is not None:
+        console.print(words(f"Expectations: {file}"), soft_wrap=True)
+    try:
+        return with_claims(cases, file, goals or (), efforts or (), asked)
     except CaseError as error:
         refuse(str(error))
 

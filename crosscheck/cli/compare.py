@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from crosscheck.cli.common import Json, Quiet, Verbose, app, console, print_json, refuse, verbosity
-
-if TYPE_CHECKING:
-    from crosscheck.sealed.document import SealedResults
 
 
 @app.command()
@@ -27,7 +24,8 @@ def compare(
 
     **Worse**: a verdict is not as expected any more, its status is graver, E or U has grown beyond the factor of
     accepted figures (10, above rounding), a run does not finish any more. **Gone**: what was judged is not judged any
-    more. Times are shown where they changed by half, and judge nothing: machines differ.
+    more. **New** is what was not judged before; where it is not as expected it is worse. Times are shown where they
+    changed by half, and judge nothing: machines differ.
 
     **Exit code**: 0 nothing is worse or gone; 1 something is; 2 a file cannot be read, is of another version, is of a
     session that was killed, or was changed after it was written (every results.json is sealed by its SHA-256).
@@ -35,26 +33,15 @@ def compare(
     **Example**: `crosscheck compare main/results.json out/results.json`
     """
     from crosscheck.sealed.compare import compare_results
-    from crosscheck.sealed.seal import ResultsError
+    from crosscheck.sealed.seal import ResultsError, read_finished
     from crosscheck.terminal.differences import print_differences
 
     shown = verbosity(quiet, verbose)
     try:
-        differences = compare_results(_finished(old), _finished(new))
+        differences = compare_results(read_finished(old), read_finished(new))
     except ResultsError as error:
         refuse(str(error))
     print_differences(console, differences, shown)
     if as_json:
         print_json(asdict(differences) | {"regressed": differences.regressed})
     raise typer.Exit(int(differences.regressed))
-
-
-def _finished(file: Path) -> SealedResults:
-    """The results of a session that has come to its end; ResultsError for any other."""
-    from crosscheck.sealed.seal import ResultsError, read_results
-
-    found = read_results(file)
-    if found.unfinished:
-        began = f", begun at {found.made.at}" if found.made.at else ""
-        raise ResultsError(f"{file} is unfinished{began}: the session runs, or it was killed. Run it to its end")
-    return found

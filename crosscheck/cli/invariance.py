@@ -15,7 +15,7 @@ from crosscheck.terminal.verbosity import Verbosity
 
 @common.app.command()
 def invariance(
-    cases: common.CaseList,
+    cases: common.CaseWords,
     engine: Annotated[str, typer.Option("--engine", "-e", help="The engine that is put to the proof.")] = "native",
     out: common.Out = Path("out"),
     fresh: common.Fresh = False,

@@ -15,7 +15,7 @@ from crosscheck.terminal.verbosity import Verbosity
 
 @common.app.command()
 def mutate(
-    cases: common.CaseList,
+    cases: common.CaseWords,
     engine: Annotated[str, typer.Option("--engine", "-e", help="The engine that runs the faulty scenes.")] = "native",
     all_targets: Annotated[
         bool, typer.Option("--all-targets", help="Every target, not one of each kind (every body, every hinge).")

@@ -15,7 +15,7 @@ from crosscheck.terminal.text import marked, words
 
 @common.app.command()
 def regenerate(
-    cases: common.CaseList,
+    cases: common.CaseWords,
     check: Annotated[bool, typer.Option("--check", help="Compare with what is stored, write nothing.")] = False,
     jobs: common.Jobs = None,
     time_limit: common.TimeLimit = None,

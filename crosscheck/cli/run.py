@@ -16,6 +16,7 @@ from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
 
 if TYPE_CHECKING:
+    from crosscheck.cli.baseline import AgainstBaseline
     from crosscheck.judging.outcome import SessionOutcome
     from crosscheck.library.find import Case
 
@@ -32,6 +33,15 @@ def run(
     jobs: common.Jobs = None,
     time_limit: common.TimeLimit = None,
     scheduler: common.SchedulerAddress = LOCAL,
+    goal: common.Goals = None,
+    efforts: common.Efforts = None,
+    expect: common.Expect = None,
+    baseline: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OLD", help="A results.json or its folder: only what became worse since fails. Written if missing."
+        ),
+    ] = None,
     accept: Annotated[
         bool, typer.Option("--accept", help="Write the figures reached into each case's accepted.toml, for review.")
     ] = False,
@@ -59,6 +69,11 @@ def run(
     accepted figures. Figures accepted with other efforts, scenes, rules or versions of engines are *stale*: accept them
     again. Nothing is accepted while anything is not as expected.
 
+    **Your own engine**: `--goal` replaces goals that it is not meant to meet, `--efforts` adds efforts where U is too
+    large, and a file, `--expect`, keeps both, with failures that you expect and their reasons; `docs/expectations.md`
+    has its keys. `--baseline OLD` lets only what became worse fail the session; without OLD it is written, and the
+    session passes.
+
     **Exit code**: 0 every verdict is as the case expects, and everything asked for gave its result; 1 something is not
     as expected, failed or did not run, an engine asked for was compared in nothing, or `--accept` wrote nothing; 2 the
     request makes no sense. With `--strict` also 1 where figures are worse than recorded or missing, a reference was
@@ -66,19 +81,24 @@ def run(
 
     **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
     `crosscheck run all -e mycode --alone --out results` · `crosscheck run ./my_case --accept` ·
-    `crosscheck run all --strict --time-limit 600`
+    `crosscheck run all --strict --time-limit 600` · `crosscheck run 'pendulums/*' -e mycode --baseline main.json`
     """
+    from crosscheck.cli.baseline import hold_against, read_baseline
     from crosscheck.records.session import last_session
     from crosscheck.report import write_all
 
     common.check_limit(time_limit)
     shown = common.verbosity(quiet, verbose)
     chosen, asked, records = _chosen(cases, engine, alone), tuple(engine or ()), out / "records.jsonl"
+    chosen = common.claimed(chosen, expect, goal, efforts, asked)
+    before = None if baseline is None else read_baseline(baseline, out)
     with common.sole_writer(out, strict):
         _run(chosen, asked, records, shown, fresh, Limits(jobs, time_limit), scheduler_at(scheduler))
         done = not accept or _accept(chosen, records, partial=bool(asked))
         outcome, page = write_all(records, out, strict, last_session, single_file)
-    _conclude(outcome, page, records, shown, out if as_json else None, open_report, failed=not done)
+        held = None if before is None else hold_against(before, outcome, out)
+    json_of = out if as_json else None
+    _conclude(outcome, page, records, shown, json_of, open_report, failed=not done, held=held)
 
 
 @common.app.command()
@@ -167,18 +187,25 @@ def _kept(records: Path) -> str:
 
 def _conclude(
     outcome: SessionOutcome, page: Path, records: Path, shown: Verbosity, json_of: Path | None, open_report: bool,
-    failed: bool = False,
+    failed: bool = False, held: AgainstBaseline | None = None,
 ) -> None:  # fmt: skip
-    """Show the outcome, with the results of the folder `json_of` as JSON, and exit; with code 1 if it `failed`."""
+    """Show the outcome, with the results of the folder `json_of` as JSON, and exit; with code 1 if it `failed`.
+
+    Where the session was `held` against a baseline, that decides.
+    """
     from crosscheck.sealed.seal import FILE
     from crosscheck.terminal.verdicts import print_outcome
 
-    code = print_outcome(common.console, outcome, shown)
+    of_session = print_outcome(common.console, outcome, shown)
     if shown is not Verbosity.QUIET:
         common.console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
         common.console.print(words(_kept(records), "dim"), soft_wrap=True)
+    if held is not None:
+        from crosscheck.cli.baseline import print_held
+
+        print_held(held, shown)
     if json_of is not None:
         typer.echo((json_of / FILE).read_text(encoding="ascii"), nl=False)
     if open_report:
         webbrowser.open(page.resolve().as_uri())
-    raise typer.Exit(code or int(failed))
+    raise typer.Exit((of_session if held is None else held.code) or int(failed))

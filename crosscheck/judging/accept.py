@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from crosscheck.engines.registry import BUILT_IN
-from crosscheck.judging.figures import figures
+from crosscheck.judging.figures import figures, recordable
 from crosscheck.judging.outcome import conclude
 from crosscheck.judging.results import collect
 from crosscheck.library.accepted import FILE, dumps, merged
@@ -36,6 +36,9 @@ def accept_figures(cases: Iterable[Case], records: Path, partial: bool) -> list[
         raise NotAccepted(f"Nothing is accepted. {outcome.headline}: correct that first.")
     if outcome.idle:
         raise NotAccepted(f"Nothing is accepted: nothing was compared in {', '.join(outcome.idle)}. Leave that out.")
+    own = [verdict for verdict in (*outcome.loosened, *outcome.own_failures) if recordable(verdict, BUILT_IN)]
+    if own:
+        raise NotAccepted(f"Nothing is accepted: {own[0].case} was judged by goals or expectations that are your own.")
     latest = {record.case: record for record in found if isinstance(record, CaseRecord)}
     written = []
     archive = Archive(records)

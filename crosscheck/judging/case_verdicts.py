@@ -9,6 +9,7 @@ import numpy as np
 from crosscheck.judging.against_reference import judge_reference
 from crosscheck.judging.basis import basis
 from crosscheck.judging.expectation import outside
+from crosscheck.judging.finer import finer_efforts
 from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import SEVERITY, Finding, Verdict, compare, conserve, not_determined
@@ -42,11 +43,13 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
     question = Question(case.case, item.name, "comparison", *item.sides, item.expect, item.reason, stands_on)
     across = question.a.variant != question.b.variant
     for channel, goal, finding in _channels(item.goals, a, b, case):
+        wanted = question.goal(channel, goal)
         if finding is None:
             scale = _scale(item.scales, channel)
-            finding = compare(channel, a.signal(channel, across), b.signal(channel, across), goal, scale)
+            finding = compare(channel, a.signal(channel, across), b.signal(channel, across), wanted, scale)
         beyond = outside(item, channel, finding) if finding.status == item.expect else ""
-        yield question.verdict(channel, goal, finding, beyond)
+        advice = finer_efforts(case.case, channel, wanted, finding, (a, b))
+        yield question.verdict(channel, goal, finding, beyond, advice)
     if _missing(a, b) is None and _elsewhere(a, b) is None:
         patterns: dict[str, Iterable[str]] = {"scale": item.scales, "band": item.band}
         for pattern, finding in (*_unused(item.goals, patterns, a, b), *_vanished(question, item, a, b, case)):
@@ -106,15 +109,15 @@ def _conservation(case: CaseResults, item: Conservation, engine: str) -> Verdict
     stands_on = basis(case.case.variants, (result,), item.scale)
     question = Question(case.case, name, "conservation", side, law, item.expect, item.reason, stands_on)
     channel = CONSERVED[item.quantity]
-    finding = _absent(result, channel) or _drift(result, channel, item)
+    finding = _absent(result, channel) or _drift(result, channel, item, question.goal(channel, item.limit))
     beyond = outside(item, channel, finding) if finding.status == item.expect else ""
     return question.verdict(channel, item.limit, finding, beyond)
 
 
-def _drift(result: Result, channel: str, item: Conservation) -> Finding:
+def _drift(result: Result, channel: str, item: Conservation, limit: float) -> Finding:
     """Drift (SI): of the energy less the work done, or the change of the momentum vector."""
     drift, scale = drift_of(result, channel)
-    return conserve(drift, item.scale if item.scale is not None else scale, item.limit)
+    return conserve(drift, item.scale if item.scale is not None else scale, limit)
 
 
 def drift_of(result: Result, channel: str) -> tuple[np.ndarray, float]:

@@ -9,6 +9,7 @@ from functools import cached_property
 from crosscheck.engines.registry import BUILT_IN
 from crosscheck.judging.applicable import Inapplicable, set_apart
 from crosscheck.judging.case_verdicts import judge
+from crosscheck.judging.claims import idle_claims
 from crosscheck.judging.figures import recordable
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.verdict import Verdict
@@ -36,7 +37,8 @@ class SessionOutcome:
     `strict`: figures worse than recorded or missing, and references that were never made, are not as expected.
     `inapplicable`: what engines that joined a case cannot represent of it. `asked`: the engines asked for by name.
     `unreferenced`: the cases with a recipe of a reference but no reference. `made_with`: versions and processor of the
-    last session in the records. `unfinished`: the session has not ended, so nothing is judged.
+    last session in the records. `unfinished`: the session has not ended, so nothing is judged. `idle_claims`: the
+    user's claims that name nothing, in words.
     """
 
     verdicts: dict[str, list[Verdict]]
@@ -48,6 +50,7 @@ class SessionOutcome:
     unreferenced: tuple[str, ...] = ()
     made_with: str = ""
     unfinished: bool = False
+    idle_claims: tuple[str, ...] = ()
 
     @property
     def all(self) -> list[Verdict]:
@@ -83,6 +86,16 @@ class SessionOutcome:
     def not_offered(self) -> dict[str, int]:
         """For each engine the number of channels that would be judged and that it does not offer."""
         return dict(Counter(each.engine for each in self.inapplicable if each.channel))
+
+    @property
+    def loosened(self) -> list[Verdict]:
+        """Verdicts as expected by goals that are looser than those of the case, since an engine claims no more."""
+        return [verdict for verdict in self.all if verdict.ok and verdict.loosened]
+
+    @property
+    def own_failures(self) -> list[Verdict]:
+        """Verdicts other than agreement that the user expects, and not the case."""
+        return [verdict for verdict in self.all if verdict.ok and verdict.own_failure]
 
     @property
     def worse(self) -> list[Verdict]:
@@ -122,7 +135,7 @@ class SessionOutcome:
     def ok(self) -> bool:
         """Whether every verdict is as expected, everything asked for was judged, and no run is lost."""
         complete = not self.unfinished and bool(self.all) and not self.lost and not self.broken
-        sound = complete and not self.unexpected and not self.uncompared
+        sound = complete and not self.unexpected and not self.uncompared and not self.idle_claims
         lacking = self.worse or self.outgrown or self.unrecorded or self.unreferenced
         return sound and not (self.strict and lacking)
 
@@ -136,7 +149,7 @@ class SessionOutcome:
             return "Nothing was compared" + (f": {why}" if why else "")
         if self.ok:
             grown = f", {len(self.worse)} of them worse than recorded" if self.worse else ""
-            return f"All {len(self.all)} verdicts are as expected{grown}{self._unoffered}"
+            return f"All {len(self.all)} verdicts are as expected{grown}{self._by_claims}{self._unoffered}"
         parts = []
         if self.unexpected:
             parts.append(f"{len(self.unexpected)} of {len(self.all)} verdicts are not as expected")
@@ -156,12 +169,19 @@ class SessionOutcome:
             parts.append(self._uncompared)
         if self.broken:
             parts.append(self._broken)
+        if self.idle_claims:
+            parts.append(f"{len(self.idle_claims)} of your own expectations name nothing")
         return " and ".join(parts)
 
     @property
     def _uncompared(self) -> str:
         were = "was" if len(self.uncompared) == 1 else "were"
         return f"{', '.join(self.uncompared)} {were} asked for and compared in nothing"
+
+    @property
+    def _by_claims(self) -> str:
+        loosened = f", {len(self.loosened)} of them by goals looser than the case's" if self.loosened else ""
+        return loosened + (f", {len(self.own_failures)} of them failures that you expect" if self.own_failures else "")
 
     @property
     def _unoffered(self) -> str:
@@ -200,6 +220,7 @@ def conclude(session: Session, strict: bool = False) -> SessionOutcome:
         asked=tuple(dict.fromkeys(engine for case in session.cases for engine in case.case.asked)),
         unreferenced=tuple(case.case.case for case in session.cases if case.case.unreferenced),
         made_with=_made_with(session),
+        idle_claims=idle_claims(session.cases, verdicts, inapplicable),
     )
 
 

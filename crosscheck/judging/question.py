@@ -9,6 +9,8 @@ from crosscheck.judging.figures import worse
 from crosscheck.judging.verdict import Finding, Status, Verdict, VerdictKind
 from crosscheck.library.accepted import key
 from crosscheck.library.case import ComparisonSide
+from crosscheck.library.claims import ClaimedFailure
+from crosscheck.library.patterns import most_specific
 from crosscheck.records.kinds import CaseRecord
 
 
@@ -28,11 +30,41 @@ class Question:
     why: str
     basis: str = ""
 
-    def verdict(self, channel: str, goal: float, finding: Finding, beyond: str = "") -> Verdict:
-        """The verdict on one channel; `beyond` says how a finding of the expected status is outside its bounds."""
+    def goal(self, channel: str, goal: float) -> float:
+        """The goal of a channel: the case's, or the one that its engines claim instead."""
+        return self._claimed(channel, goal)[0]
+
+    def _claimed(self, channel: str, goal: float) -> tuple[float, str]:
+        """The goal of a channel, with the reason if it is claimed. A goal of 0 stands for a channel that has none."""
+        if self.kind == "control" or goal == 0.0:
+            return goal, ""
+        found = []
+        for engine in dict.fromkeys((self.a.engine, self.b.engine)):
+            goals = self.case.claims.goals_of(engine)
+            pattern = most_specific(goals, channel)
+            if pattern is not None:
+                claimed, reason = goals[pattern]
+                found.append((claimed, f"{engine}: {reason}"))
+        return max(found, default=(goal, ""))
+
+    def _own_failure(self, channel: str) -> ClaimedFailure | None:
+        """The user's expectation of a failure where the case expects agreement; of several the last counts."""
+        if self.kind == "control" or self.expected != "agree":
+            return None
+        mine = [each for each in self.case.claims.failures if each.engine in (self.a.engine, self.b.engine)]
+        found = [each for each in mine if most_specific(each.channels, channel) is not None]
+        return found[-1] if found else None
+
+    def verdict(self, channel: str, goal: float, finding: Finding, beyond: str = "", advice: str = "") -> Verdict:
+        """The verdict on one channel, whose goal in the case is `goal`.
+
+        `beyond` says how a finding of the expected status is outside its bounds, `advice` what to do about a large U.
+        """
         place = key(channel, (self.a.engine, self.a.variant), (self.b.engine, self.b.variant))
         accepted = self.case.accepted.get(self.name, {}).get(place) if self.kind != "control" else None
         infos = self.case.variants
+        claimed, why = self._claimed(channel, goal)
+        failure = self._own_failure(channel)
         levels = dict.fromkeys(infos[side.variant].level for side in (self.a, self.b) if side.variant in infos)
         return Verdict(
             case=self.case.case,
@@ -45,16 +77,20 @@ class Question:
             engine_b=self.b.engine,
             level=" / ".join(levels),
             status=finding.status,
-            expected=self.expected,
+            expected=self.expected if failure is None else failure.status,
             E=finding.E,
             U=finding.U,
-            goal=goal,
+            goal=claimed,
             scale=finding.scale,
             reason=f"{finding.reason}; {beyond}" if beyond and beyond != finding.reason else finding.reason,
-            expected_reason=self.why,
+            expected_reason=self.why if failure is None else failure.reason,
             outside=beyond,
             accepted=accepted,
             worse=worse(accepted, finding.E, finding.U),
             stale="" if accepted is None else changed(accepted.of, self.basis),
             basis=self.basis,
+            case_goal=goal if why else None,
+            goal_reason=why,
+            own_failure="" if failure is None else failure.place,
+            advice=advice,
         )

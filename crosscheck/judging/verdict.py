@@ -57,7 +57,9 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
 
     `outside` says how a result with the expected status is outside the bounds of the case. `accepted` are the accepted
     figures, `worse` says how E or U has grown since, `stale` what has changed since, and `basis` identifies how E and U
-    were found (`crosscheck.judging.basis`).
+    were found (`crosscheck.judging.basis`). `case_goal` is the goal of the case where an engine claims another one, for
+    the reason `goal_reason`; `own_failure` is the place where the user expects this failure, "" if it is the case that
+    says what is expected (`crosscheck.library.claims`). `advice` is what to do about a U that is too large.
     """
 
     case: str
@@ -82,6 +84,15 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
     worse: str = ""
     stale: str = ""
     basis: str = ""
+    case_goal: float | None = None
+    goal_reason: str = ""
+    own_failure: str = ""
+    advice: str = ""
+
+    @property
+    def loosened(self) -> bool:
+        """Whether it was judged by a goal that is looser than that of the case."""
+        return self.case_goal is not None and not self.goal <= self.case_goal
 
     @property
     def grown(self) -> str:

@@ -84,6 +84,8 @@ All keys, with defaults in brackets; the structs below explain them:
 
 - at the top: ``title``; ``tags`` [none]; ``duration_s`` (s); ``samples`` (from 0 to the end, both counted);
   ``time_limit_s`` [1800] (s), for one engine on one variant with all its efforts; ``--time-limit`` comes before it;
+  ``finer`` [0], how many efforts more than its own an engine has that the case does not name, in the ratio of its last
+  two: chaotic motion needs finer ones than engines usually have;
 - ``variant``: ``name``; ``scene`` ["scene.toml"]; ``transform`` ["none"], or "rigidify", "modal_points", "segments"
   with their number ``segments``, "substructures" with ``pieces`` and ``eigenmodes`` [0], the last two for
   ``split_body`` [every beam] alone; ``level`` [the scene's] of all flexible bodies; ``refined`` [none] with
@@ -280,13 +282,17 @@ class Chart(_CasePart, frozen=True, kw_only=True):
 
 
 class RunFile(_CasePart, frozen=True, kw_only=True):
-    """run.toml. `time_limit_s` is how long one engine may take for one variant, all its efforts together."""
+    """run.toml. `time_limit_s` is how long one engine may take for one variant, all its efforts together.
+
+    `finer` is how many efforts more than its own an engine has that joins by `--engine`.
+    """
 
     title: str
     tags: tuple[str, ...] = ()
     duration_s: float
     samples: int
     time_limit_s: float | None = None
+    finer: int = 0
     variants: tuple[Variant, ...] = msgspec.field(name="variant")
     comparisons: tuple[Comparison, ...] = msgspec.field(name="comparison", default=())
     controls: tuple[Control, ...] = msgspec.field(name="control", default=())

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TypeVar
 
 from crosscheck.library.accepted import FILE as ACCEPTED
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import CaseError, Provenance, RunFile, Variant
+from crosscheck.library.case_words import chosen, meant
 from crosscheck.library.check import check_accepted, check_provenance, check_run_file
+from crosscheck.library.claims import Claims
 from crosscheck.library.own_files import source_folder
 from flexmb.scene.convert import to_struct
 from flexmb.scene.files import load_scene
-from flexmb.scene.problems import SceneError, closest
+from flexmb.scene.problems import SceneError
 from flexmb.scene.reading import Unreadable, parse_toml, read_text
 from flexmb.scene.schema import Scene
 
@@ -26,7 +27,8 @@ T = TypeVar("T")
 class Case:
     """A case folder that was read and checked. `name` is "<family>/<case>".
 
-    `alone`: engines are compared with the stored reference only, and no partners run.
+    `alone`: engines are compared with the stored reference only, and no partners run. `claims` are those of
+    `crosscheck.library.expect_file` on the engines.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Case:
     readme: str
     accepted: Accepted = field(default_factory=dict)
     alone: bool = False
+    claims: Claims = field(default_factory=Claims)
 
     def scene(self, variant: Variant) -> Scene:
         """The variant's scene as its file says, before any transformation."""
@@ -61,38 +64,37 @@ def shipped_names() -> tuple[str, ...]:
 
 
 def resolve(words: tuple[str, ...]) -> tuple[Case, ...]:
-    """The cases a user asks for: "canonical" or another tag, "all", a case name or its last part, a pattern such as
-    "pendulums/*", or a folder.
+    """The cases that a user asks for: by words (`crosscheck.library.case_words`), or by folders with a run.toml.
 
     CaseError also for two folders whose cases have the same name: records and report could not tell them apart.
     """
     found: dict[str, Case] = {}
-    for word in words:
-        for case in _resolve_one(word):
+
+    def one(word: str) -> tuple[str, ...]:
+        cases = _resolve_one(word)
+        for case in cases:
             other = found.setdefault(case.name, case)
             if other.folder != case.folder:
                 raise CaseError(
                     f"{other.folder} and {case.folder} are both called {case.name}: rename a folder, or run one alone"
                 )
-    return tuple(found.values())
+        return tuple(case.name for case in cases)
+
+    return tuple(found[name] for name in chosen(words, one))
 
 
 def _resolve_one(word: str) -> tuple[Case, ...]:
     folder = Path(word)
     if os.path.isfile(folder / "run.toml"):  # False also for words that cannot be a path
         return (load_case(folder),)
-    named = [name for name in shipped_names() if word in (name, name.partition("/")[2]) or fnmatchcase(name, word)]
-    if named:  # only these cases are read
-        return tuple(load_case(shipped_folder() / name) for name in named)
-    cases = shipped_cases()
-    chosen = tuple(case for case in cases if word == "all" or word in case.run.tags)
-    if not chosen:
-        known = {name for case in cases for name in (case.name, case.name.partition("/")[2], *case.run.tags)}
-        raise CaseError(
-            f'"{word}" is no case, no tag and no folder with a run.toml: {closest(word, known)}. '
-            "`crosscheck list` shows them all."
-        )
-    return chosen
+    read: dict[str, Case] = {}
+
+    def tags() -> dict[str, tuple[str, ...]]:
+        read.update((case.name, case) for case in shipped_cases())
+        return {name: case.run.tags for name, case in read.items()}
+
+    names = meant(word, shipped_names(), tags)  # cases that are not meant are read only where tags must be known
+    return tuple(read[name] if name in read else load_case(shipped_folder() / name) for name in names)
 
 
 def load_case(folder: Path) -> Case:

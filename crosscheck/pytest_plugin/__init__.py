@@ -53,7 +53,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("crosscheck", "hold a multibody engine against the reference cases")
     group.addoption(
         "--crosscheck", action="append", default=[], metavar="CASES",
-        help="a case, a shell pattern of case names, a tag, `all`, or a folder with a run.toml; may be repeated",
+        help="a case, a shell pattern of case names, a family, a tag, `all`, or a folder with a run.toml; behind a `!` "
+        "what is left out; may be repeated",
     )  # fmt: skip
     group.addoption(
         "--crosscheck-engine", action="append", default=[], metavar="NAME",
@@ -62,6 +63,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--crosscheck-contract", action="store_true", help="try the clauses of the contract on each engine as well"
     )
+    group.addoption(
+        "--crosscheck-expect", metavar="FILE",
+        help="goals and failures of your engine; by default crosscheck-expect.toml in the working folder, if there",
+    )  # fmt: skip
     group.addoption("--crosscheck-out", metavar="DIR", help="keep the records of all runs in this folder")
     group.addoption(
         "--crosscheck-strict", action="store_true",

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from math import inf
+from typing import Any
+
 import pytest
 
 from crosscheck.pytest_plugin.items import PREFIX
@@ -12,12 +15,18 @@ class NothingCompared:
 
     def __init__(self) -> None:
         self._compared: dict[str, int] = {}
+        self._loosened: dict[str, int] = {}
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Count an item: a skip is no comparison, an expected failure is one."""
         if not report.nodeid.startswith(f"{PREFIX}::"):
             return
-        engine = str(dict(report.user_properties).get("engine"))
+        told: dict[str, Any] = dict(report.user_properties)
+        engine = str(told.get("engine"))
+        looser = float(told.get("goal") or 0.0) > float(told.get("case_goal", inf))
+        if report.when == "call" and report.passed and looser:
+            reason = str(told["goal_reason"])
+            self._loosened[reason] = self._loosened.get(reason, 0) + 1
         compared = report.when == "call" and (not report.skipped or hasattr(report, "wasxfail"))
         self._compared[engine] = self._compared.get(engine, 0) + (compared or report.failed)
 
@@ -34,6 +43,8 @@ class NothingCompared:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """Name the engines that were not compared."""
+        """Name the engines that were not compared, and count what passed by a goal looser than the case's."""
+        for reason, count in self._loosened.items():
+            terminalreporter.write_line(f"crosscheck: {count} passed by goals looser than the case's: {reason}")
         for engine in self.idle:
             terminalreporter.write_line(f"crosscheck: {engine} was compared in nothing: all its items were skipped")

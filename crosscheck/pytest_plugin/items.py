@@ -153,17 +153,21 @@ class ChannelItem(_CaseItem):
             self._without_verdict()
             return
         numbers = {"E": verdict.E, "U": verdict.U, "goal": verdict.goal}
+        if verdict.case_goal is not None:
+            numbers["case_goal"] = verdict.case_goal
+            self.tell("goal_reason", verdict.goal_reason)
         for name, value in {"status": verdict.status, "expected": verdict.expected, **numbers}.items():
             self.tell(name, value if value is None or isinstance(value, str) else f"{value:.6g}")
         if not verdict.ok:
             refused = verdict.status == "refused"
-            if refused and not self.request.strict:
+            if refused and not self.request.strict and not verdict.own_failure:
                 pytest.skip(f"{self.engine} refuses: {verdict.reason}")
             raise NotAsExpected(told(verdict))
         if verdict.worse and self.request.strict:
             raise NotAsExpected(f"{told(verdict)}\n{verdict.grown}")
         if verdict.status != "agree":
-            pytest.xfail(f"{verdict.status}, as the case expects: {verdict.expected_reason}")
+            who = f"you expect ({verdict.own_failure})" if verdict.own_failure else "the case expects"
+            pytest.xfail(f"{verdict.status}, as {who}: {verdict.expected_reason}")
 
     def _without_verdict(self) -> None:
         """Skip a channel that is not applicable, with the engine's reason, or an energy that it does not offer."""
@@ -226,5 +230,7 @@ def told(verdict: Verdict) -> str:
     figures = {"E": verdict.E, "U": verdict.U, "goal": verdict.goal}
     numbers = ", ".join(f"{name} {value:.3g}" for name, value in figures.items() if value is not None)
     expected = "" if verdict.status == verdict.expected else f", expected {verdict.expected}"
+    own = f"; you expect it to fail: {verdict.own_failure}" if verdict.own_failure else ""
+    advice = f"; {verdict.advice}" if verdict.advice else ""
     where = f"{verdict.case}, {verdict.engine_a} on {verdict.variant_a}, {verdict.channel}"
-    return f"{where}: {verdict.status}{expected}: {verdict.reason} ({numbers}; relative to the range)"
+    return f"{where}: {verdict.status}{expected}: {verdict.reason} ({numbers}; relative to the range){own}{advice}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fnmatch
 from argparse import Namespace
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,8 @@ import pytest
 
 from crosscheck.engines.registry import engines
 from crosscheck.library.case import CaseError
-from crosscheck.library.find import Case, resolve, shipped_names
+from crosscheck.library.find import Case, resolve
+from crosscheck.library.with_claims import expect_file, with_claims
 from crosscheck.pytest_plugin.runs import SessionRuns
 from flexmb.scene.problems import closest
 
@@ -21,7 +21,7 @@ PYTESTS_OWN = {"skip", "skipif", "xfail", "parametrize", "usefixtures", "filterw
 
 @dataclass(frozen=True)
 class Request:
-    """Cases and engines, the runs that they share, and strictness."""
+    """Cases and engines, the runs that they share, strictness, and the file of the user's expectations."""
 
     cases: tuple[Case, ...]
     engines: tuple[str, ...]
@@ -29,6 +29,7 @@ class Request:
     strict: bool
     allow_missing: bool
     runs: SessionRuns
+    expectations: Path | None = None
 
     @property
     def tags(self) -> tuple[str, ...]:
@@ -40,7 +41,8 @@ class Request:
     def headline(self) -> str:
         count = f"{len(self.cases)} case{'' if len(self.cases) == 1 else 's'}"
         parts = [*([count] if self.cases else []), *(["the contract"] if self.contract else [])]
-        return f"crosscheck: {' and '.join(parts)} on {', '.join(self.engines)}, records in {self.runs.folder}"
+        own = "" if self.expectations is None else f", expectations of {self.expectations}"
+        return f"crosscheck: {' and '.join(parts)} on {', '.join(self.engines)}{own}, records in {self.runs.folder}"
 
 
 def read_request(options: Namespace, folder: Path, session: str) -> Request:
@@ -54,30 +56,23 @@ def read_request(options: Namespace, folder: Path, session: str) -> Request:
     for name in names:
         if name not in known and not options.crosscheck_allow_missing:
             raise pytest.UsageError(f'--crosscheck-engine: no engine "{name}": {closest(name, known)}')
-    cases: dict[str, Case] = {}
-    for words in options.crosscheck:
-        cases |= {case.name: case for case in _cases(words)}
+    try:
+        expected = None if options.crosscheck_expect is None else Path(options.crosscheck_expect)
+        file = expect_file(expected)
+        cases = with_claims(resolve(tuple(options.crosscheck)), file, asked=names)
+    except CaseError as error:
+        raise pytest.UsageError(f"--crosscheck: {error}") from None
     return Request(
-        cases=tuple(cases.values()),
+        cases=cases,
         engines=names,
         contract=options.crosscheck_contract,
         strict=options.crosscheck_strict,
         allow_missing=options.crosscheck_allow_missing,
         runs=SessionRuns(folder, session),
+        expectations=file,
     )
 
 
 def marks_of(case: Case) -> tuple[str, ...]:
     """The tags of a case that can be marks."""
     return tuple(tag for tag in case.run.tags if tag.isidentifier() and tag not in PYTESTS_OWN)
-
-
-def _cases(words: str) -> tuple[Case, ...]:
-    """The cases that a pattern of names, or a case, a tag or a folder means."""
-    try:
-        names = fnmatch.filter(shipped_names(), words) if any(sign in words for sign in "*?[") else [words]
-        if not names:
-            raise pytest.UsageError(f'--crosscheck "{words}" names no case: `crosscheck list` shows them all')
-        return resolve(tuple(names))
-    except CaseError as error:
-        raise pytest.UsageError(f"--crosscheck: {error}") from None

@@ -9,6 +9,7 @@ import msgspec
 
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import Provenance, RunFile
+from crosscheck.library.claims import Claims
 from crosscheck.records.drawing import Drawing
 from crosscheck.records.held import RecordedReference
 from crosscheck.records.packing import Packed
@@ -56,7 +57,7 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     figures, its stored reference if it has one, and digests of the `files` in its folder.
 
     `asked` are the engines asked for by name, `joined` those of them that the case does not name. `unreferenced`: it
-    has a recipe of a reference, but the reference was never made.
+    has a recipe of a reference, but the reference was never made. `claims` are the user's own on the engines that run.
     """
 
     case: str
@@ -70,6 +71,7 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     asked: tuple[str, ...] = ()
     joined: tuple[str, ...] = ()
     unreferenced: bool = False
+    claims: Claims = Claims()
 
 
 class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):

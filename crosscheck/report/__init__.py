@@ -11,7 +11,8 @@ from crosscheck.judging.results import collect
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import Record
 from crosscheck.records.session import standing
-from crosscheck.report.ci import VERDICTS, write_junit, write_summary, write_verdicts
+from crosscheck.report.ci import VERDICTS, write_summary, write_verdicts
+from crosscheck.report.junit import write_junit
 from crosscheck.report.mutations import read_scores
 from crosscheck.report.site import Material, write_single, write_site
 from crosscheck.report.unfinished import mark_unfinished
@@ -37,7 +38,7 @@ def write_all(
     outcome = conclude(session, strict)
     write_verdicts(outcome, out / VERDICTS)
     write_summary(outcome, out / "summary.md")
-    write_junit(outcome, out / "junit.xml")
+    write_junit(outcome, out / "junit.xml", session)
     write_results(results_of(session, outcome, records), out)
     write_badges(outcome, out)
     material = Material(session, outcome, read_scores(out))

@@ -11,7 +11,8 @@ from pathlib import Path
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import Session
 from crosscheck.records.machine import environment
-from crosscheck.report.ci import VERDICTS, write_junit, write_summary
+from crosscheck.report.ci import VERDICTS, write_summary
+from crosscheck.report.junit import write_junit
 from crosscheck.report.site import write_unfinished
 from crosscheck.sealed.badge import write_badges
 from crosscheck.sealed.document import results_of

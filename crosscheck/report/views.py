@@ -143,7 +143,7 @@ def _line(number: int, verdict: Verdict) -> VerdictLine:
         cell=summary_cell([verdict]),
         E=_number(verdict.E),
         U=_number(verdict.U),
-        goal=_number(verdict.goal),
+        goal=_goal(verdict),
         reason=_reason(verdict),
     )
 
@@ -157,6 +157,12 @@ def _worst(verdicts: list[Verdict]) -> str:
     doubt = "" if worst.kind == "conservation" else f", U {_number(worst.U) or 'unknown'}"
     bound = "limit" if worst.kind == "conservation" else "goal"
     return f"worst {worst.channel}: E {_number(worst.E)}{doubt}, {bound} {_number(worst.goal)}"
+
+
+def _goal(verdict: Verdict) -> str:
+    """The goal, with that of the case where an engine claims a looser one."""
+    looser = f" (of the case: {_number(verdict.case_goal)})" if verdict.loosened else ""
+    return _number(verdict.goal) + looser
 
 
 def _number(value: float | None) -> str:
@@ -192,6 +198,9 @@ def summary_cell(group: list[Verdict]) -> VerdictCell:
         text += f" {alike}" if alike == len(group) else f" {alike} of {len(group)}"
     if worst.expected != "agree" and worst.kind != "control":
         text += " (expected)" if worst.ok else f" (expected {worst.expected})"
+    loosened = sum(verdict.ok and verdict.loosened for verdict in group)
+    if loosened:
+        text += ", looser goal" if loosened == len(group) else f", {loosened} by looser goals"
     grown = [verdict for verdict in group if verdict.ok and verdict.worse]
     if grown:
         what = "beyond stale figures" if all(verdict.stale for verdict in grown) else WORSE
@@ -200,7 +209,16 @@ def summary_cell(group: list[Verdict]) -> VerdictCell:
 
 
 def _reason(verdict: Verdict) -> str:
-    """The reason of a verdict, and the accepted figures."""
+    """The reason of a verdict, what the user claims and expects, what to do, and the accepted figures."""
+    parts = [verdict.reason]
+    if verdict.case_goal is not None:
+        parts.append(f"goal claimed for {verdict.goal_reason}")
+    if verdict.own_failure:
+        parts.append(f"you expect {verdict.expected}: {verdict.expected_reason} ({verdict.own_failure})")
+    if not verdict.ok and verdict.advice:
+        parts.append(verdict.advice)
+    if len(parts) > 1:
+        return "; ".join((*parts, verdict.grown) if verdict.worse else parts)
     if verdict.worse:
         return f"{verdict.reason}; {verdict.grown}"
     if verdict.accepted is None:

@@ -17,6 +17,7 @@ from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.made_by import made_by
 from crosscheck.records.packing import pack
 from crosscheck.running.job import Done, Job
+from crosscheck.running.ladder import extended
 from crosscheck.running.rung import Solved, solve_rung
 from flexmb.scene.schema import Scene
 
@@ -71,11 +72,12 @@ def _solve_efforts(found: Engine, job: Job, scene: Scene, emit: Callable[[Solved
     if support.kind == "no":
         emit(Solved(msgspec.structs.replace(blank, status="refused", message=support.reason)))
         return
-    ladder = job.efforts or engine.efforts(scene)
+    ladder = job.efforts or extended(engine.efforts(scene), job.extra, job.finer)
     rungs = len(ladder)
     kept = job.kept if rungs > FULLY_STORED or job.lean else ()
     code = made_by({type(found).__module__, job.maker} - {""})
-    key = hashlib.sha256(f"{code} {version} {kept}".encode()).hexdigest()[:16]
+    longer = f" {job.extra} {job.finer}" if job.extra or job.finer else ""  # tells it from the ladder without these
+    key = hashlib.sha256(f"{code} {version} {kept}{longer}".encode()).hexdigest()[:16]
     chosen = [(rung, effort) for rung, effort in enumerate(ladder) if not job.finest_only or rung == rungs - 1]
     waiting = [(rung, effort) for rung, effort in chosen if Done(effort.label, key, rung, rungs) not in job.done]
     if len(waiting) < len(chosen):

@@ -27,11 +27,12 @@ class Done(NamedTuple):
 class Job:
     """One engine's work on one scene, done by one worker: compile once, run its efforts from coarse to fine.
 
-    `provider` is "module:function", which returns the engines by name; `maker` is the module that makes this engine,
-    or "". `efforts` replaces the engine's ladder unless it is empty; `finest_only` runs only the last effort. Efforts
-    too coarse to enter the uncertainty store only the channels `kept`. `done` are the runs already recorded for this
-    very scene. A job with an `error` cannot be run. It is stopped after `time_limit_s`; `expected_s` is what it took
-    the last time, None if unknown. A `lean` job runs each effort once, even a short one, and stores only `kept`.
+    `provider` is "module:function", which returns the engines by name; `maker` is the module that makes this engine, or
+    "". `efforts` replaces the engine's ladder unless it is empty; otherwise that gets the values `extra` and `finer`
+    efforts more (`crosscheck.running.ladder`). `finest_only` runs only the last effort. Efforts too coarse to enter the
+    uncertainty store only the channels `kept`. `done` are the runs already recorded for this very scene. A job with an
+    `error` cannot be run. It is stopped after `time_limit_s`; `expected_s` is what it took the last time, None if
+    unknown. A `lean` job runs each effort once, even a short one, and stores only `kept`.
     """
 
     case: str
@@ -44,6 +45,8 @@ class Job:
     provider: str
     maker: str
     efforts: tuple[Effort, ...] = ()
+    extra: tuple[float, ...] = ()
+    finer: int = 0
     finest_only: bool = False
     kept: tuple[str, ...] = ()
     done: frozenset[Done] = field(default_factory=frozenset)

@@ -24,6 +24,7 @@ from crosscheck.records.drawing import FILM, Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
 from crosscheck.running.held import held_reference
 from crosscheck.running.job import MAIN, REFINED, Job
+from crosscheck.running.ladder import with_efforts
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
 from flexmb.scene.check import SceneWarning, check_and_warn, check_scene
@@ -40,6 +41,9 @@ def plan(
     With `films` every variant has another run, from which its animation is made.
     """
     run = (alone if case.alone else select)(case.run, asked)
+    engines = {engine for variant in run.variants for engine in variant.engines}
+    case = replace(case, claims=case.claims.of(engines))
+    run = _with_efforts(run, case)
     infos: dict[str, VariantInfo] = {}
     jobs: list[Job] = []
     for variant in run.variants:
@@ -73,8 +77,17 @@ def plan(
         asked=asked,
         joined=joining(case.run, asked),
         unreferenced=case.run.reference is not None and not has_reference(case.folder),
+        claims=case.claims,
     )
     return record, jobs
+
+
+def _with_efforts(run: RunFile, case: Case) -> RunFile:
+    """The run file with extra efforts in the ladders that it prescribes."""
+    variants = list(run.variants)
+    for engine in {each.engine: None for each in case.claims.efforts}:
+        variants = [with_efforts(variant, engine, case.claims.efforts_of(engine)) for variant in variants]
+    return msgspec.structs.replace(run, variants=tuple(variants))
 
 
 def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None) -> Scene:
@@ -155,7 +168,8 @@ def _job(
     scene_id = "" if scene is None else scene_identity(scene, times)
     return Job(
         case.name, variant.name, role, engine, scene, scene_id, times, provider, home(engine),
-        efforts=prescribed(variant, engine), finest_only=role != MAIN,
+        efforts=prescribed(variant, engine), extra=case.claims.efforts_of(engine),
+        finer=run.finer if joining(case.run, [engine]) else 0, finest_only=role != MAIN,
         kept=tuple(chart.observable for chart in run.charts), error=error,
     )  # fmt: skip
 
@@ -174,7 +188,7 @@ def _film(case: Case, run: RunFile, variant: Variant, provider: str) -> tuple[Jo
     filmed_as = msgspec.structs.replace(variant, samples=FRAMES)
     job = _job(case, run, filmed_as, FILM, ENGINE, filmed, "", provider)
     efforts = job.efforts[:1] or (FILM_EFFORT,)
-    return replace(job, efforts=efforts, kept=film_channels(drawing), lean=True), drawing
+    return replace(job, efforts=efforts, extra=(), finer=0, kept=film_channels(drawing), lean=True), drawing
 
 
 def prescribed(variant: Variant, engine: str) -> tuple[Effort, ...]:

@@ -1,14 +1,17 @@
 """What changed between two sessions, by case, comparison, channel and engines: worse, better, new, gone.
 
 *Worse*: a verdict was as expected and is not; its status is graver; E or U has grown beyond the factor for accepted
-figures (`crosscheck.judging.figures`); a run that finished does not; the session's exit code was 0 and is not. *Gone*:
-something is not judged any more. Both are regressions. Large changes of times are listed, but they are no regression.
+figures (`crosscheck.judging.figures`), or is not known any more; it is worse than the accepted figure and was not; it
+is new and not as expected; a run ends in a graver way than before, or is new and did not finish; an engine asked for is
+compared in nothing; more lines of the records are broken; the session's exit code was 0 and is not. *Gone*: something
+is not judged any more. Both are regressions. Large changes of times are listed, but they are no regression.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from typing import Literal
 
 from crosscheck.judging.figures import worse
@@ -17,6 +20,7 @@ from crosscheck.library.accepted import Figure
 from crosscheck.sealed.document import SealedCase, SealedResults, SealedRun, SealedVerdict
 
 Direction = Literal["worse", "gone", "better", "new"]
+NOTHING = SealedCase(files={}, scenes={}, verdicts={}, runs={})
 DIRECTIONS: tuple[Direction, ...] = ("worse", "gone", "better", "new")
 REGRESSIONS = ("worse", "gone")
 SLOWER = 1.5  # ratio of times from which a change is listed
@@ -80,6 +84,9 @@ def compare_results(old: SealedResults, new: SealedResults) -> Differences:
         if before is None or now is None:
             direction: Direction = "new" if before is None else "gone"
             changes.append(ResultChange(direction, name, "", "", f"the case is {direction}"))
+            if now is not None:
+                changes += [each for each in _verdicts(name, NOTHING, now) if each.direction == "worse"]
+                changes += _runs(name, NOTHING, now)
             continue
         found = list(_verdicts(name, before, now))
         same += sum(len(table) for table in now.verdicts.values())
@@ -103,14 +110,24 @@ def _verdicts(case: str, before: SealedCase, now: SealedCase) -> Iterator[Result
         for what in dict.fromkeys((*old, *new)):
             then, current = old.get(what), new.get(what)
             if then is None or current is None:
-                status = (then or current).status  # type: ignore[union-attr]
-                direction: Direction = "new" if then is None else "gone"
-                yield ResultChange(direction, case, comparison, what, status)
+                yield _appeared(case, comparison, what, then, current)
                 continue
             if how := _declined(then, current):
                 yield ResultChange("worse", case, comparison, what, how)
             elif _declined(current, then):
                 yield ResultChange("better", case, comparison, what, _improvement(then, current))
+
+
+def _appeared(
+    case: str, comparison: str, what: str, then: SealedVerdict | None, now: SealedVerdict | None
+) -> ResultChange:
+    """The change of a verdict that one of the sessions lacks: nothing excuses a new one that is not as expected."""
+    if now is None:
+        return ResultChange("gone", case, comparison, what, "" if then is None else then.status)
+    if now.ok:
+        return ResultChange("new", case, comparison, what, now.status)
+    how = f"new, and {now.status} where {now.expected} is expected: {now.reason}"
+    return ResultChange("worse", case, comparison, what, how)
 
 
 def _declined(then: SealedVerdict, now: SealedVerdict) -> str:
@@ -123,7 +140,12 @@ def _declined(then: SealedVerdict, now: SealedVerdict) -> str:
         return f"{then.status} -> {now.status}"
     if then.status != now.status or then.kind == "control" or then.E is None:
         return ""
-    grown = worse(Figure(then.E, then.U or 0.0), now.E, now.U)
+    if now.worse and not then.worse:
+        return f"worse than recorded: {now.worse}"
+    if then.kind == "comparison" and now.E is not None and now.U is None:
+        return "" if then.U is None else f"U was {then.U:.1e} and is not known any more"
+    unknown = inf if then.kind == "comparison" else 0.0  # only an infinite U is left out, and a drift has none
+    grown = worse(Figure(then.E, unknown if then.U is None else then.U), now.E, now.U)
     return grown.replace("accepted were", "before").replace("accepted with", "before")
 
 
@@ -138,11 +160,21 @@ def _figure(value: float | None) -> str:
 
 
 def _runs(case: str, before: SealedCase, now: SealedCase) -> Iterator[ResultChange]:
-    """Runs that finished and do not any more, or are missing; engines without a comparison show only here."""
-    for what, then in before.runs.items():
-        current = now.runs.get(what, SealedRun(status="did not run"))
-        if then.status == "finished" != current.status:
-            yield ResultChange("worse", case, "the run", what, f"finished -> {current.status}")
+    """Runs that end in a graver way, or are missing; engines without a comparison show only here.
+
+    A refusal is an answer: a new run may refuse.
+    """
+    for what in dict.fromkeys((*before.runs, *now.runs)):
+        then, current = before.runs.get(what), now.runs.get(what, SealedRun(status="did not run"))
+        if then is not None and _gravity(current) > _gravity(then):
+            yield ResultChange("worse", case, "the run", what, f"{then.status} -> {current.status}")
+        elif then is None and current.status not in ("finished", "refused"):
+            yield ResultChange("worse", case, "the run", what, f"new, and {current.status}")
+
+
+def _gravity(run: SealedRun) -> int:
+    """How grave the status of a run is: 0 if it finished."""
+    return 0 if run.status == "finished" else len(SEVERITY) - SEVERITY.index(run.status)
 
 
 def _times(case: str, before: SealedCase, now: SealedCase) -> Iterator[TimeChange]:
@@ -158,8 +190,20 @@ def _times(case: str, before: SealedCase, now: SealedCase) -> Iterator[TimeChang
 
 def _session(old: SealedResults, new: SealedResults) -> Iterator[ResultChange]:
     """Changes that no verdict shows: lost runs, broken records, figures that a strict session requires."""
+    for engine in new.engines:
+        if _compared(new, engine) == 0 and (engine not in old.engines or _compared(old, engine)):
+            yield ResultChange("worse", "the session", "", engine, "asked for, and compared in nothing")
+    if new.broken > old.broken:
+        yield ResultChange("worse", "the session", "", "", f"{new.broken} lines of its records are broken")
     if old.exit_code == 0 != new.exit_code:
         yield ResultChange("worse", "the session", "", "", f"exit code 0 -> {new.exit_code}: {new.headline}")
+
+
+def _compared(session: SealedResults, engine: str) -> int:
+    """The number of verdicts of an engine, controls apart."""
+    tables = (table for case in session.cases.values() for table in case.verdicts.values())
+    sides = (what.split(" | ")[1:] for table in tables for what, each in table.items() if each.kind != "control")
+    return sum(any(side.startswith(f"{engine} (") for side in pair) for pair in sides)
 
 
 def _notes(old: SealedResults, new: SealedResults) -> Iterator[str]:
@@ -169,6 +213,11 @@ def _notes(old: SealedResults, new: SealedResults) -> Iterator[str]:
         changed = sorted(file for file in before.keys() | now.keys() if before.get(file) != now.get(file))
         if changed:
             yield f"{name}: other files than before: {', '.join(changed)}"
+        if old.cases[name].claims != new.cases[name].claims:
+            yield f"{name}: judged by other goals, failures or efforts of your own than before"
+        stale = sum(bool(each.stale) for table in new.cases[name].verdicts.values() for each in table.values())
+        if stale:
+            yield f"{name}: {stale} accepted figures are stale, so that nothing is held against them"
     for what in ("engines", "strict"):
         if getattr(old, what) != getattr(new, what):
             yield f"they were asked for with other {what}: {getattr(old, what)!r}, now {getattr(new, what)!r}"

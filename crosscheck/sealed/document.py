@@ -16,7 +16,10 @@ The file is one JSON object. Every key:
   - ``verdicts``: by comparison and "channel | engine (variant) | engine (variant)": ``kind`` (left out: "comparison"),
     ``status``, ``expected`` (left out: "agree"), ``ok`` (left out: true), ``E``, ``U`` (relative; left out where there
     is none), ``goal``, ``worse`` (E or U is beyond the accepted figure), ``stale`` (what is another than it was when
-    that was accepted) and, where it is not as expected, ``reason``;
+    that was accepted) and, where it is not as expected, ``reason``; where an engine claims a goal of its own
+    ``case_goal``, that of the case; where the user expects it to fail ``own_failure``, the place that says so;
+  - ``claims`` (left out if there are none): the user's ``goals``, ``failures`` and ``efforts`` for engines, by which it
+    was judged, each with its ``place`` (`crosscheck.library.claims`);
   - ``not_applicable`` (left out if empty): the engine's reason by "variant | engine", or "variant | engine | channel"
     where it is one channel, of engines that the case names nowhere; ``unreferenced`` (left out: false): it has a recipe
     of a reference and no reference;
@@ -36,6 +39,7 @@ from crosscheck.judging.figures import key_of
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import CaseResults, Result, Session
 from crosscheck.judging.verdict import Status, Verdict, VerdictKind
+from crosscheck.library.claims import Claims
 from crosscheck.library.digests import file_digest
 from crosscheck.records.kinds import RunStatus
 
@@ -59,6 +63,8 @@ class SealedVerdict(_SealedPart, frozen=True, kw_only=True):
     worse: str = ""
     stale: str = ""
     reason: str = ""
+    case_goal: float | None = None
+    own_failure: str = ""
 
 
 class SealedRun(_SealedPart, frozen=True, kw_only=True):
@@ -79,6 +85,7 @@ class SealedCase(_SealedPart, frozen=True, kw_only=True):
     runs: dict[str, SealedRun]
     not_applicable: dict[str, str] = {}
     unreferenced: bool = False
+    claims: Claims | None = None
 
 
 class Origin(_SealedPart, frozen=True, kw_only=True):
@@ -153,6 +160,7 @@ def _case(case: CaseResults, outcome: SessionOutcome) -> SealedCase:
             if each.case == name
         },
         unreferenced=name in outcome.unreferenced,
+        claims=None if case.case.claims == Claims() else case.case.claims,
     )
 
 
@@ -168,6 +176,8 @@ def _verdict(verdict: Verdict) -> SealedVerdict:
         worse=verdict.worse,
         stale=verdict.stale,
         reason="" if verdict.ok else verdict.reason,
+        case_goal=verdict.case_goal,
+        own_failure=verdict.own_failure,
     )
 
 

@@ -64,6 +64,15 @@ def read_results(file: Path) -> SealedResults:
         raise ResultsError(f"{file}: {error}") from None
 
 
+def read_finished(file: Path) -> SealedResults:
+    """The results of a session that has come to its end; ResultsError for any other."""
+    found = read_results(file)
+    if found.unfinished:
+        began = f", begun at {found.made.at}" if found.made.at else ""
+        raise ResultsError(f"{file} is unfinished{began}: the session runs, or it was killed. Run it to its end")
+    return found
+
+
 def _seal(content: dict[str, Any]) -> str:
     return hashlib.sha256(_canonical(content).encode("ascii")).hexdigest()
 

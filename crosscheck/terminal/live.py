@@ -15,6 +15,7 @@ from crosscheck.running.expected import Remaining
 from crosscheck.running.job import Job
 from crosscheck.running.scheduler import Event
 from crosscheck.terminal.bars import bars
+from crosscheck.terminal.heartbeat import Heartbeat
 from crosscheck.terminal.time_left import TimeLeft
 from crosscheck.terminal.verbosity import Verbosity
 from flexmb.output.printable import printable
@@ -34,6 +35,7 @@ class LiveProgress:
     """A context in which `hear` shows the events of a session; without a terminal only lasting lines are printed.
 
     Only VERBOSE has lasting lines, one for every job; otherwise failures are shown at the end. QUIET shows no bar.
+    Where output is redirected, a line every half a minute says that the session goes on, unless it is QUIET.
     """
 
     def __init__(self, console: Console, verbosity: Verbosity = Verbosity.VERBOSE) -> None:
@@ -45,16 +47,24 @@ class LiveProgress:
         self._lines: dict[int, TaskID] = {}
         self._records: dict[int, list[RunRecord]] = {}
         self._started: dict[int, float] = {}
+        beats = verbosity is not Verbosity.QUIET and not console.is_terminal
+        self._heartbeat = Heartbeat(console) if beats else None
 
     def __enter__(self) -> LiveProgress:
         self.bars.start()
+        if self._heartbeat is not None:
+            self._heartbeat.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if self._heartbeat is not None:
+            self._heartbeat.stop()
         self.bars.stop()
 
     def hear(self, jobs: Sequence[Job], event: Event) -> None:
         """Show one event."""
+        if self._heartbeat is not None:
+            self._heartbeat.hear(jobs, event)
         if self._overall is None:
             self._overall = self.bars.add_task("all runs", total=len(jobs))
             self._remaining.expect((number, job.engine, job.expected_s) for number, job in enumerate(jobs))

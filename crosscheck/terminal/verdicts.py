@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.text import Text
 
 from crosscheck.judging.figures import GROWTH
+from crosscheck.judging.finer import BEYOND
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.verdict import STATUSES, Verdict
 from crosscheck.terminal.text import marked, words
@@ -66,18 +67,21 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         worst = max(group, key=lambda verdict: verdict.E or 0.0)
         channels = worst.channel if len(group) == 1 else f"{len(group)} channels, worst {worst.channel}"
         where = f"{worst.case}, {worst.comparison}, {worst.pair}, {channels}"
-        yield marked("✕", "red", f"{where}: {worst.status}, expected {worst.expected}: {worst.reason}")
+        yield marked("✕", "red", f"{where}: {worst.status}, expected {worst.expected}: {_reason(worst, group)}")
     for line in outcome.broken:
         yield marked("✕", "red", line)
     for each in outcome.lost:
         yield marked("–", "yellow", f"{each.case}, {each.variant}, {each.engine} {each.status}: {each.reason}")
     for engine in outcome.uncompared:
         yield marked("✕", "red", f"{engine} was asked for and compared in nothing{_first_reason(outcome, engine)}")
+    for text in outcome.idle_claims:
+        yield marked("✕", "red", text)
     for case in outcome.idle:
         yield marked("–", "yellow", f"{case}: nothing was compared")
     for case in outcome.unreferenced:
         sign, colour = ("✕", "red") if outcome.strict else ("!", "yellow")
         yield marked(sign, colour, f"{case} {NO_REFERENCE.format(case)}")
+    yield from _by_claims(outcome)
     for verdict in outcome.worse:
         yield marked("!", "yellow", f"{_place(verdict)} {verdict.grown}")
     for verdict in outcome.outgrown:
@@ -112,6 +116,28 @@ def _why_worse(outcome: SessionOutcome) -> str:
 
 def _accept(cases: Sequence[str]) -> str:
     return f"crosscheck run {shlex.join(cases)} --accept"
+
+
+def _reason(verdict: Verdict, group: Iterable[Verdict]) -> str:
+    """Why a verdict is not as expected; and what to do for the one of its group that needs most, if that is known."""
+    if verdict.own_failure and verdict.status == "agree":
+        return f"you expect it to fail ({verdict.own_failure}): take that out if it is mended"
+    advised = [each for each in group if each.advice]
+    most = max(advised, key=lambda each: (each.U or 0.0) / each.goal, default=None)
+    if most is not None and most.advice.startswith(BEYOND):  # one goal for all of them
+        most = max((each for each in advised if each.advice.startswith(BEYOND)), key=lambda each: each.U or 0.0)
+    return verdict.reason if most is None else f"{verdict.reason}; {most.advice}"
+
+
+def _by_claims(outcome: SessionOutcome) -> Iterator[Text]:
+    """A line for each reason by which verdicts are as expected only by claims of the user: never green in silence."""
+    loosened = Counter((verdict.goal_reason, verdict.goal) for verdict in outcome.loosened)
+    for (reason, goal), count in loosened.items():
+        verdicts = "1 verdict" if count == 1 else f"{count} verdicts"
+        yield marked("!", "yellow", f"{verdicts} by the goal {goal:.2g}, looser than the case's: {reason}")
+    failures = Counter((each.own_failure, each.status, each.expected_reason) for each in outcome.own_failures)
+    for (place, status, reason), count in failures.items():
+        yield marked("!", "yellow", f"{count} {status}, as you expect: {reason} ({place})")
 
 
 def _first_reason(outcome: SessionOutcome, engine: str) -> str:

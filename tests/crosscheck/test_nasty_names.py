@@ -28,8 +28,9 @@ from crosscheck.records.archive import Archive, read
 from crosscheck.records.kinds import BrokenLine, RunRecord
 from crosscheck.records.machine import environment
 from crosscheck.report import write_all
-from crosscheck.report.ci import write_junit, write_summary
+from crosscheck.report.ci import write_summary
 from crosscheck.report.html import embedded
+from crosscheck.report.junit import write_junit
 from crosscheck.running.installed import EngineState
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Event

@@ -57,7 +57,31 @@ def test_a_sound_engine_is_green_and_a_wrong_one_red(project: Path, tmp_path: Pa
     assert json.loads(baseline.read_text(encoding="ascii"))["exit_code"] == 0
     code, summary, _ = act(project, second, cases=case, engines="biased", baseline=str(baseline))
     assert code == 1
-    assert "Not as expected" in summary and "worse: the session" in summary
+    assert "Not as expected" in summary and "❌ Worse than the baseline" in summary
+
+
+def test_what_was_wrong_before_does_not_fail_with_a_baseline(project: Path, tmp_path: Path) -> None:
+    """A first session passes and is the baseline; the next one is as wrong, and passes too."""
+    case = str(project / "pendulum" / "single")
+    for told in ("verdicts are not as expected", "✅ Nothing is worse than the baseline"):
+        code, summary, outputs = act(project, tmp_path, cases=case, engines="biased", baseline="kept/results.json")
+        assert code == 0 and told in summary and outputs["exit-code"] == "0", summary
+        (tmp_path / "summary").unlink()
+
+
+def test_expectations_are_handed_on(project: Path, tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    text = '[[expected_failure]]\nengine = "biased"\nchannels = ["marker", "load:pivot.force"]\nstatus = "differ"\n'
+    file.write_text(text + 'reason = "its gravity is a thousandth too large"\n', encoding="utf-8")
+    case = str(project / "pendulum" / "single")
+    code, summary, _ = act(project, tmp_path, cases=case, engines="biased", expect="mine.toml")
+    assert code == 0 and "Failures that you expect" in summary, summary
+
+
+def test_the_contract_of_nobody_is_refused_with_the_remedy(project: Path, tmp_path: Path) -> None:
+    code, told, outputs = act(project, tmp_path, cases="canonical", contract="true")
+    assert (code, outputs) == (2, {}) and "name your engines" in told
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_session_that_did_not_begin_shows_nothing_of_an_earlier_one(project: Path, tmp_path: Path) -> None:

@@ -85,8 +85,19 @@ def test_the_address_of_the_repository_is_one() -> None:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     address = PYPROJECT["project"].get("urls", {}).get("Repository")
     assert citation.get("repository-code") == address
-    owner = address.rpartition("/")[0].rpartition("/")[2] if address else "OWNER"
-    assert f"uses: {owner}/" in (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
+    action = f"{address.rpartition('/')[0].rpartition('/')[2]}/" if address else "./.github/actions/crosscheck"
+    page = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
+    assert f"uses: {action}" in page and "OWNER" not in page
+    assert ("no public address" in page) is (address is None)
+
+
+def test_actions_are_pinned_by_their_commits() -> None:
+    """A tag can be moved: what is not in the repository itself is named by a commit, with the release behind it."""
+    used = re.findall(r"uses: (\S+)(.*)$", (ROOT / "docs" / "ci.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert used
+    for action, release in used:
+        pinned = re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", action) and re.fullmatch(r" # v\d+\.\d+\.\d+", release)
+        assert pinned or action.startswith("./"), action
 
 
 def test_the_changelog_has_versions_with_dates_and_kinds_of_changes() -> None:

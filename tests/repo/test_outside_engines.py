@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from tests.repo.project import ROOT
+from tests.repo.snippets import snippets
 
 SOURCES = ROOT / "docs" / "outside-engines"
 PAGES = {"bullet": ROOT / "docs" / "howto" / "pybullet.md", "adam": ROOT / "docs" / "howto" / "adam.md"}
@@ -85,3 +86,15 @@ def test_a_case_ends_as_the_page_says(name: str, words: str, installed: Path, tm
     run = crosscheck(installed, tmp_path, "run", CASE, "--engine", name, "--alone")
     assert run.returncode == (0 if name == "adam" else 1), run.stdout + run.stderr
     assert words in " ".join(run.stdout.split()) and words in " ".join(PAGES[name].read_text(encoding="utf-8").split())
+
+
+@pytest.mark.slow
+def test_bullet_is_green_by_the_goal_of_its_page(installed: Path, tmp_path: Path) -> None:
+    needs("bullet")
+    (tmp_path / "cases").symlink_to(ROOT / "cases")
+    (goal,) = (each.code for each in snippets(PAGES["bullet"]) if each.language == "toml")
+    (tmp_path / "crosscheck-expect.toml").write_text(goal, encoding="utf-8")
+    run = crosscheck(installed, tmp_path, "run", CASE, "--engine", "bullet", "--alone")
+    assert run.returncode == 0, run.stdout + run.stderr
+    (told,) = re.findall(r'"(All 11 verdicts [^"]+)"', " ".join(PAGES["bullet"].read_text(encoding="utf-8").split()))
+    assert told in " ".join(run.stdout.split())

@@ -26,6 +26,7 @@ from crosscheck.library.check.variants import check_variant
 from flexmb.scene.problems import Defect
 
 TIME_LIMITS_S = (1e-3, 1e7)
+MOST_FINER = 8  # each effort about doubles the time
 
 
 def check_run_file(run: RunFile) -> None:
@@ -67,6 +68,8 @@ def _run(run: RunFile) -> Iterator[Defect]:
     if run.time_limit_s is not None:
         yield from check_within(run.time_limit_s, TIME_LIMITS_S, ROOT.key("time_limit_s"))
     yield from check_unique([variant.name for variant in run.variants], ROOT.key("variant"), "variants")
+    if not 0 <= run.finer <= MOST_FINER:
+        yield problem(ROOT.key("finer"), f"{run.finer} makes no sense", f"give 0 to {MOST_FINER} efforts more")
     names = [item.name for item in run.comparisons]
     yield from check_unique(names, ROOT.key("comparison"), "comparisons")
     yield from check_unique([item.name for item in run.controls], ROOT.key("control"), "controls")

@@ -31,8 +31,9 @@ from crosscheck.library.accepted import Accepted, Figure, dumps, key, merged
 from crosscheck.library.case import CaseError, Comparison, Conservation
 from crosscheck.library.find import Case, load_case
 from crosscheck.records.kinds import RunRecord
-from crosscheck.report import ci
-from crosscheck.report.ci import write_junit, write_summary
+from crosscheck.report import junit
+from crosscheck.report.ci import write_summary
+from crosscheck.report.junit import write_junit
 from crosscheck.running.plan import prescribed, sample_times, scene_basis, variant_scene
 from tests.crosscheck.made_records import ONE_PAIR, TIP, judged, ladder, single, way
 from tests.crosscheck.sessions import copy_case, shipped, sweep_here
@@ -79,7 +80,7 @@ def session(accepted: Accepted, spread: float = 1e-6, strict: bool = False) -> S
 @pytest.fixture
 def own(monkeypatch: pytest.MonkeyPatch) -> None:
     """The engines of these tests are the library's own."""
-    for module in (outcome_module, ci, accept):
+    for module in (outcome_module, junit, accept):
         monkeypatch.setattr(module, "BUILT_IN", ("one", "two", "fine", "stepper"))
 
 

@@ -41,6 +41,7 @@ expect = "differ"
 band = [0.1, 1.0]
 reason = "a thruster"
 """
+NO_CLAIMS = {"case_goal": None, "goal_reason": "", "own_failure": "", "advice": ""}
 
 
 def signal(level: float, doubt: float, sizes: tuple[float, ...] = (1.0,)) -> Signal:
@@ -70,6 +71,7 @@ def test_a_control_says_all_of_itself() -> None:
         "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid", "status": "differ",
         "expected": "differ", "goal": 1e-3, "outside": "", "accepted": None, "worse": "",
         "stale": "",
+        **NO_CLAIMS,
         "expected_reason": "negative control (mass of rod): the fault must be noticed",
     }  # fmt: skip
     assert (control.ok, control.scale) == (True, 4.0)
@@ -92,7 +94,7 @@ def test_a_conserved_quantity_says_all_of_itself() -> None:
         "case": "made/made", "comparison": "linear momentum conserved", "kind": "conservation",
         "channel": "momentum.linear", "variant_a": "rigid", "engine_a": "two", "variant_b": "rigid",
         "engine_b": "conservation law", "level": "rigid", "status": "differ", "expected": "differ", "goal": 1e-3,
-        "outside": "", "accepted": None, "worse": "", "stale": "", "expected_reason": "a thruster",
+        "outside": "", "accepted": None, "worse": "", "stale": "", "expected_reason": "a thruster", **NO_CLAIMS,
     }  # fmt: skip
     assert (conserved.U, conserved.ok) == (None, True)
     assert np.isclose(conserved.E, 0.5) and np.isclose(conserved.scale, np.sqrt(3.0))
@@ -108,6 +110,7 @@ def test_a_comparison_says_all_of_itself() -> None:
         "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid", "status": "agree",
         "expected": "agree", "goal": 1e-3, "outside": "", "accepted": {"E": 0.0, "U": 1.8e-5, "of": ""}, "worse": "",
         "stale": "",
+        **NO_CLAIMS,
         "expected_reason": "",
     }  # fmt: skip
     assert verdict.reason == "0 of the range apart, within the uncertainty 5.4e-05"
@@ -369,6 +372,7 @@ def test_an_unused_pattern_says_all_of_itself() -> None:
         "variant_a": "rigid", "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid",
         "status": "unresolved", "expected": "agree", "goal": 0.0, "outside": said, "accepted": None, "worse": "",
         "stale": "",
+        **NO_CLAIMS,
         "expected_reason": "why",
     }  # fmt: skip
     assert unused.reason == said

@@ -11,7 +11,7 @@ import pytest
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.verdict import SEVERITY
 from crosscheck.library.accepted import Figure, key
-from crosscheck.report.ci import write_junit
+from crosscheck.report.junit import write_junit
 from tests.crosscheck.made_records import ONE_PAIR, TIP, ended, judged, ladder, way
 
 BESIDE = ONE_PAIR.replace('engines = ["one", "two"]', 'engines = ["one", "two"]\nalso = ["three"]', 1)

@@ -166,7 +166,7 @@ def test_cases_that_lie_in_no_folder_are_a_usage_error(
     ("words", "message"),
     [
         (["--crosscheck", "wheel_*/nothing"], "needs --crosscheck-engine NAME"),
-        (["--crosscheck", "wheel_*/nothing", "--crosscheck-engine", "fine"], '"wheel_[*]/nothing" names no case'),
+        (["--crosscheck", "wheel_*/nothing", "--crosscheck-engine", "fine"], '"wheel_[*]/nothing" is a pattern'),
         (["--crosscheck", "four_baer", "--crosscheck-engine", "fine"], 'did you mean "four_bar"'),
         (["--crosscheck", "all", "--crosscheck-engine", "fihne"], 'no engine "fihne": did you mean "fine"'),
         (["--crosscheck-engine", "fine"], "needs --crosscheck CASES, or --crosscheck-contract"),

@@ -39,6 +39,7 @@ WITHOUT_PART = {
     "crosscheck.library": "reads cases and makes scenes, as plan",
     "crosscheck.running.plan": "makes the scene, which is in the record's own key",
     "crosscheck.running.job": "says what is in the record's own key: scene, sample times, effort",
+    "crosscheck.running.ladder": "says which efforts are run, and in the record's own key are effort, place and number",
     "crosscheck.records.machine": "tells the reader of a report about the machine",
     "crosscheck.drawing.draw": "draws",
     "crosscheck.drawing.film": "makes a scene too",

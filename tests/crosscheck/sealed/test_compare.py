@@ -117,3 +117,64 @@ def test_what_explains_a_change_is_noted() -> None:
     for words in ("other files than before: reference.csv, run.toml", "python: 3.13, now 3.14", "numpy was 2, now 3",
                   "other strict"):  # fmt: skip
         assert words in notes
+
+
+UNSURE = REPLACE(SOUND, status="unresolved", ok=False, U=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("then", "now", "worse"),
+    [
+        (None, UNSURE, True),  # new, and not as expected
+        (None, SOUND, False),
+        (UNSURE, UNSURE, False),
+        (UNSURE, REPLACE(UNSURE, U=None), True),  # a U that is infinite is left out of the file
+        (REPLACE(UNSURE, U=None), UNSURE, False),
+        (REPLACE(UNSURE, U=None), REPLACE(UNSURE, U=None), False),
+        (UNSURE, REPLACE(UNSURE, E=None, U=None), True),
+        (UNSURE, REPLACE(UNSURE, status="crashed", E=None, U=None), True),
+        (REPLACE(UNSURE, status="crashed"), UNSURE, False),
+        (SOUND, REPLACE(SOUND, worse="U is 1e-3"), True),  # within a factor of the baseline, beyond the accepted figure
+        (REPLACE(SOUND, worse="U is 1e-3"), REPLACE(SOUND, worse="U is 1e-3"), False),
+        (SOUND, REPLACE(SOUND, stale="other efforts"), False),  # a note: nothing can be held against it
+        (SOUND, REPLACE(SOUND, expected="differ", ok=False), True),  # an expected failure that agrees
+        (REPLACE(UNSURE, status="differ"), REPLACE(UNSURE, status="differ", expected="differ", ok=True), False),
+    ],
+)
+def test_worse_is_total_whatever_the_session_was(then: Any, now: Any, worse: bool) -> None:
+    """Sessions that were red already: their exit code says nothing."""
+    before, after = (made(each, exit_code=1) for each in (then, now))
+    assert compare_results(before, after).regressed is worse
+
+
+@pytest.mark.parametrize(
+    ("then", "now", "worse"),
+    [
+        ("finished", "crashed", True),
+        ("failed", "crashed", True),
+        ("crashed", "failed", False),
+        ("refused", "did not run", True),
+        ("did not run", "did not run", False),
+        ("did not finish", "finished", False),
+    ],
+)
+def test_runs_are_worse_by_how_they_end(then: Any, now: Any, worse: bool) -> None:
+    before, after = (made(UNSURE, SealedRun(status=each), exit_code=1) for each in (then, now))
+    assert compare_results(before, after).regressed is worse
+
+
+def test_new_runs_cases_engines_and_broken_lines_are_no_excuse() -> None:
+    old = made(UNSURE, exit_code=1)
+    case = old.cases["a/b"]
+    crashed = REPLACE(case, runs=case.runs | {"rigid | other | main": SealedRun(status="crashed")})
+    refused = REPLACE(case, runs=case.runs | {"rigid | other | main": SealedRun(status="refused")})
+    assert compare_results(old, REPLACE(old, cases={"a/b": crashed})).regressed
+    assert not compare_results(old, REPLACE(old, cases={"a/b": refused})).regressed
+    assert compare_results(old, REPLACE(old, cases={"a/b": case, "a/c": case})).regressed, "a new case that is red"
+    sound = made().cases["a/b"]
+    assert not compare_results(old, REPLACE(old, cases={"a/b": case, "a/c": sound})).regressed
+    assert compare_results(old, REPLACE(old, engines=("idle",))).regressed
+    assert not compare_results(REPLACE(old, engines=("idle",)), REPLACE(old, engines=("idle",))).regressed
+    assert compare_results(old, REPLACE(old, broken=1)).regressed
+    stale = made(REPLACE(SOUND, stale="other efforts"))
+    assert any("stale" in note for note in compare_results(made(), stale).notes)

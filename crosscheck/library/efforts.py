@@ -1,0 +1,27 @@
+"""Ladders of efforts with more efforts than an engine or a case gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+TIGHTEST = 1e-13  # relative tolerance: one more decade is below 100 eps, where methods take rounding for an error
+
+
+def with_extra(values: Sequence[float], extra: Sequence[float]) -> tuple[float, ...]:
+    """The values of a ladder with others in their places, from coarse to fine."""
+    return tuple(sorted({*values, *extra}, reverse=True)) if extra else tuple(values)
+
+
+def continued(kind: Literal["tolerance", "step"], values: Sequence[float], count: int) -> tuple[float, ...]:
+    """The next `count` values of a ladder in the ratio of its last two; fewer where tolerances end at `TIGHTEST`.
+
+    A ladder of one value is continued by halves, or tenths of a tolerance.
+    """
+    if not values:
+        return ()
+    usual = 0.1 if kind == "tolerance" else 0.5
+    ratio = values[-1] / values[-2] if len(values) > 1 and 0.0 < values[-1] < values[-2] else usual
+    least = min(TIGHTEST, values[-1]) if kind == "tolerance" else 0.0
+    next_ones = (float(f"{max(values[-1] * ratio**n, least):.6g}") for n in range(1, count + 1))
+    return tuple(dict.fromkeys(value for value in next_ones if value < values[-1]))
