@@ -41,8 +41,8 @@ def test_a_line_says_what_runs_how_much_is_done_and_how_long_yet() -> None:
     beat.hear(asked, Event(0, "ended"))
     beat.hear(asked, Event(1, "crashed", "it died"))
     beat.hear(asked, Event(2, "emitted", "rk4 h=0.01"))
-    assert beat.line() == (
-        "2 of 8 runs done after 60 s, about 3.0 min left; "
+    assert beat.line() == (  # three that have not begun, of a minute each, by five workers
+        "2 of 8 runs done after 60 s, about 36 s left; "
         "running a/case2 · rigid · mine: rk4 h=0.01, a/case3 · rigid · mine, a/case4 · rigid · mine"
     )
     beat.hear(asked, Event(5, "started"))
