@@ -12,6 +12,7 @@ from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import BUILT_IN, engine
 from flexmb.scene.build import angular
 from flexmb.scene.schema import Scene
+from tests.trees import with_armatures
 
 
 def machine(driven: bool = True) -> Scene:
@@ -45,10 +46,12 @@ def off(ours: dict, theirs: dict) -> float:
     return max(float(np.max(np.abs(ours[name] - theirs[name]))) for name in ours) / size
 
 
+@pytest.mark.parametrize("armed", [True, False])
 @pytest.mark.parametrize("driven", [True, False])
-def test_pinocchio_at_the_first_instant(driven):
+def test_pinocchio_at_the_first_instant(driven, armed):
+    """`armed`: coordinates have armatures too, as the motors behind gears do."""
     pytest.importorskip("pinocchio")
-    scene = machine(driven)
+    scene = with_armatures(machine(driven), 3) if armed else machine(driven)
     assert CheckedEngine(engine("pinocchio")).supports(scene).kind == "exact"
     ours, theirs = (engine(each).compile(scene).evaluate() for each in ("native", "pinocchio"))
     tips = [{"tip": each.markers["tip"].acceleration} for each in (ours, theirs)]
