@@ -48,7 +48,8 @@ def test_report_prints_its_results_as_json(runner: CliRunner, records: Path, tmp
 def test_some_ten_lines_unless_more_or_less_is_asked_for(runner: CliRunner, records: Path, tmp_path: Path) -> None:
     normal = report(runner, records, tmp_path).stdout.splitlines()
     assert normal[0].startswith("1 case: ") and normal[0].endswith("deliberate faults noticed")
-    assert normal[1] == "All 15 verdicts are as expected" and len(normal) == 3
+    assert normal[1] == "All 15 verdicts are as expected" and len(normal) == 4
+    assert normal[2].startswith("Report: ") and normal[3].startswith("Records: ")
     assert report(runner, records, tmp_path, "--quiet").stdout.splitlines() == ["All 15 verdicts are as expected"]
     verbose = report(runner, records, tmp_path, "--verbose").stdout
     assert "rigid, all engines" in verbose and "negative controls" in verbose

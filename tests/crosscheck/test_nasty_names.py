@@ -221,7 +221,7 @@ def test_the_other_printers_take_hostile_names(hostile: Path) -> None:
     console = Console(file=io.StringIO(), width=400)
     print_outcome(console, conclude(session))
     console.print(cases_table([msgspec_case(case)]))
-    job = type("Job", (), {"title": case.case, "expected_s": None})()
+    job = type("Job", (), {"title": case.case, "engine": case.case, "expected_s": None})()
     with LiveProgress(console) as live:
         live.hear([job], Event(0, "started"))
         live.hear([job], Event(0, "emitted", case.case))

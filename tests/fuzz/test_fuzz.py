@@ -98,6 +98,7 @@ def test_a_reader_that_misbehaves_is_seen(kinds, monkeypatch: pytest.MonkeyPatch
     assert read(spoiled, folder / "scene.toml")[0] == outcome
 
 
+@pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_mutants_of_archives_are_whole_archives(kinds) -> None:
     """Else all that is tested is the checksum."""
     folder, found = kinds

@@ -107,6 +107,7 @@ def test_a_case_that_judges_nothing_of_an_engine_is_refused(tmp_path: Path) -> N
         subject(case, "sloppy")
 
 
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_mutants_of_shipped_cases_are_scenes() -> None:
     for case in resolve(("torque_driven", "slider_crank", "flying_spaghetti")):
         found = litter(subject(case, "native"))
@@ -138,6 +139,7 @@ def test_the_library_bites(tmp_path: Path) -> None:
     assert print_bites(Console(), bites) == 0
 
 
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_where_closures_say_it_begins_the_scene_s_value_is_no_fault() -> None:
     """The prescribed crank moves the slider; that of the rod's hinge is found beside the rod's modes, and counts."""
     (case,) = resolve(("slider_crank_simeon",))

@@ -43,6 +43,7 @@ def near(value, scale: float = 1.0):
 
 
 @pytest.mark.parametrize("clause", CLAUSES.values(), ids=lambda clause: clause.name)
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_every_clause_is_kept_where_it_is_offered(engine, clause):
     outcome = try_clause(engine, clause)
     if outcome.status == "not offered":

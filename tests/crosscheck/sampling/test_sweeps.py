@@ -191,6 +191,7 @@ def test_an_interrupted_sweep_leaves_a_table_of_what_was_done_by_a_name_that_say
         (('engine = "fine"', 'engine = "fin"'), "no effort of an engine here: fin"),
     ],
 )
+@pytest.mark.filterwarnings("ignore:overflow encountered")
 def test_a_file_that_makes_no_sense_is_refused_before_anything_runs(
     tmp_path: Path, change: tuple[str, str], words: str
 ) -> None:

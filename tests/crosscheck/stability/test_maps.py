@@ -69,6 +69,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory):
 
 
 @pytest.mark.parametrize("name", marked(NAMES))
+@pytest.mark.filterwarnings("ignore:.*digits of the accelerations are left")
+@pytest.mark.filterwarnings("ignore:.*was too long")
 def test_the_map_agrees_with_its_overlay(name: str, finished) -> None:
     verdict = finished(name).verdict
     assert verdict.status == "agree", verdict.worst

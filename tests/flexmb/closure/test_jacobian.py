@@ -89,6 +89,7 @@ def state(system: fm.System, beside: float = 0.0) -> np.ndarray:
 @pytest.mark.parametrize("rate", [0.0, 20.0])
 @pytest.mark.parametrize("beside", [0.0, 1e-3])
 @pytest.mark.parametrize("name", MOVING)
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_all_columns_against_differences(name, beside, rate):
     """Also that of work, also of open loops, where rows are redundant, driven, or decay."""
     system = fm.compile(MOVING[name]())
@@ -97,6 +98,7 @@ def test_all_columns_against_differences(name, beside, rate):
 
 
 @pytest.mark.parametrize("name", ["four-bar, overconstrained", "flexible four-bar", "random loops 4"])
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_what_the_differences_would_notice(name):
     """A planted error of a millionth."""
     system = fm.compile(MOVING[name]())

@@ -12,6 +12,7 @@ from tests.flexmb.closure import mechanisms as m
 
 
 @pytest.mark.parametrize("scene", [m.four_bar(closure="spherical"), m.four_bar(), loops.random_loops(3)])
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_the_inertia_at_the_closures_is_that_of_the_mass_matrix(scene):
     system, tree = flexmb.compile(scene), flexmb.System(scene)
     state = system.initial_state

@@ -149,6 +149,7 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("loop", LOOPS)
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_accelerations_and_loads_equal_those_of_exudyn(loop):
     pytest.importorskip("exudyn")
     scene = with_markers(LOOPS[loop]())
@@ -169,6 +170,7 @@ def test_accelerations_and_loads_equal_those_of_exudyn(loop):
     assert np.sum(determined["drive"]) == (6 if loop == "RSSR" else 3)
 
 
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_exudyn_without_the_closure_has_the_accelerations_of_the_tree():
     """The control: the closure is what both agree on, and leaving it out is seen."""
     pytest.importorskip("exudyn")

@@ -72,6 +72,7 @@ def can_move(scene: s.Scene) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(FEW))
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_random_loops(seed):
     check(seed)
 

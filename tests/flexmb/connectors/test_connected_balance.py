@@ -45,11 +45,13 @@ def test_smooth_ones_to_the_integrators_error():
     assert np.max(np.abs(run.energy_drift)) <= BALANCED * run.energy_scale
 
 
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_losses_and_actuators_are_the_work(lossy):
     assert lossy.finished and np.max(np.abs(lossy.work)) > 0.1
     assert np.max(np.abs(lossy.energy_drift)) <= ACROSS_KINKS * lossy.energy_scale
 
 
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_on_the_ground_too():
     run = fm.simulate(everything(), END, **EXACT)
     assert np.max(np.abs(run.energy_drift)) <= ACROSS_KINKS * run.energy_scale
@@ -72,6 +74,7 @@ def test_a_lost_reaction_would_be_noticed(flight):
     assert np.max(np.abs(run.momentum_drift)) > 1e-3 * np.max(np.abs(flight.momentum[0]))
 
 
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_derivatives_are_exact():
     """d(dy/dt)/dy along directions, against collocation of dy/dt itself, which knows nothing of duals."""
     system, state = started(everything())
@@ -95,6 +98,7 @@ def test_derivatives_are_exact():
 
 
 @pytest.mark.parametrize("method", ["radau5", "exponential"])
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_implicit_methods_agree(method):
     """Their tangents hold connectors, friction and stops among them."""
     scene = free_flying(lossy=True)

@@ -29,12 +29,14 @@ def left_over(dense: DenseSystem, state, rates) -> float:
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_accelerations_solve_the_dense_equations(at_start, algorithm):
     system, state, dense = at_start
     assert left_over(dense, state, system.accelerations(state, algorithm)) <= gamma(8 * dense.nu)
 
 
 @pytest.mark.parametrize("algorithm", ["articulated", "frisch"])
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_of_first_order(algorithm):
     """Frisch's equations are those of level linear."""
     scene = everything(level="linear")
@@ -43,6 +45,7 @@ def test_of_first_order(algorithm):
 
 
 @pytest.mark.parametrize("level", ["rigid", "stiffened"])
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_at_nodes_of_other_levels(level):
     scene = everything(level=level)
     system, state = started(scene)
@@ -100,6 +103,7 @@ def test_every_connector_counts(at_start, name):
     assert left_over(other, state, system.accelerations(state)) > 1e3 * gamma(8 * dense.nu)
 
 
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_ruthless_bodies_take_no_connector_where_they_bend():
     with pytest.raises(NotImplementedError, match='connector "spring".*"ruthless".*node "tip"'):
         started(everything(level="ruthless"))

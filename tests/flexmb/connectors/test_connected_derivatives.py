@@ -169,6 +169,7 @@ EACH = {
 
 
 @pytest.mark.parametrize("name", EACH)
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_load_power_and_derivatives_are_those_of_the_formula(name: str) -> None:
     scene, inertia, x, v, formula = EACH[name]
     system = fm.compile(scene)

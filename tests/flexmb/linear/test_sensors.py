@@ -82,6 +82,7 @@ def determined(scene: fm.Scene, signals: Any) -> Any:
 
 
 @pytest.mark.parametrize("make", [tree, four_bar])
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_by_the_state_as_runs_beside_it_say(make: Any) -> None:
     scene = make()
     system = fm.compile(scene)
@@ -108,6 +109,7 @@ def test_by_the_state_as_runs_beside_it_say(make: Any) -> None:
 
 
 @pytest.mark.parametrize(("make", "hinge"), [(tree, "elbow"), (four_bar, "pin")])
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_by_a_torque_at_once(make: Any, hinge: str) -> None:
     """Loads and accelerations are linear in it; motions do not feel it yet."""
     scene = make()
@@ -132,6 +134,7 @@ def test_a_controller_that_reads_a_load_through_a_filter() -> None:
 
 
 @pytest.mark.parametrize(("make", "hinge"), [(tree, "elbow"), (four_bar, "pin")])
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_the_loop_is_that_of_the_open_model_closed_by_hand(make: Any, hinge: str) -> None:
     """A motor v = -3 x of a lag x' = -2 x + y, y a force across the hinge that it drives."""
     law = fm.StateSpace(name="law", inputs=(f"load {hinge}[3]",), A=((-2.0,),), B=((1.0,),), C=((-3.0,),))

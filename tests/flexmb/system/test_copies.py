@@ -41,6 +41,7 @@ def controlled() -> fm.Scene:
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("made", [everything, rigid, bennett, controlled], ids=lambda made: made.__name__)
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_a_copy_of_a_used_system_is_a_system(made: Any, way: str) -> None:
     """Asked at another state than the original was last, so that what it remembers is not what is asked."""
     system = fm.compile(made())
@@ -99,6 +100,7 @@ def guarded(bundled: Any, rooms: dict[str, np.ndarray]) -> Any:
 
 
 @pytest.mark.parametrize("scene", [rigid(), everything(), random_scene(5)], ids=["rigid", "connected", "random"])
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_kernels_write_into_their_arrays_only(scene: fm.Scene) -> None:
     system = fm.compile(scene, "explicit")
     rooms: dict[str, np.ndarray] = {}

@@ -80,6 +80,7 @@ VARIANTS: Mapping[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.filterwarnings("ignore:.*has its mass lumped")
 def test_the_root_transmits_what_the_hinge_does(variant: str) -> None:
     """To rounding; rotating tensors are no polynomials, and the cuts refine their integrals: to quadrature."""
     system = fm.compile(everything(**VARIANTS[variant]))

@@ -46,6 +46,7 @@ def test_a_chain_has_hardly_anything(exact):
     assert found == {"axis 2", "hinge 1", "level 0"}
 
 
+@pytest.mark.filterwarnings("ignore:.*is doubtful")
 def test_each_thing_has_its_name(exact):
     assert features.SPRINGS in fm.compile(chain(stiffness=2.0).scene()).constants.features()
     assert features.DAMPERS in fm.compile(chain(damping=2.0).scene()).constants.features()
