@@ -41,6 +41,10 @@ def main(
     if not from_kept:
         for name, row in chosen.items():
             found[name] = measured_row(row)
+            if keep:  # a run that is stopped keeps what it has measured
+                results = read()
+                results.rows[name] = found[name]
+                write(results)
             console.print(f"{name}: {verdict(row, found[name])}, {', '.join(figures(row, found[name]))}", style="dim")
         pictures = [picture for name, picture in PICTURES.items() if scaling and _is_asked_for(name, words)]
         curves = {picture.name: measured_curves(picture) for picture in pictures}
