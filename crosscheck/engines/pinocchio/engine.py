@@ -22,8 +22,8 @@ class PinocchioEngine(PeerEngine):
     algorithm = "articulated bodies, O(N)"
     settings = (
         "Its articulated-body algorithm, or its proximal constrained dynamics for closed loops, compiled and called "
-        "from Python. It has no integrator: SciPy's DOP853 steps it, in Python, so that on small scenes three quarters "
-        "of the time are SciPy's and Python's. No contacts. Outputs are computed after the timed solve."
+        "from Python. It has no integrator: SciPy's DOP853 steps it, in Python, so that on small scenes most of the "
+        "time is SciPy's and Python's. No contacts. Outputs are computed after the timed solve."
     )
 
     def version(self) -> str:
