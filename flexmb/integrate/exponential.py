@@ -208,8 +208,8 @@ def scratch(n, coordinates):
     return Collocation(
         flow, np.empty(n), np.empty((n, n)), np.empty((TERMS, n)), np.empty((TERMS, n)), np.empty((LEVELS, TERMS, n)),
         np.empty((LEVELS, TERMS, n)), np.empty((4, n)), np.empty((4, n)), np.empty((4, n)), np.empty(n), np.empty(n),
-        np.empty(n), np.empty(n), np.empty(n), unfactorised(n, coordinates, rate_blocks(coordinates), np.float64), np.empty(n),
-        np.full(1, np.nan),
+        np.empty(n), np.empty(n), np.empty(n), unfactorised(n, coordinates, rate_blocks(coordinates), np.float64),
+        np.empty(n), np.full(1, np.nan),
     )  # fmt: skip
 
 

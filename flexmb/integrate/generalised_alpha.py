@@ -263,8 +263,8 @@ def arrays(n, coordinates, a, rate, f):
     """Arrays for n components, the first of which are coordinates; a, udot and the slope at the start are given."""
     nu = a.shape[0]
     return NewmarkArrays(
-        np.empty((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), rate_blocks(coordinates), a, np.empty(nu), rate, np.empty(nu),
-        np.empty(nu), np.empty(nu), f, np.empty(n), np.zeros(n), np.empty(n),
+        np.empty((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), rate_blocks(coordinates), a, np.empty(nu), rate,
+        np.empty(nu), np.empty(nu), np.empty(nu), f, np.empty(n), np.zeros(n), np.empty(n),
     )  # fmt: skip
 
 
@@ -285,6 +285,6 @@ def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
 
 INTEGRATOR = Integrator(
     "generalised_alpha", generalised_alpha, order=2, fixed=True, linearises=True, keeps_jacobian=True,
-    damps=True, algebra=(2.0 / 3.0, 2.0),
+    damps=True, algebra=(2.0 / 24.0, 1.0),  # a real matrix of the speeds
     summary="rough answers at large steps, with damping that is chosen",
 )  # fmt: skip

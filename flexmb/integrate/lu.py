@@ -31,7 +31,7 @@ def lu_factorise(A, pivots):
 
 @helper
 def _eliminate_in_panel(A, pivots, k, stop):
-    """Column k below its pivot, and what it changes in the columns before `stop`; returns whether the pivot is sound."""
+    """Column k below its pivot, and its effect on the columns before `stop`; returns whether the pivot is sound."""
     n, row = A.shape[0], k
     for i in range(k + 1, n):
         if abs(A[i, k]) > abs(A[row, k]):
