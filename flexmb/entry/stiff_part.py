@@ -6,9 +6,9 @@ hinges, by the coordinates and the speeds that they belong to. They are block di
     E = M + a D + b K
 
 is the mass matrix of the same tree with other modal masses and armatures. The articulated-body elimination of Jain &
-Rodriguez factorises it, for complex a and b too (the method of Radau IIA has a complex pair): no Jacobian is formed, and
-nothing is cubic in the number of bodies. What is left out, the derivatives of inertial forces, gravity and node loads,
-limits the convergence of Newton's method and nothing else: the equations that it solves are the exact ones.
+Rodriguez factorises it, for complex a and b too (the method of Radau IIA has a complex pair): no Jacobian is formed,
+and nothing is cubic in the number of bodies. What is left out, the derivatives of inertial forces, gravity and node
+loads, limits the convergence of Newton's method and nothing else: the equations that it solves are the exact ones.
 """
 
 from __future__ import annotations
@@ -82,6 +82,17 @@ class StiffPart:
     stiffness: Real  # (nu,) of hinges, by speed; zero for modes and wheels
     damping: Real  # (nu,) likewise
     hinged: Index  # (nu,) whether a speed is one of a hinge, and free
+
+
+def is_complete(c: Constants) -> bool:
+    """Whether all elastic and damping forces of a scene belong to modes and to scalar coordinates of hinges."""
+    wheels = c.speed[c.wheel["u_index"]]
+    return (
+        len(c.connector) == 0
+        and not np.any(c.body["ball_spring"])
+        and not np.any(wheels["stiffness"])
+        and not np.any(wheels["damping"])
+    )
 
 
 def stiff_part(c: Constants, nq: int, nu: int) -> StiffPart:
@@ -158,7 +169,7 @@ def along(u, q, s):
 
 @kernel
 def restore(q, u, second, s):
-    """u (nu,) := E^-1 (K q + D u) of changes q (nq,) of coordinates and u of speeds, complex."""
+    """Replace u (nu,) by E^-1 (K q + D u), for changes q (nq,) of coordinates and u of speeds, complex."""
     if second:
         _restore(q, u, s, s.second)
     else:

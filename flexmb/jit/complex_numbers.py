@@ -10,10 +10,12 @@ import cmath
 import math
 from typing import Any
 
+from llvmlite import ir
 from numba import types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin
 
+from flexmb.jit.duals import nonzero
 from flexmb.jit.lanes import sincos
 
 COMPLEX = types.complex128
@@ -51,3 +53,16 @@ def _sqrt(context, builder, sig, args):
 def _sincos(context, builder, sig, args):
     both = [_library(context, builder, function, *args) for function in (cmath.sin, cmath.cos)]
     return context.make_tuple(builder, sig.return_type, both)
+
+
+@infer_global(nonzero)
+class _Nonzero(AbstractTemplate):
+    def generic(self, args, kws):
+        return signature(types.boolean, COMPLEX) if args == (COMPLEX,) else None
+
+
+@lower_builtin(nonzero, types.Complex)
+def _lower_nonzero(context, builder, sig, args):
+    zero = ir.Constant(ir.DoubleType(), 0.0)
+    parts = [builder.fcmp_unordered("!=", builder.extract_value(args[0], i), zero) for i in range(WIDTH)]
+    return builder.or_(*parts)

@@ -269,6 +269,8 @@ class _Nonzero(AbstractTemplate):
         [x] = args
         if x == LANE:
             return signature(MASK, LANE)
+        if isinstance(x, types.Complex):
+            return None  # see `flexmb.jit.complex_numbers`
         return signature(types.boolean, x if x == DUAL else types.float64)
 
 

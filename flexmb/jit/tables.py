@@ -4,8 +4,8 @@ Numba's own arrays have owners, strides and reference counts, which cost time in
 to, at compilation and in a run. Kernels do not need them: the bundle keeps its arrays, and they are contiguous. In a
 kernel a table is used like an array (`c.body[k].parent`, `w.pff[k, n, i] = x`, `U[m, m + 1 : n]`, `a.shape[0]`); a
 nested array of a record is a table with constant extents. Indices are not checked, and negative ones do not count from
-the end. The floats of a record with a field PADDING are lanes, duals or complex, depending on the length of their last axis: see
-`flexmb.jit.wide_arrays`.
+the end. The floats of a record with a field PADDING are lanes, duals or complex, depending on the length of their last
+axis: see `flexmb.jit.wide_arrays`.
 """
 
 from __future__ import annotations

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexmb.entry import articulated, tangent
+from flexmb.entry import articulated, stiff_part, tangent
 from flexmb.entry.observation import observe
-from flexmb.integrate.problem import Linear
+from flexmb.integrate.problem import Linear, StiffPart
 from flexmb.motion import coordinates, retraction
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.mechanics import Mechanics
+
+# Number of speeds from which implicit methods use the stiff part in place of the Jacobian, and no dense algebra.
+MANY_SPEEDS = 20
 
 
 def _fresh(system: Mechanics) -> tuple[Any, Any]:
@@ -18,7 +21,17 @@ def _fresh(system: Mechanics) -> tuple[Any, Any]:
 
 def _linear(system: Mechanics) -> Linear:
     exact = system.constants  # with every body eliminated explicitly, for Jacobians
-    return Linear(tangent.jacobian, retraction.move, exact, tangent.tangent_workspace(exact, system.nq, system.nu))
+    tables = tangent.tangent_workspace(exact, system.nq, system.nu)
+    return Linear(tangent.jacobian, retraction.move, exact, tables, stiff=_stiff(system))
+
+
+def _stiff(system: Mechanics) -> StiffPart | None:
+    """The stiff part of a scene for which it pays; None where stiff forces may act that it does not contain."""
+    c = system.constants
+    if system.nu < MANY_SPEEDS or not stiff_part.is_complete(c):
+        return None
+    tables = stiff_part.stiff_part(c, system.nq, system.nu)
+    return StiffPart(stiff_part.settle_at, stiff_part.shift, stiff_part.along, stiff_part.restore, tables)
 
 
 def _route(system: Mechanics) -> Route:
