@@ -85,14 +85,9 @@ class StiffPart:
 
 
 def is_complete(c: Constants) -> bool:
-    """Whether all elastic and damping forces of a scene belong to modes and to scalar coordinates of hinges."""
-    wheels = c.speed[c.wheel["u_index"]]
-    return (
-        len(c.connector) == 0
-        and not np.any(c.body["ball_spring"])
-        and not np.any(wheels["stiffness"])
-        and not np.any(wheels["damping"])
-    )
+    """Whether all elastic forces of a scene belong to modes and to scalar coordinates of hinges."""
+    turned = c.speed["stiffness"][c.wheel["u_index"]]  # springs of wheels; their friction is left out, as it is weak
+    return len(c.connector) == 0 and not np.any(c.body["ball_spring"]) and not np.any(turned)
 
 
 def stiff_part(c: Constants, nq: int, nu: int) -> StiffPart:
@@ -124,9 +119,10 @@ def settle_at(t, y, s):
         s.state[i] = y[i]
     c, w = s.scene, s.tangent
     load_state(t, s.state, c, w)
-    for i in range(w.q.shape[0]):
-        w.q[i] = seeded(w.q[i], BY_COORDINATES)
     for j in range(w.u.shape[0]):
+        i = c.speed[j].coordinate
+        if i >= 0:
+            w.q[i] = seeded(w.q[i], BY_COORDINATES)
         w.u[j] = seeded(w.u[j], BY_SPEEDS)
     hinge_forces(c, w)
     for j in range(w.u.shape[0]):
@@ -158,7 +154,7 @@ def _factorise(a, b, s, m):
 
 @kernel
 def along(u, q, s):
-    """q (nq,) = the rates of the coordinates at speeds u (nu,), complex; zero for prescribed ones."""
+    """q (nq,) = the rates of the coordinates at speeds u (nu,), complex, at the state of `shift`; zero for prescribed ones."""
     w = s.first.w
     for j in range(u.shape[0]):
         w.u[j] = u[j] if s.scene.speed[j].prescribed < 0 else 0.0 * u[j]

@@ -27,8 +27,8 @@ class FixedMethod(NamedTuple):
     of a step that met a singular position, or further.
     accept(s) is called after a successful step.
     enter(known) discards what is not valid across the end of a segment.
-    recall(problem, memory, s, known, accuracy, counts) and keep(memory, s) read and write all else that the method needs
-    to resume a run.
+    recall(problem, memory, s, known, accuracy, counts) and keep(memory, s) read and write all else that the method
+    needs to resume a run.
     state_at: see `flexmb.integrate.watch`; it is given the arrays `looking`, which only it uses.
     """
 
