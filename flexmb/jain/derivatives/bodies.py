@@ -6,6 +6,8 @@ point at r, which moves with v, has the additional acceleration 2 x x v. With N 
     change of the torque: 2 sum m r x (x x v) = 2 (tr N - N') x      of the force: 2 x x p
 """
 
+from flexmb.jain.derivatives.flexible import own_flexible_force
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.cross6 import force_cross
 from flexmb.spatial.inertia import inertia_times, rigid_inertia, store_inertia
@@ -21,11 +23,23 @@ from flexmb.spatial.vector import (
     times,
     vec3,
 )
+from flexmb.tables.features import LOADS, MODES
 
 
 @helper
 def own_force(c, w, d, k):
     """Inertia, `by_rate` and force of body k alone."""
+    if has(c, LOADS):
+        for i in range(18):
+            d.body[k].by_turn[i] = 0.0
+    if has(c, MODES) and c.body[k].modes > 0:
+        own_flexible_force(c, w, d, k)
+    else:
+        _rigid_force(c, d, k)
+
+
+@helper
+def _rigid_force(c, d, k):
     own = c.body[k].rigid
     R, r, V = mat3(d.body[k].rotation, 0), vec3(d.body[k].position, 0), vec6(d.body[k].velocity, 0)
     m, s = own[0], times(R, vec3(own, 1))

@@ -1,13 +1,13 @@
 """Rows of the matrices in strips: for the sources inboard of a row, run by run, and for those that its body carries."""
 
-from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_ACCELERATION
+from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_ACCELERATION, SPEED_BY_RATE, TURN
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.strips import after, put, strip, width
 from flexmb.spatial.rows import strips3
 from flexmb.spatial.spatial_vector import dot6, shift_force
 from flexmb.spatial.vector import dot, vec3
-from flexmb.tables.features import LOADS
+from flexmb.tables.features import LOADS, MODES
 
 
 @helper
@@ -19,17 +19,18 @@ def inboard_columns(c, d, place, run, end, l2, l1, l0, masses):
         offset = d.run[run].offset
         n = d.run[run].start
         while n < end:
-            speed = strips3(d, d.seed, 0, n)
+            J = strips3(d, d.seed, 0, n), strips3(d, d.seed, 3, n)
+            turn = strips3(d, d.seed, TURN, n) if has(c, MODES) else J[0]
+            speed = strips3(d, d.seed, SPEED_BY_RATE, n) if has(c, MODES) else J[0]
             s2 = strips3(d, d.seed, BY_ACCELERATION, n), strips3(d, d.seed, BY_ACCELERATION + 3, n)
             x = dot6(l2, s2) + dot(l1, strips3(d, d.seed, BY_RATE, n))
             if has(c, LOADS):
-                x += dot(l0, speed)
+                x += dot(l0, turn)
             put_until(d, row, n + offset, end - n, x)
             s2 = strips3(d, d.seed, SPEED_BY_ACCELERATION, n), strips3(d, d.seed, SPEED_BY_ACCELERATION + 3, n)
             put_until(d, row, nu + n + offset, end - n, dot6(l2, s2) + dot(l1, speed))
             if masses:
-                x = dot6(l2, (speed, strips3(d, d.seed, 3, n)))
-                put_until(d, row, 2 * nu + n + offset, end - n, x)
+                put_until(d, row, 2 * nu + n + offset, end - n, dot6(l2, J))
             n += width(d)
         end = d.run[run].stop
         if d.run[run].new_point:

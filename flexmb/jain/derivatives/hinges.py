@@ -9,15 +9,15 @@ d along its displacement or change,
 """
 
 from flexmb.hinges import catalogue
-from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_ACCELERATION
+from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_ACCELERATION, SPEED_BY_RATE, TURN
 from flexmb.jit.duals import rate, seeded
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.cross6 import motion_cross
 from flexmb.spatial.rows import column6, store_column3, store_column6
-from flexmb.spatial.spatial_vector import axpy6, store6, sum6, times6
-from flexmb.spatial.vector import cross, plus_cross, sub
-from flexmb.tables.features import QUATERNIONS
+from flexmb.spatial.spatial_vector import axpy6, shift_force, store6, sum6, times6
+from flexmb.spatial.vector import cross, mat3, matmul, plus_cross, sub
+from flexmb.tables.features import MODES, OUTBOARD_NODES, QUATERNIONS
 
 
 @helper
@@ -25,6 +25,14 @@ def put_seed(d, row, slot, V):
     """Store a spatial vector in column `slot` of `seed`, from row `row` on."""
     store_column3(d.seed, row, slot, V[0])
     store_column3(d.seed, row + 3, slot, V[1])
+
+
+@helper
+def put_turn(c, d, slot, J):
+    """In scenes with modes: the angular parts of s0 and s1 of a hinge speed, which are those of its motion."""
+    if has(c, MODES):
+        store_column3(d.seed, TURN, slot, J[0])
+        store_column3(d.seed, SPEED_BY_RATE, slot, J[0])
 
 
 @helper
@@ -46,10 +54,26 @@ def several(c, w, d, k, R, r, V0, A0):
         s2 = axpy6(2.0, motion_cross(V0, change), sum6(s2, own))
         store_column6(d.seed, slot + n, J)
         store_column3(d.seed, BY_RATE, slot + n, s1[0])
+        put_turn(c, d, slot + n, J)
         put_seed(d, BY_ACCELERATION, slot + n, s2)
         own = sum6(to_world(R, r, column6(d.turned[2], n)), motion_cross(relative, J))
         put_seed(d, SPEED_BY_ACCELERATION, slot + n, axpy6(2.0, turned, own))
     return V, A
+
+
+@helper
+def outboard_rotation(c, w, d, k):
+    """R_World_O of hinge k."""
+    R = mat3(d.body[k].rotation, 0)
+    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
+        return matmul(R, mat3(w.port[c.body[k].outboard_port].R, 0))
+    return R
+
+
+@helper
+def force_to_world(R, r, F):
+    """A force about O in body axes, in World axes about the base point; r leads from there to O."""
+    return shift_force(times6(R, F), r)
 
 
 @helper

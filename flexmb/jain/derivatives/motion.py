@@ -12,13 +12,16 @@ and further terms where J changes with the hinge's own coordinates (`flexmb.jain
 """
 
 from flexmb.jain import axis
-from flexmb.jain.derivatives.hinges import put_seed, several
+from flexmb.jain.derivatives.hinges import outboard_rotation, put_seed, put_turn, several
+from flexmb.jain.derivatives.ports import move_frame, see_modes
 from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_ACCELERATION
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.cross6 import motion_cross
 from flexmb.spatial.rows import store_column3, store_column6
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, scale6, shift_motion, store6, sum6, vec6
-from flexmb.spatial.vector import add, cross, mat3, matmul, store3, store9, times, vec3
+from flexmb.spatial.vector import add, cross, mat3, matmul, store3, store9, sub, times, vec3
+from flexmb.tables.features import INBOARD_NODES, LOADS, MODES, OUTBOARD_NODES, WHEELS
 
 
 @helper
@@ -27,10 +30,16 @@ def move(c, w, d, k):
     R, r, V0, A0 = _inboard(c, w, d, k)
     store9(d.body[k].rotation, 0, R)
     store3(d.body[k].position, 0, r)
+    R_O = outboard_rotation(c, w, d, k)
     if axis.has_axis(c, k):
-        V, A = _single(c, w, d, k, R, r, V0, A0)
+        V, A = _single(c, w, d, k, R_O, r, V0, A0)
     else:
-        V, A = several(c, w, d, k, R, r, V0, A0)
+        V, A = several(c, w, d, k, R_O, r, V0, A0)
+    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
+        V, A = move_frame(c, w, d, k, R, r, V, A)
+        r = sub(r, times(R, vec3(w.port[c.body[k].outboard_port].r, 0)))
+    if has(c, MODES) or has(c, LOADS) or has(c, WHEELS):
+        store3(d.body[k].origin, 0, r)
     store6(d.body[k].velocity, 0, V)
     store6(d.body[k].accel, 0, A)
 
@@ -44,12 +53,20 @@ def _inboard(c, w, d, k):
         return R, (0.0, 0.0, 0.0), ZERO6, (ZERO6[0], vec3(w.ground, 0))
     R_parent = mat3(d.body[p].rotation, 0)
     V0, A0 = vec6(d.body[p].velocity, 0), vec6(d.body[p].accel, 0)
-    r = add(vec3(d.body[p].position, 0), times(R_parent, arm))
+    if has(c, INBOARD_NODES) and c.body[k].inboard_port >= 0:
+        i = c.body[k].inboard_port
+        r = vec3(d.port[i].position, 0)
+        V0, A0 = vec6(d.port[i].velocity, 0), vec6(d.port[i].accel, 0)
+    else:
+        r = vec3(d.body[p].origin if has(c, MODES) else d.body[p].position, 0)
+    r = add(r, times(R_parent, arm))
     R = matmul(R_parent, R)
     if d.places[k].new_point:
         store3(d.body[k].step, 0, r)
         V0, A0 = shift_motion(V0, r), shift_motion(A0, r)
         r = (0.0, 0.0, 0.0)
+    if has(c, INBOARD_NODES) and c.body[k].inboard_port >= 0:
+        see_modes(c, d, k)
     return R, r, V0, A0
 
 
@@ -62,6 +79,7 @@ def _single(c, w, d, k, R, r, V0, A0):
     turned = motion_cross(V0, J)
     store_column6(d.seed, slot, J)
     store_column3(d.seed, BY_RATE, slot, turned[0])
+    put_turn(c, d, slot, J)
     put_seed(d, BY_ACCELERATION, slot, sum6(motion_cross(A0, J), motion_cross(V0, turned)))
     put_seed(d, SPEED_BY_ACCELERATION, slot, scale6(2.0, turned))
     V = axpy6(w.u[j], J, V0)

@@ -11,7 +11,7 @@ Armatures act along their own speed alone: they are on the diagonal of M.
 """
 
 from flexmb.jain.derivatives.columns import at_inboard_point, inboard_columns, own_columns
-from flexmb.jain.derivatives.hinges import to_world
+from flexmb.jain.derivatives.hinges import outboard_rotation, to_world
 from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_ACCELERATION
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
@@ -20,7 +20,7 @@ from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, shi
 from flexmb.spatial.rows import column3, column6
 from flexmb.spatial.spatial_vector import add6, dot6, shift_force, store6, sum6, vec6
 from flexmb.spatial.vector import add, mat3, times, times_t, vec3
-from flexmb.tables.features import ARMATURES, LOADS, SEVERAL
+from flexmb.tables.features import ARMATURES, INBOARD_NODES, LOADS, SEVERAL
 
 BY_SPEED, BY_RATES = 6, 12  # first rows of `force` for changes of speeds and of their rates
 
@@ -36,8 +36,14 @@ def inward(c, w, d, k, masses):
         if has(c, ARMATURES) and masses:
             d.matrix[first + n, 2 * w.u.shape[0] + first + n] += c.speed[c.body[k].u_index + n].armature
     if has(c, SEVERAL) and c.body[k].axis < 0:
-        _same_hinge(c, d, k)
-    if c.body[k].parent >= 0:
+        _same_hinge(c, w, d, k)
+    p = c.body[k].parent
+    if p >= 0:
+        if has(c, INBOARD_NODES) and c.body[k].inboard_port >= 0:
+            # the modes of the parent, as body k sees them, on all that it carries
+            for n in range(c.body[p].modes):
+                J = column6(d.seed, d.places[k].seen + n)
+                own_columns(d, J, d.places[p].modes + n, first, d.places[k].stop, masses)
         if d.places[k].new_point:
             _to_inboard_point(c, d, k, masses)
         _to_parent(c, d, k)
@@ -72,7 +78,7 @@ def _column(c, d, k, place, slot):
 @helper
 def _row(c, d, k, place, slot, masses):
     """Row of one speed of hinge k, for all sources inboard and beyond."""
-    J, l2 = column6(d.seed, slot), _six_of(d.force, BY_RATES, place)
+    J, l2 = column6(d.seed, slot), six_of(d.force, BY_RATES, place)
     l1, l0 = row_by_angle(d.body[k].by_rate, J), (0.0, 0.0, 0.0)
     if has(c, LOADS):
         l0 = row_by_angle(d.body[k].by_turn, J)
@@ -83,9 +89,9 @@ def _row(c, d, k, place, slot, masses):
 
 
 @helper
-def _same_hinge(c, d, k):
+def _same_hinge(c, w, d, k):
     """Add (J_n x J_i + dJ_i) . F: the motion of speed i by displacement n of the same hinge."""
-    R, r, F = mat3(d.body[k].rotation, 0), vec3(d.body[k].position, 0), vec6(d.body[k].force, 0)
+    R, r, F = outboard_rotation(c, w, d, k), vec3(d.body[k].position, 0), vec6(d.body[k].force, 0)
     first, slot = d.places[k].hinge, d.places[k].slot
     for n in range(c.body[k].nv):
         J = column6(d.seed, slot + n)
@@ -97,11 +103,12 @@ def _same_hinge(c, d, k):
 @helper
 def _six(d, row, slot):
     """Six rows of column `slot` of `seed`."""
-    return _six_of(d.seed, row, slot)
+    return six_of(d.seed, row, slot)
 
 
 @helper
-def _six_of(a, row, n):
+def six_of(a, row, n):
+    """Six rows of column n as a spatial vector."""
     return column3(a, row, n), column3(a, row + 3, n)
 
 
@@ -115,15 +122,24 @@ def put_force(d, row, place, F):
 
 @helper
 def _to_parent(c, d, k):
-    """Add what body k and all that it carries answer to the answer of its parent, about the same point."""
-    p = c.body[k].parent
-    add_inertia(d.body[p].inertia, 0, load_inertia(d.body[k].inertia, 0))
-    add6(d.body[p].force, 0, vec6(d.body[k].force, 0))
+    """Add what body k and all that it carries answer to the answer of its parent, or of the port that it sits on."""
+    p, i = c.body[k].parent, c.body[k].inboard_port
+    if has(c, INBOARD_NODES) and i >= 0:
+        add_answer(c, d.port[i], d.body[k])
+    else:
+        add_answer(c, d.body[p], d.body[k])
+
+
+@helper
+def add_answer(c, to, answer):
+    """Add what one body or port with all that it carries answers to that of another, about the same point."""
+    add_inertia(to.inertia, 0, load_inertia(answer.inertia, 0))
+    add6(to.force, 0, vec6(answer.force, 0))
     for i in range(18):
-        d.body[p].by_rate[i] += d.body[k].by_rate[i]
+        to.by_rate[i] += answer.by_rate[i]
     if has(c, LOADS):
         for i in range(18):
-            d.body[p].by_turn[i] += d.body[k].by_turn[i]
+            to.by_turn[i] += answer.by_turn[i]
 
 
 @helper

@@ -21,6 +21,15 @@ from flexmb.jain.derivatives.blocks import (
     sum_block6,
 )
 from flexmb.jain.derivatives.tables import BLOCK
+from flexmb.jain.derivatives.hinges import force_to_world
+from flexmb.jain.derivatives.solve_modes import (
+    answer_modes,
+    answer_wheels,
+    load_modes,
+    moved_by_modes,
+    release_modes,
+    release_wheels,
+)
 from flexmb.jain.hinge_solve import SINGLE
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
@@ -28,7 +37,7 @@ from flexmb.jit.strips import width
 from flexmb.spatial.rows import column6
 from flexmb.spatial.spatial_vector import shift_force, store6, times6, vec6
 from flexmb.spatial.vector import mat3, vec3
-from flexmb.tables.features import SEVERAL
+from flexmb.tables.features import INBOARD_NODES, MODES, SEVERAL, WHEELS
 
 
 @helper
@@ -36,6 +45,10 @@ def solve(c, w, d, columns):
     """Replace the first `columns` columns of `matrix` by those of -M^-1 times them; rows of prescribed speeds vanish."""
     for k in range(c.body.shape[0]):
         _gains(c, w, d, k)
+        if has(c, MODES):
+            for n in range(c.body[k].modes):
+                R, r = mat3(d.body[k].rotation, 0), vec3(d.body[k].position, 0)
+                store6(d.gain[d.places[k].modes + n], 0, force_to_world(R, r, vec6(w.pfr[k, n], 0)))
     for at in range(0, columns, BLOCK * width(d)):
         for k in range(c.body.shape[0] - 1, -1, -1):
             _inward(c, w, d, k, at)
@@ -65,15 +78,13 @@ def _gains(c, w, d, k):
 
 
 @helper
-def force_to_world(R, r, F):
-    """A force about O in body axes, in World axes about the base point; r leads from there to O."""
-    return shift_force(times6(R, F), r)
-
-
-@helper
 def _inward(c, w, d, k, at):
     """y = -T - J . z of the block of columns from `at` on, and z + G y to the parent, as `hinge_solve.innovate`."""
     z = block6(d, d.passed[k]) if not d.places[k].tip else no_block6(d, d.passed[k, 0])
+    if has(c, WHEELS):
+        z = release_wheels(c, w, d, k, at, z)
+    if has(c, MODES):
+        z = release_modes(c, w, d, k, at, z)
     first, slot = d.places[k].hinge, d.places[k].slot
     if is_single(c, w, k):
         y = along(column6(d.seed, slot), z)
@@ -84,6 +95,8 @@ def _inward(c, w, d, k, at):
         z = _innovate(c, w, d, k, at, z)
     p = c.body[k].parent
     if p >= 0:
+        if has(c, INBOARD_NODES) and c.body[k].inboard_port >= 0:
+            load_modes(c, d, k, at, z)
         if d.places[k].new_point:
             z = shift_forces(z, vec3(d.body[k].step, 0))
         if not d.places[k].first:
@@ -114,6 +127,8 @@ def _outward(c, w, d, k, at):
     A = block6(d, d.passed[p]) if p >= 0 else no_block6(d, d.passed[k, 0])
     if p >= 0 and d.places[k].new_point:
         A = shift_motions(A, vec3(d.body[k].step, 0))
+    if has(c, INBOARD_NODES) and c.body[k].inboard_port >= 0:
+        A = moved_by_modes(c, d, k, at, A)
     first, slot = d.places[k].hinge, d.places[k].slot
     if is_single(c, w, k):
         x = along(vec6(d.gain[first], 0), A)
@@ -122,6 +137,10 @@ def _outward(c, w, d, k, at):
         A = plus6(column6(d.seed, slot), x, A)
     else:
         A = _solve(c, w, d, k, at, A)
+    if has(c, MODES):
+        answer_modes(c, w, d, k, at, A)
+    if has(c, WHEELS):
+        answer_wheels(c, w, d, k, at, A)
     if not d.places[k].tip:
         put_block6(d, d.passed[k], A)
 

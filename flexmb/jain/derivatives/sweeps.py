@@ -1,11 +1,16 @@
 """Derivatives of M udot + b - T for known accelerations, and from them those of the accelerations."""
 
 from flexmb.jain.derivatives.applied import subtract_applied
+from flexmb.jain.derivatives.attached import attach, wheel_rows
 from flexmb.jain.derivatives.bodies import own_force
+from flexmb.jain.derivatives.modes import mode_rows
 from flexmb.jain.derivatives.motion import move
-from flexmb.jain.derivatives.rows import inward
+from flexmb.jain.derivatives.ports import clear_ports, move_ports
+from flexmb.jain.derivatives.rows import add_answer, inward
 from flexmb.jain.derivatives.solve import solve
-from flexmb.jit.kernel import kernel
+from flexmb.jit.features import has
+from flexmb.jit.kernel import helper, kernel
+from flexmb.tables.features import LOADS, MODES, WHEELS
 
 
 @kernel
@@ -14,15 +19,39 @@ def inverse_dynamics(c, w, d, masses):
 
     Needs poses and rotations in w, and udot in w.speed.acceleration.
     """
-    for i in range(d.matrix.shape[0]):
-        row = d.matrix[i]
-        for j in range(3 * d.matrix.shape[0]):
-            row[j] = 0.0
+    nu = d.speed.shape[0]
+    for place in range(nu):
+        _clear(d.matrix[place], 0, 3 * nu if masses else 2 * nu)
     for k in range(c.body.shape[0]):
         move(c, w, d, k)
+        if has(c, MODES) or has(c, LOADS) or has(c, WHEELS):
+            clear_ports(c, d, k)
+            move_ports(c, w, d, k)
         own_force(c, w, d, k)
+        if has(c, LOADS) or has(c, WHEELS):
+            attach(c, w, d, k)
     for k in range(c.body.shape[0] - 1, -1, -1):
+        if has(c, MODES) or has(c, LOADS) or has(c, WHEELS):
+            _answer_of_ports(c, d, k)
+        if has(c, MODES) and c.body[k].modes > 0:
+            mode_rows(c, d, k, masses)
+        if has(c, WHEELS):
+            wheel_rows(c, w, d, k, masses)
         inward(c, w, d, k, masses)
+
+
+@helper
+def _answer_of_ports(c, d, k):
+    """Add what is attached to the ports of body k."""
+    for i in range(c.body[k].port_start, c.body[k].port_stop):
+        if d.port[i].used:
+            add_answer(c, d.body[k], d.port[i])
+
+
+@helper
+def _clear(row, start, stop):
+    for j in range(start, stop):
+        row[j] = 0.0
 
 
 @kernel
@@ -32,5 +61,6 @@ def accelerations(c, w, d):
     subtract_applied(c, w, d)
     nu = w.u.shape[0]
     for place in range(nu):
+        _clear(d.matrix[place], 2 * nu, 3 * nu)
         d.matrix[place, 2 * nu + place] = -1.0
     solve(c, w, d, 3 * nu)

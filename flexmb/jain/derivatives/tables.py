@@ -68,6 +68,7 @@ BODY = np.dtype(
     [
         ("rotation", _F, (9,)),  # R_World_body
         ("position", _F, (3,)),  # of O
+        ("origin", _F, (3,)),  # of the body frame, which is O unless the modes move O in the body
         ("step", _F, (3,)),  # from the parent's base point to the body's, where they differ
         ("velocity", _F, (6,)),  # V
         ("accel", _F, (6,)),  # A, relative to free fall
@@ -79,8 +80,41 @@ BODY = np.dtype(
     ],
     align=True,
 )
+PORT = np.dtype(
+    [
+        ("used", _I),  # whether a body, wheel or load is attached to it
+        ("position", _F, (3,)),
+        ("velocity", _F, (6,)),
+        ("accel", _F, (6,)),
+        ("inertia", _F, (21,)),  # of all that is attached to it
+        ("by_rate", _F, (18,)),
+        ("by_turn", _F, (18,)),
+        ("force", _F, (6,)),  # on all that is attached to it
+    ],
+    align=True,
+)
+# What a mode does to a port relative to its body, or to the body frame relative to O: its motion J, then s1 (angular
+# part), s2 of a displacement, s2 of a speed. At level ruthless a mode has no other effect than its acceleration J.
+MOVED = np.dtype(
+    [
+        ("motion", _F, (6,)),
+        ("by_rate", _F, (3,)),
+        ("by_acceleration", _F, (6,)),
+        ("speed_by_acceleration", _F, (6,)),
+    ],
+    align=True,
+)
+MODE = np.dtype(
+    [
+        ("row", _F, (6,)),  # l2 without the motion of the body frame: M_fr, and what the ports add
+        ("by_rate", _F, (3,)),  # l1
+        ("by_turn", _F, (3,)),  # l0
+        ("force", _F, (12,)),  # change of the body's own force by displacement, then by speed
+    ],
+    align=True,
+)
 # Rows of `seed`: what a unit of a source does to all bodies beyond.
-MOTION, BY_RATE, BY_ACCELERATION, SPEED_BY_ACCELERATION, ROWS = 0, 6, 9, 15, 21
+MOTION, BY_RATE, BY_ACCELERATION, SPEED_BY_ACCELERATION, TURN, SPEED_BY_RATE, ROWS = 0, 6, 9, 15, 21, 24, 27
 
 
 @bundle
@@ -100,8 +134,9 @@ class Derivatives:
     speed: Index  # (nu,) number in u of a place
     place: Index  # (nu,) place of a speed
     shape: Index  # (2,) whether the tree branches; whether places are the numbers in u
-    # (ROWS,slots) MOTION: s0 of a displacement, which is s1 of a speed, and the motion of M; BY_RATE: angular part of s1
-    # of a displacement; BY_ACCELERATION: its s2; SPEED_BY_ACCELERATION: s2 of a speed
+    # (ROWS,slots) MOTION: the motion J at unit speed; BY_RATE: angular part of s1 of a displacement; BY_ACCELERATION: its
+    # s2; SPEED_BY_ACCELERATION: s2 of a speed; and only for scenes with modes, because they are else those of J, TURN
+    # and SPEED_BY_RATE: angular parts of s0 of a displacement and of s1 of a speed
     seed: Real
     force: Real  # (18,nu) change of the load across each hinge inboard, [torque; force]: by displacement, speed, rate
     matrix: Real  # (nu,3nu) d(M udot + b) by displacement, by speed, and M or -1; then the solution
@@ -110,6 +145,13 @@ class Derivatives:
     passed: Real  # (N,6,block) forces, then accelerations, of one block of columns
     moved: Real  # (N,6,6,6) of hinges that are no single axis: derivatives of H in outboard axes by displacement
     turned: Real  # (3,6,6) of one such hinge: of V_r and A_r by displacement, of A_r by speed, in columns
+    port: Record  # (P,) PORT
+    port_mode: Record  # (P,m) MOVED, relative to the body
+    frame_mode: Record  # (N,m) MOVED of the body frame relative to O; zero unless the modes move O in the body
+    mode: Record  # (N,m) MODE
+    bent: Real  # (P,m,m,6) derivatives of the motions of a port at unit speed of mode j by displacement n: [n, j]
+    change: Real  # (18,m) of one port: of its V_r and A_r by displacements, of A_r by speeds, in body axes
+    local: Real  # (6,3) of one body: derivatives of its force by its angular velocity, body axes
     duals: Duals
 
 
@@ -126,6 +168,7 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
     place = np.empty(nu, np.int64)
     place[order.speed] = np.arange(nu)
     columns = 3 * nu + BLOCK * LANES  # room for the last block
+    m = c.mfr.shape[2]
     return Derivatives(
         places=places,
         run=runs,
@@ -141,8 +184,23 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
         passed=strip_zeros((len(c.body), 6, BLOCK * LANES)),
         moved=np.zeros((len(c.body) if np.any(c.body["axis"] < 0) else 1, 6, 6, 6)),
         turned=np.zeros((3, 6, 6)),
+        port=_ports(c),
+        port_mode=np.zeros((len(c.port), m), MOVED),
+        frame_mode=np.zeros((len(c.body), m), MOVED),
+        mode=np.zeros((len(c.body), m), MODE),
+        bent=np.zeros((len(c.port), m, m, 6)),
+        change=np.zeros((18, m)),
+        local=np.zeros((6, 3)),
         duals=duals(c, nq, nu),
     )
+
+
+def _ports(c: Constants) -> Record:
+    """(P,) PORT with what is attached where."""
+    port = np.zeros(len(c.port), PORT)
+    for attached in (c.body["inboard_port"], c.wheel["port"], c.load["port"]):
+        port["used"][attached[attached >= 0]] = 1
+    return port
 
 
 def _places_and_runs(c: Constants, order: Matrices) -> tuple[Record, Record, int]:
