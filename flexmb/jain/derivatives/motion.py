@@ -65,7 +65,7 @@ def _inboard(c, w, d, k):
         store3(d.body[k].step, 0, r)
         V0, A0 = shift_motion(V0, r), shift_motion(A0, r)
         r = (0.0, 0.0, 0.0)
-    if has(c, INBOARD_NODES) and c.body[k].inboard_port >= 0:
+    if has(c, MODES) and d.places[k].sees > 0:
         see_modes(c, d, k)
     return R, r, V0, A0
 

@@ -107,14 +107,17 @@ def move_frame(c, w, d, k, R, r, V, A):
 
 @helper
 def see_modes(c, d, k):
-    """Seeds of the parent's modes as body k sees them through its inboard port, about its base point."""
+    """Seeds of the parent's modes as body k sees them at its inboard frame, about its base point."""
     p, i = c.body[k].parent, c.body[k].inboard_port
     new_point, at_rest = d.places[k].new_point != 0, is_at_rest(c.body[p].level)
     step = vec3(d.body[k].step, 0)
-    for n in range(c.body[p].modes):
-        slot, port, frame = d.places[k].seen + n, d.port_mode[i, n], d.frame_mode[p, n]
-        J, s2 = vec6(port.motion, 0), vec6(port.by_acceleration, 0)
-        s1, s2_speed = vec3(port.by_rate, 0), vec6(port.speed_by_acceleration, 0)
+    for n in range(d.places[k].sees):
+        slot, frame = d.places[k].seen + n, d.frame_mode[p, n]
+        J, s2, s1, s2_speed = ZERO6, ZERO6, ZERO6[0], ZERO6
+        if i >= 0:
+            port = d.port_mode[i, n]
+            J, s2 = vec6(port.motion, 0), vec6(port.by_acceleration, 0)
+            s1, s2_speed = vec3(port.by_rate, 0), vec6(port.speed_by_acceleration, 0)
         if has(c, OUTBOARD_NODES) and c.body[p].outboard_port >= 0:
             J, s2 = sum6(J, vec6(frame.motion, 0)), sum6(s2, vec6(frame.by_acceleration, 0))
             s1 = add(s1, vec3(frame.by_rate, 0))

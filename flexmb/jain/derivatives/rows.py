@@ -20,7 +20,7 @@ from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, shi
 from flexmb.spatial.rows import column3, column6
 from flexmb.spatial.spatial_vector import add6, dot6, shift_force, store6, sum6, vec6
 from flexmb.spatial.vector import add, mat3, times, times_t, vec3
-from flexmb.tables.features import ARMATURES, INBOARD_NODES, LOADS, SEVERAL
+from flexmb.tables.features import ARMATURES, INBOARD_NODES, LOADS, MODES, SEVERAL
 
 BY_SPEED, BY_RATES = 6, 12  # first rows of `force` for changes of speeds and of their rates
 
@@ -39,9 +39,9 @@ def inward(c, w, d, k, masses):
         _same_hinge(c, w, d, k)
     p = c.body[k].parent
     if p >= 0:
-        if has(c, INBOARD_NODES) and c.body[k].inboard_port >= 0:
+        if has(c, MODES):
             # the modes of the parent, as body k sees them, on all that it carries
-            for n in range(c.body[p].modes):
+            for n in range(d.places[k].sees):
                 J = column6(d.seed, d.places[k].seen + n)
                 own_columns(d, J, d.places[p].modes + n, first, d.places[k].stop, masses)
         if d.places[k].new_point:

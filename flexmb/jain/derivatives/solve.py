@@ -37,7 +37,7 @@ from flexmb.jit.strips import width
 from flexmb.spatial.rows import column6
 from flexmb.spatial.spatial_vector import shift_force, store6, times6, vec6
 from flexmb.spatial.vector import mat3, vec3
-from flexmb.tables.features import INBOARD_NODES, MODES, SEVERAL, WHEELS
+from flexmb.tables.features import MODES, SEVERAL, WHEELS
 
 
 @helper
@@ -95,7 +95,7 @@ def _inward(c, w, d, k, at):
         z = _innovate(c, w, d, k, at, z)
     p = c.body[k].parent
     if p >= 0:
-        if has(c, INBOARD_NODES) and c.body[k].inboard_port >= 0:
+        if has(c, MODES):
             load_modes(c, d, k, at, z)
         if d.places[k].new_point:
             z = shift_forces(z, vec3(d.body[k].step, 0))
@@ -127,7 +127,7 @@ def _outward(c, w, d, k, at):
     A = block6(d, d.passed[p]) if p >= 0 else no_block6(d, d.passed[k, 0])
     if p >= 0 and d.places[k].new_point:
         A = shift_motions(A, vec3(d.body[k].step, 0))
-    if has(c, INBOARD_NODES) and c.body[k].inboard_port >= 0:
+    if has(c, MODES):
         A = moved_by_modes(c, d, k, at, A)
     first, slot = d.places[k].hinge, d.places[k].slot
     if is_single(c, w, k):

@@ -82,7 +82,7 @@ def answer_modes(c, w, d, k, at, A):
 def load_modes(c, d, k, at, z):
     """What the force of body k does to the modes of its parent."""
     p = c.body[k].parent
-    for n in range(c.body[p].modes):
+    for n in range(d.places[k].sees):
         row = d.matrix[d.places[p].modes + n]
         force = along(column6(d.seed, d.places[k].seen + n), z)
         put_block(d, row, at, plus(1.0, block(d, row, at), force))
@@ -92,7 +92,7 @@ def load_modes(c, d, k, at, z):
 def moved_by_modes(c, d, k, at, A):
     """A and the acceleration of the inboard port of body k by the modes of its parent."""
     p = c.body[k].parent
-    for n in range(c.body[p].modes):
+    for n in range(d.places[k].sees):
         x = block(d, d.matrix[d.places[p].modes + n], at)
         A = plus6(column6(d.seed, d.places[k].seen + n), x, A)
     return A

@@ -41,7 +41,8 @@ PLACES = np.dtype(
         ("wheels", _I),  # of its wheels
         ("stop", _I),  # end of what it carries
         ("slot", _I),  # first slot of the body's hinge
-        ("seen", _I),  # first slot of its parent's modes as it sees them, if its inboard port deforms
+        ("seen", _I),  # first slot of its parent's modes as it sees them
+        ("sees", _I),  # number of these: none where neither its inboard port nor its parent's frame moves by them
         ("inboard_run", _I),  # the last run of all sources inboard of its hinge, or -1
         ("inboard_end", _I),  # end of the slots there
         ("run", _I),  # the same of all sources inboard of the body, with its hinge
@@ -213,13 +214,15 @@ def _places_and_runs(c: Constants, order: Matrices) -> tuple[Record, Record, int
     paths = _Paths()
     for k in np.argsort(places["hinge"], kind="stable").tolist():  # a weld has the place of what it carries first
         own, p = places[k], int(body["parent"][k])
-        seen = int(body["modes"][p]) if p >= 0 and body["inboard_port"][k] >= 0 else 0
+        moves = p >= 0 and (body["inboard_port"][k] >= 0 or body["outboard_port"][p] >= 0)
+        seen = int(body["modes"][p]) if moves else 0
         count = int(body["nv"][k])
         since[k] = since[p] + 1 if p >= 0 else BODIES_A_POINT
         new = since[k] >= BODIES_A_POINT and (p < 0 or seen + count > 0)
         since[k] = 0 if new else since[k]
         path = (-1, 0) if p < 0 else (int(places["run"][p]), int(places["end"][p]))
         own["new_point"], own["leaves_point"], own["seen"] = new, new and not seen, paths.slots
+        own["sees"] = seen
         path = paths.extended(path, k, int(places["modes"][p]), seen, new)
         own["inboard_run"], own["inboard_end"] = path
         own["slot"] = paths.slots
