@@ -37,15 +37,24 @@ def _attach_load(c, w, d, k, i):
     if not in_world:
         load = times(_port_rotation(w, d, k, port), load)
     torque, force = (zero, load) if c.load[i].type == FORCE else (load, zero)
-    add6(d.port[port].force, 0, (add(torque, cross(r, force)), force))
     if in_world:
-        for j in range(3):
-            x = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
-            change = cross(force, x)
-            moment = add(cross(torque, x), cross(r, change))
-            for n in range(3):
-                d.port[port].by_turn[3 * n + j] += moment[n]
-                d.port[port].by_turn[9 + 3 * n + j] += change[n]
+        add_world_load(d, port, (torque, force))
+    else:
+        add6(d.port[port].force, 0, (add(torque, cross(r, force)), force))
+
+
+@helper
+def add_world_load(d, port, F):
+    """Add a force about the point of a port that keeps its components in World, with the sign of inertia."""
+    r, (torque, force) = vec3(d.port[port].position, 0), F
+    add6(d.port[port].force, 0, (add(torque, cross(r, force)), force))
+    for j in range(3):
+        x = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
+        change = cross(force, x)
+        moment = add(cross(torque, x), cross(r, change))
+        for n in range(3):
+            d.port[port].by_turn[3 * n + j] += moment[n]
+            d.port[port].by_turn[9 + 3 * n + j] += change[n]
 
 
 @helper

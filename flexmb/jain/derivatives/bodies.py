@@ -23,13 +23,13 @@ from flexmb.spatial.vector import (
     times,
     vec3,
 )
-from flexmb.tables.features import LOADS, MODES
+from flexmb.tables.features import CONNECTORS, LOADS, MODES
 
 
 @helper
 def own_force(c, w, d, k):
     """Inertia, `by_rate` and force of body k alone."""
-    if has(c, LOADS):
+    if has(c, LOADS) or has(c, CONNECTORS):
         for i in range(18):
             d.body[k].by_turn[i] = 0.0
     if has(c, MODES) and c.body[k].modes > 0:

@@ -7,7 +7,7 @@ from flexmb.jit.strips import after, put, strip, width
 from flexmb.spatial.rows import strips3
 from flexmb.spatial.spatial_vector import dot6, shift_force
 from flexmb.spatial.vector import dot, vec3
-from flexmb.tables.features import LOADS, MODES
+from flexmb.tables.features import CONNECTORS, LOADS, MODES
 
 
 @helper
@@ -24,7 +24,7 @@ def inboard_columns(c, d, place, run, end, l2, l1, l0, masses):
             speed = strips3(d, d.seed, SPEED_BY_RATE, n) if has(c, MODES) else J[0]
             s2 = strips3(d, d.seed, BY_ACCELERATION, n), strips3(d, d.seed, BY_ACCELERATION + 3, n)
             x = dot6(l2, s2) + dot(l1, strips3(d, d.seed, BY_RATE, n))
-            if has(c, LOADS):
+            if has(c, LOADS) or has(c, CONNECTORS):
                 x += dot(l0, turn)
             put_until(d, row, n + offset, end - n, x)
             s2 = strips3(d, d.seed, SPEED_BY_ACCELERATION, n), strips3(d, d.seed, SPEED_BY_ACCELERATION + 3, n)

@@ -53,7 +53,7 @@ def several(c, w, d, k, R, r, V0, A0):
         s2 = sum6(motion_cross(A0, J), motion_cross(V0, turned))
         s2 = axpy6(2.0, motion_cross(V0, change), sum6(s2, own))
         store_column6(d.seed, slot + n, J)
-        store_column3(d.seed, BY_RATE, slot + n, s1[0])
+        put_seed(d, BY_RATE, slot + n, s1)
         put_turn(c, d, slot + n, J)
         put_seed(d, BY_ACCELERATION, slot + n, s2)
         own = sum6(to_world(R, r, column6(d.turned[2], n)), motion_cross(relative, J))

@@ -7,16 +7,15 @@ more thing that they move.
 """
 
 from flexmb.jain.derivatives.columns import inboard_columns
-from flexmb.jain.derivatives.hinges import to_world
 from flexmb.jain.derivatives.rows import BY_RATES, BY_SPEED, by_angle, put_force, row_by_angle, six_of
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import is_at_rest
 from flexmb.spatial.cross6 import force_cross, motion_cross
 from flexmb.spatial.inertia import inertia_times, load_inertia
-from flexmb.spatial.spatial_vector import add6, dot6, sub6, sum6, vec6
-from flexmb.spatial.vector import add3, dot, mat3, vec3
-from flexmb.tables.features import LOADS, OUTBOARD_NODES
+from flexmb.spatial.spatial_vector import add6, dot6, shift_force, sum6, times6_t, vec6
+from flexmb.spatial.vector import add3, dot, mat3, scale, vec3
+from flexmb.tables.features import CONNECTORS, LOADS, OUTBOARD_NODES
 
 
 @helper
@@ -50,7 +49,7 @@ def _add_rows(c, d, mode, moved, J):
     """Add J'[I D E] of what moves with J to the row of a mode."""
     add6(mode.row, 0, inertia_times(load_inertia(moved.inertia, 0), J))
     add3(mode.by_rate, 0, row_by_angle(moved.by_rate, J))
-    if has(c, LOADS):
+    if has(c, LOADS) or has(c, CONNECTORS):
         add3(mode.by_turn, 0, row_by_angle(moved.by_turn, J))
 
 
@@ -60,7 +59,7 @@ def _changes(c, moved, seeds, J):
     inertia, D = load_inertia(moved.inertia, 0), moved.by_rate
     X = sum6(inertia_times(inertia, vec6(seeds.by_acceleration, 0)), by_angle(D, vec3(seeds.by_rate, 0)))
     X = sum6(X, force_cross(J, vec6(moved.force, 0)))
-    if has(c, LOADS):
+    if has(c, LOADS) or has(c, CONNECTORS):
         X = sum6(X, by_angle(moved.by_turn, J[0]))
     speed = sum6(inertia_times(inertia, vec6(seeds.speed_by_acceleration, 0)), by_angle(D, J[0]))
     return X, speed
@@ -81,10 +80,10 @@ def _at_port(c, d, k, i, n):
     X, speed = _changes(c, port, seeds, J)
     _add_force(d, 0, at, X)
     _add_force(d, BY_SPEED, at, speed)
-    R, r, F = mat3(d.body[k].rotation, 0), vec3(port.position, 0), vec6(port.force, 0)
+    F = in_body_axes(mat3(d.body[k].rotation, 0), vec3(port.position, 0), vec6(port.force, 0))
     for j in range(c.body[k].modes):
         Pi = vec6(d.port_mode[i, j].motion, 0)
-        d.matrix[first + j, at] += dot6(Pi, X) + dot6(to_world(R, r, vec6(d.bent[i, n, j], 0)), F)
+        d.matrix[first + j, at] += dot6(Pi, X) + dot6(vec6(d.bent[i, n, j], 0), F)
         d.matrix[first + j, nu + at] += dot6(Pi, speed)
 
 
@@ -100,7 +99,8 @@ def _move_frame(c, d, k, n):
         _add_force(d, 0, at, X)
         _add_force(d, BY_SPEED, at, speed)
     X, speed, inertia = six_of(d.force, 0, at), six_of(d.force, BY_SPEED, at), six_of(d.force, BY_RATES, at)
-    R, r, F = mat3(own.rotation, 0), vec3(own.position, 0), vec6(own.force, 0)
+    F = vec6(own.force, 0)
+    F_body = in_body_axes(mat3(own.rotation, 0), vec3(own.position, 0), F)
     for j in range(c.body[k].modes):
         mode, J_j = d.mode[k, j], vec6(d.frame_mode[k, j].motion, 0)
         row = vec6(mode.row, 0)
@@ -109,10 +109,15 @@ def _move_frame(c, d, k, n):
         d.matrix[first + j, nu + at] += dot6(J_j, speed)
         if not at_rest:
             l1, l0 = vec3(mode.by_rate, 0), vec3(mode.by_turn, 0)
-            change = to_world(R, r, vec6(d.bent[c.body[k].outboard_port, n, j], 0))
-            change = sub6(motion_cross(J, J_j), change)
-            d.matrix[first + j, at] += dot6(row, s2) + dot(l1, s1) + dot(l0, J[0]) + dot6(change, F)
+            change = dot6(motion_cross(J, J_j), F) - dot6(vec6(d.bent[c.body[k].outboard_port, n, j], 0), F_body)
+            d.matrix[first + j, at] += dot6(row, s2) + dot(l1, s1) + dot(l0, J[0]) + change
             d.matrix[first + j, nu + at] += dot6(row, s2_speed) + dot(l1, J[0])
+
+
+@helper
+def in_body_axes(R, r, F):
+    """A force about the base point in World axes, about a point at r in body axes."""
+    return times6_t(R, shift_force(F, scale(-1.0, r)))
 
 
 @helper

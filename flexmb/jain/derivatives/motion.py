@@ -18,10 +18,10 @@ from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_AC
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.cross6 import motion_cross
-from flexmb.spatial.rows import store_column3, store_column6
+from flexmb.spatial.rows import store_column6
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, scale6, shift_motion, store6, sum6, vec6
 from flexmb.spatial.vector import add, cross, mat3, matmul, store3, store9, sub, times, vec3
-from flexmb.tables.features import INBOARD_NODES, LOADS, MODES, OUTBOARD_NODES, WHEELS
+from flexmb.tables.features import CONNECTORS, INBOARD_NODES, LOADS, MODES, OUTBOARD_NODES, WHEELS
 
 
 @helper
@@ -38,7 +38,7 @@ def move(c, w, d, k):
     if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         V, A = move_frame(c, w, d, k, R, r, V, A)
         r = sub(r, times(R, vec3(w.port[c.body[k].outboard_port].r, 0)))
-    if has(c, MODES) or has(c, LOADS) or has(c, WHEELS):
+    if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):
         store3(d.body[k].origin, 0, r)
     store6(d.body[k].velocity, 0, V)
     store6(d.body[k].accel, 0, A)
@@ -78,7 +78,7 @@ def _single(c, w, d, k, R, r, V0, A0):
     j, slot = c.body[k].u_index, d.places[k].slot
     turned = motion_cross(V0, J)
     store_column6(d.seed, slot, J)
-    store_column3(d.seed, BY_RATE, slot, turned[0])
+    put_seed(d, BY_RATE, slot, turned)
     put_turn(c, d, slot, J)
     put_seed(d, BY_ACCELERATION, slot, sum6(motion_cross(A0, J), motion_cross(V0, turned)))
     put_seed(d, SPEED_BY_ACCELERATION, slot, scale6(2.0, turned))

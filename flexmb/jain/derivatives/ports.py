@@ -69,7 +69,7 @@ def _seed(c, w, d, k, i, n, R, r, V, A):
     a, b = to_world(R, r, _six(d, 0, n)), to_world(R, r, _six(d, 6, n))
     s1 = sub6(a, motion_cross(J, V))
     s2 = sub6(sum6(motion_cross(V_body, a), b), sum6(motion_cross(J, A), motion_cross(s1, V)))
-    store3(d.port_mode[i, n].by_rate, 0, s1[0])
+    store6(d.port_mode[i, n].by_rate, 0, s1)
     store6(d.port_mode[i, n].by_acceleration, 0, s2)
     b = to_world(R, r, _six(d, 12, n))
     s2 = sub6(sum6(motion_cross(V_body, J), b), motion_cross(J, V))
@@ -95,7 +95,7 @@ def move_frame(c, w, d, k, R, r, V, A):
             dA = sum6(dA, sum6(to_world(R, r, _six(d, 6, n)), motion_cross(J, A_r)))
             s1 = sub6(dV, motion_cross(J, V_body))
             s2 = sub6(scale6(-1.0, dA), sum6(motion_cross(J, A_body), motion_cross(s1, V_body)))
-            store3(d.frame_mode[k, n].by_rate, 0, s1[0])
+            store6(d.frame_mode[k, n].by_rate, 0, s1)
             store6(d.frame_mode[k, n].by_acceleration, 0, s2)
             # speeds: V_r changes by -J, V_body by J
             dA = sum6(motion_cross(J, V_r), motion_cross(V_body, scale6(-1.0, J)))
@@ -113,19 +113,20 @@ def see_modes(c, d, k):
     step = vec3(d.body[k].step, 0)
     for n in range(d.places[k].sees):
         slot, frame = d.places[k].seen + n, d.frame_mode[p, n]
-        J, s2, s1, s2_speed = ZERO6, ZERO6, ZERO6[0], ZERO6
+        J, s2, s1, s2_speed = ZERO6, ZERO6, ZERO6, ZERO6
         if i >= 0:
             port = d.port_mode[i, n]
             J, s2 = vec6(port.motion, 0), vec6(port.by_acceleration, 0)
-            s1, s2_speed = vec3(port.by_rate, 0), vec6(port.speed_by_acceleration, 0)
+            s1, s2_speed = vec6(port.by_rate, 0), vec6(port.speed_by_acceleration, 0)
         if has(c, OUTBOARD_NODES) and c.body[p].outboard_port >= 0:
             J, s2 = sum6(J, vec6(frame.motion, 0)), sum6(s2, vec6(frame.by_acceleration, 0))
-            s1 = add(s1, vec3(frame.by_rate, 0))
+            s1 = sum6(s1, vec6(frame.by_rate, 0))
             s2_speed = sum6(s2_speed, vec6(frame.speed_by_acceleration, 0))
         if new_point:
-            J, s2, s2_speed = shift_motion(J, step), shift_motion(s2, step), shift_motion(s2_speed, step)
+            J, s1 = shift_motion(J, step), shift_motion(s1, step)
+            s2, s2_speed = shift_motion(s2, step), shift_motion(s2_speed, step)
         store_column6(d.seed, slot, J)
-        store_column3(d.seed, BY_RATE, slot, s1)
+        put_seed(d, BY_RATE, slot, s1)
         put_seed(d, BY_ACCELERATION, slot, s2)
         put_seed(d, SPEED_BY_ACCELERATION, slot, s2_speed)
         turn = scale(0.0 if at_rest else 1.0, J[0])

@@ -20,7 +20,7 @@ from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, shi
 from flexmb.spatial.rows import column3, column6
 from flexmb.spatial.spatial_vector import add6, dot6, shift_force, store6, sum6, vec6
 from flexmb.spatial.vector import add, mat3, times, times_t, vec3
-from flexmb.tables.features import ARMATURES, INBOARD_NODES, LOADS, MODES, SEVERAL
+from flexmb.tables.features import ARMATURES, CONNECTORS, INBOARD_NODES, LOADS, MODES, SEVERAL
 
 BY_SPEED, BY_RATES = 6, 12  # first rows of `force` for changes of speeds and of their rates
 
@@ -67,7 +67,7 @@ def _column(c, d, k, place, slot):
     J, s1 = column6(d.seed, slot), column3(d.seed, BY_RATE, slot)
     inertia, D = load_inertia(d.body[k].inertia, 0), d.body[k].by_rate
     X = sum6(inertia_times(inertia, _six(d, BY_ACCELERATION, slot)), by_angle(D, s1))
-    if has(c, LOADS):
+    if has(c, LOADS) or has(c, CONNECTORS):
         X = sum6(X, by_angle(d.body[k].by_turn, J[0]))
     put_force(d, 0, place, sum6(X, force_cross(J, vec6(d.body[k].force, 0))))
     X = sum6(inertia_times(inertia, _six(d, SPEED_BY_ACCELERATION, slot)), by_angle(D, J[0]))
@@ -80,7 +80,7 @@ def _row(c, d, k, place, slot, masses):
     """Row of one speed of hinge k, for all sources inboard and beyond."""
     J, l2 = column6(d.seed, slot), six_of(d.force, BY_RATES, place)
     l1, l0 = row_by_angle(d.body[k].by_rate, J), (0.0, 0.0, 0.0)
-    if has(c, LOADS):
+    if has(c, LOADS) or has(c, CONNECTORS):
         l0 = row_by_angle(d.body[k].by_turn, J)
     if d.places[k].leaves_point:
         l2 = at_inboard_point(l2, vec3(d.body[k].step, 0))
@@ -137,7 +137,7 @@ def add_answer(c, to, answer):
     add6(to.force, 0, vec6(answer.force, 0))
     for i in range(18):
         to.by_rate[i] += answer.by_rate[i]
-    if has(c, LOADS):
+    if has(c, LOADS) or has(c, CONNECTORS):
         for i in range(18):
             to.by_turn[i] += answer.by_turn[i]
 
@@ -149,7 +149,7 @@ def _to_inboard_point(c, d, k, masses):
     store_inertia(d.body[k].inertia, 0, shift_inertia(load_inertia(d.body[k].inertia, 0), step))
     store6(d.body[k].force, 0, shift_force(vec6(d.body[k].force, 0), step))
     shift_by_angle(d.body[k].by_rate, step)
-    if has(c, LOADS):
+    if has(c, LOADS) or has(c, CONNECTORS):
         shift_by_angle(d.body[k].by_turn, step)
     start, stop = d.places[k].hinge, d.places[k].stop
     for row in range(0, 18 if masses else 12, 6):

@@ -22,7 +22,7 @@ from flexmb.jit.duals import DUAL
 from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import strip_zeros
 from flexmb.jit.wide_arrays import as_duals
-from flexmb.tables.arrays import Constants, Workspace
+from flexmb.tables.arrays import ON_GROUND, Constants, Workspace
 from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real, Record
 
@@ -94,12 +94,12 @@ PORT = np.dtype(
     ],
     align=True,
 )
-# What a mode does to a port relative to its body, or to the body frame relative to O: its motion J, then s1 (angular
-# part), s2 of a displacement, s2 of a speed. At level ruthless a mode has no other effect than its acceleration J.
+# What a mode does to a port relative to its body, or to the body frame relative to O: its motion J, then s1 and
+# s2 of a displacement, s2 of a speed. At level ruthless a mode has no other effect than its acceleration J.
 MOVED = np.dtype(
     [
         ("motion", _F, (6,)),
-        ("by_rate", _F, (3,)),
+        ("by_rate", _F, (6,)),
         ("by_acceleration", _F, (6,)),
         ("speed_by_acceleration", _F, (6,)),
     ],
@@ -115,7 +115,9 @@ MODE = np.dtype(
     align=True,
 )
 # Rows of `seed`: what a unit of a source does to all bodies beyond.
-MOTION, BY_RATE, BY_ACCELERATION, SPEED_BY_ACCELERATION, TURN, SPEED_BY_RATE, ROWS = 0, 6, 9, 15, 21, 24, 27
+MOTION, BY_RATE, BY_ACCELERATION, SPEED_BY_ACCELERATION, TURN, SPEED_BY_RATE, ROWS = 0, 6, 12, 18, 24, 27, 30
+# Rows of `end`, six each: J; s0 and s1 of displacements; s1 of speeds.
+END_MOTION, END_DISPLACED, END_MOVED, END_SPEED, END_ROWS = 0, 6, 12, 18, 24
 
 
 @bundle
@@ -135,8 +137,8 @@ class Derivatives:
     speed: Index  # (nu,) number in u of a place
     place: Index  # (nu,) place of a speed
     shape: Index  # (2,) whether the tree branches; whether places are the numbers in u
-    # (ROWS,slots) MOTION: the motion J at unit speed; BY_RATE: angular part of s1 of a displacement; BY_ACCELERATION: its
-    # s2; SPEED_BY_ACCELERATION: s2 of a speed; and only for scenes with modes, because they are else those of J, TURN
+    # (ROWS,slots) MOTION: the motion J at unit speed; BY_RATE: s1 of a displacement; BY_ACCELERATION: its s2;
+    # SPEED_BY_ACCELERATION: s2 of a speed; and only for scenes with modes, because they are else those of J, TURN
     # and SPEED_BY_RATE: angular parts of s0 of a displacement and of s1 of a speed
     seed: Real
     force: Real  # (18,nu) change of the load across each hinge inboard, [torque; force]: by displacement, speed, rate
@@ -152,6 +154,11 @@ class Derivatives:
     mode: Record  # (N,m) MODE
     bent: Real  # (P,m,m,6) derivatives of the motions of a port at unit speed of mode j by displacement n: [n, j]
     change: Real  # (18,m) of one port: of its V_r and A_r by displacements, of A_r by speeds, in body axes
+    end: Real  # (2,END_ROWS,nu) what all sources do to the two ends of a connector
+    # (C,13,24) derivatives of the forces on the bodies of A and B, and of the power, by s0 and s1 of A, then of B
+    link: Real
+    passed_row: Real  # (24,) of one row
+    work: Real  # (3nu,) derivatives of the power by displacements and speeds, and by accelerations
     local: Real  # (6,3) of one body: derivatives of its force by its angular velocity, body axes
     duals: Duals
 
@@ -191,6 +198,10 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
         mode=np.zeros((len(c.body), m), MODE),
         bent=np.zeros((len(c.port), m, m, 6)),
         change=np.zeros((18, m)),
+        end=strip_zeros((2, END_ROWS, nu + LANES)) if len(c.connector) + len(c.load) else strip_zeros((2, END_ROWS, LANES)),
+        link=np.zeros((len(c.connector), 13, 24)),
+        passed_row=np.zeros(24),
+        work=strip_zeros((3 * nu + LANES,)),
         local=np.zeros((6, 3)),
         duals=duals(c, nq, nu),
     )
@@ -199,7 +210,7 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
 def _ports(c: Constants) -> Record:
     """(P,) PORT with what is attached where."""
     port = np.zeros(len(c.port), PORT)
-    for attached in (c.body["inboard_port"], c.wheel["port"], c.load["port"]):
+    for attached in (c.body["inboard_port"], c.wheel["port"], c.load["port"], c.end["port"][c.end["body"] != ON_GROUND]):
         port["used"][attached[attached >= 0]] = 1
     return port
 
