@@ -32,9 +32,6 @@ def subtract_applied(c, w, d):
 @helper
 def _by_duals(c, w, d):
     e, nu = d.duals, w.u.shape[0]
-    for f in range(c.function.shape[0]):
-        for i in range(3):
-            e.function[f, i] = w.function[f, i]
     for i in range(w.q.shape[0]):
         e.q[i] = w.q[i]
     if has(c, BALL_SPRINGS):

@@ -32,6 +32,9 @@ def inverse_dynamics(c, w, d, masses):
         own_force(c, w, d, k)
         if has(c, LOADS) or has(c, WHEELS):
             attach(c, w, d, k)
+    for f in range(c.function.shape[0]):
+        for i in range(3):
+            d.duals.function[f, i] = w.function[f, i]
     if has(c, CONNECTORS):
         attach_connectors(c, w, d)
     for k in range(c.body.shape[0] - 1, -1, -1):
