@@ -159,7 +159,9 @@ class Derivatives:
     link: Real
     passed_row: Real  # (24,) of one row
     work: Real  # (3nu,) derivatives of the power by displacements and speeds, and by accelerations
+    own: Real  # (15,m) of one body of level full: the same of its force by its modes, and `by_rate` of their rows
     local: Real  # (6,3) of one body: derivatives of its force by its angular velocity, body axes
+    plain: Workspace  # for the inertia of single bodies
     duals: Duals
 
 
@@ -202,7 +204,9 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
         link=np.zeros((len(c.connector), 13, 24)),
         passed_row=np.zeros(24),
         work=strip_zeros((3 * nu + LANES,)),
+        own=strip_zeros((15, m)),
         local=np.zeros((6, 3)),
+        plain=workspace(c, nq, nu),
         duals=duals(c, nq, nu),
     )
 
