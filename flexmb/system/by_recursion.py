@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexmb.entry import articulated, stiff_part, tangent
+from flexmb.entry import articulated, derivatives, stiff_part
 from flexmb.entry.observation import observe
 from flexmb.integrate.problem import Linear, StiffPart
 from flexmb.motion import coordinates, retraction
@@ -22,8 +22,8 @@ def _fresh(system: Mechanics) -> tuple[Any, Any]:
 
 def _linear(system: Mechanics) -> Linear:
     exact = system.constants  # with every body eliminated explicitly, for Jacobians
-    tables = tangent.tangent_workspace(exact, system.nq, system.nu)
-    return Linear(tangent.jacobian, retraction.move, exact, tables, stiff=_stiff(system))
+    written = derivatives.derivative_workspace(exact, system.nq, system.nu)
+    return Linear(derivatives.jacobian, retraction.move, exact, written, stiff=_stiff(system))
 
 
 def _stiff(system: Mechanics) -> StiffPart | None:
