@@ -62,6 +62,8 @@ def _by_duals(c, w, d, k, V, A):
     for n in range(nm):
         e.eta[k, n], e.etad[k, n] = w.eta[k, n], w.etad[k, n]
     last = 3 if is_at_rest(c.body[k].level) else 3 + 2 * nm
+    if is_at_rest(c.body[k].level):
+        _no_rows(d, k, nm)
     for first in range(0, last, LANES):
         count = min(LANES, last - first)
         for lane in range(count):
@@ -71,6 +73,16 @@ def _by_duals(c, w, d, k, V, A):
         for lane in range(count):
             _keep(c, w, d, k, first + lane, lane)
     _with_the_motion(e, d, nm, k, V)
+
+
+@helper
+def _no_rows(d, k, nm):
+    """The modes' rows of their own displacements and speeds, without elasticity, at rest shape."""
+    first, nu = d.places[k].modes, d.speed.shape[0]
+    for i in range(nm):
+        for n in range(nm):
+            d.matrix[first + i, first + n] = 0.0
+            d.matrix[first + i, nu + first + n] = 0.0
 
 
 @helper
