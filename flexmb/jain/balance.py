@@ -51,7 +51,8 @@ def energy_and_momentum(c, w, energy, momentum):
         for j in range(w.u.shape[0]):
             i = c.speed[j].coordinate
             if i >= 0:
-                energy[SPRING] += 0.5 * c.speed[j].stiffness * (w.q[i] - c.speed[j].rest) ** 2
+                stretch = w.q[i] - c.speed[j].rest
+                energy[SPRING] += 0.5 * c.speed[j].stiffness * stretch * stretch
     if has(c, BALL_SPRINGS):
         for k in range(c.body.shape[0]):
             if c.body[k].ball_spring != 0.0:
