@@ -62,6 +62,7 @@ class ChainDerivatives(Derivatives):
                 f'scene "{self.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
                 f'closures join them, and {what} does not support that: use level "linear" or a better one'
             )
+        self.initial_state  # noqa: B018 - counts the independent rows, without which no position is seen to be singular
         return super()._differentiable(state, what)
 
     def _given(self, accelerations: Real) -> Real:
