@@ -64,7 +64,8 @@ def rows_tangent(cc: ClosureConstants, c: Constants) -> RowsTangent:
 def observe_given(x, c, w, cc, cw, out):
     """As `flexmb.entry.given_motion.observe_given` under the loads of the rows; those of closures go to cw.loads.
 
-    What hinges transmit is the inertial load of all that they carry less the loads of closures on it.
+    The rows have the rates and accelerations of this motion, which need not keep the closures closed. What hinges
+    transmit is the inertial load of all that they carry less the loads of closures on it.
     """
     status = invert(x, c, w)
     if status != OK:
@@ -72,9 +73,9 @@ def observe_given(x, c, w, cc, cw, out):
     clear(c, cw.response)
     for i in range(cc.closure.shape[0]):
         if has(cc, COUPLINGS) and is_coupling(cc, i):
-            evaluate_coupling(c, w, cc, cw, i, False)
+            evaluate_coupling(c, w, cc, cw, i, True)
         else:
-            evaluate_closure(c, w, cc, cw, i, False)
+            evaluate_closure(c, w, cc, cw, i, True)
         apply_rows(c, w, cc, cw, i)
         store6(cw.loads[i], 0, times6(mat3(cw.closure[i].world, 0), load_on_b(cc, cw, i)))
     _relieve_hinges(c, w, cw)

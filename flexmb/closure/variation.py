@@ -61,10 +61,14 @@ def variation(
     of_loads, of_rates = np.zeros((len(loads), nq + nu + 1)), found.of_slope[nq:].copy()
     of_loads[chosen] = -solve_triangular(R, opening)
     of_rates[free] -= solve_triangular(root, Q @ opening, lower=True, trans=1)
+    lever, inertia, R_inverse = np.zeros((nu, len(loads))), np.zeros((len(loads),) * 2), np.linalg.inv(R)
+    lever[np.ix_(free, chosen)] = solve_triangular(root, Q @ R_inverse.T, lower=True, trans=1)
+    inertia[np.ix_(chosen, chosen)] = R_inverse @ R_inverse.T
     return Variation(
         accelerations, Change(of_rates[:, :-1], of_rates[:, -1], _by_force(root, Q, free, nu)),
         found.of_slope[:nq, nq:-1], loads,
         Change(of_loads[:, :-1], of_loads[:, -1], _loads_by_force(root, Q, R, chosen, free, (len(loads), nu))),
+        lever, inertia,
     )  # fmt: skip
 
 

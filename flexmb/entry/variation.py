@@ -19,7 +19,9 @@ class Variation(NamedTuple):
     """The accelerations (nu,) of a free motion and the loads (G,) of the rows of closures, with their derivatives.
 
     motion (nq,nu): N = d(qdot)/du, the change of the coordinates by displacements along the speeds. Columns of
-    prescribed coordinates and speeds vanish. Trees have no rows.
+    prescribed coordinates and speeds vanish. Trees have no rows. lever (nu,G): P = M^-1 J' Lambda, accelerations that
+    give the rows unit accelerations; inertia (G,G): Lambda = (J M^-1 J')^-1, the loads for that; of the independent
+    rows, zero for the others.
     """
 
     accelerations: Real
@@ -27,3 +29,5 @@ class Variation(NamedTuple):
     motion: Real
     loads: Real
     of_loads: Change
+    lever: Real
+    inertia: Real

@@ -70,6 +70,11 @@ class Along:
         closures = [] if self.rows is None else [self.rows.loads[..., lanes].reshape(-1, lanes.stop - lanes.start)]
         return np.concatenate([self.out.every[:, lanes], self.out.drives[:, lanes], *closures])
 
+    def balance(self, lanes: slice) -> Real:
+        """(nu+G,lanes) of what is missing for equilibrium along the speeds, and of the rows' accelerations."""
+        rows = [] if self.rows is None else [self.rows.row["acceleration"][:, lanes]]
+        return np.concatenate([self.out.drives[:, lanes], *rows])
+
     def _set(self, at: GivenMotion, directions: Directions, some: slice, lanes: slice) -> None:
         x = self.x
         values = (x.state, at.y), (x.rates, at.accelerations), (x.time, at.t)

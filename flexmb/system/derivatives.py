@@ -47,14 +47,17 @@ class Derivatives(FreeMotion):
     a law has a corner, and DynamicsError, ValueError and TypeError as the methods do that give the values.
     """
 
-    def acceleration_derivatives(self, state: State) -> AccelerationDerivatives:
+    def acceleration_derivatives(self, state: State, forces: Real | None = None) -> AccelerationDerivatives:
         """Derivatives of `accelerations` by displacements along the speeds, coordinates, speeds, forces and time.
 
+        `forces` (nu,): generalised forces along the speeds (N m, N) that act in addition to those of the scene.
         Closed chains: of the accelerations under constraint loads that keep the row accelerations zero, as a function
         of all coordinates and speeds; they mean something along changes that the closures allow.
         """
         t, y = self._differentiable(state, "system.acceleration_derivatives")
         at = self._variation(t, y)
+        if forces is not None:
+            at = self._under_forces(at, t, y, self.layout.rates("forces", forces))
         by_coordinates, by_speed = np.hsplit(at.of_accelerations.by_state, [self.nq])
         return AccelerationDerivatives(
             at.accelerations, by_coordinates @ at.motion, by_speed, at.of_accelerations.by_force,
@@ -130,7 +133,8 @@ class Derivatives(FreeMotion):
         by_force = factors.solve(np.eye(nu)) if nu else np.zeros((0, 0))
         of_rates = Change(finite_result(J[nq:-1, :-1], t), finite_result(drift[nq:-1], t), by_force)
         none = Change(np.zeros((0, nq + nu)), np.zeros(0), np.zeros((0, nu)))
-        return Variation(accelerations, of_rates, J[:nq, nq:-1], np.zeros(0), none)
+        rows = np.zeros((nu, 0)), np.zeros((0, 0))
+        return Variation(accelerations, of_rates, J[:nq, nq:-1], np.zeros(0), none, *rows)
 
     @per_thread
     def _along(self) -> Along:
@@ -194,6 +198,35 @@ class Derivatives(FreeMotion):
         time[-1] = 1.0
         motion = GivenMotion(t, y, at.accelerations, at.loads)
         return motion, Directions(state, by_all(at.of_accelerations), by_all(at.of_loads), time)
+
+    def _under_forces(self, at: Variation, t: float, y: Real, forces: Real) -> Variation:
+        """The motion under further generalised forces (nu,), which the scene's motion `at` is without.
+
+        They add accelerations x and row loads f with M x - J'f = forces and J x = 0. In a direction these change by
+        M dx - J'df = -(dM x - dJ'f) and J dx = -dJ x.
+        """
+        along, rows, nu = self._along, self._row_count, self.nu
+        x, f = at.of_accelerations.by_force @ forces, at.of_loads.by_force @ forces
+
+        def left(accelerations: Real, loads: Real) -> Real:
+            """Derivatives of M accelerations - J' loads + c and J accelerations + gamma by [q, u] and time."""
+            motion = GivenMotion(t, y, accelerations, loads)
+            return along.derivatives(motion, self._unit_directions(), along.balance)
+
+        drift, opening = np.vsplit(finite_result(left(x, f) - left(np.zeros(nu), np.zeros(rows)), t), [nu])
+        of_rates, of_loads = at.of_accelerations, at.of_loads
+        turned = of_rates.by_force @ drift + at.lever @ opening
+        loaded = of_loads.by_force @ drift + at.inertia @ opening
+        return at._replace(
+            accelerations=at.accelerations + x,
+            of_accelerations=of_rates._replace(
+                by_state=of_rates.by_state - turned[:, :-1], by_time=of_rates.by_time - turned[:, -1]
+            ),
+            loads=at.loads + f,
+            of_loads=of_loads._replace(
+                by_state=of_loads.by_state - loaded[:, :-1], by_time=of_loads.by_time - loaded[:, -1]
+            ),
+        )
 
     def _as_given(self, t: float, y: Real, rates: Real) -> tuple[GivenMotion, Directions]:
         """A motion with these accelerations, and its changes by displacements, speeds, accelerations and time."""

@@ -16,7 +16,7 @@ from flexmb.system.kinks import NotDifferentiableError
 from tests import trees
 from tests.bounds import UNIT_ROUNDOFF, algebra
 from tests.flexmb.connectors.connected_scenes import everything
-from tests.flexmb.entry.test_tangent import H, RECIPES, extrapolated, terms
+from tests.flexmb.entry.test_tangent import RECIPES, H, extrapolated, terms
 from tests.flexmb.system import test_section_loads as sections
 
 SCENES = {
@@ -160,7 +160,8 @@ def test_inverse_dynamics_against_the_dense_route(recipe: str, seed: int) -> Non
         expected = np.imag(inertial + bias) / H
         columns = d.by_displacement if by_displacement else d.by_speed
         M = dense.mass_matrix(state.q)
-        size = max(np.max(np.abs(part)) for part in (np.imag(inertial) / H, np.imag(bias) / H, d.tau, M @ np.abs(rates)))
+        parts = np.imag(inertial) / H, np.imag(bias) / H, d.tau, M @ np.abs(rates)
+        size = max(np.max(np.abs(part)) for part in parts)
         assert np.max(np.abs(columns @ change - expected)) <= bound * size
         assert np.max(np.abs(columns @ change * (1.0 + 1e-9) - expected)) > bound * size, "a planted error"
     M = dense.mass_matrix(state.q)
@@ -190,6 +191,44 @@ def test_accelerations_against_the_dense_route(recipe: str, seed: int) -> None:
     size = np.linalg.norm(M, np.inf) * np.linalg.norm(d.by_force, np.inf)
     np.testing.assert_allclose(identity, np.eye(np.sum(free)), rtol=0.0, atol=bound * size)
     np.testing.assert_allclose(d.by_coordinates @ d.motion, d.by_displacement, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("recipe", "seed"), [(name, seed) for name in SMALL for seed in (0, 3)])
+def test_observed_quantities_against_the_dense_route(recipe: str, seed: int) -> None:
+    """Loads, markers and momentum of given accelerations, by a complex step through the other code."""
+    scene = trees.random_scene(seed, replace(SMALL[recipe], prescribed=False))
+    system, dense = fm.compile(scene), DenseSystem(scene)
+    state, rng = system.initial_state, np.random.default_rng(seed)
+    rates = rng.normal(size=system.nu)
+    d, motion = system.evaluation_derivatives(state, rates), system.acceleration_derivatives(state).motion
+    bound = algebra(dense.nu, len(dense.tree.members), max(len(member.model.mass) for member in dense.tree.members))
+
+    def observed(q: Any, u: Any, rates: Any) -> dict[str, Any]:
+        markers = {
+            name: np.concatenate([each.position, each.velocity, each.acceleration])
+            for name, each in dense.markers(0.0, q, u, rates).items()
+        }
+        loads = dense.hinge_loads(0.0, q, u, rates) | dense.wheel_loads(0.0, q, u, rates)
+        return {**markers, **loads, "momentum": dense.momentum(q, u)}
+
+    for kind in ("by_displacement", "by_speed", "by_acceleration"):
+        change = rng.normal(size=system.nu)
+        step = {"by_displacement": motion @ change}.get(kind, change) * 1j * H
+        q, u = state.q + (step if kind == "by_displacement" else 0.0), state.u + (step if kind == "by_speed" else 0.0)
+        expected = observed(q, u, rates + (step if kind == "by_acceleration" else 0.0))
+        markers = {
+            name: np.concatenate([getattr(part, kind) for part in (each.position, each.velocity, each.acceleration)])
+            for name, each in d.markers.items()
+        }
+        found = {**markers, **{name: getattr(each, kind) for name, each in {**d.loads, **d.wheel_loads}.items()}}
+        found["momentum"] = getattr(d.momentum, kind)
+        size = max(np.max(np.abs(value)) + np.max(np.abs(np.imag(value))) / H for value in expected.values())
+        size += max(np.max(np.abs(each)) for each in found.values()) * np.max(np.abs(change))
+        misses = [np.max(np.abs(found[name] @ change - np.imag(value) / H)) for name, value in expected.items()]
+        planted = [np.max(np.abs(found[name] @ change * (1.0 + 1e-8) - np.imag(value) / H))
+                   for name, value in expected.items()]  # fmt: skip
+        assert max(misses) <= bound * size
+        assert max(planted) > bound * size, "a planted error of a hundred-millionth"
 
 
 @pytest.mark.parametrize("name", ["every level", "stiffened", "connectors"])
@@ -306,8 +345,10 @@ def test_section_loads_against_differences(connected: bool) -> None:
     free = system.constants.speed["prescribed"] < 0
     xi, du = rng.normal(size=(2, system.nu)) * np.where(free, 1e-2, 0.0)
     for dq, dv, dt, found in (
-        (motion @ xi, 0.0, 0.0, d.by_displacement @ xi), (0.0, du, 0.0, d.by_speed @ du), (0.0, 0.0, 1e-2, d.by_time * 1e-2),
-    ):  # fmt: skip
+        (motion @ xi, 0.0, 0.0, d.by_displacement @ xi),
+        (0.0, du, 0.0, d.by_speed @ du),
+        (0.0, 0.0, 1e-2, d.by_time * 1e-2),
+    ):
         moved = lambda h, dq=dq, dv=dv, dt=dt: system.section_loads(  # noqa: E731
             system.state(state.q + h * dq, state.u + h * dv, state.t + h * dt), body, x
         ).load  # fmt: skip
@@ -316,6 +357,42 @@ def test_section_loads_against_differences(connected: bool) -> None:
         assert np.max(np.abs(found - expected)) <= 30.0 * np.max(doubt) + 1e-9 * size
         if np.max(np.abs(expected)) > 1e-3:
             assert np.max(np.abs(found * (1.0 + 1e-5) - expected)) > 30.0 * np.max(doubt) + 1e-9 * size, "planted"
+
+
+def pushed(torque: float, *, closed: bool = False) -> fm.System:
+    """A flexible arm and a swinging bar, with a motor; closed to a loop by a spherical closure."""
+    scene = fm.SceneBuilder("pushed", gravity=(0.3, -9.81, 0.5))
+    section = fm.scene.shapes.beam_section(E=2e9, G=8e8, A=6e-4, Iy=8e-8, Iz=5e-8, rho=1500.0)
+    scene.beam("rod", length=0.8, elements=4, section=section, modes=2)
+    scene.rigid_body("bar", mass=0.8, com=(0.2, 0.01, 0.0), inertia=(0.02, 0.03, 0.025))
+    scene.revolute("root", "ground", "rod", axis=(0, 0.6, 0.8), angle=0.4, rate=0.8, torque=fm.Constant(value=torque))
+    scene.spherical("ball", "rod", "bar", parent_node="tip", quaternion=(0.8, 0.36, -0.48, 0.0),
+                    angular_velocity=(0.4, -0.7, 0.5))  # fmt: skip
+    if closed:
+        scene.prismatic("slide", "ground", "post", axis=(1, 0, 0))
+        scene.rigid_body("post", mass=0.5, inertia=(0.01, 0.01, 0.01))
+        scene.closure("end", "universal", "bar", "post", position_a=(0.5, 0, 0), position_b=(0.9, 0.2, 0.1))
+    return fm.compile(scene.scene())
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
+def test_further_forces_are_as_those_of_a_motor(closed: bool) -> None:
+    torque = 35.0
+    without, motor = pushed(0.0, closed=closed), pushed(torque, closed=closed)
+    state = without.initial_state
+    forces = np.zeros(without.nu)
+    forces[without.speed("root")] = torque
+    found = without.acceleration_derivatives(state, forces)
+    expected = motor.acceleration_derivatives(motor.state(state.q, state.u))
+    plain = without.acceleration_derivatives(state)
+    for field in fields(found):
+        one, other = getattr(found, field.name), getattr(expected, field.name)
+        size = np.max(np.abs(other), initial=1.0)
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-11 * size, err_msg=field.name)
+    assert np.max(np.abs(plain.by_displacement - found.by_displacement)) > 1e-4 * np.max(np.abs(found.by_displacement))
+    with pytest.raises(ValueError, match="forces"):
+        without.acceleration_derivatives(state, np.full(without.nu, np.nan))
 
 
 def test_prescribed_columns_vanish() -> None:
