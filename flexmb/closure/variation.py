@@ -24,7 +24,7 @@ from scipy.linalg import solve_triangular
 from flexmb.closure.closures import Closures
 from flexmb.closure.tangent import ClosureTangentWorkspace, closed_jacobian
 from flexmb.entry.tangent import TangentWorkspace
-from flexmb.entry.variation import Change, Variation
+from flexmb.entry.variation import StateDerivatives, Variation
 from flexmb.typing import Index, Real
 
 
@@ -64,10 +64,11 @@ def variation(
     lever, inertia, R_inverse = np.zeros((nu, len(loads))), np.zeros((len(loads),) * 2), np.linalg.inv(R)
     lever[np.ix_(free, chosen)] = solve_triangular(root, Q @ R_inverse.T, lower=True, trans=1)
     inertia[np.ix_(chosen, chosen)] = R_inverse @ R_inverse.T
+    loads_by_force = np.zeros((len(loads), nu))
+    loads_by_force[np.ix_(chosen, free)] = -solve_triangular(R, solve_triangular(root, Q, lower=True, trans=1).T)
     return Variation(
-        accelerations, Change(of_rates[:, :-1], of_rates[:, -1], _by_force(root, Q, free, nu)),
-        found.of_slope[:nq, nq:-1], loads,
-        Change(of_loads[:, :-1], of_loads[:, -1], _loads_by_force(root, Q, R, chosen, free, (len(loads), nu))),
+        accelerations, StateDerivatives(of_rates[:, :-1], of_rates[:, -1], _by_force(root, Q, free, nu)),
+        found.of_slope[:nq, nq:-1], loads, StateDerivatives(of_loads[:, :-1], of_loads[:, -1], loads_by_force),
         lever, inertia,
     )  # fmt: skip
 
@@ -89,11 +90,4 @@ def _by_force(root: Real, Q: Real, free: Index, nu: int) -> Real:
     left = inverse - Q @ (Q.T @ inverse)
     out = np.zeros((nu, nu))
     out[np.ix_(free, free)] = left.T @ left
-    return out
-
-
-def _loads_by_force(root: Real, Q: Real, R: Real, chosen: Index, free: Index, shape: tuple[int, int]) -> Real:
-    """(G,nu) -R^-1 Q' L^-1 in the places of the chosen rows and the free speeds."""
-    out = np.zeros(shape)
-    out[np.ix_(chosen, free)] = -solve_triangular(R, solve_triangular(root, Q, lower=True, trans=1).T)
     return out

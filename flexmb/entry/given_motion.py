@@ -5,7 +5,7 @@
 
 Coordinates, speeds, accelerations and time are independent here: no equations of motion are solved. Loads are those of
 inverse dynamics. How the accelerations of a free motion depend on the state is then a matter of the directions:
-`flexmb.system.pushed`.
+`flexmb.system.pushforward`.
 
 w is made by `flexmb.entry.tangent.tangent_workspace`, out by `flexmb.entry.observed_tangent.outputs_tangent`.
 """

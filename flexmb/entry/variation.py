@@ -7,7 +7,7 @@ from typing import NamedTuple
 from flexmb.typing import Real
 
 
-class Change(NamedTuple):
+class StateDerivatives(NamedTuple):
     """Derivatives of m numbers: by [q, u] (m,nq+nu), by time (m,), by generalised forces along all speeds (m,nu)."""
 
     by_state: Real
@@ -25,9 +25,9 @@ class Variation(NamedTuple):
     """
 
     accelerations: Real
-    of_accelerations: Change
+    of_accelerations: StateDerivatives
     motion: Real
     loads: Real
-    of_loads: Change
+    of_loads: StateDerivatives
     lever: Real
     inertia: Real

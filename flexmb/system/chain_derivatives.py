@@ -13,8 +13,8 @@ from flexmb.entry.observed_tangent import outputs_tangent
 from flexmb.entry.variation import Variation
 from flexmb.jit.direct import direct
 from flexmb.jit.pointer import STATUS
-from flexmb.system.along import Along
 from flexmb.system.derivatives import Derivatives
+from flexmb.system.pushforward import Pushforward
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Real
@@ -44,12 +44,12 @@ class ChainDerivatives(Derivatives):
         return closure_tangent_workspace(self.closures.constants[1])
 
     @per_thread
-    def _along(self) -> Along:
+    def _pushforward(self) -> Pushforward:
         own = self.closures.constants[1]
         x, out = motion_tangent(self.nq, self.nu), outputs_tangent(self.observation.out)
         tables, rows = (x, self.constants, self._tangent, out), rows_tangent(own, self.constants)
         observe = direct(observe_given, STATUS, *tables[:3], own, rows, out)
-        return Along(tables, rows, observe, self.check_status)
+        return Pushforward(tables, rows, observe, self.check_status)
 
     @property
     def _row_count(self) -> int:

@@ -22,7 +22,7 @@ class OfFreeMotion(NamedTuple):
 
     by_displacement (...,nu): along the speeds, as `AccelerationDerivatives.by_displacement`; by_speed (...,nu);
     by_force (...,nu): by generalised forces along the speeds (N m, N), in addition to all others; by_time (...): with
-    all coordinates and speeds held but the prescribed ones. Along a motion a quantity changes at the rate
+    all coordinates and speeds held but the prescribed ones. Pushforward a motion a quantity changes at the rate
     by_displacement u + by_speed udot + by_time.
     """
 

@@ -14,11 +14,10 @@ import numpy as np
 from flexmb.entry.given_motion import motion_tangent, observe_given
 from flexmb.entry.observed_tangent import outputs_tangent
 from flexmb.entry.tangent import TangentWorkspace, jacobian, tangent_workspace, time_derivative
-from flexmb.entry.variation import Change, Variation
+from flexmb.entry.variation import StateDerivatives, Variation
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
 from flexmb.scene.open_loop import refuse_feedback
-from flexmb.system.along import Along, Directions, GivenMotion
 from flexmb.system.derivative_records import (
     AccelerationDerivatives,
     By,
@@ -31,6 +30,7 @@ from flexmb.system.derivative_records import (
 from flexmb.system.factors import MassMatrixFactors
 from flexmb.system.free_motion import FreeMotion
 from flexmb.system.kinks import has_corners, refuse_kinks
+from flexmb.system.pushforward import Directions, GivenMotion, Pushforward
 from flexmb.system.section_derivatives import section_row
 from flexmb.system.section_loads import SectionBalance
 from flexmb.tables.per_thread import per_thread
@@ -68,9 +68,9 @@ class Derivatives(FreeMotion):
         """Derivatives of `inverse_dynamics` at these accelerations (nu,); of closed chains those of the tree alone."""
         t, y = self._differentiable(state, "system.inverse_dynamics_derivatives")
         rates = self.layout.rates("accelerations", accelerations)
-        along, nq, nu = self._along, self.nq, self.nu
+        push, nq, nu = self._pushforward, self.nq, self.nu
         motion = GivenMotion(t, y, rates, np.zeros(self._row_count))
-        found = along.derivatives(motion, self._unit_directions(), lambda lanes: along.x.tau[:, lanes])
+        found = push.derivatives(motion, self._unit_directions(), lambda lanes: push.x.tau[:, lanes])
         finite_result(found, t)
         N, by_coordinates = self._coordinate_motion(motion), found[:, :nq]
         return InverseDynamicsDerivatives(
@@ -94,14 +94,14 @@ class Derivatives(FreeMotion):
         inverse dynamics.
         """
         t, y = self._differentiable(state, "system.evaluation_derivatives")
-        along, observation = self._along, self.observation
+        push, observation = self._pushforward, self.observation
         kind: Any = OfFreeMotion if accelerations is None else OfGivenMotion
         if accelerations is None:
             motion, directions = self._freely(t, y)
         else:
             motion, directions = self._as_given(t, y, self._given(accelerations))
-        change = finite_result(along.derivatives(motion, directions, along.row), t)
-        row = along.row(slice(0, 1))[:, 0]
+        change = finite_result(push.derivatives(motion, directions, push.row), t)
+        row = push.row(slice(0, 1))[:, 0]
         if accelerations is None:
             self._relieve_drives(change)
             change[self._open_row(t, y)] = np.nan
@@ -110,10 +110,10 @@ class Derivatives(FreeMotion):
     def section_load_derivatives(self, state: State, body: str, x: Any) -> OfFreeMotion:
         """Derivatives (X,6,nu) of `section_loads(state, body, x).load`, of the free motion."""
         t, y = self._differentiable(state, "system.section_load_derivatives")
-        balance, along = SectionBalance(self, body, x), self._along
+        balance, push = SectionBalance(self, body, x), self._pushforward
         motion, directions = self._freely(t, y)
-        change = along.derivatives(
-            motion, directions, lambda lanes: section_row(balance, along, self.observation, lanes)
+        change = push.derivatives(
+            motion, directions, lambda lanes: section_row(balance, push, self.observation, lanes)
         )
         is_open = self._open_sections(state, balance)
         found = finite_result(change, t).reshape(*is_open.shape, -1)
@@ -131,16 +131,16 @@ class Derivatives(FreeMotion):
         factors = MassMatrixFactors(self.constants, self.workspace, t, y, self.constants)
         self.check_status(factors.status, factors.fault)
         by_force = factors.solve(np.eye(nu)) if nu else np.zeros((0, 0))
-        of_rates = Change(finite_result(J[nq:-1, :-1], t), finite_result(drift[nq:-1], t), by_force)
-        none = Change(np.zeros((0, nq + nu)), np.zeros(0), np.zeros((0, nu)))
+        of_rates = StateDerivatives(finite_result(J[nq:-1, :-1], t), finite_result(drift[nq:-1], t), by_force)
+        none = StateDerivatives(np.zeros((0, nq + nu)), np.zeros(0), np.zeros((0, nu)))
         rows = np.zeros((nu, 0)), np.zeros((0, 0))
         return Variation(accelerations, of_rates, J[:nq, nq:-1], np.zeros(0), none, *rows)
 
     @per_thread
-    def _along(self) -> Along:
+    def _pushforward(self) -> Pushforward:
         x, out = motion_tangent(self.nq, self.nu), outputs_tangent(self.observation.out)
         tables = x, self.constants, self._tangent, out
-        return Along(tables, None, direct(observe_given, STATUS, *tables), self.check_status)
+        return Pushforward(tables, None, direct(observe_given, STATUS, *tables), self.check_status)
 
     @property
     def _row_count(self) -> int:
@@ -190,7 +190,7 @@ class Derivatives(FreeMotion):
         """The free motion, and how it changes by displacements and speeds, forces and time."""
         at, nq, nu = self._variation(t, y), self.nq, self.nu
 
-        def by_all(change: Change) -> Real:
+        def by_all(change: StateDerivatives) -> Real:
             by_displacement = change.by_state[:, :nq] @ at.motion
             return np.column_stack([by_displacement, change.by_state[:, nq:], change.by_force, change.by_time])
 
@@ -205,13 +205,13 @@ class Derivatives(FreeMotion):
         They add accelerations x and row loads f with M x - J'f = forces and J x = 0. In a direction these change by
         M dx - J'df = -(dM x - dJ'f) and J dx = -dJ x.
         """
-        along, rows, nu = self._along, self._row_count, self.nu
+        push, rows, nu = self._pushforward, self._row_count, self.nu
         x, f = at.of_accelerations.by_force @ forces, at.of_loads.by_force @ forces
 
         def left(accelerations: Real, loads: Real) -> Real:
             """Derivatives of M accelerations - J' loads + c and J accelerations + gamma by [q, u] and time."""
             motion = GivenMotion(t, y, accelerations, loads)
-            return along.derivatives(motion, self._unit_directions(), along.balance)
+            return push.derivatives(motion, self._unit_directions(), push.balance)
 
         drift, opening = np.vsplit(finite_result(left(x, f) - left(np.zeros(nu), np.zeros(rows)), t), [nu])
         of_rates, of_loads = at.of_accelerations, at.of_loads
@@ -253,10 +253,10 @@ class Derivatives(FreeMotion):
 
     def _coordinate_motion(self, motion: GivenMotion) -> Real:
         """N (nq,nu): derivatives of dq/dt by the speeds."""
-        n, along = self.nu, self._along
+        n, push = self.nu, self._pushforward
         state = np.eye(self.nq + n)[:, self.nq :]
         directions = Directions(state, np.zeros((n, n)), np.zeros((self._row_count, n)), np.zeros(n))
-        return along.derivatives(motion, directions, lambda lanes: along.x.moving[:, lanes])
+        return push.derivatives(motion, directions, lambda lanes: push.x.moving[:, lanes])
 
     def _relieve_drives(self, change: Real) -> None:
         """A force along a prescribed speed relieves its drive, and does nothing else."""

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from flexmb.system.along import Along
 from flexmb.system.observables import Observation
+from flexmb.system.pushforward import Pushforward
 from flexmb.system.section_loads import SectionBalance
 from flexmb.typing import Real
 
@@ -34,11 +34,11 @@ def _complex(duals: Any, lane: int) -> Any:
     return duals[..., 0] + 1j * SMALL * duals[..., lane]
 
 
-def section_row(balance: SectionBalance, along: Along, observation: Observation, lanes: slice) -> Real:
-    """(6 X,lanes) derivatives of the section loads (X,6), for `Along.derivatives`."""
-    value, change = along.row(slice(0, 1))[:, 0], along.row(lanes)
+def section_row(balance: SectionBalance, push: Pushforward, observation: Observation, lanes: slice) -> Real:
+    """(6 X,lanes) derivatives of the section loads (X,6), for `Pushforward.derivatives`."""
+    value, change = push.row(slice(0, 1))[:, 0], push.row(lanes)
     found = []
     for i, lane in enumerate(range(lanes.start, lanes.stop)):
         exerted: Any = observation.evaluation(value + 1j * SMALL * change[:, i])
-        found.append(balance.transmitted(exerted, _InLane(along.w, lane)).imag.ravel() / SMALL)  # type: ignore[arg-type]
+        found.append(balance.transmitted(exerted, _InLane(push.w, lane)).imag.ravel() / SMALL)  # type: ignore[arg-type]
     return np.array(found).T

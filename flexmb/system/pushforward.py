@@ -39,7 +39,7 @@ class Directions(NamedTuple):
     time: Real
 
 
-class Along:
+class Pushforward:
     """The tables in dual numbers of one thread, and the kernel (): everything observable of the motion in them."""
 
     def __init__(
