@@ -27,7 +27,7 @@ SCENES = {
     "connectors": everything,
 }
 SMALL = {name: replace(recipe, bodies=6) for name, recipe in RECIPES.items()}
-pytestmark = pytest.mark.filterwarnings("ignore:.*friction rises to")
+pytestmark = pytest.mark.filterwarnings("ignore:.*is doubtful")
 
 
 @dataclass(frozen=True)
