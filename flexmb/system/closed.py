@@ -267,6 +267,9 @@ class ClosedSystem(ChainDerivatives, System):
     def _open_row(self, t: float, y: Real) -> Flags:
         return np.isnan(self._row(t, y, self._motion(t, y, "articulated")))
 
+    def _open_loads(self, state: State, axes: Axes, about: tuple[str, str] | None) -> dict[str, Flags]:
+        return {name: np.isnan(load) for name, load in self.hinge_loads(state, axes=axes, about=about).items()}
+
     def _open_sections(self, state: State, balance: SectionBalance) -> Flags:
         return np.isnan(balance.at(self.all_loads(state)))
 

@@ -18,6 +18,7 @@ from flexmb.entry.variation import StateDerivatives, Variation
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
 from flexmb.scene.open_loop import refuse_feedback
+from flexmb.system.complex_step import load_row, section_row
 from flexmb.system.derivative_records import (
     AccelerationDerivatives,
     By,
@@ -30,8 +31,8 @@ from flexmb.system.derivative_records import (
 from flexmb.system.factors import MassMatrixFactors
 from flexmb.system.free_motion import FreeMotion
 from flexmb.system.kinks import has_corners, refuse_kinks
+from flexmb.system.load_axes import Axes, referred
 from flexmb.system.pushforward import Directions, GivenMotion, Pushforward
-from flexmb.system.section_derivatives import section_row
 from flexmb.system.section_loads import SectionBalance
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
@@ -107,14 +108,30 @@ class Derivatives(FreeMotion):
             change[self._open_row(t, y)] = np.nan
         return by_names(observation, row, change, partial(_split, self.nu, kind))
 
+    def hinge_load_derivatives(
+        self, state: State, *, axes: Axes = "world", about: tuple[str, str] | None = None
+    ) -> dict[str, OfFreeMotion]:
+        """Derivatives (6,nu) of `hinge_loads(state, axes=axes, about=about)` of the free motion, by hinge and closure.
+
+        In axes that turn, or about a node that moves, these turn and move with the state.
+        """
+        t, y = self._differentiable(state, "system.hinge_load_derivatives")
+        referred(self, self.own_workspace, {}, axes, about)  # refuses unknown axes and nodes
+        push, seen, open_ = self._pushforward, (axes, about), self._open_loads(state, axes, about)
+        motion, directions = self._freely(t, y)
+        change = push.derivatives(motion, directions, partial(load_row, self, push, self.observation, seen))
+        names = *self.observation.names.hinges, *self.observation.names.closures
+        found = dict(zip(names, finite_result(change, t).reshape(len(names), 6, -1), strict=True))
+        for name, is_open in open_.items():
+            found[name][is_open] = np.nan
+        return {name: _split(self.nu, OfFreeMotion, each) for name, each in found.items()}
+
     def section_load_derivatives(self, state: State, body: str, x: Any) -> OfFreeMotion:
         """Derivatives (X,6,nu) of `section_loads(state, body, x).load`, of the free motion."""
         t, y = self._differentiable(state, "system.section_load_derivatives")
         balance, push = SectionBalance(self, body, x), self._pushforward
         motion, directions = self._freely(t, y)
-        change = push.derivatives(
-            motion, directions, lambda lanes: section_row(balance, push, self.observation, lanes)
-        )
+        change = push.derivatives(motion, directions, partial(section_row, balance, push, self.observation))
         is_open = self._open_sections(state, balance)
         found = finite_result(change, t).reshape(*is_open.shape, -1)
         return _split(self.nu, OfFreeMotion, np.where(is_open[..., None], np.nan, found))
@@ -154,6 +171,10 @@ class Derivatives(FreeMotion):
     def _open_row(self, t: float, y: Real) -> Flags:
         """Which entries of a row (E,) the free motion does not determine."""
         return np.zeros(self.observation.width, bool)
+
+    def _open_loads(self, state: State, axes: Axes, about: tuple[str, str] | None) -> dict[str, Flags]:
+        """Which components (6,) of loads in axes, about a node, it does not determine, by hinge and closure."""
+        return {}
 
     def _open_sections(self, state: State, balance: SectionBalance) -> Flags:
         """Which section loads (X,6) it does not determine."""

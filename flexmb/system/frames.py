@@ -9,9 +9,10 @@ import numpy as np
 from flexmb.building.links import Side, closure_sides
 from flexmb.modal.flexible_model import FlexibleNode
 from flexmb.scene.bodies import SidBody
-from flexmb.scene.quaternions import rotation_by, rotation_matrix
+from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.tree import GROUND, rest_frames
 from flexmb.system.scene_arrays import SceneArrays
+from flexmb.system.turning_points import rotation_along
 from flexmb.typing import Real
 
 
@@ -89,7 +90,7 @@ def deformed(at: FlexibleNode, eta: Real) -> tuple[Real, Real]:
     if at.second is not None:
         position = position + 0.5 * np.einsum("amn,m,n->a", at.second.translation, eta, eta)
         theta = theta + 0.5 * np.einsum("amn,m,n->a", at.second.rotation, eta, eta)
-    return rotation_by(theta) @ at.rotation, position
+    return rotation_along(theta[None])[0] @ at.rotation, position
 
 
 def hinge_frames(arrays: SceneArrays, w: MotionTables) -> dict[str, HingeFrames]:

@@ -181,6 +181,20 @@ def test_section_loads_of_a_loop() -> None:
     assert np.max(np.abs(found - wanted)) <= 30.0 * np.max(doubt) + 1e-8 * np.max(np.abs(wanted))
 
 
+@pytest.mark.parametrize("name", ["four-bar, overconstrained", "connected"])
+def test_loads_in_other_axes(name: str) -> None:
+    """What is not determined there has no derivative there; by forces they are turned, for the axes stay."""
+    system, state, _, d = asked(name)
+    values, found = system.hinge_loads(state, axes="outboard"), system.hinge_load_derivatives(state, axes="outboard")
+    world = system.hinge_loads(state)
+    for load, value in values.items():
+        np.testing.assert_array_equal(np.isnan(found[load].by_speed).all(axis=1), np.isnan(value))
+        if not np.isnan(world[load]).any() and not np.isnan(value).any():
+            turned, fixed = found[load].by_force[3:], d.loads[load].by_force[3:]
+            size = np.max(np.abs(fixed), initial=1.0) ** 2
+            np.testing.assert_allclose(turned.T @ turned, fixed.T @ fixed, rtol=0.0, atol=1e-9 * size)
+
+
 def test_what_is_refused() -> None:
     system, state, *_ = asked("flexible four-bar")
     with pytest.raises(NotImplementedError, match="for given accelerations are for trees only"):

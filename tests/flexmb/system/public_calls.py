@@ -99,6 +99,9 @@ def calls() -> dict[str, Call]:
     add("System.section_load_derivatives", tree.section_load_derivatives, of_sections, state=states, body=names,
         x=chosen(None, "root", [0.6], [-0.1], [[0.1]], [np.nan], [0.1j], plain=(([0.25, 0], np.array([0.25, 0.0])),)),
     )  # fmt: skip
+    in_axes = {"state": state, "axes": "outboard", "about": ("arm", "tip")}
+    add("System.hinge_load_derivatives", tree.hinge_load_derivatives, in_axes, state=states,
+        axes=chosen(None, "body", 5), about=chosen("tip", ("arm", "nowhere"), ("nobody", "tip"), 5))  # fmt: skip
     add("System.acceleration_derivatives", tree.acceleration_derivatives, {"state": state, "forces": rates},
         state=states, forces=but_none(vectors))  # fmt: skip
     add("System.inverse_dynamics_derivatives", tree.inverse_dynamics_derivatives, of_rates, state=states,
@@ -158,7 +161,7 @@ def calls() -> dict[str, Call]:
     start = chain.initial_state
     for name in (
         "mass_matrix", "bias", "energy", "momentum", "determined_loads", "closure_gaps", "hinge_loads", "digits_left",
-        "mass_properties", "precision", "admissible", "evaluation_derivatives",
+        "mass_properties", "precision", "admissible", "evaluation_derivatives", "hinge_load_derivatives",
     ):  # fmt: skip
         add(f"ClosedSystem.{name}", getattr(chain, name), {"state": start}, state=closed_states)
     add(

@@ -12,12 +12,10 @@ import pytest
 import flexmb as fm
 from flexmb.dense import DenseSystem
 from flexmb.entry import articulated
-from flexmb.system.kinks import NotDifferentiableError
 from tests import trees
 from tests.bounds import UNIT_ROUNDOFF, algebra
 from tests.flexmb.connectors.connected_scenes import everything
 from tests.flexmb.entry.test_tangent import RECIPES, H, extrapolated, terms
-from tests.flexmb.system import test_section_loads as sections
 
 SCENES = {
     "every level": lambda: trees.random_scene(0, trees.EVERY_LEVEL),
@@ -231,33 +229,6 @@ def test_observed_quantities_against_the_dense_route(recipe: str, seed: int) -> 
         assert max(planted) > bound * size, "a planted error of a hundred-millionth"
 
 
-@pytest.mark.parametrize("name", ["every level", "stiffened", "connectors"])
-def test_loads_of_given_accelerations(name: str) -> None:
-    """By accelerations they are linear; by the state and time as differences of inverse dynamics say."""
-    at = asked(name)
-    system, t, q, u = at.system, at.state.t, at.state.q, at.state.u
-    rng = np.random.default_rng(11)
-    rates, other = rng.normal(size=(2, system.nu))
-    d = system.evaluation_derivatives(at.state, rates)
-    here, there = (system.hinge_loads(at.state, each) for each in (rates, rates + 2.0**20 * other))
-    for hinge, load in here.items():
-        size = max(np.max(np.abs(each)) for each in there.values()) / 2.0**20
-        np.testing.assert_allclose(
-            d.loads[hinge].by_acceleration @ other, (there[hinge] - load) / 2.0**20, rtol=0.0, atol=1e-11 * size
-        )
-    np.testing.assert_array_equal(d.accelerations.by_acceleration, np.eye(system.nu))
-    for xi, du, dt in directions(at):
-        moved = lambda h, xi=xi, du=du, dt=dt: np.concatenate(list(system.hinge_loads(  # noqa: E731
-            system.state(q + h * at.of_rates.motion @ xi, u + h * du, t + h * dt), rates
-        ).values()))  # fmt: skip
-        expected, doubt = extrapolated(moved, 1e-2)
-        found = np.concatenate([
-            each.by_displacement @ xi + each.by_speed @ du + each.by_time * dt for each in d.loads.values()
-        ])  # fmt: skip
-        size = np.max(np.abs(moved(0.0)))
-        assert np.max(np.abs(found - expected)) <= 30.0 * np.max(doubt) + 1e-10 * size
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_rates_along_the_motion(name: str) -> None:
     """A marker's position changes by its velocity, and its velocity by its acceleration."""
@@ -334,31 +305,6 @@ def test_forces_as_motors_exert_them(name: str) -> None:
         assert not by.by_force.any()
 
 
-@pytest.mark.parametrize("connected", [False, True])
-def test_section_loads_against_differences(connected: bool) -> None:
-    scene = sections.everything(connected=connected)
-    system = fm.compile(scene)
-    state, body, x = sections.somewhere(system), "beam", [0.0, 0.7, 1.6]
-    rng = np.random.default_rng(8)
-    d = system.section_load_derivatives(state, body, x)
-    motion = system.acceleration_derivatives(state).motion
-    free = system.constants.speed["prescribed"] < 0
-    xi, du = rng.normal(size=(2, system.nu)) * np.where(free, 1e-2, 0.0)
-    for dq, dv, dt, found in (
-        (motion @ xi, 0.0, 0.0, d.by_displacement @ xi),
-        (0.0, du, 0.0, d.by_speed @ du),
-        (0.0, 0.0, 1e-2, d.by_time * 1e-2),
-    ):
-        moved = lambda h, dq=dq, dv=dv, dt=dt: system.section_loads(  # noqa: E731
-            system.state(state.q + h * dq, state.u + h * dv, state.t + h * dt), body, x
-        ).load  # fmt: skip
-        expected, doubt = extrapolated(moved, 1e-1)
-        size = max(np.max(np.abs(expected)), 1e-3 * np.max(np.abs(moved(0.0))))
-        assert np.max(np.abs(found - expected)) <= 30.0 * np.max(doubt) + 1e-9 * size
-        if np.max(np.abs(expected)) > 1e-3:
-            assert np.max(np.abs(found * (1.0 + 1e-5) - expected)) > 30.0 * np.max(doubt) + 1e-9 * size, "planted"
-
-
 def pushed(torque: float, *, closed: bool = False) -> fm.System:
     """A flexible arm and a swinging bar, with a motor; closed to a loop by a spherical closure."""
     scene = fm.SceneBuilder("pushed", gravity=(0.3, -9.81, 0.5))
@@ -404,86 +350,3 @@ def test_prescribed_columns_vanish() -> None:
     for name in at.of_all.loads:
         assert not at.of_all.loads[name].by_speed[:, held].any()
     assert at.of_rates.by_time.any() and at.of_all.loads["h3"].by_time.any()
-
-
-def with_stop(angle: float) -> fm.System:
-    scene = fm.SceneBuilder("stopped", gravity=(0.0, -9.81, 0.0))
-    scene.rigid_body("arm", mass=1.0, com=(0.5, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
-    scene.revolute("pivot", "ground", "arm", angle=angle)
-    scene.angular_spring("stop", "pivot", upper=0.5, stop_stiffness=100.0)
-    return fm.compile(scene.scene())
-
-
-def with_cable(length: float) -> fm.System:
-    scene = fm.SceneBuilder("tethered", gravity=(0.0, 0.0, 0.0))
-    scene.rigid_body("bob", mass=1.0, inertia=(0.1, 0.1, 0.1))
-    scene.prismatic("slide", "ground", "bob", axis=(1.0, 0.0, 0.0), position=length)
-    scene.spring_damper("cable", "ground", "bob", free_length=0.4, stiffness=50.0, acts="tension")
-    return fm.compile(scene.scene())
-
-
-def test_corners_of_laws_are_refused() -> None:
-    """Just at the stop or just slack; on either side derivatives exist, and differ."""
-    for make, at, step, slope in ((with_stop, 0.5, 0.1, -100.0 / 0.35), (with_cable, 0.4, 0.1, -50.0)):
-        corner = make(at)
-        for ask in (corner.acceleration_derivatives, corner.evaluation_derivatives):
-            with pytest.raises(NotDifferentiableError, match='connector "(stop|cable)" has no derivative'):
-                ask(corner.initial_state)
-        with pytest.raises(NotDifferentiableError):
-            corner.inverse_dynamics_derivatives(corner.initial_state, np.zeros(1))
-        before, after = (make(at + side * step) for side in (-1, 1))
-        one, other = (each.acceleration_derivatives(each.initial_state).by_displacement for each in (before, after))
-        gravity = 9.81 * 0.5 / 0.35 if make is with_stop else 0.0
-        np.testing.assert_allclose(one, gravity * np.sin(at - step), atol=1e-9)
-        np.testing.assert_allclose(other, gravity * np.sin(at + step) + slope, rtol=1e-6)
-
-
-def test_friction_at_rest_is_smooth() -> None:
-    """Its derivative is finite there: -level / smoothing / I."""
-    scene = fm.SceneBuilder("rubbing")
-    scene.rigid_body("disc", mass=1.0, inertia=(0.1, 0.1, 0.1)).revolute("pivot", "ground", "disc")
-    scene.angular_friction("bearing", "pivot", sliding=0.3, smoothing=0.02)
-    system = fm.compile(scene.scene())
-    d = system.acceleration_derivatives(system.initial_state)
-    np.testing.assert_allclose(d.by_speed, -0.3 / 0.02 / 0.1, rtol=1e-12)
-
-
-def test_what_is_refused() -> None:
-    at = asked("every level")
-    system, state = at.system, at.state
-    for wrong in (np.nan, np.inf):
-        with pytest.raises(ValueError, match="give finite numbers"):
-            q = state.q.copy()
-            q[0] = wrong
-            system.acceleration_derivatives(fm.State(q, state.u))
-        with pytest.raises(ValueError, match="accelerations"):
-            system.inverse_dynamics_derivatives(state, np.full(system.nu, wrong))
-        with pytest.raises(ValueError, match="accelerations"):
-            system.evaluation_derivatives(state, np.full(system.nu, wrong))
-    with pytest.raises(TypeError, match="a State is needed"):
-        system.evaluation_derivatives(state.q)  # type: ignore[call-overload]
-    with pytest.raises(ValueError, match="is no beam of the scene"):
-        system.section_load_derivatives(state, "nobody", [0.0])
-    with pytest.raises(ArithmeticError):
-        system.acceleration_derivatives(system.state(state.q, 1e200 * np.ones(system.nu)))
-
-
-def test_controllers_are_refused_with_the_remedy() -> None:
-    from tests.flexmb.system.test_copies import controlled
-
-    system = fm.compile(controlled())
-    state = system.initial_state
-    for ask in (system.acceleration_derivatives, system.evaluation_derivatives):
-        with pytest.raises(NotImplementedError, match=r"has controllers.*open_loop.*linearize"):
-            ask(state)
-    opened = fm.compile(fm.open_loop(controlled()))
-    assert np.isfinite(opened.acceleration_derivatives(opened.initial_state).by_displacement).all()
-
-
-def test_a_scene_without_freedom() -> None:
-    scene = fm.SceneBuilder("still").rigid_body("block", mass=1.0, inertia=(0.1, 0.1, 0.1)).weld("w", "ground", "block")
-    system = fm.compile(scene.scene())
-    d = system.evaluation_derivatives(system.initial_state)
-    assert d.loads["w"].by_speed.shape == (6, 0) and not d.loads["w"].by_time.any()
-    rates = system.acceleration_derivatives(system.initial_state)
-    assert {getattr(rates, field.name).size for field in fields(rates)} == {0}
