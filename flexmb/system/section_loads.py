@@ -153,7 +153,7 @@ class SectionBalance:
     def transmitted(self, exerted: Evaluation, w: MotionTables) -> Real:
         """Loads (X,6) of `SectionLoads` that balance the momentum of a motion and the loads that others exert.
 
-        An analytic function of all these numbers, which may be complex: `flexmb.system.section_derivatives`.
+        An analytic function of all these numbers, which may be complex: `flexmb.system.complex_step`.
         """
         arrays, k = self._arrays, self._k
         pose = body_pose(arrays, w, k)
