@@ -1,0 +1,158 @@
+"""The force of a flexible body's own inertia and elasticity, and how it changes: the level's kernels with dual numbers.
+
+The directions are the three components of the angular velocity, then the displacements and the speeds of the modes; none
+leaves the body. Accelerations stay: a change s1 = (x, y) adds x x w and 2 x x v to them, with the velocity v of the
+origin of the body frame.
+"""
+
+from flexmb.jain.derivatives.hinges import force_to_world
+from flexmb.jain.derivatives.ports import seed_mode
+from flexmb.jit.duals import rate, seeded
+from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import LANES
+from flexmb.levels.body import body_inertia, is_at_rest
+from flexmb.spatial.inertia import inertia_times, load_inertia, rotate_inertia, shift_inertia, store_inertia
+from flexmb.spatial.spatial_vector import axpy6, plus6, shift_motion, store6, times6_t, vec6
+from flexmb.spatial.vector import add, cross, mat3, scale, store3, times, vec3
+
+
+@helper
+def own_flexible_force(c, w, d, k):
+    """Inertia, `by_rate` and force of body k alone, and the rows and columns of its modes."""
+    e, nm = d.duals, c.body[k].modes
+    R, V, A = mat3(d.body[k].rotation, 0), vec6(w.body[k].velocity, 0), _acceleration(d, k)
+    store6(e.body[k].velocity, 0, V)
+    for n in range(nm):
+        e.eta[k, n], e.etad[k, n] = w.eta[k, n], w.etad[k, n]
+    last = 3 if is_at_rest(c.body[k].level) else 3 + 2 * nm
+    for first in range(0, last, LANES):
+        count = min(LANES, last - first)
+        for lane in range(count):
+            _seed(e, k, nm, first + lane, lane)
+        body_inertia(c, e, k)
+        _force(c, w, d, k, A)
+        for lane in range(count):
+            _keep(c, w, d, k, first + lane, lane)
+    _to_world(c, d, k, R, V)
+    _elastic_rows(c, d, k)
+
+
+@helper
+def _acceleration(d, k):
+    """Classical acceleration of the origin of body k, relative to free fall, body axes."""
+    R, origin = mat3(d.body[k].rotation, 0), vec3(d.body[k].origin, 0)
+    V, A = shift_motion(vec6(d.body[k].velocity, 0), origin), shift_motion(vec6(d.body[k].accel, 0), origin)
+    return times6_t(R, (A[0], add(A[1], cross(V[0], V[1]))))
+
+
+@helper
+def _seed(e, k, nm, n, lane):
+    if n < 3:
+        e.body[k].velocity[n] = seeded(e.body[k].velocity[n], lane)
+    else:
+        seed_mode(e, k, nm, n - 3, lane)
+
+
+@helper
+def _force(c, w, d, k, A):
+    """f_m = M_m alpha_m + b_m of duals, as `flexmb.jain.inverse` has it: to hinge_force and zf."""
+    e, nm, first = d.duals, c.body[k].modes, c.body[k].etad_index
+    F = inertia_times(load_inertia(e.body[k].inertia, 0), A)
+    for n in range(nm):
+        M_fr = vec6(e.pfr[k, n], 0)
+        F = axpy6(w.speed[first + n].acceleration, M_fr, F)
+        row = plus6(e.zf[k, n], M_fr, A)
+        for i in range(nm):
+            row += e.pff[k, n, i] * w.speed[first + i].acceleration
+        e.zf[k, n] = row
+    store6(e.body[k].hinge_force, 0, F)
+    for i in range(6):
+        e.body[k].hinge_force[i] += e.body[k].force[i]
+
+
+@helper
+def _keep(c, w, d, k, n, lane):
+    """The derivatives along one lane; the seed of this direction is removed."""
+    e, nm, nu = d.duals, c.body[k].modes, d.speed.shape[0]
+    first = d.places[k].modes
+    if n < 3:
+        e.body[k].velocity[n] = w.body[k].velocity[n]
+        for i in range(6):
+            d.local[i, n] = rate(e.body[k].hinge_force[i], lane)
+        for i in range(nm):
+            d.mode[k, i].by_rate[n] = rate(e.zf[k, i], lane)
+        return
+    speed = 0 if n < 3 + nm else 1
+    n -= 3 + speed * nm
+    if speed:
+        e.etad[k, n] = w.etad[k, n]
+    else:
+        e.eta[k, n] = w.eta[k, n]
+    for i in range(6):
+        d.mode[k, n].force[6 * speed + i] = rate(e.body[k].hinge_force[i], lane)
+    for i in range(nm):
+        d.matrix[first + i, speed * nu + first + n] = rate(e.zf[k, i], lane)
+
+
+@helper
+def _to_world(c, d, k, R, V):
+    """The numbers of the body in World axes about the base point."""
+    e, nm, origin = d.duals, c.body[k].modes, vec3(d.body[k].origin, 0)
+    inertia = _inertia(e, k)
+    F = _six(e.body[k].hinge_force, 0)
+    store6(d.body[k].force, 0, force_to_world(R, origin, F))
+    for j in range(3):
+        # the unit vector j of World in body axes
+        x = (R[3 * j], R[3 * j + 1], R[3 * j + 2])
+        change = cross(x, V[0]), scale(2.0, cross(x, V[1]))
+        D = inertia_times(inertia, change)
+        D = axpy6(x[0], _column(d.local, 0), axpy6(x[1], _column(d.local, 1), axpy6(x[2], _column(d.local, 2), D)))
+        torque, force = force_to_world(R, origin, D)
+        for i in range(3):
+            d.body[k].by_rate[3 * i + j] = torque[i]
+            d.body[k].by_rate[9 + 3 * i + j] = force[i]
+    store_inertia(d.body[k].inertia, 0, shift_inertia(rotate_inertia(R, inertia), origin))
+    for n in range(nm):
+        M_fr, by_rate = _six(e.pfr[k, n], 0), vec3(d.mode[k, n].by_rate, 0)
+        across = cross(V[0], M_fr[0]), cross(V[1], M_fr[1])
+        # M_fr . (x x w, 2 x x v) = x . (w x angular part + 2 v x linear part)
+        store3(d.mode[k, n].by_rate, 0, times(R, add(by_rate, add(across[0], scale(2.0, across[1])))))
+        store3(d.mode[k, n].by_turn, 0, (0.0, 0.0, 0.0))
+        store6(d.mode[k, n].row, 0, force_to_world(R, origin, M_fr))
+        for at in range(0, 12, 6):
+            store6(d.mode[k, n].force, at, force_to_world(R, origin, vec6(d.mode[k, n].force, at)))
+
+
+@helper
+def _column(a, n):
+    return (a[0, n], a[1, n], a[2, n]), (a[3, n], a[4, n], a[5, n])
+
+
+@helper
+def _six(a, i):
+    """The numbers of six duals."""
+    return (a[i].real, a[i + 1].real, a[i + 2].real), (a[i + 3].real, a[i + 4].real, a[i + 5].real)
+
+
+@helper
+def _inertia(e, k):
+    """The numbers of the body's spatial inertia."""
+    a = e.body[k].inertia
+    return (
+        (a[0].real, a[1].real, a[2].real, a[3].real, a[4].real, a[5].real),
+        (
+            a[6].real, a[7].real, a[8].real, a[9].real, a[10].real, a[11].real, a[12].real, a[13].real, a[14].real,
+        ),
+        (a[15].real, a[16].real, a[17].real, a[18].real, a[19].real, a[20].real),
+    )  # fmt: skip
+
+
+@helper
+def _elastic_rows(c, d, k):
+    """Stiffness and damping of the modes, and their masses in the third part of `matrix`."""
+    first, nm, nu = d.places[k].modes, c.body[k].modes, d.speed.shape[0]
+    for i in range(nm):
+        for n in range(nm):
+            d.matrix[first + i, first + n] += c.stiffness[k, i, n]
+            d.matrix[first + i, nu + first + n] += c.damping[k, i, n]
+            d.matrix[first + i, 2 * nu + first + n] = d.duals.pff[k, i, n].real

@@ -1,0 +1,219 @@
+"""Ports of bodies that deform: their motion, and what each mode does to a port relative to its body.
+
+With V_r and A_r of a port relative to the body, the motion J of mode n, and the derivatives a of V_r and b of A_r along
+it while the body frame stays,
+
+    displacement    s0 = J    s1 = a - J x V    s2 = V_body x a + b - J x A - s1 x V
+    speed           s0 = 0    s1 = J            s2 = V_body x J + b - J x V
+
+with the velocity V and acceleration A of the port. Where the hinge point O sits on a node d that the modes move in the
+body, it is the body frame that moves against O, with the motion -J of d. At level ruthless the modes move nothing, and
+only their accelerations act.
+"""
+
+from flexmb.jain.derivatives.hinges import put_seed, to_world
+from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_ACCELERATION, SPEED_BY_RATE, TURN
+from flexmb.jain.ports import mode_motion, move_port
+from flexmb.jit.duals import rate, seeded
+from flexmb.jit.features import has
+from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import LANES
+from flexmb.levels.body import is_at_rest
+from flexmb.spatial.cross6 import motion_cross
+from flexmb.spatial.rows import column3, column6, store_column3, store_column6
+from flexmb.spatial.spatial_vector import ZERO6, axpy6, scale6, shift_motion, store6, sub6, sum6, vec6
+from flexmb.spatial.vector import add, cross, mat3, scale, store3, sub, times, vec3
+from flexmb.tables.features import OUTBOARD_NODES
+
+
+@helper
+def clear_ports(c, d, k):
+    """No forces and inertia at the ports of body k."""
+    for i in range(c.body[k].port_start, c.body[k].port_stop):
+        if d.port[i].used:
+            for n in range(21):
+                d.port[i].inertia[n] = 0.0
+            for n in range(18):
+                d.port[i].by_rate[n] = 0.0
+                d.port[i].by_turn[n] = 0.0
+            store6(d.port[i].force, 0, ZERO6)
+
+
+@helper
+def move_ports(c, w, d, k):
+    """Motion of the ports of body k in World axes, and what its modes do to them."""
+    R = mat3(d.body[k].rotation, 0)
+    V_body, A_body = vec6(d.body[k].velocity, 0), vec6(d.body[k].accel, 0)
+    for i in range(c.body[k].port_start, c.body[k].port_stop):
+        if d.port[i].used:
+            r = add(vec3(d.body[k].origin, 0), times(R, vec3(w.port[i].r, 0)))
+            store3(d.port[i].position, 0, r)
+            V, A = V_body, A_body
+            if c.body[k].modes > 0:
+                V_r, A_r = to_world(R, r, vec6(w.port[i].v, 0)), to_world(R, r, _relative_acceleration(c, w, k, i))
+                V, A = sum6(V_body, V_r), sum6(sum6(A_body, motion_cross(V_body, V_r)), A_r)
+                _change(c, w, d, k, i)
+                for n in range(c.body[k].modes):
+                    _seed(c, w, d, k, i, n, R, r, V, A)
+            store6(d.port[i].velocity, 0, V)
+            store6(d.port[i].accel, 0, A)
+
+
+@helper
+def _seed(c, w, d, k, i, n, R, r, V, A):
+    """What mode n does to port i, which moves with V and A."""
+    J, V_body = to_world(R, r, mode_motion(w, i, n)), vec6(d.body[k].velocity, 0)
+    store6(d.port_mode[i, n].motion, 0, J)
+    if is_at_rest(c.body[k].level):
+        return
+    a, b = to_world(R, r, _six(d, 0, n)), to_world(R, r, _six(d, 6, n))
+    s1 = sub6(a, motion_cross(J, V))
+    s2 = sub6(sum6(motion_cross(V_body, a), b), sum6(motion_cross(J, A), motion_cross(s1, V)))
+    store6(d.port_mode[i, n].by_rate, 0, s1)
+    store6(d.port_mode[i, n].by_acceleration, 0, s2)
+    b = to_world(R, r, _six(d, 12, n))
+    s2 = sub6(sum6(motion_cross(V_body, J), b), motion_cross(J, V))
+    store6(d.port_mode[i, n].speed_by_acceleration, 0, s2)
+
+
+@helper
+def move_frame(c, w, d, k, R, r, V, A):
+    """V and A of the body frame from those of O on a deforming node of the body, and what the modes do to the frame."""
+    i = c.body[k].outboard_port
+    V_r, A_r = to_world(R, r, vec6(w.port[i].v, 0)), to_world(R, r, _relative_acceleration(c, w, k, i))
+    V_body = sub6(V, V_r)
+    A_body = sub6(A, sum6(motion_cross(V_body, V_r), A_r))
+    _change(c, w, d, k, i)
+    for n in range(c.body[k].modes):
+        J = scale6(-1.0, to_world(R, r, mode_motion(w, i, n)))
+        store6(d.frame_mode[k, n].motion, 0, J)
+        if not is_at_rest(c.body[k].level):
+            # the axes of O stay, so that V_r and A_r change by more than in the body's axes
+            change = sum6(to_world(R, r, _six(d, 0, n)), motion_cross(J, V_r))
+            dV = scale6(-1.0, change)
+            dA = sum6(motion_cross(dV, V_r), motion_cross(V_body, change))
+            dA = sum6(dA, sum6(to_world(R, r, _six(d, 6, n)), motion_cross(J, A_r)))
+            s1 = sub6(dV, motion_cross(J, V_body))
+            s2 = sub6(scale6(-1.0, dA), sum6(motion_cross(J, A_body), motion_cross(s1, V_body)))
+            store6(d.frame_mode[k, n].by_rate, 0, s1)
+            store6(d.frame_mode[k, n].by_acceleration, 0, s2)
+            # speeds: V_r changes by -J, V_body by J
+            dA = sum6(motion_cross(J, V_r), motion_cross(V_body, scale6(-1.0, J)))
+            dA = sum6(dA, to_world(R, r, _six(d, 12, n)))
+            s2 = sub6(scale6(-1.0, dA), motion_cross(J, V_body))
+            store6(d.frame_mode[k, n].speed_by_acceleration, 0, s2)
+    return V_body, A_body
+
+
+@helper
+def see_modes(c, d, k):
+    """Seeds of the parent's modes as body k sees them at its inboard frame, about its base point."""
+    p, i = c.body[k].parent, c.body[k].inboard_port
+    new_point, at_rest = d.places[k].new_point != 0, is_at_rest(c.body[p].level)
+    step = vec3(d.body[k].step, 0)
+    for n in range(d.places[k].sees):
+        slot, frame = d.places[k].seen + n, d.frame_mode[p, n]
+        J, s2, s1, s2_speed = ZERO6, ZERO6, ZERO6, ZERO6
+        if i >= 0:
+            port = d.port_mode[i, n]
+            J, s2 = vec6(port.motion, 0), vec6(port.by_acceleration, 0)
+            s1, s2_speed = vec6(port.by_rate, 0), vec6(port.speed_by_acceleration, 0)
+        if has(c, OUTBOARD_NODES) and c.body[p].outboard_port >= 0:
+            J, s2 = sum6(J, vec6(frame.motion, 0)), sum6(s2, vec6(frame.by_acceleration, 0))
+            s1 = sum6(s1, vec6(frame.by_rate, 0))
+            s2_speed = sum6(s2_speed, vec6(frame.speed_by_acceleration, 0))
+        if new_point:
+            J, s1 = shift_motion(J, step), shift_motion(s1, step)
+            s2, s2_speed = shift_motion(s2, step), shift_motion(s2_speed, step)
+        store_column6(d.seed, slot, J)
+        put_seed(d, BY_RATE, slot, s1)
+        put_seed(d, BY_ACCELERATION, slot, s2)
+        put_seed(d, SPEED_BY_ACCELERATION, slot, s2_speed)
+        turn = scale(0.0 if at_rest else 1.0, J[0])
+        store_column3(d.seed, TURN, slot, turn)
+        store_column3(d.seed, SPEED_BY_RATE, slot, turn)
+
+
+@helper
+def _six(d, row, n):
+    return column3(d.change, row, n), column3(d.change, row + 3, n)
+
+
+@helper
+def _relative_acceleration(c, w, k, i):
+    """A_r of port i, in body axes, with what the modal accelerations add."""
+    w_rel, v_rel = vec6(w.port[i].v, 0)
+    alpha, a = vec6(w.port[i].a, 0)
+    A = alpha, sub(a, cross(w_rel, v_rel))
+    for n in range(c.body[k].modes):
+        A = axpy6(w.speed[c.body[k].etad_index + n].acceleration, mode_motion(w, i, n), A)
+    return A
+
+
+@helper
+def _change(c, w, d, k, i):
+    """Derivatives of V_r, A_r and the motions of port i to `change` and `bent`; its point moves along, too."""
+    if is_at_rest(c.body[k].level):
+        return
+    e, nm = d.duals, c.body[k].modes
+    for n in range(nm):
+        e.eta[k, n] = w.eta[k, n]
+        e.etad[k, n] = w.etad[k, n]
+    for first in range(0, 2 * nm, LANES):
+        count = min(LANES, 2 * nm - first)
+        for lane in range(count):
+            seed_mode(e, k, nm, first + lane, lane)
+        move_port(c, e, k, i)
+        _store_relative(c, w, d, k, i)
+        for lane in range(count):
+            n = first + lane
+            if n < nm:
+                _keep_displacement(c, d, k, i, n, lane)
+                e.eta[k, n] = w.eta[k, n]
+            else:
+                for row in range(6):
+                    d.change[12 + row, n - nm] = rate(e.body[k].accel[row], lane)
+                e.etad[k, n - nm] = w.etad[k, n - nm]
+
+
+@helper
+def seed_mode(e, k, nm, n, lane):
+    """Direction n < nm is a displacement of that mode, nm + n the change of its speed."""
+    if n < nm:
+        e.eta[k, n] = seeded(e.eta[k, n], lane)
+    else:
+        e.etad[k, n - nm] = seeded(e.etad[k, n - nm], lane)
+
+
+@helper
+def _store_relative(c, w, d, k, i):
+    """A_r of duals, to their body's acceleration, which is not needed otherwise."""
+    e = d.duals
+    w_rel, v_rel = vec6(e.port[i].v, 0)
+    alpha, a = vec6(e.port[i].a, 0)
+    A = alpha, sub(a, cross(w_rel, v_rel))
+    for n in range(c.body[k].modes):
+        A = axpy6(w.speed[c.body[k].etad_index + n].acceleration, column6(e.port_mode[i], n), A)
+    store6(e.body[k].accel, 0, A)
+
+
+@helper
+def _keep_displacement(c, d, k, i, n, lane):
+    """The derivatives along one lane as spatial vectors about the port's point as it is now."""
+    e = d.duals
+    moved = (rate(e.port[i].r[0], lane), rate(e.port[i].r[1], lane), rate(e.port[i].r[2], lane))
+    for row in range(3):
+        d.change[row, n] = rate(e.port[i].v[row], lane)
+        d.change[6 + row, n] = rate(e.body[k].accel[row], lane)
+    spin = (e.port[i].v[0].real, e.port[i].v[1].real, e.port[i].v[2].real)
+    alpha = (e.body[k].accel[0].real, e.body[k].accel[1].real, e.body[k].accel[2].real)
+    v, a = cross(moved, spin), cross(moved, alpha)
+    for row in range(3):
+        d.change[3 + row, n] = rate(e.port[i].v[3 + row], lane) + v[row]
+        d.change[9 + row, n] = rate(e.body[k].accel[3 + row], lane) + a[row]
+    for j in range(c.body[k].modes):
+        mode = (e.port_mode[i, 0, j].real, e.port_mode[i, 1, j].real, e.port_mode[i, 2, j].real)
+        v = cross(moved, mode)
+        for row in range(3):
+            d.bent[i, n, j, row] = rate(e.port_mode[i, row, j], lane)
+            d.bent[i, n, j, 3 + row] = rate(e.port_mode[i, 3 + row, j], lane) + v[row]

@@ -1,0 +1,91 @@
+"""Derivatives of M udot + b - T for known accelerations, and from them those of the accelerations."""
+
+from flexmb.jain.derivatives.applied import subtract_applied
+from flexmb.jain.derivatives.attached import attach, wheel_rows
+from flexmb.jain.derivatives.bodies import own_force
+from flexmb.jain.derivatives.connected import attach_connectors, link
+from flexmb.jain.derivatives.modes import mode_rows
+from flexmb.jain.derivatives.motion import move
+from flexmb.jain.derivatives.ports import clear_ports, move_ports
+from flexmb.jain.derivatives.rows import add_answer, inward
+from flexmb.jain.derivatives.solve import solve
+from flexmb.jain.derivatives.work import differentiate_power
+from flexmb.jit.features import has
+from flexmb.jit.kernel import helper, kernel
+from flexmb.tables.features import CONNECTORS, LOADS, MODES, PRESCRIBED, WHEELS
+
+
+@kernel
+def inverse_dynamics(c, w, d, masses):
+    """Derivatives of M udot + b to `matrix`, in the order of places; M beside them if `masses`.
+
+    Needs the velocity sweep in w, that of poses if there are connectors, and udot in w.speed.acceleration.
+    """
+    nu = d.speed.shape[0]
+    for place in range(nu):
+        _clear(d.matrix[place], 0, 3 * nu if masses else 2 * nu)
+    for k in range(c.body.shape[0]):
+        move(c, w, d, k)
+        if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):
+            clear_ports(c, d, k)
+            move_ports(c, w, d, k)
+        own_force(c, w, d, k)
+        if has(c, LOADS) or has(c, WHEELS):
+            attach(c, w, d, k)
+    for f in range(c.function.shape[0]):
+        for i in range(3):
+            d.duals.function[f, i] = w.function[f, i]
+    if has(c, CONNECTORS):
+        attach_connectors(c, w, d)
+    for k in range(c.body.shape[0] - 1, -1, -1):
+        if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):
+            _answer_of_ports(c, d, k)
+        if has(c, MODES) and c.body[k].modes > 0:
+            mode_rows(c, d, k, masses)
+        if has(c, WHEELS):
+            wheel_rows(c, w, d, k, masses)
+        inward(c, w, d, k, masses)
+    if has(c, CONNECTORS):
+        link(c, d)
+
+
+@helper
+def _answer_of_ports(c, d, k):
+    """Add what is attached to the ports of body k."""
+    for i in range(c.body[k].port_start, c.body[k].port_stop):
+        if d.port[i].used:
+            add_answer(c, d.body[k], d.port[i])
+
+
+@helper
+def _clear(row, start, stop):
+    for j in range(start, stop):
+        row[j] = 0.0
+
+
+@kernel
+def accelerations(c, w, d):
+    """Derivatives of udot by displacement, speed and force to `matrix`, after forward dynamics in w."""
+    inverse_dynamics(c, w, d, False)
+    subtract_applied(c, w, d)
+    nu = w.u.shape[0]
+    for place in range(nu):
+        _clear(d.matrix[place], 2 * nu, 3 * nu)
+        d.matrix[place, 2 * nu + place] = -1.0
+    solve(c, w, d, 3 * nu)
+
+
+@kernel
+def accelerations_and_power(c, w, d):
+    """Derivatives of udot by displacement and speed to `matrix`, and of the power to `work`, likewise."""
+    masses = has(c, PRESCRIBED)  # rows of prescribed speeds, for the loads of their drives
+    inverse_dynamics(c, w, d, masses)
+    subtract_applied(c, w, d)
+    differentiate_power(c, w, d)
+    nu = w.u.shape[0]
+    solve(c, w, d, 2 * nu)
+    if masses:
+        for place in range(nu):
+            row, load = d.matrix[place], d.work[2 * nu + place]
+            for n in range(2 * nu):
+                d.work[n] += load * row[n]

@@ -1,0 +1,267 @@
+"""The arrays of the derivatives of a tree, and the order of its rows and columns.
+
+A *place* is a row of the matrices, as in `flexmb.jain.places`: depth first. A *slot* is a source of motion as the bodies
+beyond it see it: a hinge speed has one slot, a mode has one for each body and wheel that sits on a port of its body,
+because each port moves differently. The slots from the base to a body are divided into *runs*: contiguous slots whose
+places are contiguous too, and whose spatial vectors are about one point, so that loops over them run in strips.
+
+All spatial vectors are in World axes. They are about a *base point* near the body: the hinge point of the body itself
+or of one of a few bodies inboard, `BODIES_A_POINT` in a row. A common point of the whole tree would save all shifts, but
+moments about a far point lose digits; a point for each body would need a shift at every body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+
+from flexmb.jain.places import Matrices, matrices
+from flexmb.jit.bundle import bundle
+from flexmb.jit.duals import DUAL
+from flexmb.jit.lanes import LANES
+from flexmb.jit.strips import strip_zeros
+from flexmb.jit.wide_arrays import as_duals
+from flexmb.tables.arrays import ON_GROUND, Constants, Workspace
+from flexmb.tables.workspaces import workspace
+from flexmb.typing import Index, Real, Record
+
+BODIES_A_POINT = 8
+"""Moments about a point eight bodies away lose two digits at most."""
+
+BLOCK = 4
+"""Strips of columns that are solved together: as many independent sums hide the time that one product takes."""
+
+_F, _I = np.float64, np.int64
+
+PLACES = np.dtype(
+    [
+        ("hinge", _I),  # first place of the body's hinge
+        ("modes", _I),  # of its modes
+        ("wheels", _I),  # of its wheels
+        ("stop", _I),  # end of what it carries
+        ("slot", _I),  # first slot of the body's hinge
+        ("seen", _I),  # first slot of its parent's modes as it sees them
+        ("sees", _I),  # number of these: none where neither its inboard port nor its parent's frame moves by them
+        ("inboard_run", _I),  # the last run of all sources inboard of its hinge, or -1
+        ("inboard_end", _I),  # end of the slots there
+        ("run", _I),  # the same of all sources inboard of the body, with its hinge
+        ("end", _I),
+        ("new_point", _I),  # whether its hinge point is a base point
+        ("leaves_point", _I),  # whether no source inboard of its hinge is about its base point
+        ("first", _I),  # whether it is the first in the inward sweep to add to its parent's force
+        ("tip", _I),  # whether it carries nothing
+    ],
+    align=True,
+)
+RUN = np.dtype(
+    [
+        ("start", _I),  # first slot
+        ("offset", _I),  # place less slot
+        ("inboard", _I),  # the run inboard, or -1
+        ("stop", _I),  # end of the slots of that run that are inboard of this one
+        ("body", _I),  # the first body of this run, whose base point is new if `new_point`
+        ("new_point", _I),
+    ],
+    align=True,
+)
+BODY = np.dtype(
+    [
+        ("rotation", _F, (9,)),  # R_World_body
+        ("position", _F, (3,)),  # of O
+        ("origin", _F, (3,)),  # of the body frame, which is O unless the modes move O in the body
+        ("step", _F, (3,)),  # from the parent's base point to the body's, where they differ
+        ("velocity", _F, (6,)),  # V
+        ("accel", _F, (6,)),  # A, relative to free fall
+        ("inertia", _F, (21,)),  # I of the body, then of all that it carries too
+        # columns of (6,3): change of the force with the angular part of s1, of all that it carries too
+        ("by_rate", _F, (18,)),
+        ("by_turn", _F, (18,)),  # likewise of s0: of loads that keep their direction in World
+        ("force", _F, (6,)),  # F, the load across the hinge on all that it carries
+    ],
+    align=True,
+)
+PORT = np.dtype(
+    [
+        ("used", _I),  # whether a body, wheel or load is attached to it
+        ("position", _F, (3,)),
+        ("velocity", _F, (6,)),
+        ("accel", _F, (6,)),
+        ("inertia", _F, (21,)),  # of all that is attached to it
+        ("by_rate", _F, (18,)),
+        ("by_turn", _F, (18,)),
+        ("force", _F, (6,)),  # on all that is attached to it
+    ],
+    align=True,
+)
+# What a mode does to a port relative to its body, or to the body frame relative to O: its motion J, then s1 and
+# s2 of a displacement, s2 of a speed. At level ruthless a mode has no other effect than its acceleration J.
+MOVED = np.dtype(
+    [
+        ("motion", _F, (6,)),
+        ("by_rate", _F, (6,)),
+        ("by_acceleration", _F, (6,)),
+        ("speed_by_acceleration", _F, (6,)),
+    ],
+    align=True,
+)
+MODE = np.dtype(
+    [
+        ("row", _F, (6,)),  # l2 without the motion of the body frame: M_fr, and what the ports add
+        ("by_rate", _F, (3,)),  # l1
+        ("by_turn", _F, (3,)),  # l0
+        ("force", _F, (12,)),  # change of the body's own force by displacement, then by speed
+    ],
+    align=True,
+)
+# Rows of `seed`: what a unit of a source does to all bodies beyond.
+MOTION, BY_RATE, BY_ACCELERATION, SPEED_BY_ACCELERATION, TURN, SPEED_BY_RATE, ROWS = 0, 6, 12, 18, 24, 27, 30
+# Rows of `end`, six each: J; s0 and s1 of displacements; s1 of speeds.
+END_MOTION, END_DISPLACED, END_MOVED, END_SPEED, END_ROWS = 0, 6, 12, 18, 24
+
+
+@bundle
+class Duals(Workspace):
+    """A workspace whose numbers are duals, for derivatives of single hinges and bodies."""
+
+    numbers = DUAL
+
+
+@bundle
+class Derivatives:
+    """The arrays that the derivatives of a tree write. One set per thread."""
+
+    places: Record  # (N,) PLACES
+    run: Record  # (runs,) RUN
+    body: Record  # (N,) BODY
+    speed: Index  # (nu,) number in u of a place
+    place: Index  # (nu,) place of a speed
+    shape: Index  # (2,) whether the tree branches; whether places are the numbers in u
+    # (ROWS,slots) MOTION: the motion J at unit speed; BY_RATE: s1 of a displacement; BY_ACCELERATION: its s2;
+    # SPEED_BY_ACCELERATION: s2 of a speed; and only for scenes with modes, because they are else those of J, TURN
+    # and SPEED_BY_RATE: angular parts of s0 of a displacement and of s1 of a speed
+    seed: Real
+    force: Real  # (18,nu) change of the load across each hinge inboard, [torque; force]: by displacement, speed, rate
+    matrix: Real  # (nu,3nu) d(M udot + b) by displacement, by speed, and M or -1; then the solution
+    gain: Real  # (nu,6) of the factors of M
+    factor: Real  # (nu,)
+    passed: Real  # (N,6,block) forces, then accelerations, of one block of columns
+    moved: Real  # (N,6,6,6) of hinges that are no single axis: derivatives of H in outboard axes by displacement
+    turned: Real  # (3,6,6) of one such hinge: of V_r and A_r by displacement, of A_r by speed, in columns
+    port: Record  # (P,) PORT
+    port_mode: Record  # (P,m) MOVED, relative to the body
+    frame_mode: Record  # (N,m) MOVED of the body frame relative to O; zero unless the modes move O in the body
+    mode: Record  # (N,m) MODE
+    bent: Real  # (P,m,m,6) derivatives of the motions of a port at unit speed of mode j by displacement n: [n, j]
+    change: Real  # (18,m) of one port: of its V_r and A_r by displacements, of A_r by speeds, in body axes
+    end: Real  # (2,END_ROWS,nu) what all sources do to the two ends of a connector
+    # (C,13,24) derivatives of the forces on the bodies of A and B, and of the power, by s0 and s1 of A, then of B
+    link: Real
+    passed_row: Real  # (24,) of one row
+    work: Real  # (3nu,) derivatives of the power by displacements and speeds, and by accelerations
+    local: Real  # (6,3) of one body: derivatives of its force by its angular velocity, body axes
+    duals: Duals
+
+
+def duals(c: Constants, nq: int, nu: int) -> Duals:
+    """A dual workspace of the right sizes."""
+    tables = workspace(c, nq, nu)
+    return Duals(**{field.name: as_duals(getattr(tables, field.name)) for field in fields(tables)})
+
+
+def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
+    """Arrays of the right sizes."""
+    order = matrices(c)
+    places, runs, slots = _places_and_runs(c, order)
+    place = np.empty(nu, np.int64)
+    place[order.speed] = np.arange(nu)
+    columns = 3 * nu + BLOCK * LANES  # room for the last block
+    m = c.mfr.shape[2]
+    return Derivatives(
+        places=places,
+        run=runs,
+        body=np.zeros(len(c.body), BODY),
+        speed=order.speed,
+        place=place,
+        shape=np.array([len(runs) > 1, np.array_equal(place, np.arange(nu))], np.int64),
+        seed=strip_zeros((ROWS, slots + LANES)),
+        force=strip_zeros((18, nu + LANES)),
+        matrix=strip_zeros((nu, columns)),
+        gain=np.zeros((nu, 6)),
+        factor=np.zeros(nu),
+        passed=strip_zeros((len(c.body), 6, BLOCK * LANES)),
+        moved=np.zeros((len(c.body) if np.any(c.body["axis"] < 0) else 1, 6, 6, 6)),
+        turned=np.zeros((3, 6, 6)),
+        port=_ports(c),
+        port_mode=np.zeros((len(c.port), m), MOVED),
+        frame_mode=np.zeros((len(c.body), m), MOVED),
+        mode=np.zeros((len(c.body), m), MODE),
+        bent=np.zeros((len(c.port), m, m, 6)),
+        change=np.zeros((18, m)),
+        end=strip_zeros((2, END_ROWS, nu + LANES)) if len(c.connector) + len(c.load) else strip_zeros((2, END_ROWS, LANES)),
+        link=np.zeros((len(c.connector), 13, 24)),
+        passed_row=np.zeros(24),
+        work=strip_zeros((3 * nu + LANES,)),
+        local=np.zeros((6, 3)),
+        duals=duals(c, nq, nu),
+    )
+
+
+def _ports(c: Constants) -> Record:
+    """(P,) PORT with what is attached where."""
+    port = np.zeros(len(c.port), PORT)
+    for attached in (c.body["inboard_port"], c.wheel["port"], c.load["port"], c.end["port"][c.end["body"] != ON_GROUND]):
+        port["used"][attached[attached >= 0]] = 1
+    return port
+
+
+def _places_and_runs(c: Constants, order: Matrices) -> tuple[Record, Record, int]:
+    """Places of each body, the runs, and the number of slots."""
+    body = c.body
+    places = np.zeros(len(body), PLACES)
+    for name in ("hinge", "modes", "wheels", "stop"):
+        places[name] = getattr(order, name)
+    since = np.zeros(len(body), np.int64)  # bodies since the last base point
+    paths = _Paths()
+    for k in np.argsort(places["hinge"], kind="stable").tolist():  # a weld has the place of what it carries first
+        own, p = places[k], int(body["parent"][k])
+        moves = p >= 0 and (body["inboard_port"][k] >= 0 or body["outboard_port"][p] >= 0)
+        seen = int(body["modes"][p]) if moves else 0
+        count = int(body["nv"][k])
+        since[k] = since[p] + 1 if p >= 0 else BODIES_A_POINT
+        new = since[k] >= BODIES_A_POINT and (p < 0 or seen + count > 0)
+        since[k] = 0 if new else since[k]
+        path = (-1, 0) if p < 0 else (int(places["run"][p]), int(places["end"][p]))
+        own["new_point"], own["leaves_point"], own["seen"] = new, new and not seen, paths.slots
+        own["sees"] = seen
+        path = paths.extended(path, k, int(places["modes"][p]), seen, new)
+        own["inboard_run"], own["inboard_end"] = path
+        own["slot"] = paths.slots
+        own["run"], own["end"] = paths.extended(path, k, int(own["hinge"]), count, new and not seen)
+    begun = set[int]()
+    for k in range(len(body) - 1, -1, -1):
+        p = int(body["parent"][k])
+        places["first"][k] = p not in begun
+        begun.add(p)
+    places["tip"] = [k not in begun for k in range(len(body))]
+    return places, np.array(paths.runs or [(0, 0, -1, 0, 0, 0)], RUN), paths.slots
+
+
+class _Paths:
+    """Runs as they are found. A path is the number of its last run, and the end of its slots there."""
+
+    def __init__(self) -> None:
+        self.runs: list[tuple[int, ...]] = []
+        self.slots = 0
+
+    def extended(self, path: tuple[int, int], body: int, place: int, count: int, new_point: bool) -> tuple[int, int]:
+        """The path with `count` further slots, for places from `place` on."""
+        if not count:
+            return path
+        run, end = path
+        goes_on = run >= 0 and not new_point and end == self.slots and self.runs[run][1] == place - self.slots
+        if not goes_on:
+            self.runs.append((self.slots, place - self.slots, run, end, body, int(new_point)))
+            run = len(self.runs) - 1
+        self.slots += count
+        return run, self.slots
