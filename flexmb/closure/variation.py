@@ -61,15 +61,18 @@ def variation(
     of_loads, of_rates = np.zeros((len(loads), nq + nu + 1)), found.of_slope[nq:].copy()
     of_loads[chosen] = -solve_triangular(R, opening)
     of_rates[free] -= solve_triangular(root, Q @ opening, lower=True, trans=1)
-    lever, inertia, R_inverse = np.zeros((nu, len(loads))), np.zeros((len(loads),) * 2), np.linalg.inv(R)
+    R_inverse, motion = np.linalg.inv(R), found.of_slope[:nq, nq:-1]
+    lever, inertia, by_force = (np.zeros((m, n)) for m, n in ((nu, len(loads)), (len(loads),) * 2, (len(loads), nu)))
     lever[np.ix_(free, chosen)] = solve_triangular(root, Q @ R_inverse.T, lower=True, trans=1)
     inertia[np.ix_(chosen, chosen)] = R_inverse @ R_inverse.T
-    loads_by_force = np.zeros((len(loads), nu))
-    loads_by_force[np.ix_(chosen, free)] = -solve_triangular(R, solve_triangular(root, Q, lower=True, trans=1).T)
+    by_force[np.ix_(chosen, free)] = -solve_triangular(R, solve_triangular(root, Q, lower=True, trans=1).T)
+
+    def along_speeds(change: Real, by_force: Real) -> StateDerivatives:
+        return StateDerivatives(change[:, :nq] @ motion, change[:, nq:-1], by_force, change[:, -1])
+
     return Variation(
-        accelerations, StateDerivatives(of_rates[:, :-1], of_rates[:, -1], _by_force(root, Q, free, nu)),
-        found.of_slope[:nq, nq:-1], loads, StateDerivatives(of_loads[:, :-1], of_loads[:, -1], loads_by_force),
-        lever, inertia,
+        accelerations, along_speeds(of_rates, _by_force(root, Q, free, nu)), motion, loads,
+        along_speeds(of_loads, by_force), lever, inertia,
     )  # fmt: skip
 
 

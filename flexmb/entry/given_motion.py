@@ -25,7 +25,7 @@ from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.levels.body import AT_REST
-from flexmb.motion.coordinates import configuration_rate, hinge_forces, load_state
+from flexmb.motion.coordinates import hinge_forces, load_state
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 
@@ -40,14 +40,13 @@ class MotionTangent:
     state: Real  # (nq+nu+1,) y = [q, u, work]
     rates: Real  # (nu,) accelerations
     tau: Real  # (nu,) of inverse dynamics, written
-    moving: Real  # (nq,) dq/dt, written
 
 
 def motion_tangent(nq: int, nu: int) -> MotionTangent:
     """All zero; one per thread."""
     return MotionTangent(
         time=as_duals(np.zeros(1)), state=as_duals(np.zeros(nq + nu + 1)), rates=as_duals(np.zeros(nu)),
-        tau=as_duals(np.zeros(nu)), moving=as_duals(np.zeros(nq)),
+        tau=as_duals(np.zeros(nu)),
     )  # fmt: skip
 
 
@@ -69,12 +68,10 @@ def observe_given(x, c, w, out):
 
 @helper
 def invert(x, c, w):
-    """Inverse dynamics of the motion x: tau to x.tau, loads of hinges to w.body.load, dq/dt to x.moving; a status code.
-    """
+    """Inverse dynamics of the motion x: tau to x.tau, loads of hinges to w.body.load; returns a status code."""
     load_state(x.time[0], x.state, c, w)
     for j in range(x.rates.shape[0]):
         w.speed[j].acceleration = x.rates[j]
-    configuration_rate(c, w, x.moving)
     hinge_forces(c, w)
     status = inverse_dynamics(c, w, x.tau)
     pose_sweep(c, w)

@@ -1,7 +1,8 @@
 """Exact derivatives at one state: of accelerations, of inverse dynamics, and of everything observable.
 
-No differences are formed: kernels carry derivatives along (`flexmb.jit.duals`), and what follows from them by linear
-equations is solved for. `docs/derivatives.md` says what is held fixed.
+No differences are formed: derivatives of the equations of motion of a tree are found by recursion
+(`flexmb.jain.derivatives`), others by kernels that carry them along (`flexmb.jit.duals`), and what follows from them by
+linear equations is solved for. `docs/derivatives.md` says what is held fixed.
 """
 
 from __future__ import annotations
@@ -11,12 +12,18 @@ from typing import Any, overload
 
 import numpy as np
 
+from flexmb.entry.derivatives import (
+    DerivativeWorkspace,
+    acceleration_derivatives,
+    derivative_workspace,
+    inverse_dynamics_derivatives,
+)
 from flexmb.entry.given_motion import motion_tangent, observe_given
 from flexmb.entry.observed_tangent import outputs_tangent
-from flexmb.entry.tangent import TangentWorkspace, jacobian, tangent_workspace, time_derivative
-from flexmb.entry.variation import StateDerivatives, Variation
+from flexmb.entry.tangent import TangentWorkspace, tangent_workspace, time_derivative
+from flexmb.entry.variation import StateDerivatives, Variation, coordinate_motion, displacement_of
 from flexmb.jit.direct import Direct, direct
-from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
+from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.system.complex_step import load_row, section_row
 from flexmb.system.derivative_records import (
@@ -28,7 +35,6 @@ from flexmb.system.derivative_records import (
     OfGivenMotion,
     by_names,
 )
-from flexmb.system.factors import MassMatrixFactors
 from flexmb.system.free_motion import FreeMotion
 from flexmb.system.kinks import has_corners, refuse_kinks
 from flexmb.system.load_axes import Axes, referred
@@ -59,24 +65,22 @@ class Derivatives(FreeMotion):
         at = self._variation(t, y)
         if forces is not None:
             at = self._under_forces(at, t, y, self.layout.rates("forces", forces))
-        by_coordinates, by_speed = np.hsplit(at.of_accelerations.by_state, [self.nq])
-        return AccelerationDerivatives(
-            at.accelerations, by_coordinates @ at.motion, by_speed, at.of_accelerations.by_force,
-            at.of_accelerations.by_time, by_coordinates, at.motion,
-        )  # fmt: skip
+        by_coordinates = at.of_accelerations.by_displacement @ displacement_of(at.motion)
+        return AccelerationDerivatives(at.accelerations, *at.of_accelerations, by_coordinates, at.motion)
 
     def inverse_dynamics_derivatives(self, state: State, accelerations: Real) -> InverseDynamicsDerivatives:
         """Derivatives of `inverse_dynamics` at these accelerations (nu,); of closed chains those of the tree alone."""
         t, y = self._differentiable(state, "system.inverse_dynamics_derivatives")
         rates = self.layout.rates("accelerations", accelerations)
-        push, nq, nu = self._pushforward, self.nq, self.nu
-        motion = GivenMotion(t, y, rates, np.zeros(self._row_count))
-        found = push.derivatives(motion, self._unit_directions(), lambda lanes: push.x.tau[:, lanes])
-        finite_result(found, t)
-        N, by_coordinates = self._coordinate_motion(motion), found[:, :nq]
+        parts = by_displacement, by_speed, M = np.zeros((3, self.nu, self.nu))
+        self._differentiate_inverse(t, y, rates, *parts)
+        held = self.constants.speed["prescribed"] >= 0
+        by_displacement[:, held] = by_speed[:, held] = 0.0
+        finite_result(np.concatenate(parts), t)
+        N = self._coordinate_motion(t, y)
         return InverseDynamicsDerivatives(
-            self.inverse_dynamics(state, rates), by_coordinates @ N, found[:, nq : nq + nu], self.mass_matrix(state),
-            found[:, -1], by_coordinates, N,
+            self.inverse_dynamics(state, rates), by_displacement, by_speed, M, self._inverse_by_time(t, y, rates),
+            by_displacement @ displacement_of(N), N,
         )  # fmt: skip
 
     @overload
@@ -140,18 +144,33 @@ class Derivatives(FreeMotion):
 
     def _variation(self, t: float, y: Real) -> Variation:
         """How the free motion changes."""
-        nq, nu, n, w = self.nq, self.nu, len(y), self._tangent
-        J, drift = np.empty((n, n)), np.empty(n)
         accelerations = self.accelerations(self.layout.known(t, y))  # with the checks, errors and warnings
-        self.check_status(self._differentiate(t, y, J), int(w.fault[0]))
-        self.check_status(self._differentiate_by_time(t, y, drift), int(w.fault[0]))
-        factors = MassMatrixFactors(self.constants, self.workspace, t, y, self.constants)
-        self.check_status(factors.status, factors.fault)
-        by_force = factors.solve(np.eye(nu)) if nu else np.zeros((0, 0))
-        of_rates = StateDerivatives(finite_result(J[nq:-1, :-1], t), finite_result(drift[nq:-1], t), by_force)
-        none = StateDerivatives(np.zeros((0, nq + nu)), np.zeros(0), np.zeros((0, nu)))
-        rows = np.zeros((nu, 0)), np.zeros((0, 0))
-        return Variation(accelerations, of_rates, J[:nq, nq:-1], np.zeros(0), none, *rows)
+        w, parts = self._derivative_workspace, np.zeros((3, self.nu, self.nu))
+        self.check_status(self._differentiate(t, y, *parts), int(w.fault[0]))
+        by_displacement, by_speed, by_force = finite_result(parts, t)
+        of_rates = StateDerivatives(by_displacement, by_speed, by_force, self._by_time(t, y))
+        none = np.zeros((0, self.nu))
+        return Variation(
+            accelerations, of_rates, self._coordinate_motion(t, y), np.zeros(0),
+            StateDerivatives(none, none, none, np.zeros(0)), none.T, np.zeros((0, 0)),
+        )  # fmt: skip
+
+    def _by_time(self, t: float, y: Real) -> Real:
+        """Explicit derivatives (nu,) of the accelerations by time."""
+        if not len(self.constants.function):
+            return np.zeros(self.nu)
+        drift = np.empty_like(y)
+        self.check_status(self._differentiate_by_time(t, y, drift), int(self._tangent.fault[0]))
+        return finite_result(drift[self.nq : -1], t)
+
+    def _inverse_by_time(self, t: float, y: Real, rates: Real) -> Real:
+        """The same of inverse dynamics at these accelerations (nu,)."""
+        if not len(self.constants.function):
+            return np.zeros(self.nu)
+        motion, push = GivenMotion(t, y, rates, np.zeros(self._row_count)), self._pushforward
+        later = self._directions(np.zeros((self.nq, 0)), 0)
+        found = push.derivatives(motion, later, lambda lanes: push.x.tau[:, lanes])
+        return finite_result(found, t)[:, 0]
 
     @per_thread
     def _pushforward(self) -> Pushforward:
@@ -187,9 +206,25 @@ class Derivatives(FreeMotion):
         return tangent_workspace(self.constants, self.nq, self.nu)
 
     @per_thread
+    def _derivative_workspace(self) -> DerivativeWorkspace:
+        return derivative_workspace(self.constants, self.nq, self.nu)
+
+    @per_thread
     def _differentiate(self) -> Direct:
-        """(t, y, J)."""
-        return direct(jacobian, STATUS, REAL, VECTOR, MATRIX, self.constants, self._tangent)
+        """(t, y, by_displacement, by_speed, by_force)."""
+        tables = self.constants, self._derivative_workspace
+        return direct(acceleration_derivatives, STATUS, REAL, VECTOR, MATRIX, MATRIX, MATRIX, *tables)
+
+    @per_thread
+    def _differentiate_inverse(self) -> Direct:
+        """(t, y, rates, by_displacement, by_speed, by_acceleration)."""
+        tables = self.constants, self._derivative_workspace
+        return direct(inverse_dynamics_derivatives, VOID, REAL, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, *tables)
+
+    @per_thread
+    def _move(self) -> Direct:
+        """(t, y, N)."""
+        return direct(coordinate_motion, VOID, REAL, VECTOR, MATRIX, self.constants, self.own_workspace)
 
     @per_thread
     def _differentiate_by_time(self) -> Direct:
@@ -207,18 +242,18 @@ class Derivatives(FreeMotion):
             refuse_kinks(self, self.own_workspace)
         return t, y
 
+    def _coordinate_motion(self, t: float, y: Real) -> Real:
+        """N (nq,nu): derivatives of dq/dt by the speeds."""
+        N = np.zeros((self.nq, self.nu))
+        self._move(t, y, N)
+        return N
+
     def _freely(self, t: float, y: Real) -> tuple[GivenMotion, Directions]:
         """The free motion, and how it changes by displacements and speeds, forces and time."""
-        at, nq, nu = self._variation(t, y), self.nq, self.nu
-
-        def by_all(change: StateDerivatives) -> Real:
-            by_displacement = change.by_state[:, :nq] @ at.motion
-            return np.column_stack([by_displacement, change.by_state[:, nq:], change.by_force, change.by_time])
-
-        state, time = self._changes_of_state(at.motion, nu + 1), np.zeros(3 * nu + 1)
-        time[-1] = 1.0
+        at = self._variation(t, y)
+        state, time = self._directions(at.motion, self.nu)[::3]
         motion = GivenMotion(t, y, at.accelerations, at.loads)
-        return motion, Directions(state, by_all(at.of_accelerations), by_all(at.of_loads), time)
+        return motion, Directions(state, at.of_accelerations.by_all, at.of_loads.by_all, time)
 
     def _under_forces(self, at: Variation, t: float, y: Real, forces: Real) -> Variation:
         """The motion under further generalised forces (nu,), which the scene's motion `at` is without.
@@ -228,56 +263,41 @@ class Derivatives(FreeMotion):
         """
         push, rows, nu = self._pushforward, self._row_count, self.nu
         x, f = at.of_accelerations.by_force @ forces, at.of_loads.by_force @ forces
+        directions = self._directions(at.motion, 0)
 
         def left(accelerations: Real, loads: Real) -> Real:
-            """Derivatives of M accelerations - J' loads + c and J accelerations + gamma by [q, u] and time."""
-            motion = GivenMotion(t, y, accelerations, loads)
-            return push.derivatives(motion, self._unit_directions(), push.balance)
+            """Derivatives of M accelerations - J' loads + c and J accelerations + gamma."""
+            return push.derivatives(GivenMotion(t, y, accelerations, loads), directions, push.balance)
 
         drift, opening = np.vsplit(finite_result(left(x, f) - left(np.zeros(nu), np.zeros(rows)), t), [nu])
-        of_rates, of_loads = at.of_accelerations, at.of_loads
-        turned = of_rates.by_force @ drift + at.lever @ opening
-        loaded = of_loads.by_force @ drift + at.inertia @ opening
+
+        def turned(of: StateDerivatives, by_row: Real) -> StateDerivatives:
+            less = of.by_force @ drift + by_row @ opening
+            by_displacement, by_speed, by_time = np.hsplit(less, [nu, 2 * nu])
+            return StateDerivatives(
+                of.by_displacement - by_displacement, of.by_speed - by_speed, of.by_force, of.by_time - by_time[:, 0]
+            )
+
         return at._replace(
-            accelerations=at.accelerations + x,
-            of_accelerations=of_rates._replace(
-                by_state=of_rates.by_state - turned[:, :-1], by_time=of_rates.by_time - turned[:, -1]
-            ),
-            loads=at.loads + f,
-            of_loads=of_loads._replace(
-                by_state=of_loads.by_state - loaded[:, :-1], by_time=of_loads.by_time - loaded[:, -1]
-            ),
-        )
+            accelerations=at.accelerations + x, of_accelerations=turned(at.of_accelerations, at.lever),
+            loads=at.loads + f, of_loads=turned(at.of_loads, at.inertia),
+        )  # fmt: skip
 
     def _as_given(self, t: float, y: Real, rates: Real) -> tuple[GivenMotion, Directions]:
         """A motion with these accelerations, and its changes by displacements, speeds, accelerations and time."""
-        nu, motion = self.nu, GivenMotion(t, y, rates, np.zeros(0))
-        state, time = self._changes_of_state(self._coordinate_motion(motion), nu + 1), np.zeros(3 * nu + 1)
-        time[-1] = 1.0
-        accelerations = np.zeros((nu, 3 * nu + 1))
-        accelerations[:, 2 * nu : -1] = np.eye(nu)
-        return motion, Directions(state, accelerations, np.zeros((0, 3 * nu + 1)), time)
+        directions = self._directions(self._coordinate_motion(t, y), self.nu)
+        directions.accelerations[:, 2 * self.nu : -1] = np.eye(self.nu)
+        return GivenMotion(t, y, rates, np.zeros(0)), directions
 
-    def _changes_of_state(self, N: Real, others: int) -> Real:
-        """(nq+nu,2nu+others) of [q, u] by displacements, by speeds, and by others, which leave it as it is."""
-        state = np.zeros((self.nq + self.nu, 2 * self.nu + others))
-        state[: self.nq, : self.nu], state[self.nq :, self.nu : 2 * self.nu] = N, np.eye(self.nu)
-        return state
-
-    def _unit_directions(self) -> Directions:
-        """By each of [q, u], then by time, at the same accelerations and loads."""
-        n = self.nq + self.nu
-        time = np.zeros(n + 1)
-        time[-1] = 1.0
-        none = np.zeros((self.nu, n + 1)), np.zeros((self._row_count, n + 1))
-        return Directions(np.eye(n, n + 1), *none, time)
-
-    def _coordinate_motion(self, motion: GivenMotion) -> Real:
-        """N (nq,nu): derivatives of dq/dt by the speeds."""
-        n, push = self.nu, self._pushforward
-        state = np.eye(self.nq + n)[:, self.nq :]
-        directions = Directions(state, np.zeros((n, n)), np.zeros((self._row_count, n)), np.zeros(n))
-        return push.derivatives(motion, directions, lambda lanes: push.x.moving[:, lanes])
+    def _directions(self, N: Real, others: int) -> Directions:
+        """Changes of [q, u] by displacements and speeds, as many as N (nq,...) has, then `others` in which nothing
+        changes, then time, at the same accelerations and loads."""
+        k, nq = N.shape[1], self.nq
+        state, rates, loads = (np.zeros((n, 2 * k + others + 1)) for n in (nq + self.nu, self.nu, self._row_count))
+        found = Directions(state, rates, loads, np.zeros(2 * k + others + 1))
+        found.state[:nq, :k], found.state[nq:, k : 2 * k] = N, np.eye(self.nu, k)
+        found.time[-1] = 1.0
+        return found
 
     def _relieve_drives(self, change: Real) -> None:
         """A force along a prescribed speed relieves its drive, and does nothing else."""

@@ -200,7 +200,8 @@ def test_what_is_refused() -> None:
     with pytest.raises(NotImplementedError, match="for given accelerations are for trees only"):
         system.evaluation_derivatives(state, np.zeros(system.nu))
     d = system.inverse_dynamics_derivatives(state, np.zeros(system.nu))
-    np.testing.assert_array_equal(d.by_acceleration, system.mass_matrix(state))
+    M = system.mass_matrix(state)
+    np.testing.assert_allclose(d.by_acceleration, M, rtol=0.0, atol=1e-13 * np.max(np.abs(M)))
     scene = m.four_bar(rate=2.0, modes=1)
     ruthless = tuple(msgspec.structs.replace(body, level="ruthless") for body in scene.bodies)
     resting = fm.compile(msgspec.structs.replace(scene, bodies=ruthless))

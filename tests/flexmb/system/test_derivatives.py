@@ -12,6 +12,7 @@ import pytest
 import flexmb as fm
 from flexmb.dense import DenseSystem
 from flexmb.entry import articulated
+from flexmb.entry.tangent import jacobian, tangent_workspace
 from tests import trees
 from tests.bounds import UNIT_ROUNDOFF, algebra
 from tests.flexmb.connectors.connected_scenes import everything
@@ -188,7 +189,22 @@ def test_accelerations_against_the_dense_route(recipe: str, seed: int) -> None:
     identity = M[np.ix_(free, free)] @ d.by_force[np.ix_(free, free)]
     size = np.linalg.norm(M, np.inf) * np.linalg.norm(d.by_force, np.inf)
     np.testing.assert_allclose(identity, np.eye(np.sum(free)), rtol=0.0, atol=bound * size)
-    np.testing.assert_allclose(d.by_coordinates @ d.motion, d.by_displacement, rtol=1e-12)
+    size = np.max(np.abs(d.by_displacement))
+    np.testing.assert_allclose(d.by_coordinates @ d.motion, d.by_displacement, rtol=0.0, atol=1e-14 * size)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_accelerations_against_the_directions_of_duals(name: str) -> None:
+    """The other route pushes each direction through the whole recursion: by raw coordinates, and by speeds."""
+    at = asked(name)
+    system, y, nq = at.system, at.state.y.copy(), at.system.nq
+    J, w = np.empty((len(y), len(y))), tangent_workspace(system.constants, nq, system.nu)
+    assert jacobian(at.state.t, y, J, system.constants, w) == fm.Status.OK
+    by_q, by_u, N = J[nq:-1, :nq], J[nq:-1, nq:-1], J[:nq, nq:-1]
+    d = at.of_rates
+    pairs = (d.by_coordinates, by_q), (d.by_speed, by_u), (d.motion, N), (d.by_displacement, by_q @ N)
+    for found, other in pairs:
+        assert np.max(np.abs(found - other)) <= 1e-11 * np.max(np.abs(other))
 
 
 @pytest.mark.parametrize(("recipe", "seed"), [(name, seed) for name in SMALL for seed in (0, 3)])
