@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from flexmb.entry.observation import parts
+from flexmb.entry.variation import displacement_of
 from flexmb.system.observables import ENERGIES, Observation
 from flexmb.typing import Real
 
@@ -51,8 +53,7 @@ class AccelerationDerivatives:
     by_displacement (nu,nu): by displacements along the speeds, the motions that unit speeds would make in a unit of
     time: of a scalar coordinate, a mode or a wheel its change, of a quaternion a small rotation (rad) in outboard axes,
     of the origin of a free hinge a displacement (m) in outboard axes. by_speed (nu,nu); by_force (nu,nu): by
-    generalised forces, M^-1 in a tree; by_time (nu,). by_coordinates (nu,nq): by the entries of q, with quaternions
-    normalised. motion (nq,nu): dq of displacements, so that by_displacement = by_coordinates @ motion.
+    generalised forces, M^-1 in a tree; by_time (nu,). motion (nq,nu): dq of displacements.
     """
 
     accelerations: Real
@@ -60,8 +61,12 @@ class AccelerationDerivatives:
     by_speed: Real
     by_force: Real
     by_time: Real
-    by_coordinates: Real
     motion: Real
+
+    @cached_property
+    def by_coordinates(self) -> Real:
+        """(nu,nq) by the entries of q, with quaternions normalised: by_displacement = by_coordinates @ motion."""
+        return np.asarray(self.by_displacement @ displacement_of(self.motion))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +78,12 @@ class InverseDynamicsDerivatives:
     by_speed: Real
     by_acceleration: Real
     by_time: Real
-    by_coordinates: Real
     motion: Real
+
+    @cached_property
+    def by_coordinates(self) -> Real:
+        """(nu,nq), as of accelerations."""
+        return np.asarray(self.by_displacement @ displacement_of(self.motion))
 
 
 @dataclass(frozen=True, eq=False)

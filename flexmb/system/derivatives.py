@@ -7,7 +7,7 @@ linear equations is solved for. `docs/derivatives.md` says what is held fixed.
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, overload
 
 import numpy as np
@@ -21,7 +21,7 @@ from flexmb.entry.derivatives import (
 from flexmb.entry.given_motion import motion_tangent, observe_given
 from flexmb.entry.observed_tangent import outputs_tangent
 from flexmb.entry.tangent import TangentWorkspace, tangent_workspace, time_derivative
-from flexmb.entry.variation import StateDerivatives, Variation, coordinate_motion, displacement_of
+from flexmb.entry.variation import StateDerivatives, Variation, coordinate_motion
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.scene.open_loop import refuse_feedback
@@ -65,8 +65,7 @@ class Derivatives(FreeMotion):
         at = self._variation(t, y)
         if forces is not None:
             at = self._under_forces(at, t, y, self.layout.rates("forces", forces))
-        by_coordinates = at.of_accelerations.by_displacement @ displacement_of(at.motion)
-        return AccelerationDerivatives(at.accelerations, *at.of_accelerations, by_coordinates, at.motion)
+        return AccelerationDerivatives(at.accelerations, *at.of_accelerations, at.motion)
 
     def inverse_dynamics_derivatives(self, state: State, accelerations: Real) -> InverseDynamicsDerivatives:
         """Derivatives of `inverse_dynamics` at these accelerations (nu,); of closed chains those of the tree alone."""
@@ -77,10 +76,9 @@ class Derivatives(FreeMotion):
         held = self.constants.speed["prescribed"] >= 0
         by_displacement[:, held] = by_speed[:, held] = 0.0
         finite_result(np.concatenate(parts), t)
-        N = self._coordinate_motion(t, y)
         return InverseDynamicsDerivatives(
             self.inverse_dynamics(state, rates), by_displacement, by_speed, M, self._inverse_by_time(t, y, rates),
-            by_displacement @ displacement_of(N), N,
+            self._coordinate_motion(t, y),
         )  # fmt: skip
 
     @overload
@@ -199,7 +197,11 @@ class Derivatives(FreeMotion):
         """Which section loads (X,6) it does not determine."""
         return np.zeros((len(balance.x), 6), bool)
 
-    # Tables and kernels in dual numbers
+    @cached_property
+    def _has_corners(self) -> bool:
+        return has_corners(self.constants)
+
+    # Tables and kernels of derivatives
 
     @per_thread
     def _tangent(self) -> TangentWorkspace:
@@ -237,7 +239,7 @@ class Derivatives(FreeMotion):
         """Time and y of a state at which derivatives exist."""
         refuse_feedback(self.scene, what, _INSTEAD)
         t, y = self.layout.entering(state)
-        if has_corners(self.constants):
+        if self._has_corners:
             self._inverse(t, y, np.zeros(self.nu))  # evaluates the connectors
             refuse_kinks(self, self.own_workspace)
         return t, y

@@ -348,10 +348,10 @@ def test_further_forces_are_as_those_of_a_motor(closed: bool) -> None:
     found = without.acceleration_derivatives(state, forces)
     expected = motor.acceleration_derivatives(motor.state(state.q, state.u))
     plain = without.acceleration_derivatives(state)
-    for field in fields(found):
-        one, other = getattr(found, field.name), getattr(expected, field.name)
+    for name in (*(field.name for field in fields(found)), "by_coordinates"):
+        one, other = getattr(found, name), getattr(expected, name)
         size = np.max(np.abs(other), initial=1.0)
-        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-11 * size, err_msg=field.name)
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-11 * size, err_msg=name)
     assert np.max(np.abs(plain.by_displacement - found.by_displacement)) > 1e-4 * np.max(np.abs(found.by_displacement))
     with pytest.raises(ValueError, match="forces"):
         without.acceleration_derivatives(state, np.full(without.nu, np.nan))
