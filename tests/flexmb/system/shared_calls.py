@@ -109,6 +109,7 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
         found["acceleration_derivatives"] = lambda s, x: tuple(vars(s.acceleration_derivatives(x, pushed)).values())
         found["inverse_dynamics_derivatives"] = lambda s, x: s.inverse_dynamics_derivatives(x, rates).by_displacement
         found["evaluation_derivatives"] = lambda s, x: vars(s.evaluation_derivatives(x))
+        found["hinge_load_derivatives"] = lambda s, x: s.hinge_load_derivatives(x, axes="outboard")
         found["linearize"] = lambda s, x: fm.linearize(s, x).A
         model = fm.linearize(system, state)
         found["frequency_response"] = lambda s, x: model.frequency_response(model.inputs[-1][0], [1.0 + 0.1 * x.t])
