@@ -40,6 +40,8 @@ _HOME = {
     "flexmb.scene.user_code": "no_user_code",
     "flexmb.system.batch": "Batch",
     "flexmb.system.compile": "compile compile_batch",
+    "flexmb.system.derivative_records": "AccelerationDerivatives EvaluationDerivatives InverseDynamicsDerivatives",
+    "flexmb.system.kinks": "NotDifferentiableError",
     "flexmb.system.observables": "Evaluation",
     "flexmb.system.tree_system": "System",
     "flexmb.tables.state": "DynamicsError PrecisionWarning State",
@@ -87,6 +89,10 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.system.batch import Batch as Batch
     from flexmb.system.compile import compile as compile
     from flexmb.system.compile import compile_batch as compile_batch
+    from flexmb.system.derivative_records import AccelerationDerivatives as AccelerationDerivatives
+    from flexmb.system.derivative_records import EvaluationDerivatives as EvaluationDerivatives
+    from flexmb.system.derivative_records import InverseDynamicsDerivatives as InverseDynamicsDerivatives
+    from flexmb.system.kinks import NotDifferentiableError as NotDifferentiableError
     from flexmb.system.observables import Evaluation as Evaluation
     from flexmb.system.tree_system import System as System
     from flexmb.tables.state import DynamicsError as DynamicsError

@@ -103,6 +103,10 @@ class Closures:
         self.is_singular = False
         """Whether the last motion failed at a singular position, where fewer rows are independent than elsewhere."""
 
+    def check(self, status: int, fault: int) -> None:
+        """DynamicsError unless a status is OK; `fault`: the body or closure at fault."""
+        self._check(status, fault)
+
     def on_tree(self, constants: Constants, tree: Callable[[], Workspace]) -> Closures:
         """The same closures and tree with other functions of time, and with workspaces of their own."""
         return Closures(self.scene, constants, self.constants[1], self._layout, tree, self._slowest, self._check)
@@ -117,6 +121,13 @@ class Closures:
     def row_loads(self) -> Real:
         """(G,) loads of the rows in the last evaluated motion."""
         return self._evaluated.cw.row["load"].copy()
+
+    @property
+    def chosen_rows(self) -> Index:
+        """Numbers of the independent rows that carry the loads at the last evaluated motion."""
+        (_, cc), cw = self.constants, self._evaluated.cw
+        pairs = zip(cc.group["row_start"].tolist(), cw.rank.tolist(), strict=True)
+        return np.concatenate([np.zeros(0, np.int64), *(cw.chosen[at : at + rank] for at, rank in pairs)])
 
     def chain(self, algorithm: str, rate: float = 0.0) -> Closed:
         """The chain for an algorithm, with workspaces of its own; with a `rate` (1/s) closures are stabilised."""

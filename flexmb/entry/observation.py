@@ -93,7 +93,7 @@ def observe(c, w, out):
     It does not evaluate the right-hand side itself: a run needs that kernel anyway, and most of the code is in it.
     """
     observe_free_motion(c, w, out)
-    _observe_motion(c, w, out)
+    observe_bodies(c, w, out)
 
 
 @helper
@@ -127,7 +127,7 @@ def observe_motion(t, y, c, w, out):
     velocity_sweep(c, w, False, False)
     pose_sweep(c, w)
     acceleration_sweep(c, w)
-    _observe_motion(c, w, out)
+    observe_bodies(c, w, out)
 
 
 @kernel
@@ -146,7 +146,7 @@ def sense_markers(t, y, c, w, out):
 
 
 @helper
-def _observe_motion(c, w, out):
+def observe_bodies(c, w, out):
     """Loads of wheels, energy, momentum, connectors and markers.
 
     Needs the velocity, pose and acceleration sweeps of the equations of motion. For bodies of level ruthless the sweeps

@@ -108,6 +108,8 @@ def _single_states() -> None:
         factors = system.factorise(state)
         for solve in (factors.solve, factors.half_solve, factors.half_multiply, factors.multiply):
             solve(rates)
+        system.acceleration_derivatives(state)
+        system.evaluation_derivatives(state)
         assert np.isfinite(factors.log_determinant)
     nested = system.nested()
     y = np.concatenate([state.q, state.u, [0.0]])
@@ -129,6 +131,9 @@ def _single_states_of_a_loop(builder: Callable[[], SceneBuilder]) -> None:
     system.hinge_loads(state)
     system.closure_gaps(state)
     system.closure_operators(state)
+    if not system.closures.at_rest:
+        system.acceleration_derivatives(state)
+        system.evaluation_derivatives(state)
 
 
 def _batches() -> None:

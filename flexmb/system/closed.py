@@ -29,17 +29,17 @@ from flexmb.scene.problems import SceneWarning
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.asking import asked, everything
+from flexmb.system.chain_derivatives import ChainDerivatives
 from flexmb.system.evaluator import Evaluator
 from flexmb.system.free_motion import Given
 from flexmb.system.load_axes import Axes
 from flexmb.system.observables import Evaluation
-from flexmb.system.section_loads import AllLoads
+from flexmb.system.section_loads import AllLoads, SectionBalance
 from flexmb.system.tree_system import System, copied
 from flexmb.tables import arguments
 from flexmb.tables.features import asking
-from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, finite_result, pack
-from flexmb.typing import Index, Real, Record
+from flexmb.typing import Flags, Index, Real, Record
 
 if TYPE_CHECKING:
     from flexmb.frisch.nested_system import NestedSystem
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 LARGEST_INITIAL_GAP = 1e-2
 
 
-class ClosedSystem(System):
+class ClosedSystem(ChainDerivatives, System):
     """A tree with closures. Mass matrix, bias and inverse dynamics are those of the tree alone.
 
     `closure_operators` gives the terms that closures add. Operators and partitions, which belong to the accelerations
@@ -65,11 +65,6 @@ class ClosedSystem(System):
         tree = scene.constraints, self.constants, own, self.layout, self.workspace, slowest
         self._closures = self.own.closures = Closures(*tree, self.check_status)  # for this thread
         self._start: State | None = None
-
-    @per_thread
-    def closures(self) -> Closures:
-        """The closure equations with workspaces of this thread."""
-        return self._closures.for_thread()
 
     def with_numbers(self, scene: s.Scene) -> ClosedSystem:
         """As for a tree."""
@@ -275,6 +270,15 @@ class ClosedSystem(System):
         Jain & Rodriguez, section VIII. Raises DynamicsError where the closures are singular.
         """
         return closure_operators(self.closures, *self.layout.entering(state))
+
+    def _open_row(self, t: float, y: Real) -> Flags:
+        return np.isnan(self._row(t, y, self._motion(t, y, "articulated")))
+
+    def _open_loads(self, state: State, axes: Axes, about: tuple[str, str] | None) -> dict[str, Flags]:
+        return {name: np.isnan(load) for name, load in self.hinge_loads(state, axes=axes, about=about).items()}
+
+    def _open_sections(self, state: State, balance: SectionBalance) -> Flags:
+        return np.isnan(balance.at(self.all_loads(state)))
 
     def nested(self, algorithm: Algorithm = "frisch") -> NestedSystem:
         """Raises NotImplementedError."""

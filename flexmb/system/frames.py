@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from flexmb.building.links import Side, closure_sides
 from flexmb.modal.flexible_model import FlexibleNode
 from flexmb.scene.bodies import SidBody
-from flexmb.scene.quaternions import rotation_by, rotation_matrix
+from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.tree import GROUND, rest_frames
 from flexmb.system.scene_arrays import SceneArrays
-from flexmb.tables.arrays import Workspace
+from flexmb.system.turning_points import rotation_along
 from flexmb.typing import Real
+
+
+class MotionTables(Protocol):
+    """What is read here and in section loads of a workspace; its numbers may be complex."""
+
+    @property
+    def body(self) -> Any: ...
+    @property
+    def port(self) -> Any: ...
+    @property
+    def eta(self) -> Any: ...
+    @property
+    def etad(self) -> Any: ...
+    @property
+    def etadd(self) -> Any: ...
+    @property
+    def function(self) -> Any: ...
 
 
 class Pose(NamedTuple):
@@ -34,14 +51,14 @@ class HingeFrames(NamedTuple):
 AT_GROUND = Pose(np.eye(3), np.zeros(3))
 
 
-def link_pose(w: Workspace, k: int) -> Pose:
+def link_pose(w: MotionTables, k: int) -> Pose:
     """Pose of the link frame of body k; -1 is the ground."""
     if k < 0:
         return AT_GROUND
     return Pose(w.body["pose_rotation"][k].reshape(3, 3), w.body["pose_position"][k])
 
 
-def body_pose(arrays: SceneArrays, w: Workspace, k: int) -> Pose:
+def body_pose(arrays: SceneArrays, w: MotionTables, k: int) -> Pose:
     """Pose of the frame of body k as the scene defines it, undeformed."""
     pose, at = link_pose(w, k), arrays.links[k].outboard
     if at.deforms:
@@ -50,7 +67,7 @@ def body_pose(arrays: SceneArrays, w: Workspace, k: int) -> Pose:
     return Pose(rotation, pose.position - rotation @ at.origin)
 
 
-def node_pose(arrays: SceneArrays, w: Workspace, body: str, node: str) -> Pose:
+def node_pose(arrays: SceneArrays, w: MotionTables, body: str, node: str) -> Pose:
     """Pose of a node, which moves with the deformation; ValueError if there is no such body or node."""
     if body == GROUND:
         return AT_GROUND
@@ -73,10 +90,10 @@ def deformed(at: FlexibleNode, eta: Real) -> tuple[Real, Real]:
     if at.second is not None:
         position = position + 0.5 * np.einsum("amn,m,n->a", at.second.translation, eta, eta)
         theta = theta + 0.5 * np.einsum("amn,m,n->a", at.second.rotation, eta, eta)
-    return rotation_by(theta) @ at.rotation, position
+    return rotation_along(theta[None])[0] @ at.rotation, position
 
 
-def hinge_frames(arrays: SceneArrays, w: Workspace) -> dict[str, HingeFrames]:
+def hinge_frames(arrays: SceneArrays, w: MotionTables) -> dict[str, HingeFrames]:
     """The frames of every hinge and point mass, and of closures: frames A and B, and the origin of B."""
     found = {link.hinge.name: hinge_frames_of(arrays, w, k) for k, link in enumerate(arrays.links)}
     found |= {coupling.name: found[coupling.hinge] for coupling in arrays.scene.couplings}
@@ -84,14 +101,14 @@ def hinge_frames(arrays: SceneArrays, w: Workspace) -> dict[str, HingeFrames]:
     return found | {closure.name: closure_frames_of(arrays, w, i) for i, closure in closures}
 
 
-def closure_frames_of(arrays: SceneArrays, w: Workspace, i: int) -> HingeFrames:
+def closure_frames_of(arrays: SceneArrays, w: MotionTables, i: int) -> HingeFrames:
     """Frames A and B of closure i, and the origin of B."""
     sides = closure_sides(arrays.scene.closures[i])
     a, b = (_of_side(w, sides[j], *arrays.closure_ports[2 * i + j]) for j in range(2))
     return HingeFrames(a.rotation, b.rotation, b.position)
 
 
-def hinge_frames_of(arrays: SceneArrays, w: Workspace, k: int) -> HingeFrames:
+def hinge_frames_of(arrays: SceneArrays, w: MotionTables, k: int) -> HingeFrames:
     """The frames of the hinge of body k. `BodyLink` turns both so that a hinge axis is z; here they are turned back."""
     body, back = arrays.constants.body[k], arrays.links[k].turn.T
     parent, own = link_pose(w, int(body["parent"])), link_pose(w, k)
@@ -103,7 +120,7 @@ def hinge_frames_of(arrays: SceneArrays, w: Workspace, k: int) -> HingeFrames:
     )
 
 
-def _of_side(w: Workspace, side: Side, body: int, port: int) -> Pose:
+def _of_side(w: MotionTables, side: Side, body: int, port: int) -> Pose:
     """Frame A or B of a closure; -1 for a body is the ground, whose side has no port."""
     if body < 0:
         return Pose(rotation_matrix(side.quaternion), np.array(side.offset, float))
@@ -111,7 +128,7 @@ def _of_side(w: Workspace, side: Side, body: int, port: int) -> Pose:
     return Pose(pose.rotation @ turn @ side.turn.T, pose.position + pose.rotation @ arm)
 
 
-def _port(w: Workspace, port: int) -> tuple[Real, Real]:
+def _port(w: MotionTables, port: int) -> tuple[Real, Real]:
     """Rotation (3,3) port -> link and position (3,) of a port of a link."""
     return w.port["R"][port].reshape(3, 3), w.port["r"][port]
 

@@ -6,17 +6,16 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from flexmb.system.frames import hinge_frames, node_pose
+from flexmb.system.frames import MotionTables, hinge_frames, node_pose
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables import arguments
-from flexmb.tables.arrays import Workspace
 from flexmb.typing import Real
 
 Axes = Literal["world", "inboard", "outboard"]
 
 
 def referred(
-    arrays: SceneArrays, w: Workspace, loads: dict[str, Real], axes: Axes, about: tuple[str, str] | None
+    arrays: SceneArrays, w: MotionTables, loads: dict[str, Real], axes: Axes, about: tuple[str, str] | None
 ) -> dict[str, Real]:
     """Loads (6,) of hinges and closures, World axes about their own points, in other axes about a node.
 
@@ -39,7 +38,7 @@ def referred(
     return found
 
 
-def _node(arrays: SceneArrays, w: Workspace, about: tuple[str, str]) -> Real:
+def _node(arrays: SceneArrays, w: MotionTables, about: tuple[str, str]) -> Real:
     if isinstance(about, str) or len(about) != 2:
         raise ValueError(f"about is {about!r}: give body and node, such as ('panel', 'tip')")
     return node_pose(arrays, w, *about).position

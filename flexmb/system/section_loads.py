@@ -21,12 +21,11 @@ from flexmb.modal.beam_sections import beam_sections
 from flexmb.modal.flexible_model import SecondOrder
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.problems import SceneWarning
-from flexmb.scene.quaternions import rotation_by
 from flexmb.scene.tree import node_frame
-from flexmb.system.frames import Pose, body_pose, closure_frames_of, hinge_frames_of, link_pose
+from flexmb.system.frames import MotionTables, Pose, body_pose, closure_frames_of, hinge_frames_of, link_pose
 from flexmb.system.observables import Evaluation
 from flexmb.system.scene_arrays import SceneArrays
-from flexmb.system.turning_points import turning
+from flexmb.system.turning_points import rotation_along, turning
 from flexmb.tables import arguments
 from flexmb.tables.arrays import NODE_AXES, TORQUE, Workspace
 from flexmb.tables.state import finite_result
@@ -143,25 +142,27 @@ class SectionBalance:
 
         DynamicsError where a number is not finite.
         """
-        arrays, k = self._arrays, self._k
         t, exerted, w, changes, rounding = state
-        pose = body_pose(arrays, w, k)
-        m = arrays.links[k].mode_count
-        eta, etad, etadd = w.eta[k, :m], w.etad[k, :m], w.etadd[k, :m]
-        inertial = self._inertial(_motion_in(pose, link_pose(w, k), w, k), eta, etad, etadd)
-
-        def transmitted(exerted: Evaluation) -> Real:
-            needed = inertial.copy()
-            for outer in self._outer(w, pose, exerted):
-                needed[: outer.beyond] -= outer.wrench
-            return self._in_sections(needed, eta)[self._places]
-
-        found = finite_result(transmitted(exerted), t)
+        found = finite_result(self.transmitted(exerted, w), t)
         is_open = np.zeros(found.shape, bool)
         for change in changes:
             other = {name: load + change[name] for name, load in exerted.loads.items()}
-            is_open |= np.abs(transmitted(replace(exerted, loads=other)) - found) > rounding
+            is_open |= np.abs(self.transmitted(replace(exerted, loads=other), w) - found) > rounding
         return np.where(is_open, np.nan, found)
+
+    def transmitted(self, exerted: Evaluation, w: MotionTables) -> Real:
+        """Loads (X,6) of `SectionLoads` that balance the momentum of a motion and the loads that others exert.
+
+        An analytic function of all these numbers, which may be complex: `flexmb.system.complex_step`.
+        """
+        arrays, k = self._arrays, self._k
+        pose = body_pose(arrays, w, k)
+        m = arrays.links[k].mode_count
+        eta, etad, etadd = w.eta[k, :m], w.etad[k, :m], w.etadd[k, :m]
+        needed = self._inertial(_motion_in(pose, link_pose(w, k), w, k), eta, etad, etadd)
+        for outer in self._outer(w, pose, exerted):
+            needed[: outer.beyond] -= outer.wrench
+        return self._in_sections(needed, eta)[self._places]
 
     def loads(self, values: Real) -> SectionLoads:
         """`SectionLoads` with these loads (...,X,6)."""
@@ -186,11 +187,11 @@ class SectionBalance:
             torque = np.einsum("nab,nb->na", J, turn) + np.cross(omega, np.einsum("nab,nb->na", J, omega))
         force = points.mass[:, None] * acceleration
         each = np.hstack([np.cross(r, force) + torque, force])
-        between = np.zeros((len(s.x) + 1, 6))
+        between = np.zeros((len(s.x) + 1, 6), each.dtype)
         np.add.at(between, s.beyond, each)
         return np.cumsum(between[::-1], axis=0)[::-1][1:]
 
-    def _outer(self, w: Workspace, pose: Pose, exerted: Evaluation) -> list[_Outer]:
+    def _outer(self, w: MotionTables, pose: Pose, exerted: Evaluation) -> list[_Outer]:
         """All loads on the beam, with their places along it."""
         arrays, k, scene = self._arrays, self._k, self._arrays.scene
         loads, wheels = exerted.loads, exerted.wheel_loads
@@ -246,7 +247,7 @@ class SectionBalance:
         theta = _field(s.motion[:, 3:], s.second_motion, "rotation", eta, none, none)[0]
         axis[:, 0] += s.x
         torque = wrench[:, :3] - np.cross(axis, wrench[:, 3:])
-        R = rotation_by(theta)
+        R = rotation_along(theta)
         return np.hstack([np.einsum("nba,nb->na", R, each) for each in (torque, wrench[:, 3:])])
 
 
@@ -258,7 +259,7 @@ class _Motion(NamedTuple):
     acceleration: Real
 
 
-def _motion_in(pose: Pose, link: Pose, w: Workspace, k: int) -> _Motion:
+def _motion_in(pose: Pose, link: Pose, w: MotionTables, k: int) -> _Motion:
     """The motion of body k in its frame of the scene, from that of its link frame."""
     turn = pose.rotation.T @ link.rotation
     r = link.rotation.T @ (pose.position - link.position)

@@ -24,7 +24,7 @@ from flexmb.motion import coordinates
 from flexmb.scene import schema as s
 from flexmb.system import algorithms, labels
 from flexmb.system.algorithm import Algorithm, Route
-from flexmb.system.free_motion import FreeMotion
+from flexmb.system.derivatives import Derivatives
 from flexmb.system.load_axes import Axes, referred
 from flexmb.system.mass_properties import MassProperties, mass_properties
 from flexmb.system.observables import Evaluation
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 _NO_CLOSURES = np.zeros((0, 6))
 
 
-class System(FreeMotion):
+class System(Derivatives):
     """A checked scene turned into arrays; made by `compile`. Threads may share it: each has workspaces of its own."""
 
     def __init__(self, scene: s.Scene, elimination: Elimination = "fastest", like: s.Scene | None = None) -> None:

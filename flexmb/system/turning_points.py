@@ -1,7 +1,8 @@
 """Points that turn with the deformation: rotations by rotation vectors, with their rates.
 
 With theta(t) the rotation exp(theta~) turns at w = J_l theta', J_l = 1 + A theta~ + B theta~^2 with phi = |theta|,
-A = (1 - cos phi)/phi^2 and B = (phi - sin phi)/phi^3: `docs/notation.md`, section 4.
+A = (1 - cos phi)/phi^2 and B = (phi - sin phi)/phi^3: `docs/notation.md`, section 4. Both are series in phi^2, so that
+complex vectors are welcome too: an imaginary part that is negligible beside the real one carries a derivative.
 """
 
 from __future__ import annotations
@@ -11,10 +12,16 @@ from math import factorial
 import numpy as np
 
 from flexmb.modal.cross import cross_matrix
-from flexmb.scene.quaternions import rotation_by
 from flexmb.typing import Real
 
 TERMS = 20  # of the series of A and B in phi^2: all digits up to half a turn
+
+
+def rotation_along(theta: Real) -> Real:
+    """R (n,3,3) = exp(theta~) of rotation vectors (n,3) rad, (sin phi)/phi being 1 - B phi^2."""
+    square = np.sum(theta * theta, axis=1)
+    A, B, T = _series(square, 2)[0], _series(square, 3)[0], cross_matrix(theta)
+    return np.asarray(np.eye(3) + (1.0 - B * square)[:, None, None] * T + A[:, None, None] * (T @ T))
 
 
 def turning(theta: Real, rate: Real, acceleration: Real) -> tuple[Real, Real, Real]:
@@ -32,7 +39,7 @@ def turning(theta: Real, rate: Real, acceleration: Real) -> tuple[Real, Real, Re
     change += (B_slope * growth)[:, None, None] * squared + B[:, None, None] * (T_rate @ T + T @ T_rate)
     velocity = np.einsum("nab,nb->na", jacobian, rate)
     turning_rate = np.einsum("nab,nb->na", jacobian, acceleration) + np.einsum("nab,nb->na", change, rate)
-    return rotation_by(theta), velocity, turning_rate
+    return rotation_along(theta), velocity, turning_rate
 
 
 def _series(square: Real, first: int) -> tuple[Real, Real]:

@@ -96,6 +96,18 @@ def calls() -> dict[str, Call]:
     add("System.section_loads", tree.section_loads, of_sections, state=states, body=names,
         x=chosen(None, "root", [0.6], [-0.1], [[0.1]], [np.nan], [0.1j], plain=(([0.25, 0], np.array([0.25, 0.0])),)),
     )  # fmt: skip
+    add("System.section_load_derivatives", tree.section_load_derivatives, of_sections, state=states, body=names,
+        x=chosen(None, "root", [0.6], [-0.1], [[0.1]], [np.nan], [0.1j], plain=(([0.25, 0], np.array([0.25, 0.0])),)),
+    )  # fmt: skip
+    in_axes = {"state": state, "axes": "outboard", "about": ("arm", "tip")}
+    add("System.hinge_load_derivatives", tree.hinge_load_derivatives, in_axes, state=states,
+        axes=chosen(None, "body", 5), about=chosen("tip", ("arm", "nowhere"), ("nobody", "tip"), 5))  # fmt: skip
+    add("System.acceleration_derivatives", tree.acceleration_derivatives, {"state": state, "forces": rates},
+        state=states, forces=but_none(vectors))  # fmt: skip
+    add("System.inverse_dynamics_derivatives", tree.inverse_dynamics_derivatives, of_rates, state=states,
+        accelerations=vectors)  # fmt: skip
+    add("System.evaluation_derivatives", tree.evaluation_derivatives, of_rates, state=states,
+        accelerations=but_none(vectors))  # fmt: skip
     add("System.factorise", lambda state: tree.factorise(state).log_determinant, {"state": state}, state=states)
     add("System.operators", lambda state: tree.operators(state).M, {"state": state}, state=states)
     add(
@@ -149,7 +161,7 @@ def calls() -> dict[str, Call]:
     start = chain.initial_state
     for name in (
         "mass_matrix", "bias", "energy", "momentum", "determined_loads", "closure_gaps", "hinge_loads", "digits_left",
-        "mass_properties", "precision", "admissible",
+        "mass_properties", "precision", "admissible", "evaluation_derivatives", "hinge_load_derivatives",
     ):  # fmt: skip
         add(f"ClosedSystem.{name}", getattr(chain, name), {"state": start}, state=closed_states)
     add(
@@ -170,6 +182,11 @@ def calls() -> dict[str, Call]:
         state=closed_states,
         accelerations=vectors,
     )
+    along_speeds = np.arange(1.0, chain.nu + 1.0)
+    add("ClosedSystem.acceleration_derivatives", chain.acceleration_derivatives,
+        {"state": start, "forces": along_speeds}, state=closed_states, forces=but_none(vectors))  # fmt: skip
+    add("ClosedSystem.inverse_dynamics_derivatives", chain.inverse_dynamics_derivatives,
+        {"state": start, "accelerations": along_speeds}, state=closed_states, accelerations=vectors)  # fmt: skip
     add(
         "ClosedSystem.route",
         chain.route,
@@ -331,7 +348,7 @@ EXEMPT = {
     "Trajectory.state_at", "Trajectory.values_at", "Trajectory.then",  # a place in a list; a trajectory
     "RunStage", "Restart", "EventRecord",  # what runs are given, or give
     "open_loop", "user_function", "no_user_code",  # a scene; a function; nothing
-    "ClosedSystem.section_loads",  # the closed chain here has no beam
+    "ClosedSystem.section_loads", "ClosedSystem.section_load_derivatives",  # the closed chain here has no beam
     "LinearModel.save", "Campbell.plot", "Campbell.to_csv",  # a path
     "ClosedSystem.consistent_inverse_dynamics", "ClosedSystem.modal_residual", "ClosedSystem.applied",  # the tree's
     "ClosedSystem.factorise",
@@ -340,10 +357,11 @@ EXEMPT = {
     "ClosedSystem.evaluator",  # always refused
     "ClosedSystem.workspace", "ClosedSystem.recursion_workspace", "ClosedSystem.composite_workspace",
     "load_scene", "save_scene", "SceneBuilder",  # files and data, checked where they are compiled
+    "AccelerationDerivatives", "EvaluationDerivatives", "InverseDynamicsDerivatives",  # results
     "Advice", "Campbell", "Evaluation", "LinearModel", "SteadySpin", "System", "Trajectory", "Status",  # results
     "Batch.initial_states", "Batch.tables", "Batch.constants",  # nothing; of those who fill lanes
     "BatchTrajectory",  # a result
-    "ClosureError", "DynamicsError", "EquilibriumError", "Interrupted", "PrecisionWarning",
+    "ClosureError", "DynamicsError", "EquilibriumError", "Interrupted", "NotDifferentiableError", "PrecisionWarning",
     "SceneError", "SceneWarning",
 }  # fmt: skip
 CLASSES = (

@@ -105,11 +105,17 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
         found["closure_gaps"] = lambda s, x: s.closure_gaps(x)
         found["determined_loads"] = lambda s, x: s.determined_loads(x)
     if not scene.controllers:
+        pushed = np.cos(np.arange(system.nu))
+        found["acceleration_derivatives"] = lambda s, x: tuple(vars(s.acceleration_derivatives(x, pushed)).values())
+        found["inverse_dynamics_derivatives"] = lambda s, x: s.inverse_dynamics_derivatives(x, rates).by_displacement
+        found["evaluation_derivatives"] = lambda s, x: vars(s.evaluation_derivatives(x))
+        found["hinge_load_derivatives"] = lambda s, x: s.hinge_load_derivatives(x, axes="outboard")
         found["linearize"] = lambda s, x: fm.linearize(s, x).A
         model = fm.linearize(system, state)
         found["frequency_response"] = lambda s, x: model.frequency_response(model.inputs[-1][0], [1.0 + 0.1 * x.t])
         found["displaced"] = lambda s, x: model.displaced(model.modes[-1], 0.1 * x.u[0])
     if any(body.name == "arm" for body in scene.bodies):
+        found["section_load_derivatives"] = lambda s, x: s.section_load_derivatives(x, "arm", [0.25]).by_speed
         found["section_loads"] = lambda s, x: s.section_loads(x, "arm", [0.0, 0.25]).load
         found["equilibrium"] = lambda s, x: fm.equilibrium(s, x)
         found["steady_spin"] = lambda s, x: fm.steady_spin(s, "rotor", 0.5 + x.t).state

@@ -1,0 +1,72 @@
+"""Derivatives of closed chains: how their motion changes with the state, and their loads."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexmb.closure.closures import Closures
+from flexmb.closure.given_motion import observe_given, rows_tangent
+from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace
+from flexmb.closure.variation import variation
+from flexmb.entry.given_motion import motion_tangent
+from flexmb.entry.observed_tangent import outputs_tangent
+from flexmb.entry.variation import Variation
+from flexmb.jit.direct import direct
+from flexmb.jit.pointer import STATUS
+from flexmb.system.derivatives import Derivatives
+from flexmb.system.pushforward import Pushforward
+from flexmb.tables.per_thread import per_thread
+from flexmb.tables.state import State, finite_result
+from flexmb.typing import Real
+
+
+class ChainDerivatives(Derivatives):
+    """`Derivatives` of a system with closures or couplings."""
+
+    _closures: Closures
+
+    @per_thread
+    def closures(self) -> Closures:
+        """The closure equations with workspaces of this thread."""
+        return self._closures.for_thread()
+
+    def _variation(self, t: float, y: Real) -> Variation:
+        self.accelerations(self.layout.known(t, y))  # with its errors and warnings
+        mass = np.empty((self.nu, self.nu))
+        self._fill_mass_matrix(t, y, mass)
+        found = variation(self.closures, t, y, mass, (self._tangent, self._closure_tangent))
+        for part in (*found.of_accelerations, *found.of_loads):
+            finite_result(part, t)
+        return found
+
+    @per_thread
+    def _closure_tangent(self) -> ClosureTangentWorkspace:
+        return closure_tangent_workspace(self.closures.constants[1])
+
+    @per_thread
+    def _pushforward(self) -> Pushforward:
+        own = self.closures.constants[1]
+        x, out = motion_tangent(self.nq, self.nu), outputs_tangent(self.observation.out)
+        tables, rows = (x, self.constants, self._tangent, out), rows_tangent(own, self.constants)
+        observe = direct(observe_given, STATUS, *tables[:3], own, rows, out)
+        return Pushforward(tables, rows, observe, self.check_status)
+
+    @property
+    def _row_count(self) -> int:
+        return len(self.closures.constants[1].row)
+
+    def _differentiable(self, state: State, what: str) -> tuple[float, Real]:
+        """As of a tree; NotImplementedError for bodies whose inertia is not where closures join them."""
+        if self.closures.at_rest:
+            raise NotImplementedError(
+                f'scene "{self.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
+                f'closures join them, and {what} does not support that: use level "linear" or a better one'
+            )
+        self.initial_state  # noqa: B018 - counts the independent rows, without which no position is seen to be singular
+        return super()._differentiable(state, what)
+
+    def _given(self, accelerations: Real) -> Real:
+        raise NotImplementedError(
+            f'scene "{self.scene.name}" has closures, and derivatives of loads for given accelerations are for trees '
+            "only: leave accelerations out, or prescribe coordinates"
+        )

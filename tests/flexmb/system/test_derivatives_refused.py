@@ -1,0 +1,94 @@
+"""What has no derivative, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+import flexmb as fm
+from tests.flexmb.system.test_derivatives import asked
+
+
+def with_stop(angle: float) -> fm.System:
+    scene = fm.SceneBuilder("stopped", gravity=(0.0, -9.81, 0.0))
+    scene.rigid_body("arm", mass=1.0, com=(0.5, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
+    scene.revolute("pivot", "ground", "arm", angle=angle)
+    scene.angular_spring("stop", "pivot", upper=0.5, stop_stiffness=100.0)
+    return fm.compile(scene.scene())
+
+
+def with_cable(length: float) -> fm.System:
+    scene = fm.SceneBuilder("tethered", gravity=(0.0, 0.0, 0.0))
+    scene.rigid_body("bob", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    scene.prismatic("slide", "ground", "bob", axis=(1.0, 0.0, 0.0), position=length)
+    scene.spring_damper("cable", "ground", "bob", free_length=0.4, stiffness=50.0, acts="tension")
+    return fm.compile(scene.scene())
+
+
+def test_corners_of_laws_are_refused() -> None:
+    """Just at the stop or just slack; on either side derivatives exist, and differ."""
+    for make, at, step, slope in ((with_stop, 0.5, 0.1, -100.0 / 0.35), (with_cable, 0.4, 0.1, -50.0)):
+        corner = make(at)
+        for ask in (corner.acceleration_derivatives, corner.evaluation_derivatives):
+            with pytest.raises(fm.NotDifferentiableError, match='connector "(stop|cable)" has no derivative'):
+                ask(corner.initial_state)
+        with pytest.raises(fm.NotDifferentiableError):
+            corner.inverse_dynamics_derivatives(corner.initial_state, np.zeros(1))
+        before, after = (make(at + side * step) for side in (-1, 1))
+        one, other = (each.acceleration_derivatives(each.initial_state).by_displacement for each in (before, after))
+        gravity = 9.81 * 0.5 / 0.35 if make is with_stop else 0.0
+        np.testing.assert_allclose(one, gravity * np.sin(at - step), atol=1e-9)
+        np.testing.assert_allclose(other, gravity * np.sin(at + step) + slope, rtol=1e-6)
+
+
+def test_friction_at_rest_is_smooth() -> None:
+    """Its derivative is finite there: -level / smoothing / I."""
+    scene = fm.SceneBuilder("rubbing")
+    scene.rigid_body("disc", mass=1.0, inertia=(0.1, 0.1, 0.1)).revolute("pivot", "ground", "disc")
+    scene.angular_friction("bearing", "pivot", sliding=0.3, smoothing=0.02)
+    system = fm.compile(scene.scene())
+    d = system.acceleration_derivatives(system.initial_state)
+    np.testing.assert_allclose(d.by_speed, -0.3 / 0.02 / 0.1, rtol=1e-12)
+
+
+def test_what_is_refused() -> None:
+    at = asked("every level")
+    system, state = at.system, at.state
+    for wrong in (np.nan, np.inf):
+        with pytest.raises(ValueError, match="give finite numbers"):
+            q = state.q.copy()
+            q[0] = wrong
+            system.acceleration_derivatives(fm.State(q, state.u))
+        with pytest.raises(ValueError, match="accelerations"):
+            system.inverse_dynamics_derivatives(state, np.full(system.nu, wrong))
+        with pytest.raises(ValueError, match="accelerations"):
+            system.evaluation_derivatives(state, np.full(system.nu, wrong))
+    with pytest.raises(TypeError, match="a State is needed"):
+        system.evaluation_derivatives(state.q)  # type: ignore[call-overload]
+    with pytest.raises(ValueError, match="is no beam of the scene"):
+        system.section_load_derivatives(state, "nobody", [0.0])
+    with pytest.raises(ArithmeticError):
+        system.acceleration_derivatives(system.state(state.q, 1e200 * np.ones(system.nu)))
+
+
+def test_controllers_are_refused_with_the_remedy() -> None:
+    from tests.flexmb.system.test_copies import controlled
+
+    system = fm.compile(controlled())
+    state = system.initial_state
+    for ask in (system.acceleration_derivatives, system.evaluation_derivatives):
+        with pytest.raises(NotImplementedError, match=r"has controllers.*open_loop.*linearize"):
+            ask(state)
+    opened = fm.compile(fm.open_loop(controlled()))
+    assert np.isfinite(opened.acceleration_derivatives(opened.initial_state).by_displacement).all()
+
+
+def test_a_scene_without_freedom() -> None:
+    scene = fm.SceneBuilder("still").rigid_body("block", mass=1.0, inertia=(0.1, 0.1, 0.1)).weld("w", "ground", "block")
+    system = fm.compile(scene.scene())
+    d = system.evaluation_derivatives(system.initial_state)
+    assert d.loads["w"].by_speed.shape == (6, 0) and not d.loads["w"].by_time.any()
+    rates = system.acceleration_derivatives(system.initial_state)
+    assert {getattr(rates, field.name).size for field in fields(rates)} == {0}
