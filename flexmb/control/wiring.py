@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import Any, NamedTuple, assert_never
 
@@ -171,6 +171,12 @@ def numbers_of(names: dict[str, slice], reference: str) -> list[int]:
     if at.number >= len(every):
         raise ValueError(f'signal "{reference}": "{at.name}" has {len(every)} numbers, 0 to {len(every) - 1}')
     return [every[at.number]]
+
+
+def law_numbers(controllers: Sequence[Controller], inputs: Sequence[int]) -> tuple[Real, Real]:
+    """The parameters of all controllers with so many inputs each, and the initial values of their states."""
+    numbers = [value for each, count in zip(controllers, inputs, strict=True) for value in _numbers(each, count)]
+    return np.array(numbers), np.array([value for each in controllers for value in _states(each)])
 
 
 def _states(controller: Controller) -> list[float]:
