@@ -24,8 +24,10 @@ ORIGIN = FlexibleNode(np.zeros(3), np.eye(3), _NO_MODES, _NO_MODES)
 class Models:
     """The models of bodies and of the ground, by name. Wheels are parts of their bodies, despun (Frisch)."""
 
-    def __init__(self, scene: s.Scene) -> None:
+    def __init__(self, scene: s.Scene, like: s.Scene | None = None) -> None:
+        """like: the same scene with slightly other numbers; see `flexmb.modal.flexible.flexible_model`."""
         self.body: dict[str, s.Body] = {body.name: body for body in scene.bodies}
+        self._like: dict[str, s.Body] = {} if like is None else {body.name: body for body in like.bodies}
         self.wheels = wheels_by_body(scene)
         self._made: dict[str, FlexibleModel] = {}
         self._frames: dict[str, dict[str, NodeFrame]] = {}
@@ -59,7 +61,9 @@ class Models:
                 nodes = {node: self.node(name, node) for node in rest_frames(body)}
                 model = one_point(body.mass_kg, body.com_m, body.inertia_kg_m2, nodes)
             case s.BeamBody() | s.ModalBody():
-                model = flexible_model(body)
+                followed = self._like.get(name)
+                assert not isinstance(followed, s.RigidBody | s.SidBody)  # it is the same body with other numbers
+                model = flexible_model(body, like=followed)
                 model = model if level_of(body).flexible else _without_modes(model)
             case s.SidBody():
                 raise NotImplementedError(f'body "{name}": SID files are not supported yet; use kind = "modal"')

@@ -36,6 +36,7 @@ from flexmb.system.observables import Evaluation
 from flexmb.system.section_loads import AllLoads
 from flexmb.system.tree_system import System, copied
 from flexmb.tables import arguments
+from flexmb.tables.features import asking
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, finite_result, pack
 from flexmb.typing import Index, Real, Record
@@ -56,9 +57,10 @@ class ClosedSystem(System):
     of a tree, raise NotImplementedError.
     """
 
-    def __init__(self, scene: s.Scene) -> None:
-        super().__init__(scene)
-        own = closure_constants(scene, self.constants, self.closure_ports, self.links)
+    def __init__(self, scene: s.Scene, *, like: s.Scene | None = None) -> None:
+        """like: see `SceneArrays`."""
+        super().__init__(scene, like=like)
+        own = closure_constants(scene, self.constants, self.closure_ports, self.links, like)
         slowest = slowest_mode(self.links)
         tree = scene.constraints, self.constants, own, self.layout, self.workspace, slowest
         self._closures = self.own.closures = Closures(*tree, self.check_status)  # for this thread
@@ -68,6 +70,11 @@ class ClosedSystem(System):
     def closures(self) -> Closures:
         """The closure equations with workspaces of this thread."""
         return self._closures.for_thread()
+
+    def with_numbers(self, scene: s.Scene) -> ClosedSystem:
+        """As for a tree."""
+        with asking(self.kernels):
+            return ClosedSystem(scene, like=self.scene)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As for a tree."""

@@ -28,11 +28,13 @@ class SceneArrays:
     numbers; they are zero outside of runs.
     """
 
-    def __init__(self, scene: s.Scene, elimination: Elimination) -> None:
+    def __init__(self, scene: s.Scene, elimination: Elimination, like: s.Scene | None = None) -> None:
+        """like: the same scene with slightly other numbers; the tables are then smooth functions of the numbers around
+        those of `like`: modes follow its modes, and equal functions of time are kept apart."""
         self.scene = scene
-        self.links = links(scene)
+        self.links = links(scene, like)
         numbering = Numbering(self.links, scene)
-        assembled = assemble(scene, self.links, numbering)
+        assembled = assemble(scene, self.links, numbering, like=like)
         self.constants, self.markers, self.closure_ports = assembled.constants, assembled.markers, assembled.closures
         self.recursion_constants = with_elimination(self.constants, elimination)
         """The same constants with bodies eliminated as chosen."""
