@@ -166,6 +166,11 @@ class Feedback:
         return np.zeros((max(int(np.sum(table["kind"] == a.SAMPLE)), 1), widest(self._wiring.controller)))
 
     @property
+    def names(self) -> dict[str, slice]:
+        """Places of the signals of sensors and controllers, by name."""
+        return self._wiring.names
+
+    @property
     def schedule(self) -> Record:
         """INSTANT records of the last run, those at its end included."""
         return self._instants

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexmb.control.wiring import law_numbers, wired
+from flexmb.control.wiring import law_numbers, profile_tables, wired
 from flexmb.parameters.numbers import Number
 from flexmb.parameters.spectral import derivative
 from flexmb.scene.check.walk import values
@@ -21,11 +21,13 @@ from flexmb.typing import Real
 
 class LawRates(NamedTuple):
     """Scaled derivatives of the tables of controllers: parameters (numbers,P), initial states (states,P), gains of what
-    signals drive (drives,P)."""
+    signals drive (drives,P); of the functions that sensors read (functions,4,P) and of their pieces (pieces,8,P)."""
 
     number: Real
     state: Real
     gain: Real
+    course: Real
+    piece: Real
 
 
 class EventRates(NamedTuple):
@@ -41,12 +43,16 @@ def law_rates(system: System, numbers: Sequence[Number | None], scales: Real) ->
     inputs = wiring.controller["inputs"].tolist()
 
     def of_laws(scene: Scene) -> Real:
-        return np.concatenate([*law_numbers(scene.controllers, inputs), _gains(system, scene)])
+        course, piece = profile_tables(scene)
+        laws = law_numbers(scene.controllers, inputs)
+        return np.concatenate([*laws, _gains(system, scene), course["data"].ravel(), piece.ravel()])
 
     relevant = [each if _changes(each, system.scene, _laws) else None for each in numbers]
     found = _by_numbers(of_laws, system.scene, relevant, scales)
-    number, state = len(wiring.number), len(wiring.number) + len(wiring.initial)
-    return LawRates(found[:number], found[number:state], found[state:])
+    shapes = wiring.number.shape, wiring.initial.shape, wiring.drive.shape, (len(wiring.course), 4), wiring.piece.shape
+    stops = np.cumsum([np.prod(shape, dtype=int) for shape in shapes])
+    parts = np.split(found, stops[:-1])
+    return LawRates(*(part.reshape(*shape, -1) for part, shape in zip(parts, shapes, strict=True)))
 
 
 def event_rates(scene: Scene, numbers: Sequence[Number | None], scales: Real) -> dict[str, EventRates]:
@@ -72,7 +78,7 @@ def _changes(number: Number | None, scene: Scene, part: Callable[[Scene], Any]) 
 
 def _laws(scene: Scene) -> Any:
     """What the tables of controllers are made from."""
-    return scene.controllers, [each for _, _, each in values(ROOT, scene) if isinstance(each, ControlSignal)]
+    return scene.controllers, scene.sensors, [each for _, _, each in values(ROOT, scene) if isinstance(each, ControlSignal)]
 
 
 def _gains(system: System, scene: Scene) -> Real:

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.control.feedback import Feedback
 from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.problem import Accuracy, Clock, problem
 from flexmb.integrate.settings import Settings
@@ -110,8 +109,3 @@ def clock_of_leg(solve: Integration, leg: Leg, times: Real, settings: Settings) 
     accuracy, counts = settings.accuracy(solve.system.nq, solve.system.nu), np.zeros(COUNTS, np.int64)
     y, clock, _ = solve.begin(begin._replace(y=begin.y.copy()), clock, accuracy, counts)
     return y, clock
-
-
-def feedback_of(solve: Integration) -> Feedback | None:
-    """The controllers of an integration."""
-    return solve.feedback

@@ -44,8 +44,9 @@ class Loops:
     law (B,states,9), law_rate: states of controllers and their rates, the memory of the loops.
     """
 
-    def __init__(self, feedback: Feedback, blocks: Blocks, rates: LawRates, before: Loops | None) -> None:
-        """before: the loops of the part of the run before, None at its start."""
+    def __init__(self, feedback: Feedback, blocks: Blocks, rates: LawRates, before: Loops | None, ends: bool) -> None:
+        """before: the loops of the part of the run before, None at its start; ends: whether the run ends where this
+        part begins, so that controllers which act there have acted in floats only."""
         made, self._feedback, self.blocks = feedback.running, feedback, blocks
         plain, shape = _plain(made), (len(blocks), len(made.state))
         self.law, self.law_rate = (wide_zeros(shape, width=DualType.width) for _ in range(2))
@@ -58,13 +59,17 @@ class Loops:
         for b, each in enumerate(self.tables):
             set_lanes(each.number, rates.number, b)
             set_lanes(each.drive["gain"], rates.gain, b)
+            set_lanes(each.course["data"], rates.course, b)
+            set_lanes(each.piece, rates.piece, b)
             if before is None:
                 set_lanes(each.state, rates.state, b)
             else:
                 for name in KEPT:
                     old, new = getattr(before.tables[b], name), getattr(each, name)
                     rows = min(len(old), len(new))
-                    new[:rows, ..., 1:] = old[:rows, ..., 1:]
+                    new[:rows, ..., 0 if ends else 1 :] = old[:rows, ..., 0 if ends else 1 :]
+                if ends:
+                    each.following[:] = before.tables[b].following
         first = self.tables[0]
         self.steer, _ = addresses(variation.steer, STATUS, REAL, first)
         self.follow = addresses(variation.follow, STATUS, REAL, first)[0] if made.follows[0] else 0
@@ -81,6 +86,12 @@ class Loops:
             if each.continuous[0] and len(each.instant) and each.instant["time"][each.following[0], 0] == t:
                 variation.steer(t, each)
                 variation.begin(t, each)
+
+    def is_due(self, t: float) -> bool:
+        """Whether a sampled controller acts at t."""
+        first = self.tables[0]
+        waiting = first.instant["time"][first.following[0] :, 0]
+        return bool(len(waiting)) and bool(waiting[0] <= t)
 
     def replay(self) -> None:
         """From now on outputs of sampled controllers are read back."""
