@@ -44,6 +44,7 @@ class Following:
         P = len(found)
         self._derivatives = np.full((len(trajectory.t), len(outputs.names), P), np.nan)
         self._events: EventTimes = []
+        self._energy = np.zeros(P)
 
     def __call__(self, course: Sequence[Leg]) -> tuple[Real, EventTimes]:
         """Derivatives (T,K,P) of the outputs, and those of the times of events."""
@@ -103,14 +104,16 @@ class Following:
             loops.begin(t)
             states[:] = loops.blocks.joined(list(loops.law[:, loops.continuous]))
             return Course(y, np.vstack([start[:-1], states, start[-1:]]))
-        at = Course(y, after.D)
+        at = Course(y, after.D.copy())
+        if np.any(after.dt) and loops is not None and loops.is_due(t):
+            raise EventError(
+                f'event "{after.crossings[0].event.name}" happens at t = {t:g} s, when a sampled controller acts: which '
+                "comes first changes what follows, so that the run has no derivative beyond; move one of them"
+            )
+        if after.changes:  # the work includes the energy that changes of values bring
+            at.Y[-1] += variation.energy_rates(t, at) - self._energy
         if np.any(after.dt):
-            if loops is not None and loops.is_due(t):
-                raise EventError(
-                    f'event "{after.crossings[0].event.name}" happens at t = {t:g} s, when a sampled controller acts: '
-                    "which comes first changes what follows, so that the run has no derivative beyond; move one of them"
-                )
-            at = Course(y, after.D - np.outer(variation.slope(t, at).y, after.dt))
+            at = Course(y, at.Y - np.outer(variation.slope(t, at).y, after.dt))
         return at
 
     def _jumped(self, variation: Variation, end: Course, held: dict[str, Real]) -> Jumped:
@@ -122,6 +125,7 @@ class Following:
         if found.changes:
             self._changes += found.changes
             self._alive = [self._matters(each) for each in self._numbers]
+            self._energy = variation.energy_rates(leg.raw.t, Course(end.y, found.D))
         return found
 
     def _matters(self, number: Number) -> bool:
@@ -133,8 +137,6 @@ class Following:
         self, variation: Variation, solve: Integration, times: Real, states: Sequence[Course], wanted: slice, is_last: bool
     ) -> None:
         """Derivatives of the outputs at the output times of a part of the run."""
-        if wanted.stop <= wanted.start:
-            return
         loops, system = variation.loops, variation.blocks.system
         names = {} if solve.feedback is None else solve.feedback.names
         known = channels(system, names)

@@ -61,8 +61,9 @@ def jumped(
     """
     leg, t = variation.leg, variation.leg.raw.t
     _refuse(leg)
-    before = variation.slope(np.nextafter(t, -np.inf), end) if any(_moves(each) for each in leg.events) else None
     P = end.Y.shape[1]
+    is_fixed = all(not _moves(each) and not np.any(_level(each, rates, P)) for each in leg.events)
+    before = None if is_fixed else variation.slope(np.nextafter(t, -np.inf), end)
     crossings = [Crossing(each, _time(variation, end, before, each, rates, tolerance)) for each in leg.events]
     dt = crossings[0].dt if crossings else np.zeros(P)
     for each in crossings[1:]:
@@ -137,12 +138,17 @@ def _moves(event: SceneEvent) -> bool:
     return event.watch != "time"
 
 
+def _level(event: SceneEvent, rates: Mapping[str, EventRates], P: int) -> Real:
+    """The scaled derivative (P,) of the level of an event."""
+    return rates[event.name].level if event.name in rates else np.zeros(P)
+
+
 def _time(
     variation: Variation, end: Course, before: Course | None, event: SceneEvent, rates: Mapping[str, EventRates],
     tolerance: Real,
 ) -> Real:  # fmt: skip
     """The scaled derivative (P,) of the time of an event."""
-    level = rates[event.name].level if event.name in rates else np.zeros(end.Y.shape[1])
+    level = _level(event, rates, end.Y.shape[1])
     if not _moves(event):
         return level
     assert before is not None

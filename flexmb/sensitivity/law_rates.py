@@ -52,7 +52,7 @@ def law_rates(system: System, numbers: Sequence[Number | None], scales: Real) ->
     shapes = wiring.number.shape, wiring.initial.shape, wiring.drive.shape, (len(wiring.course), 4), wiring.piece.shape
     stops = np.cumsum([np.prod(shape, dtype=int) for shape in shapes])
     parts = np.split(found, stops[:-1])
-    return LawRates(*(part.reshape(*shape, -1) for part, shape in zip(parts, shapes, strict=True)))
+    return LawRates(*(part.reshape(*shape, len(numbers)) for part, shape in zip(parts, shapes, strict=True)))
 
 
 def event_rates(scene: Scene, numbers: Sequence[Number | None], scales: Real) -> dict[str, EventRates]:

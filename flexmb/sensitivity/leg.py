@@ -79,6 +79,13 @@ class Variation:
         for b in range(len(self.blocks)):
             flow.take.py_func(z, b, self.flow)
 
+    def energy_rates(self, t: float, at: Course) -> Real:
+        """The derivatives (P,) of the energy at a state."""
+        self.put(t, at)
+        place, _ = self.blocks.system.observation.columns["energy"]
+        rates: Real = np.sum(self.blocks.observe().rates[place], axis=0)
+        return rates
+
     def check(self, status: int, t: float) -> None:
         """DynamicsError with the time, unless a status is OK."""
         if status != OK:
