@@ -78,12 +78,17 @@ def _changes(number: Number | None, scene: Scene, part: Callable[[Scene], Any]) 
 
 def _laws(scene: Scene) -> Any:
     """What the tables of controllers are made from."""
-    return scene.controllers, scene.sensors, [each for _, _, each in values(ROOT, scene) if isinstance(each, ControlSignal)]
+    return scene.controllers, scene.sensors, _signals(scene)
+
+
+def _signals(scene: Scene) -> list[ControlSignal]:
+    """What signals drive, in the order of the scene."""
+    return [each for _, _, each in values(ROOT, scene) if isinstance(each, ControlSignal)]
 
 
 def _gains(system: System, scene: Scene) -> Real:
     """Gains of what signals drive, in the order of the system."""
-    if scene is system.scene:
+    if _signals(scene) == _signals(system.scene):  # a system takes much longer to make
         return np.array([signal.gain for signal in system.signals.values()])
     return np.array([signal.gain for signal in system.with_numbers(scene).signals.values()])
 
