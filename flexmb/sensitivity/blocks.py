@@ -37,6 +37,16 @@ class Observed(NamedTuple):
     rates: Real
 
 
+class Response(NamedTuple):
+    """Accelerations (nu,) due to loads of rows, their derivatives (nu,P), those of the drive loads (nu,P) that keep
+    prescribed speeds, and of the rows' rates (G,P)."""
+
+    gain: Real
+    gain_rates: Real
+    drive_rates: Real
+    row_rates: Real
+
+
 class Blocks:
     """The tables of all blocks of a system, and the addresses of its kernels.
 
@@ -125,6 +135,20 @@ class Blocks:
             tree.inertia_forces(t, each.constants, w, np.zeros(len(rates)), x)
             found.append(moved - x.tau)
         return found[0][:, 0], self.joined(found)
+
+    def response(self, t: float, load: Real) -> Response:
+        """How the motion of a closed chain at the blocks' states responds to loads of rows (G,)."""
+        found = []
+        for block, w in zip(self.tables, self.workspaces, strict=True):
+            parts = []
+            for given in (load, np.zeros(len(load))):
+                self.check(chain.under_loads(t, block, given))
+                rates = w.slope[self.system.nq : self.system.nq + self.system.nu]
+                parts.append((rates.copy(), w.speed["drive"].copy(), block.x.cw.row["rate"].copy()))
+            (gained, drive, _), (own, idle, rate) = parts
+            found.append((gained - own, drive - idle, rate))
+        gains, drives, rates = zip(*found, strict=True)
+        return Response(gains[0][:, 0], self.joined(gains), self.joined(drives), self.joined(rates))
 
     def joined(self, duals: Sequence[Real]) -> Real:
         """The derivatives (...,P) of one array of duals (...,9) for each block."""

@@ -87,6 +87,15 @@ def _move(state, i, value):
 
 
 @kernel
+def under_loads(t, s, load):
+    """Accelerations, drive loads and row rates at s.x.w.state under given row loads (G,); returns a status code."""
+    s.x.w.time[0] = t
+    for r in range(load.shape[0]):
+        s.x.cw.row[r].load = load[r]
+    return evaluate(s.c, s.x.w, s.cc, s.x.cw)
+
+
+@kernel
 def observing(s, out):
     """Everything observable where `motion` was just evaluated, but for the loads of closures."""
     if has(s.cc, COUPLINGS):

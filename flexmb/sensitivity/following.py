@@ -54,7 +54,7 @@ class Following:
         for i, leg in enumerate(course):
             if leg.system is not system:
                 assert after is not None
-                blocks, system = self._systems.then(leg.system, self._alive, after.held), leg.system
+                blocks, system = self._systems.then(leg.system, leg.begin.state, self._alive, after.held), leg.system
                 self._laws = None if after.changes else self._laws  # latches and releases leave controllers as they are
             with integration(leg.system, "articulated", 0.0, self._settings.integrator) as solve:
                 is_last, stop = i + 1 == len(course), leg.raw.t

@@ -15,10 +15,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexmb.closure.factor import DEPENDENT
+from flexmb.closure.impulses import RowMotion
 from flexmb.run.impulses import struck
 from flexmb.scene.tree import rate_name, scalar_paths
 from flexmb.sensitivity.leg import Course, Variation
-from flexmb.tables.state import State
+from flexmb.tables.state import State, pack
 from flexmb.typing import Real
 
 
@@ -58,8 +60,7 @@ class Striking:
         speeds = sorted(given)
         wanted = D[nq + np.array(speeds)].copy()
         wanted[speeds.index(j)] = change * state.u[j] + factor * D[nq + j]
-        du, dp = self._changed(state, after - state.u, D, speeds, wanted)
-        p = np.array([found.impulses[place] for place in speeds])
+        p, du, dp = self._changed(state, after - state.u, D, speeds, wanted)
         sums = (after + state.u)[speeds]
         out = D.copy()
         out[nq : nq + nu] = du
@@ -69,20 +70,41 @@ class Striking:
             self._kept.add(j)
         return out
 
-    def _changed(self, state: State, gain: Real, D: Real, speeds: list[int], wanted: Real) -> tuple[Real, Real]:
-        """Changes of the speeds (nu,P) after impulses and of the impulses along `speeds` (k,P), whose speeds change by
-        `wanted` (k,P); gain (nu,): u+ - u-."""
-        variation, system = self._variation, self._variation.blocks.system
-        nq, nu = system.nq, system.nu
-        M = system.mass_matrix(state)
-        E = np.eye(nu)[speeds]
-        variation.take(Course(self._y, D))
-        _, turned = variation.blocks.inertia_forces(state.t, gain)  # dM (u+ - u-), by change of the coordinates
-        right = M @ D[nq : nq + nu] - turned
-        k = len(speeds)
-        system_matrix = np.block([[M, -E.T], [E, np.zeros((k, k))]])
-        found = np.linalg.solve(system_matrix, np.vstack([right, wanted]))
-        return found[:nu], found[nu:]
+    def _changed(self, state: State, gain: Real, D: Real, speeds: list[int], wanted: Real) -> tuple[Real, Real, Real]:
+        """Impulses (k,) along `speeds`, the changes of all speeds (nu,P) after them, and those of the impulses (k,P);
+        gain (nu,): u+ - u-; wanted (k,P): changes of `speeds`. Of impulses that redundant closures leave undetermined
+        the least ones are taken, which does not affect the speeds."""
+        blocks, t = self._variation.blocks, state.t
+        system = blocks.system
+        nq, nu, k, P = system.nq, system.nu, len(speeds), D.shape[1]
+        M, along = system.mass_matrix(state), np.eye(nu)[speeds]
+        by_rows, of_drives, opening = np.zeros((nu, P)), np.zeros((nu, P)), np.zeros((0, P))
+        by_closures = np.zeros(nu)
+        impulses = (M @ gain)[speeds]
+        if system.closures is not None:
+            J = RowMotion(system.closures, t, pack(state)).jacobian
+            along = np.vstack([along, J])
+            impulses, rows = np.split(np.linalg.lstsq(along.T, M @ gain, rcond=DEPENDENT)[0], [k])
+            self._put(state.u + gain, D, with_speeds=False)
+            found = blocks.response(t, rows)
+            by_closures, of_drives, opening = found.gain, -found.drive_rates, -found.row_rates
+            by_rows = M @ found.gain_rates
+        self._put(state.u, D)
+        _, turned = blocks.inertia_forces(t, gain - by_closures)  # dM M^-1 E'p, by the change of the coordinates
+        right = M @ D[nq : nq + nu] - turned + by_rows
+        right[speeds] += of_drives[speeds]
+        whole = np.block([[M, -along.T], [along, np.zeros((len(along), len(along)))]])
+        change = np.linalg.lstsq(whole, np.vstack([right, wanted, opening]), rcond=None)[0]
+        return impulses, change[:nu], change[nu : nu + k]
+
+    def _put(self, u: Real, D: Real, with_speeds: bool = True) -> None:
+        """Set the states of the blocks to the coordinates and these speeds (nu,), with the change of the coordinates."""
+        nq, nu = self._variation.blocks.system.nq, self._variation.blocks.system.nu
+        y, along = self._y.copy(), D.copy()
+        y[nq : nq + nu] = u
+        if not with_speeds:
+            along[nq : nq + nu] = 0.0
+        self._variation.take(Course(y, along))
 
     def _speed(self, coordinate: str) -> int:
         """Index in u of the rate of a coordinate."""

@@ -22,7 +22,7 @@ from flexmb.scene.tree import rate_name, scalar_paths
 from flexmb.scene.values import PathError
 from flexmb.sensitivity.blocks import Blocks, DualTables, set_lanes
 from flexmb.system.tree_system import System
-from flexmb.tables.arrays import Constants
+from flexmb.tables.state import State, pack
 from flexmb.typing import Real
 
 _DIAGONAL = "orthogonal", "uncoupled"  # integers of a body that hold for other numbers too, see flexmb.parameters.tables
@@ -53,20 +53,22 @@ class Systems:
         self._known = self._differentiated(system, list(range(self._mechanical)), start)
         return self._blocks(self._known, {}), start
 
-    def then(self, system: System, alive: Sequence[bool], held: Mapping[str, Real]) -> Blocks:
-        """The blocks after events. alive (P,): which numbers the scene still has; held: the scaled derivatives (P,) of
-        the values at which coordinates are held, by name."""
+    def then(self, system: System, state: State, alive: Sequence[bool], held: Mapping[str, Real]) -> Blocks:
+        """The blocks after events, from a state on. alive (P,): which numbers the scene still depends on; held: the
+        scaled derivatives (P,) of the values at which coordinates are held, by name."""
         assert self._known is not None  # a run begins with `first`
         plant = system.with_numbers(system.scene)
-        taken = [_taken_over(self._known.system, plant, each, list(alive)) for each in self._known.duals]
+        taken = [_taken_over(self._known.system, plant, each) if all(alive) else None for each in self._known.duals]
         if all(each is not None for each in taken):
             found = Known(plant, [each for each in taken if each is not None])
-            broaden([each.constants for each in found.duals])
+            _alike(found.duals)
         else:
             start = np.zeros((system.nq + system.nu + 1, len(self._numbers)))
             names = [k for k in range(self._mechanical) if alive[k] and _exists(system.scene, self._numbers[k].name)]
             found = self._differentiated(system, names, start)
         self._known = found
+        if found.system.closures is not None:  # the rows that are independent here
+            found.system.closures.begin_at(state.t, pack(state))
         return self._blocks(found, held)
 
     def _differentiated(self, system: System, chosen: Sequence[int], start: Real) -> Known:
@@ -77,19 +79,18 @@ class Systems:
             plant.initial_state  # noqa: B018  (counts the rows of closures)
             sources: list[tuple[Any, Any]] = []
         else:
-            found = system.parameters([self._numbers[k].name for k in chosen])
-            plant, sources = found.plant, [(each.constants, each.closures) for each in found.blocks]  # type: ignore[assignment]
-            start[:, list(chosen)] = found.initial_state * self._scales[list(chosen)]
+            parameters = system.parameters([self._numbers[k].name for k in chosen])
+            plant, sources = parameters.plant, [(each.constants, each.closures) for each in parameters.blocks]
+            start[:, list(chosen)] = parameters.initial_state * self._scales[list(chosen)]
         tree = [_arranged(plant.constants, [each[0] for each in sources], chosen, self._scales, b) for b in range(_count(P))]
         closed: list[DualClosureConstants | None] = [None] * _count(P)
         if plant.closures is not None:
             own = plant.closures.constants[1]
             of_closures = [_arranged(own, [each[1] for each in sources], chosen, self._scales, b) for b in range(_count(P))]
             closed = [DualClosureConstants(**each) for each in of_closures]
-            broaden(closed)
-        constants = [DualConstants(**each) for each in tree]
-        broaden(constants)
-        return Known(plant, [DualTables(*each) for each in zip(constants, closed, strict=True)])
+        found = [DualTables(DualConstants(**each), other) for each, other in zip(tree, closed, strict=True)]
+        _alike(found)
+        return Known(plant, found)
 
     def _blocks(self, known: Known, held: Mapping[str, Real]) -> Blocks:
         """The blocks with derivatives of what is held, which those that are taken over do not have."""
@@ -99,8 +100,16 @@ class Systems:
             for name, rates in held.items():
                 set_lanes(functions["data"][_function_of(known.system, name), :1], rates[None], b)
             found.append(each._replace(constants=replace(each.constants, function=functions)))
-        broaden([each.constants for each in found])
+        _alike(found)
         return Blocks(known.system, found, len(self._numbers))
+
+
+def _alike(duals: Sequence[DualTables]) -> None:
+    """Give the tables of all blocks the features of any, so that they share kernels."""
+    broaden([each.constants for each in duals])
+    closures = [each.closures for each in duals if each.closures is not None]
+    if closures:
+        broaden(closures)
 
 
 def _count(directions: int) -> int:
@@ -139,29 +148,36 @@ def _floats(wide: Any, own: Any) -> list[tuple[Any, str | None]]:
     return [(wide[name], name) for name in names if (own.dtype[name].subdtype or (own.dtype[name],))[0] == np.float64]
 
 
-def _taken_over(before: System, now: System, duals: DualTables, alive: Sequence[bool]) -> DualTables | None:
+def _taken_over(before: System, now: System, duals: DualTables) -> DualTables | None:
     """The tables of a system in duals, with the derivatives of the system before; None if these do not suffice."""
-    if duals.closures is not None or not all(alive):
-        return None
-    arrays = {}
-    for each in fields(Constants):
-        old, new, wide = getattr(before.constants, each.name), getattr(now.constants, each.name), as_duals(getattr(now.constants, each.name))
-        known = getattr(duals.constants, each.name)
+    tree = _with_derivatives(before.constants, now.constants, duals.constants)
+    if tree is None or now.closures is None or before.closures is None:
+        return None if tree is None else DualTables(DualConstants(**tree), None)
+    closed = _with_derivatives(before.closures.constants[1], now.closures.constants[1], duals.closures)
+    return None if closed is None else DualTables(DualConstants(**tree), DualClosureConstants(**closed))
+
+
+def _with_derivatives(before: Any, now: Any, duals: Any) -> dict[str, Any] | None:
+    """The arrays of a table in duals, with the derivatives of a table before that has the same numbers; None if it does
+    not. Functions of time may differ where they have no derivatives."""
+    found = {}
+    for each in fields(now):
+        old, new, known = (getattr(of, each.name) for of in (before, now, duals))
+        wide = as_duals(new)
         for part, name in _floats(wide, new):
-            source = known if name is None else known[name]
+            source, one, other = (array if name is None else array[name] for array in (known, old, new))
             if each.name in _OF_TIME:
                 if np.any(source[..., 1:]):
                     return None
-                continue
-            pair = (old, new) if name is None else (old[name], new[name])
-            if pair[0].shape != pair[1].shape or not np.array_equal(*pair):
+            elif not np.array_equal(one, other):
                 return None
-            part[...] = source
+            else:
+                part[...] = source
         if each.name == "body":
             for name in _DIAGONAL:
                 wide[name] = known[name]
-        arrays[each.name] = wide
-    return DualTables(DualConstants(**arrays), None)
+        found[each.name] = wide
+    return found
 
 
 def _exists(scene: Scene, name: str) -> bool:
