@@ -80,6 +80,7 @@ class Blocks:
             found.append(
                 chain.ChainBlock(
                     chain=self._chain, c=each.constants, cc=each.closures, y=np.zeros(len(self.state[0])),
+                    slope=np.zeros(len(self.state[0])),
                     x=chain_rates(w, system.closures.constants[1]),
                 )  # fmt: skip
             )

@@ -45,7 +45,8 @@ class ChainBlock:
     c: Constants
     cc: ClosureConstants
     x: ChainRates
-    y: Real  # (nq+nu+1,) the state without derivatives
+    y: Real  # (nq+nu+1,) the state without derivatives, and its rate
+    slope: Real
 
 
 @kernel
@@ -55,8 +56,8 @@ def motion(t, s):
     for i in range(s.y.shape[0]):
         s.y[i] = w.state[i].real
     w.time[0] = t
-    status = slope(t, s.y, x.slope, s.chain)
-    for r in range(x.load.shape[0]):
+    status = slope(t, s.y, s.slope, s.chain)
+    for r in range(s.cc.row.shape[0]):
         x.cw.row[r].load = s.chain.cw.row[r].load
     if status == OK:
         status = evaluate(s.c, w, s.cc, x.cw)
