@@ -35,6 +35,9 @@ UNSEEN = 1e-7
 INVOLVED = 0.1  # components of such a combination that name a parameter
 AGREE = 0.01  # relative change of estimated sigmas at which the weights count as settled
 REWEIGHTED = 8  # times at most
+# Relative change of the sum of squares at which the search ends. The parameters are then within sqrt(FLAT n) of their
+# sigmas for n measurements, a hundredth for ten thousand, and smaller changes are lost in the error of the runs.
+FLAT = 1e-8
 
 
 @dataclass(frozen=True)
@@ -190,19 +193,19 @@ def _searched(problem: _Problem, start: Real, limits: tuple[Real, Real], noise: 
     x = start
     for _ in range(1 if noise is not None else REWEIGHTED):
         solution = least_squares(
-            residuals, x, jacobian, limits, method="trf", x_scale="jac", max_nfev=max_runs, xtol=1e-10, ftol=1e-12,
-            gtol=1e-12,
-        )  # fmt: skip
-        x = solution.x
+            residuals, x, jacobian, limits, method="trf", x_scale="jac", max_nfev=max_runs, ftol=FLAT, xtol=FLAT, gtol=None
+        )
+        x, before = solution.x, weights
         if noise is not None:
             break
-        before, off = weights, _by_time(known, solution.fun) * weights
+        off = _by_time(known, solution.fun) * weights
         share = 1.0 - len(x) / np.sum(known)  # parameters take so much of the residuals away
         weights = np.sqrt(np.nanmean(off**2, axis=0) / share)
         weights = np.where(weights > 0.0, weights, before)
         if len(weights) == 1 or np.all(np.abs(weights - before) <= AGREE * weights):
             break
-    return _found(problem, x, solution, jacobian(x), weights, noise is None, runs)
+    J = solution.jac * (before / weights)[np.nonzero(problem.known)[1], None]  # the weights may have changed since
+    return _found(problem, x, solution, J, weights, noise is None, runs)
 
 
 def _found(
