@@ -58,8 +58,9 @@ class Models:
         body = self.body[name]
         match body:
             case s.RigidBody():
-                wheels = self.wheels.get(name)
-                return _with_wheels(body, tuple(wheels)) if wheels else _rigid(body)
+                if self._like and name in self.wheels:
+                    return _kept(body, tuple(self.wheels[name]))
+                model = _rigid(body)
             case s.BeamBody() | s.ModalBody():
                 followed = self._like.get(name)
                 assert not isinstance(followed, s.RigidBody | s.SidBody)  # it is the same body with other numbers
@@ -80,8 +81,8 @@ def _rigid(body: s.RigidBody) -> FlexibleModel:
 
 
 @lru_cache(maxsize=64)
-def _with_wheels(body: s.RigidBody, wheels: tuple[s.Wheel, ...]) -> FlexibleModel:
-    """A rigid body with its wheels. Equal ones, also in copies of a scene, share it, and thereby their tables."""
+def _kept(body: s.RigidBody, wheels: tuple[s.Wheel, ...]) -> FlexibleModel:
+    """A rigid body with its wheels, of which many copies of a scene with other numbers elsewhere share the tables."""
     model = _rigid(body)
     for wheel in wheels:
         model = _with_wheel(model, wheel)
