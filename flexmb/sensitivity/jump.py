@@ -22,6 +22,7 @@ from flexmb.scene.schema import SceneEvent
 from flexmb.sensitivity.impulses import Striking
 from flexmb.sensitivity.law_rates import EventRates
 from flexmb.sensitivity.leg import Course, Variation
+from flexmb.sensitivity.watched import Watched
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 
@@ -154,17 +155,18 @@ def _time(
     assert before is not None
     system, t = variation.blocks.system, variation.leg.raw.t
     names = [name for names in system.state_names for name, _ in names]
-    if event.watch not in names:
-        raise NotImplementedError(
-            f'event "{event.name}" watches the signal "{event.watch}": derivatives pass events on time, coordinates and '
-            "their rates"
-        )
-    place = names.index(event.watch)
-    rate = before.y[place]
+    if event.watch in names:
+        place = names.index(event.watch)
+        rate, change = float(before.y[place]), end.Y[place]
+    else:
+        watched = Watched(variation, event.watch)
+        if watched.is_sampled:  # it jumps at a sampling instant, which stays where it is
+            return np.zeros(end.Y.shape[1])
+        rate, change = watched.rate(end, before), watched.change(end)
     atol, rtol, length = tolerance
     if abs(rate) * GRAZING * length <= atol + rtol * abs(event.level):
         raise EventError(
             f'event "{event.name}" at t = {t:g} s grazes its level: the quantity reaches it at {rate:.1e} per second, '
             "almost at rest, so that its time has no derivative; change the level or the motion"
         )
-    return (level - end.Y[place]) / rate
+    return (level - change) / rate

@@ -93,6 +93,23 @@ class Loops:
         waiting = first.instant["time"][first.following[0] :, 0]
         return bool(len(waiting)) and bool(waiting[0] <= t)
 
+    def is_sampled(self, signal: str) -> bool:
+        """Whether a signal is an output of a sampled controller."""
+        return self._feedback.is_sampled(signal)
+
+    def place_of(self, signal: str) -> int:
+        """The index of a signal among all of them."""
+        return self._feedback.place_of(signal)
+
+    def just_before(self, t: float) -> float:
+        """A time (s) before t at which no instant counts as reached that is due at t."""
+        return float(np.nextafter(t - 2.0 * self.tables[0].slack[0, 0], -np.inf))
+
+    def distance_to_instants(self, t: float) -> float:
+        """The time (s) from t to the nearest sampling instant, infinite without one."""
+        times = self.tables[0].instant["time"][:, 0]
+        return float(np.min(np.abs(times - t), initial=np.inf))
+
     def replay(self) -> None:
         """From now on outputs of sampled controllers are read back."""
         for each in self.tables:
