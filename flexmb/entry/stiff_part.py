@@ -154,7 +154,10 @@ def _factorise(a, b, s, m):
 
 @kernel
 def along(u, q, s):
-    """q (nq,) = the rates of the coordinates at speeds u (nu,), complex, at the state of `shift`; zero for prescribed ones."""
+    """q (nq,) = the rates of the coordinates at speeds u (nu,), complex, at the state of `shift`.
+
+    Those of prescribed coordinates are zero.
+    """
     w = s.first.w
     for j in range(u.shape[0]):
         w.u[j] = u[j] if s.scene.speed[j].prescribed < 0 else 0.0 * u[j]

@@ -196,6 +196,11 @@ def _cosine(call, builder, x):
     return call(math.cos, x), builder.fneg(call(math.sin, x))
 
 
+def _exponential(call, builder, x):
+    power = call(math.exp, x)
+    return power, power
+
+
 _binary(_add, operator.add, operator.iadd)
 _binary(_subtract, operator.sub, operator.isub)
 _binary(_multiply, operator.mul, operator.imul)
@@ -203,6 +208,7 @@ _binary(_divide, operator.truediv, operator.itruediv)
 _unary(math.sqrt, _square_root)
 _unary(math.sin, _sine)
 _unary(math.cos, _cosine)
+_unary(math.exp, _exponential)
 infer_global(operator.neg)(_Unary)
 infer_global(math.atan2)(_Binary)
 

@@ -77,7 +77,7 @@ def _on_interval(
         if before is not None:
             # The middle is none of the points: it must lie on the interpolant of the others.
             jump = sum(weight * even[place] for place, weight in zip(places, _rest(intervals), strict=True)) / width
-            error = max(_relative(each, now, size / scale, parts) for each in (now - before, jump))
+            error = max(_relative(each, now, size / width, parts) for each in (now - before, jump))
             if error <= ENOUGH:
                 break
         before = now

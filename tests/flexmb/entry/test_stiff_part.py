@@ -33,7 +33,7 @@ def tables(system: flexmb.System) -> stiff_part.StiffPart:
 
 def blocks(system: flexmb.System, part: stiff_part.StiffPart) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """K and D (nu,nu), and the place in q of the coordinate of each speed, -1 where it has none of its own."""
-    c, nu = system.constants, system.nu
+    c = system.constants
     K, D, place = np.diag(part.stiffness), np.diag(part.damping), c.speed["coordinate"].copy()
     for k, body in enumerate(c.body):
         m, first = int(body["modes"]), int(body["etad_index"])
@@ -115,13 +115,14 @@ def test_laws_of_hinges():
 
 
 def test_completeness():
-    """Forces between frames, and the isotropic spring of a ball, are not in the stiff part: such scenes need Jacobians."""
+    """Forces between frames and the isotropic spring of a ball are not in the stiff part: these need Jacobians."""
 
     def base() -> SceneBuilder:
         return SceneBuilder("s", gravity=(0, 0, -9.81)).rigid_body("a", mass=1.0, inertia=(1, 1, 1))
 
     held = base().spherical("ball", "ground", "a")
     sprung = base().spherical("ball", "ground", "a", stiffness=3.0)
-    tied = base().spherical("ball", "ground", "a").spring_damper("tie", "ground", "a", position_a=(1, 0, 0), stiffness=2.0)
+    tied = base().spherical("ball", "ground", "a")
+    tied.spring_damper("tie", "ground", "a", position_a=(1, 0, 0), stiffness=2.0)
     found = [stiff_part.is_complete(flexmb.compile(each.scene()).constants) for each in (held, sprung, tied)]
     assert found == [True, False, False]
