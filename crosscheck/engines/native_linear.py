@@ -53,8 +53,7 @@ def _exactly(equations: Equations, states: Iterable[State]) -> Iterator[Matrices
 
 def _exact(equations: Equations, state: State) -> Matrices:
     at = equations.variations(state)
-    u = state.u[equations.free][at.chosen]
-    return exact(at.by_displacement, at.by_speed, np.linalg.inv(at.mass), at.transport, u, at.rates)
+    return exact(at.by_displacement, at.by_speed, np.linalg.inv(at.mass), at.transport, state.u, at.rates)
 
 
 def _by_differences(equations: Equations, algorithm: Algorithm, states: Iterable[State]) -> Iterator[Matrices]:

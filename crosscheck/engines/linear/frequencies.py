@@ -18,7 +18,7 @@ that error, which is the root of what the matrices are known to.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cholesky, eig, matrix_balance, solve_triangular
+from scipy.linalg import cholesky, eig, solve_triangular
 
 from crosscheck.engines.linear.matrices import EPS, Matrices, norm
 from flexmb.typing import Real
@@ -61,16 +61,19 @@ def _of_squares(S: Real, doubt: float) -> tuple[Real, Real]:
 
 
 def _damped(at: Matrices) -> tuple[Real, Real]:
-    """Frequencies and errors by the eigenvalues of A, balanced by powers of two."""
+    """Frequencies and errors by the eigenvalues of A in the coordinates a, b of xi = L a, u = s L b, which have no
+    units: their inertia is 1, and s is the size of the frequencies."""
     n = len(at.by_speed)
-    A = np.block([[at.transport, np.eye(n)], [at.by_displacement, at.by_speed]])
-    balanced, (scale, _) = matrix_balance(A, permute=False, separate=1)
-    values, left, right = eig(balanced, left=True, right=True)
+    L = cholesky(at.by_force, lower=True)
+    T, Q, V = (solve_triangular(L, part @ L, lower=True) for part in (at.transport, at.by_displacement, at.by_speed))
+    s = max(np.sqrt(norm(Q)), norm(V), norm(T)) or 1.0
+    A = np.block([[T, s * np.eye(n)], [Q / s, V]])
+    values, left, right = eig(A, left=True, right=True)
     overlap = np.abs(np.sum(left.conj() * right, axis=0))
-    x, y = scale[:, None] * right, left / scale[:, None]
-    displaced, hurried = (np.linalg.norm(part, axis=0) for part in (x[:n], x[n:]))
-    change = at.errors.by_displacement * displaced + at.errors.by_speed * hurried
-    change = np.linalg.norm(y[n:], axis=0) * change + 2 * n * EPS * norm(balanced)
-    errors = np.minimum(change / np.maximum(overlap, np.sqrt(EPS)), np.sqrt(np.maximum(change, EPS) * norm(balanced)))
+    displaced, hurried = np.linalg.norm(L @ right[:n], axis=0), s * np.linalg.norm(L @ right[n:], axis=0)
+    weight = np.linalg.norm(solve_triangular(L.T, left[n:], lower=False), axis=0) / s
+    change = weight * (at.errors.by_displacement * displaced + at.errors.by_speed * hurried)
+    change += 2 * n * EPS * norm(A)
+    errors = np.minimum(change / np.maximum(overlap, np.sqrt(EPS)), np.sqrt(change * norm(A)))
     order = np.argsort(np.abs(values.imag), kind="stable")
     return np.abs(values.imag)[order][::2], errors[order][::2]

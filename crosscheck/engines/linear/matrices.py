@@ -7,10 +7,12 @@ udot (n,) are the accelerations of the free speeds u, xi displacements along the
 `transport` is that of xi' = du + transport xi (`flexmb.linear.variations`): carried axes turn.
 
 **Exact derivatives** are known up to rounding. They come from solving with the mass matrix M = by_force^-1, and the
-relative error of that is at most about n eps kappa (Higham 2002, chapters 9 and 10), where kappa is the condition
+relative error of that is at most about c n eps kappa (Higham 2002, chapters 9 and 10), where kappa is the condition
 number of M after its rows and columns are scaled by the roots of its diagonal: by the choice of units no digit is lost
-(van der Sluis 1969). It applies to the parts of a derivative, which may cancel. Their sizes are those of the derivative
-itself and of the products with speeds and accelerations by which turned axes and arms enter:
+(van der Sluis 1969). n counts all speeds, prescribed ones too, through which a recursion passes, and c the roundings of
+a product of spatial vectors and matrices on the way. The bound applies to the parts of a derivative, which may cancel.
+Their sizes are those of the derivative itself and of the products with speeds and accelerations by which turned axes
+and arms enter:
 
     |by_displacement| + |by_speed| |u| + |udot|,    |by_speed| + |u|,    |by_force|
 """
@@ -26,6 +28,7 @@ import numpy as np
 from flexmb.typing import Real
 
 EPS = float(np.finfo(np.float64).eps)
+ROUNDINGS = 8  # c: six products and their sum, and the one that turns the axes
 DERIVATIVES = ("by_displacement", "by_speed", "by_force")
 FREQUENCIES = "frequencies"
 
@@ -57,8 +60,9 @@ class Matrices:
 
 
 def exact(by_displacement: Real, by_speed: Real, by_force: Real, transport: Real, u: Real, udot: Real) -> Matrices:
-    """Derivatives that are exact up to rounding."""
-    unit = len(u) * EPS * scaled_condition(by_force)
+    """Derivatives that are exact up to rounding, of a state with all speeds u and accelerations udot, also prescribed
+    ones."""
+    unit = ROUNDINGS * len(u) * EPS * scaled_condition(by_force)
     turning = norm(by_speed) + norm(u)
     errors = Errors(
         by_displacement=unit * (norm(by_displacement) + norm(by_speed) * norm(u) + norm(udot)),

@@ -61,7 +61,7 @@ class PinocchioLinear:
         by_q, by_v, by_force = self._of_all(state, acting) if self._free else self._of_free(state, acting, a)
         place = self._places
         transport = self._transport(state.v)[np.ix_(place, place)]
-        return exact(by_q, by_v, by_force, transport, state.v[place], a[place])
+        return exact(by_q, by_v, by_force, transport, state.v, a)
 
     def _of_all(self, state: PinocchioState, acting: Acting) -> tuple[Real, Real, Real]:
         """By forward dynamics: derivatives by displacements, speeds and forces."""
