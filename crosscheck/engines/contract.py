@@ -129,8 +129,8 @@ class Trajectory:
     which are given only where the run asks for them: `derivatives` "by_displacement", "by_speed" and "by_force"
     (T,n*n) are those of the accelerations of the n free speeds at every sample, row by row in the order and by the
     displacements of `crosscheck.engines.linear.coordinates`; `frequencies` (T,n) rad/s as
-    `crosscheck.engines.linear.frequencies` defines them; `known_to` (T,), by these names and "frequencies", says how far
-    (Frobenius norm) they may be from those of the same state in exact arithmetic. `undetermined`: the channels
+    `crosscheck.engines.linear.frequencies` defines them; `known_to` (T,), by these names and "frequencies", says how
+    far (Frobenius norm) they may be from those of the same state in exact arithmetic. `undetermined`: the channels
     "load:<name>.torque", "load:<name>.force" or "drive:<name>" that redundant closures leave undetermined; they may
     hold NaN and are not compared.
     """

@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
 from crosscheck.engines.linear.differences import differentiated
-from crosscheck.engines.linear.matrices import DERIVATIVES, EPS, Errors, Matrices, exact, norm, scaled_condition
+from crosscheck.engines.linear.matrices import DERIVATIVES, Errors, Matrices, exact, norm, rounding
 from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs, LinearPart, outputs
 from flexmb.linear.equations import equations_of
 from flexmb.linear.linearize import displacement_names
@@ -76,7 +76,7 @@ def _differenced(equations: Equations, at: Variations, accelerations) -> Matrice
         return accelerations(state.t, state.q, u)[free].copy()
 
     by_force = np.linalg.inv(at.mass)
-    unit = n * EPS * scaled_condition(by_force)
+    unit = rounding(by_force, len(state.u))
     noise = unit * (norm(at.rates) + norm(state.u) ** 2)
     by_displacement, apart = differentiated(displaced, n, noise)
     by_speed, asunder = differentiated(hurried, n, noise)

@@ -11,6 +11,7 @@ import numpy as np
 from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import RUNGS, RungSignal, Uncertainty, estimate, spatial, unknown
 from crosscheck.judging.verdict import Ending, Signal
+from crosscheck.library.channels import is_judged, known_to
 from crosscheck.records.drawing import FILM
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record, RunRecord, RunStatus
 from crosscheck.records.packing import Packed, unpack
@@ -49,7 +50,7 @@ class Result:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        return tuple(self.finest.channels) if self.status == "finished" else ()
+        return tuple(filter(is_judged, self.finest.channels)) if self.status == "finished" else ()
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -91,7 +92,17 @@ class Result:
         if _without_effect(ladder):
             ladder = ladder[-1:]
         rungs = [RungSignal(run.effort_value, self.values(channel, run), run.evaluations) for run in ladder]
-        return estimate(channel, finest.effort_kind, rungs, self._sizes.magnitude(channel, finest.evaluations))
+        size = self._sizes.magnitude(channel, finest.evaluations)
+        return self._with_own(channel, estimate(channel, finest.effort_kind, rungs, size))
+
+    def _with_own(self, channel: str, of_run: Uncertainty) -> Uncertainty:
+        """U with what the engine says of how well it knows a derivative or a frequency of a state."""
+        own = self.finest.channels.get(known_to(channel))
+        if own is None:
+            return of_run
+        envelope = of_run.envelope + np.maximum.accumulate(self._array(own)[:, 0])
+        how = f"{of_run.how}; {envelope[-1] - of_run.value:.1e} by the engine's own account"
+        return Uncertainty(envelope, float(envelope[-1]), how, of_run.order)
 
     def _ladder(self) -> list[RunRecord]:
         method = (self.finest.effort_kind, self.finest.effort_method)

@@ -62,7 +62,7 @@ class Matrices:
 def exact(by_displacement: Real, by_speed: Real, by_force: Real, transport: Real, u: Real, udot: Real) -> Matrices:
     """Derivatives that are exact up to rounding, of a state with all speeds u and accelerations udot, also prescribed
     ones."""
-    unit = ROUNDINGS * len(u) * EPS * scaled_condition(by_force)
+    unit = rounding(by_force, len(u))
     turning = norm(by_speed) + norm(u)
     errors = Errors(
         by_displacement=unit * (norm(by_displacement) + norm(by_speed) * norm(u) + norm(udot)),
@@ -70,6 +70,11 @@ def exact(by_displacement: Real, by_speed: Real, by_force: Real, transport: Real
         by_force=unit * norm(by_force),
     )
     return Matrices(by_displacement, by_speed, by_force, transport, errors)
+
+
+def rounding(by_force: Real, speeds: int) -> float:
+    """The relative error c n eps kappa of a solution with the mass matrix, of a tree with so many speeds."""
+    return ROUNDINGS * speeds * EPS * scaled_condition(by_force)
 
 
 def norm(values: Real) -> float:

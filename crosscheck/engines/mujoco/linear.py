@@ -21,7 +21,7 @@ import numpy as np
 from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
 from crosscheck.engines.linear.differences import STEP, fourth_order
-from crosscheck.engines.linear.matrices import EPS, Errors, Matrices, norm, quaternion_transport, scaled_condition
+from crosscheck.engines.linear.matrices import EPS, Errors, Matrices, norm, quaternion_transport, rounding
 from crosscheck.engines.linear.slots import slot_names
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.mujoco.forces import Forces
@@ -102,9 +102,9 @@ class MujocoLinear:
         by_speed = T.T @ by_v @ T + of_speeds
         square = np.ix_(self._places, self._places)
         by_force = (T.T @ inverse @ T)[square]
-        unit = nv * EPS * scaled_condition(by_force)
+        unit = rounding(by_force, nv)
         noise = 1.5 * np.sqrt(nv) / STEP * (unit * norm(udot[self._places]) + EPS * norm(u))
-        errors = Errors(apart + asunder * norm(turned) + noise, asunder + noise, 8.0 * unit * norm(by_force))
+        errors = Errors(apart + asunder * norm(turned) + noise, asunder + noise, unit * norm(by_force))
         return Matrices(by_displacement[square], by_speed[square], by_force, self._transport(u)[square], errors)
 
     def _transport(self, u: Real) -> Real:
