@@ -34,7 +34,7 @@ def derivatives_by_displacements(engine: Engine) -> None:
     _matrix(engine, scene, "by_displacement", derivatives(scene))
 
 
-@LINEARISED.clause("Derivatives by speeds are those of Coriolis and centrifugal terms and of dampers, with their signs.")
+@LINEARISED.clause("Derivatives by speeds are those of Coriolis and centrifugal terms and of dampers, with signs.")
 def derivatives_by_speeds(engine: Engine) -> None:
     scene = sprung().scene()
     _matrix(engine, scene, "by_speed", derivatives(scene))
@@ -107,9 +107,9 @@ def frequency_of_a_damped_pendulum(engine: Engine) -> None:
 def frequencies_of_what_does_not_oscillate(engine: Engine) -> None:
     """A slide without a spring, one with so strong a damper that both its eigenvalues are real, and one that swings."""
     tree = SceneBuilder("three slides", gravity=(0.0, 0.0, 0.0))
-    for name, own in (("free", {}), ("slow", {"stiffness": 3.0, "damping": 9.0}), ("quick", {"stiffness": 8.0})):
+    for name, stiffness, damping in (("free", 0.0, 0.0), ("slow", 3.0, 9.0), ("quick", 8.0, 0.0)):
         tree.rigid_body(name, mass=2.0, inertia=(0.01, 0.02, 0.03))
-        tree.prismatic(f"to {name}", "ground", name, axis=AXES[0], **own)
+        tree.prismatic(f"to {name}", "ground", name, axis=AXES[0], stiffness=stiffness, damping=damping)
     tree.marker("quick", "quick")
     _frequencies(engine, tree.scene(), np.array([0.0, 0.0, 2.0]))
 

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from crosscheck.conformance.tree_mechanics import TreeMechanics
 from crosscheck.engines.conventions import rotation_matrix
-from flexmb.scene.hinges import Free, Spherical
+from flexmb.scene.hinges import Free, Hinge, Spherical
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -42,7 +42,7 @@ def derivatives(scene: Scene) -> KnownDerivatives:
     return KnownDerivatives(
         np.array([_slope(displaced[n]) for n in tree.free]).T,
         np.array([_slope(hurried(n)) for n in tree.free]).T,
-        np.linalg.inv(tree.mass_matrix()),
+        np.asarray(np.linalg.inv(tree.mass_matrix())),
     )
 
 
@@ -71,8 +71,9 @@ def _displaced(scene: Scene, tree: TreeMechanics) -> Iterator[Callable[[float], 
     yield from (shifted(k) for k in range(n, tree.size))  # wheels and modes
 
 
-def _moved(hinge: Spherical | Free, xi: Real) -> Spherical | Free:
-    """The hinge turned and shifted by xi (6,) [rotation; position] in its outboard axes."""
+def _moved(hinge: Hinge, xi: Real) -> Spherical | Free:
+    """A ball joint or free flight turned and shifted by xi (6,) [rotation; position] in its outboard axes."""
+    assert isinstance(hinge, Spherical | Free)  # no other has a freedom of several speeds
     w, x, y, z = hinge.quaternion
     angle = float(np.linalg.norm(xi[:3]))
     a, (b, c, d) = np.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / np.pi) * xi[:3]

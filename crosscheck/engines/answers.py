@@ -240,6 +240,8 @@ def _signals(run: Trajectory) -> Iterator[tuple[str, Real]]:
             yield f"markers[{name!r}].{part.name}", getattr(path, part.name)
     for output in OUTPUTS:
         found = getattr(run, output)
+        if output == "known_to":
+            continue  # an engine may say that it does not know: infinity
         if isinstance(found, dict):
             for name, values in found.items():
                 yield f"{output}[{name!r}]", _determined(run, output, name, values)

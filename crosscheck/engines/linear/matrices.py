@@ -63,12 +63,8 @@ def exact(by_displacement: Real, by_speed: Real, by_force: Real, transport: Real
     """Derivatives that are exact up to rounding, of a state with all speeds u and accelerations udot, also prescribed
     ones."""
     unit = rounding(by_force, len(u))
-    turning = norm(by_speed) + norm(u)
-    errors = Errors(
-        by_displacement=unit * (norm(by_displacement) + norm(by_speed) * norm(u) + norm(udot)),
-        by_speed=unit * turning,
-        by_force=unit * norm(by_force),
-    )
+    sizes = (norm(by_displacement) + norm(by_speed) * norm(u) + norm(udot), norm(by_speed) + norm(u), norm(by_force))
+    errors = Errors(*(unit * size if np.isfinite(unit) else float("inf") for size in sizes))
     return Matrices(by_displacement, by_speed, by_force, transport, errors)
 
 
