@@ -35,15 +35,6 @@ def eigenfrequencies(at: Matrices) -> tuple[Real, float]:
     return frequencies[order], norm(errors)
 
 
-def of_stiffness(stiffness: Real, mass: Real, error: float) -> tuple[Real, float]:
-    """The frequencies (n,) of M q'' + K q = 0, the symmetric K known to `error` (Frobenius norm), and their errors."""
-    L = cholesky(mass, lower=True)
-    S = solve_triangular(L, solve_triangular(L, stiffness, lower=True).T, lower=True)
-    least = float(np.linalg.eigvalsh(mass)[0])
-    frequencies, errors = _of_squares(S, error / least + len(S) * EPS * norm(S))
-    return np.sort(np.where(frequencies <= errors, 0.0, frequencies)), norm(errors)
-
-
 def _undamped(at: Matrices) -> tuple[Real, Real] | None:
     """Frequencies and errors where speeds have no part and S is symmetric, within what is known; None elsewhere."""
     if norm(at.by_speed) > at.errors.by_speed or norm(at.transport) > 0.0:
