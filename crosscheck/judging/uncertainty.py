@@ -96,6 +96,11 @@ def unknown(samples: int, why: str) -> Uncertainty:
     return Uncertainty(np.full(samples, np.inf), float("inf"), f"unknown: {why}")
 
 
+def at_rest(samples: int) -> Uncertainty:
+    """That of a state which rests, and is the same at every effort: none by the integration."""
+    return Uncertainty(np.zeros(samples), 0.0, "the state rests at every effort")
+
+
 def estimate(channel: str, kind: str, rungs: Sequence[RungSignal], size: float) -> Uncertainty:
     """U of the finest of `rungs` (coarse to fine, all of one method; `kind` is "step" or "tolerance").
 

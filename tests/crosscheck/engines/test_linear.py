@@ -1,4 +1,4 @@
-"""Derivatives and frequencies of random trees: engines agree within what each says of its own, and not by saying much."""
+"""Derivatives and frequencies of random trees: engines agree within what each says of its own, and that is little."""
 
 from __future__ import annotations
 
