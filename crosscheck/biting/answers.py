@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.contract import ENERGIES, OUTPUTS, MarkerPath, Trajectory
-from crosscheck.engines.linear.matrices import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene

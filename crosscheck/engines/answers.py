@@ -27,7 +27,7 @@ from crosscheck.engines.contract import (
     Trajectory,
 )
 from crosscheck.engines.linear.answer import fault as fault_of_linear
-from crosscheck.engines.linear.matrices import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.trajectories import first_samples
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.schema import Scene

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, Protocol, runtime_checkable
 
-from crosscheck.engines.linear.outputs import LinearPart as LinearPart
+from crosscheck.engines.linear.parts import LinearPart as LinearPart
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from crosscheck.engines.contract import Trajectory
-from crosscheck.engines.linear.matrices import FREQUENCIES
+from crosscheck.engines.linear.parts import FREQUENCIES
 from flexmb.run.channels import channels_of
 from flexmb.typing import Real
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.engines.linear.matrices import FREQUENCIES
+from crosscheck.engines.linear.parts import FREQUENCIES
 from crosscheck.judging.verdict import Finding
 from crosscheck.records.kinds import VariantInfo
 from flexmb.typing import Real

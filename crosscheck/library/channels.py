@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from crosscheck.engines.contract import ENERGIES
-from crosscheck.engines.linear.matrices import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.signals import KNOWN_TO
 
 

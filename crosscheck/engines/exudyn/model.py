@@ -8,14 +8,13 @@ from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.exudyn.assembly import assemble
 from crosscheck.engines.exudyn.balance import energy_and_momentum
 from crosscheck.engines.exudyn.connections import Connected, connected
-from crosscheck.engines.exudyn.frequencies import frequencies
 from crosscheck.engines.exudyn.kkt import body_mass_matrix, initial_state
 from crosscheck.engines.exudyn.markers import marker_path, marker_snapshot
 from crosscheck.engines.exudyn.modal import NodeShape
 from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.state import CarrierPath, States, carrier_path
 from crosscheck.engines.exudyn.wrench import drives, link_wrenches
-from crosscheck.engines.linear.outputs import NOTHING
+from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs
 from flexmb.scene.schema import Marker, Scene
 from flexmb.typing import Real
 
@@ -55,7 +54,7 @@ class ExudynModel:
         states.multipliers[:1] = initial_state(self.assembly).multipliers
         paths = self._paths(states)
         loads, energy, momentum, held = self._loads_and_balance(states, paths)
-        linear = frequencies(self.assembly, states) if "frequencies" in run.linear else NOTHING
+        linear = self._linearised(run, states)
         return Trajectory(
             status=solution.status, message=solution.message, times=run.times[: len(states.times)],
             markers={
@@ -68,6 +67,13 @@ class ExudynModel:
             connectors=held.between, hinge_forces=held.along,
             wall_s=solution.wall_s, evaluations=solution.evaluations, **linear.as_outputs,
         )  # fmt: skip
+
+    def _linearised(self, run: Run, states: States) -> LinearOutputs:
+        if "frequencies" not in run.linear:
+            return NOTHING
+        from crosscheck.engines.exudyn.frequencies import frequencies  # loads SciPy
+
+        return frequencies(self.assembly, states)
 
     @property
     def _loaded(self) -> list[str]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from crosscheck.engines.linear.coordinates import coordinate_names, is_counted, obstacle
-from crosscheck.engines.linear.matrices import FREQUENCIES
+from crosscheck.engines.linear.parts import FREQUENCIES
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from collections.abc import Collection, Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.engines.linear.frequencies import eigenfrequencies
-from crosscheck.engines.linear.matrices import DERIVATIVES, FREQUENCIES, Matrices
+from crosscheck.engines.linear.matrices import StateDerivatives
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES, LinearPart
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
-
-LinearPart = Literal["derivatives", "frequencies"]
 
 
 class LinearOutputs(NamedTuple):
@@ -34,7 +29,7 @@ NOTHING = LinearOutputs({}, None, {})
 
 
 def outputs(
-    asked: Collection[LinearPart], samples: Iterable[Matrices], offered: Sequence[str] = DERIVATIVES
+    asked: Collection[LinearPart], samples: Iterable[StateDerivatives], offered: Sequence[str] = DERIVATIVES
 ) -> LinearOutputs:
     """The outputs that were `asked` from the matrices of every sample; of the derivatives those `offered`.
 
@@ -48,6 +43,8 @@ def outputs(
         derivatives = {name: np.array([getattr(at, name).ravel() for at in found]) for name in offered}
         known_to = {name: np.array([getattr(at.errors, name) for at in found]) for name in offered}
     if "frequencies" in asked:
+        from crosscheck.engines.linear.frequencies import eigenfrequencies  # loads SciPy
+
         frequencies, doubts = map(np.array, zip(*(eigenfrequencies(at) for at in found), strict=True))
         known_to[FREQUENCIES] = doubts
     return LinearOutputs(derivatives, frequencies, known_to)

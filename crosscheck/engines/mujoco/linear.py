@@ -21,7 +21,7 @@ import numpy as np
 from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
 from crosscheck.engines.linear.differences import STEP, fourth_order
-from crosscheck.engines.linear.matrices import EPS, Errors, Matrices, norm, quaternion_transport, rounding
+from crosscheck.engines.linear.matrices import EPS, Errors, StateDerivatives, norm, quaternion_transport, rounding
 from crosscheck.engines.linear.slots import slot_names
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.mujoco.forces import Forces
@@ -59,7 +59,7 @@ class MujocoLinear:
                     assert_never(slot.freedom)
         self._places = places(coordinate_names(scene), own)
 
-    def at(self, t: float, qpos: Real, qvel: Real) -> Matrices:
+    def at(self, t: float, qpos: Real, qvel: Real) -> StateDerivatives:
         """The derivatives at a state, in the order that all engines share."""
         model, data, nv = self._model, self._data, self._model.nv
         data.time, data.qpos[:], data.qvel[:] = t, qpos, qvel
@@ -82,7 +82,7 @@ class MujocoLinear:
 
     def _converted(
         self, by_q: Real, by_v: Real, inverse: Real, apart: float, asunder: float, acceleration: Real
-    ) -> Matrices:
+    ) -> StateDerivatives:
         """In outboard axes of free flights and in the shared order; the errors with the rounding of the differences."""
         nv, qvel = self._model.nv, self._data.qvel
         T, turned = np.eye(nv), np.zeros((nv, nv))
@@ -105,7 +105,7 @@ class MujocoLinear:
         unit = rounding(by_force, nv)
         noise = 1.5 * np.sqrt(nv) / STEP * (unit * norm(udot[self._places]) + EPS * norm(u))
         errors = Errors(apart + asunder * norm(turned) + noise, asunder + noise, unit * norm(by_force))
-        return Matrices(by_displacement[square], by_speed[square], by_force, self._transport(u)[square], errors)
+        return StateDerivatives(by_displacement[square], by_speed[square], by_force, self._transport(u)[square], errors)
 
     def _transport(self, u: Real) -> Real:
         """Of [linear; angular] speeds of free flights: that of [angular; linear] ones with both halves exchanged."""

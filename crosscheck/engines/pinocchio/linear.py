@@ -18,7 +18,7 @@ import pinocchio as pin
 
 from crosscheck.engines.conventions import rotation_vector, scalar_first
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
-from crosscheck.engines.linear.matrices import Matrices, exact, quaternion_transport
+from crosscheck.engines.linear.matrices import StateDerivatives, exact, quaternion_transport
 from crosscheck.engines.linear.slots import slot_names
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.dynamics import Acting, Dynamics, PinocchioState
@@ -54,7 +54,7 @@ class PinocchioLinear:
         self._places = places(coordinate_names(scene), own)
         self._free = not dynamics.driven
 
-    def at(self, t: float, state: PinocchioState) -> Matrices:
+    def at(self, t: float, state: PinocchioState) -> StateDerivatives:
         """The derivatives at a state, in the order that all engines share."""
         acting = self._dynamics.acting(t, state)
         a = self._dynamics.solve(t, state).acceleration

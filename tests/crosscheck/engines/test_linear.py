@@ -10,7 +10,7 @@ import pytest
 from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import EngineMissing, Run, Trajectory
 from crosscheck.engines.linear.coordinates import coordinate_names, modes_of, obstacle, places
-from crosscheck.engines.linear.matrices import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.registry import engine
 from flexmb.linear.linearize import displacement_names
 from flexmb.linear.variations import Equations

@@ -11,7 +11,7 @@ import pytest
 from crosscheck.engines.answers import BrokenContract, checked_run
 from crosscheck.engines.contract import Trajectory
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle
-from crosscheck.engines.linear.matrices import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Scene

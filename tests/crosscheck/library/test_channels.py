@@ -10,7 +10,7 @@ import pytest
 
 import flexmb
 from crosscheck.engines.contract import ENERGIES, LINEAR, OUTPUTS, MarkerPath, Snapshot, Trajectory
-from crosscheck.engines.linear.matrices import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.signals import signals_of
 from crosscheck.library.channels import CONSERVED, KINDS, is_judged, kind_named, known_to, part_of
 from flexmb.run.channels import family, unit
