@@ -6,8 +6,7 @@ the step. Those of three step sizes of the differences make differences of fourt
 (`crosscheck.engines.linear.differences`). The inverse of the mass matrix is by MuJoCo's factors.
 
 Displacements of MuJoCo's joints are those of their speeds. For free flight, three slides in inboard axes and a ball,
-ours are in outboard axes: with R from outboard to inboard axes, v_in = R v, so that the accelerations are
-R' a_in - w x v, and a rotation that keeps v turns v_in.
+ours are in outboard axes (`crosscheck.engines.linear.axes`).
 """
 
 from __future__ import annotations
@@ -19,9 +18,10 @@ import mujoco
 import numpy as np
 
 from crosscheck.engines.conventions import rotation_matrix
+from crosscheck.engines.linear.axes import OutboardAxes, swapped_transport
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
 from crosscheck.engines.linear.differences import STEP, fourth_order
-from crosscheck.engines.linear.matrices import EPS, Errors, StateDerivatives, norm, quaternion_transport, rounding
+from crosscheck.engines.linear.matrices import EPS, Errors, StateDerivatives, norm, rounding
 from crosscheck.engines.linear.slots import slot_names
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.mujoco.forces import Forces
@@ -84,36 +84,17 @@ class MujocoLinear:
         self, by_q: Real, by_v: Real, inverse: Real, apart: float, asunder: float, acceleration: Real
     ) -> StateDerivatives:
         """In outboard axes of free flights and in the shared order; the errors with the rounding of the differences."""
-        nv, qvel = self._model.nv, self._data.qvel
-        T, turned = np.eye(nv), np.zeros((nv, nv))
-        of_axes, of_speeds = np.zeros((nv, nv)), np.zeros((nv, nv))
-        u, udot = qvel.copy(), acceleration.copy()
+        nv, axes = self._model.nv, OutboardAxes(self._data.qvel, acceleration)
         for slot in self._flying:
-            moving, turning = slice(slot.v, slot.v + 3), slice(slot.v + 3, slot.v + 6)
             quaternion = self._data.qpos[slot.q + 3 : slot.q + 7]
             R = rotation_matrix(quaternion / np.linalg.norm(quaternion))
-            w, v, a = qvel[turning], R.T @ qvel[moving], R.T @ acceleration[moving]
-            T[moving, moving] = R
-            turned[moving, turning] = -R @ _cross(v)
-            of_axes[moving, turning] = _cross(a)
-            of_speeds[moving, turning], of_speeds[moving, moving] = _cross(v), -_cross(w)
-            u[moving], udot[moving] = v, a - np.cross(w, v)
-        by_displacement = T.T @ (by_q @ T + by_v @ turned) + of_axes
-        by_speed = T.T @ by_v @ T + of_speeds
+            turning = slice(slot.v + 3, slot.v + 6)
+            axes.turned(R, slice(slot.v, slot.v + 3), turning, self._data.qvel[turning])
         square = np.ix_(self._places, self._places)
-        by_force = (T.T @ inverse @ T)[square]
+        by_force = axes.by_force(inverse)[square]
         unit = rounding(by_force, nv)
-        noise = 1.5 * np.sqrt(nv) / STEP * (unit * norm(udot[self._places]) + EPS * norm(u))
-        errors = Errors(apart + asunder * norm(turned) + noise, asunder + noise, unit * norm(by_force))
-        return StateDerivatives(by_displacement[square], by_speed[square], by_force, self._transport(u)[square], errors)
-
-    def _transport(self, u: Real) -> Real:
-        """Of [linear; angular] speeds of free flights: that of [angular; linear] ones with both halves exchanged."""
-        swapped, flying = np.arange(len(u)), [slot.v for slot in self._flying]
-        for j in flying:
-            swapped[j : j + 6] = [*range(j + 3, j + 6), *range(j, j + 3)]
-        return quaternion_transport(u[swapped], self._turning, flying)[np.ix_(swapped, swapped)]
-
-
-def _cross(v: Real) -> Real:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+        noise = 1.5 * np.sqrt(nv) / STEP * (unit * norm(axes.udot[self._places]) + EPS * norm(axes.u))
+        errors = Errors(apart + asunder * axes.kept + noise, asunder + noise, unit * norm(by_force))
+        transport = swapped_transport(axes.u, self._turning, [slot.v for slot in self._flying])
+        by_displacement, by_speed = axes.by_displacement(by_q, by_v), axes.by_speed(by_v)
+        return StateDerivatives(by_displacement[square], by_speed[square], by_force, transport[square], errors)

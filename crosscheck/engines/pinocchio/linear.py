@@ -17,8 +17,9 @@ import numpy as np
 import pinocchio as pin
 
 from crosscheck.engines.conventions import rotation_vector, scalar_first
+from crosscheck.engines.linear.axes import swapped_transport
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
-from crosscheck.engines.linear.matrices import StateDerivatives, exact, quaternion_transport
+from crosscheck.engines.linear.matrices import StateDerivatives, exact
 from crosscheck.engines.linear.slots import slot_names
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.dynamics import Acting, Dynamics, PinocchioState
@@ -60,7 +61,7 @@ class PinocchioLinear:
         a = self._dynamics.solve(t, state).acceleration
         by_q, by_v, by_force = self._of_all(state, acting) if self._free else self._of_free(state, acting, a)
         place = self._places
-        transport = self._transport(state.v)[np.ix_(place, place)]
+        transport = swapped_transport(state.v, self._turning, self._moving)[np.ix_(place, place)]
         return exact(by_q, by_v, by_force, transport, state.v, a)
 
     def _of_all(self, state: PinocchioState, acting: Acting) -> tuple[Real, Real, Real]:
@@ -121,10 +122,3 @@ class PinocchioLinear:
                 case _:
                     assert_never(slot.freedom)
         return np.diag(found)
-
-    def _transport(self, v: Real) -> Real:
-        """Of [linear; angular] speeds of free flyers: that of [angular; linear] ones with both halves exchanged."""
-        swapped = np.arange(len(v))
-        for j in self._moving:
-            swapped[j : j + 6] = [*range(j + 3, j + 6), *range(j, j + 3)]
-        return quaternion_transport(v[swapped], self._turning, self._moving)[np.ix_(swapped, swapped)]
