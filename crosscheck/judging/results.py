@@ -91,16 +91,16 @@ class Result:
         if gap:
             return unknown(len(self.values(channel)), gap)
         ladder = [run for run in self._ladder() if run.status == "finished" and channel in run.channels]
+        size = self._sizes.magnitude(channel, finest.evaluations)
         if _without_effect(ladder):
-            if known_to(channel) in finest.channels and self._rests:
-                return self._with_own(channel, at_rest(len(self.values(channel))))
+            if known_to(channel) in finest.channels and self.rests:
+                return self._with_own(channel, at_rest(len(self.values(channel)), size, finest.evaluations))
             ladder = ladder[-1:]
         rungs = [RungSignal(run.effort_value, self.values(channel, run), run.evaluations) for run in ladder]
-        size = self._sizes.magnitude(channel, finest.evaluations)
         return self._with_own(channel, estimate(channel, finest.effort_kind, rungs, size))
 
     @property
-    def _rests(self) -> bool:
+    def rests(self) -> bool:
         """Whether nothing that is seen moves: then efforts that give the same are no sign that they are ignored."""
         seen = [name for name in self.finest.channels if name.endswith((".position", ".orientation"))]
         return bool(seen) and all(signal_range(name, self.values(name)) <= AT_REST for name in seen)
