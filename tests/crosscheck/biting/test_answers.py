@@ -10,17 +10,20 @@ import pytest
 from crosscheck.biting.answers import FAULTS, AnswerFault, run_of
 from crosscheck.engines.answers import checked_run
 from crosscheck.engines.contract import OUTPUTS, MarkerPath, Trajectory
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.signals import signals_of
 from crosscheck.judging.outcome import conclude
 from crosscheck.judging.results import collect
+from crosscheck.library.channels import is_judged
 from crosscheck.library.find import load_case
 from crosscheck.records.kinds import Record, RunRecord
 from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan
-from flexmb.run.channels import channels_of
 from flexmb.scene.bodies import Node, RigidBody
 from flexmb.scene.connectors import AngularSpring, SpringDamper
 from flexmb.scene.hinges import AngularCoordinate, Revolute
 from flexmb.scene.schema import Marker, Scene, Wheel
+from flexmb.typing import Real
 from tests.crosscheck.sessions import copy_case
 
 TIMES = np.linspace(0.0, 1.0, 5)
@@ -64,13 +67,21 @@ def answer() -> Trajectory:
         energy={kind: rng.normal(size=5) for kind in ("kinetic", "strain", "spring", "gravity")},
         momentum=rng.normal(size=(5, 6)),
         work=rng.normal(size=5),
+        derivatives={name: rng.normal(size=(5, 4)) for name in DERIVATIVES},
+        frequencies=np.sort(rng.uniform(size=(5, 2)), axis=1),
+        known_to=dict.fromkeys((*DERIVATIVES, FREQUENCIES), np.full(5, 1e-12)),
     )
+
+
+def channels(run: Trajectory) -> dict[str, Real]:
+    """Those that are compared."""
+    return {name: values for name, values in signals_of(run).items() if is_judged(name)}
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda each: each.name)
 def test_a_fault_changes_some_channels_and_keeps_to_the_contract(fault: AnswerFault) -> None:
-    right = channels_of(answer())
-    wrong = channels_of(checked_run(fault.falsify(answer(), SCENE), TIMES, SCENE))
+    right = channels(answer())
+    wrong = channels(checked_run(fault.falsify(answer(), SCENE), TIMES, SCENE))
     changed = {name for name, values in wrong.items() if not np.allclose(values, right[name])}
     assert set(wrong) == set(right)
     assert 0 < len(changed) < len(right) or fault.name == "late"
@@ -78,10 +89,10 @@ def test_a_fault_changes_some_channels_and_keeps_to_the_contract(fault: AnswerFa
 
 def test_a_run_is_told_by_its_channels() -> None:
     assert all(getattr(answer(), output) is not None and len(getattr(answer(), output)) for output in OUTPUTS)
-    channels = channels_of(answer())
-    again = channels_of(run_of(TIMES, channels))
-    assert set(again) == set(channels)
-    assert all(np.array_equal(values, again[name]) for name, values in channels.items())
+    right = channels(answer())
+    again = channels(run_of(TIMES, right))
+    assert set(again) == set(right)
+    assert all(np.array_equal(values, again[name]) for name, values in right.items())
 
 
 CAUGHT = (
