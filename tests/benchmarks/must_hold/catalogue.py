@@ -10,6 +10,7 @@ from tests.benchmarks.must_hold import (
     first_use,
     floating_frames,
     growth,
+    implicit,
     missions,
     modes,
     runs,
@@ -18,7 +19,9 @@ from tests.benchmarks.must_hold import (
 )
 from tests.benchmarks.must_hold.row import Row
 
-SOURCES = (evaluation, runs, runs_at_equal_error, missions, modes, floating_frames, growth, charts, start, first_use)
+SOURCES = (
+    evaluation, runs, runs_at_equal_error, missions, implicit, modes, floating_frames, growth, charts, start, first_use,
+)  # fmt: skip
 
 
 @cache
