@@ -22,9 +22,7 @@ def rows() -> list[Row]:
     """Both methods that can do without."""
     what = f"with Jacobians and dense factors, {BODIES} beams of {MODES} modes, `full`, {T_END:g} s"
     names = {method: f"`{method}` {what}" for method in SETTINGS}
-    return [
-        Row(f"implicit_{method}", "Implicit methods", name, 3.0, partial(_run, method)) for method, name in names.items()
-    ]
+    return [Row(f"implicit_{m}", "Implicit methods", name, 3.0, partial(_run, m)) for m, name in names.items()]
 
 
 def _run(method: fm.Method) -> Measured:
