@@ -12,14 +12,13 @@ V_n and W_n (phi etadot and phi etaddot for r), S_n = sum m phi_n, and the vecto
     by s1 = x      mode n: -2 x . cr(S_n v' + P_n w~' + V_n)
 """
 
-from flexmb.jain.derivatives.rigid import moved_moments
 from flexmb.jain.derivatives.columns import put_until
+from flexmb.jain.derivatives.rigid import moved_moments
 from flexmb.jit.kernel import helper
-from flexmb.jit.strips import ROW, put, strip, width
+from flexmb.jit.strips import ROW, strip, width
 from flexmb.levels.affine_integrals import columns_of
 from flexmb.spatial.inertia import load_inertia
 from flexmb.spatial.rows import put3, strips3, total3
-from flexmb.spatial.spatial_vector import vec6
 from flexmb.spatial.vector import add, axpy, cross, dot, scale, sub, times
 
 ZERO9 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

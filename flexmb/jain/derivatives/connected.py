@@ -14,7 +14,7 @@ from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import strip, width
 from flexmb.spatial.rows import strips6
-from flexmb.spatial.spatial_vector import ZERO6, dot6, scale6, shift_force, shift_motion, store6, times6, vec6
+from flexmb.spatial.spatial_vector import ZERO6, dot6, scale6, shift_force, shift_motion, store6, vec6
 from flexmb.spatial.vector import add, cross, mat3, matmul, times, vec3
 from flexmb.tables.arrays import ON_GROUND
 

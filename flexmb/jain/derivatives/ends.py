@@ -1,11 +1,11 @@
 """What every source does to one point: the end of a connector, or the node of a load."""
 
-from flexmb.jain.derivatives.tables import BY_RATE, END_DISPLACED, END_MOTION, END_MOVED, END_SPEED, SPEED_BY_RATE, TURN
+from flexmb.jain.derivatives.tables import BY_RATE, END_DISPLACED, END_MOTION, END_MOVED, END_SPEED
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import is_at_rest
-from flexmb.spatial.rows import column3, column6, store_column3
-from flexmb.spatial.spatial_vector import ZERO6, shift_motion, sum6, vec6
+from flexmb.spatial.rows import column3, column6
+from flexmb.spatial.spatial_vector import shift_motion, sum6, vec6
 from flexmb.spatial.vector import add, vec3
 from flexmb.tables.features import MODES, OUTBOARD_NODES
 

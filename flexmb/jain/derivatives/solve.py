@@ -20,7 +20,6 @@ from flexmb.jain.derivatives.blocks import (
     shift_motions,
     sum_block6,
 )
-from flexmb.jain.derivatives.tables import BLOCK
 from flexmb.jain.derivatives.hinges import force_to_world
 from flexmb.jain.derivatives.solve_modes import (
     answer_modes,
@@ -30,12 +29,13 @@ from flexmb.jain.derivatives.solve_modes import (
     release_modes,
     release_wheels,
 )
+from flexmb.jain.derivatives.tables import BLOCK
 from flexmb.jain.hinge_solve import SINGLE
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.strips import width
 from flexmb.spatial.rows import column6
-from flexmb.spatial.spatial_vector import shift_force, store6, times6, vec6
+from flexmb.spatial.spatial_vector import store6, vec6
 from flexmb.spatial.vector import mat3, vec3
 from flexmb.tables.features import MODES, SEVERAL, WHEELS
 

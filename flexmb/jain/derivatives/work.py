@@ -4,7 +4,7 @@ The power of a drive is that of the load that its row of the inverse dynamics ha
 those of `applied`; a load at a node has the power of its velocity.
 """
 
-from flexmb.jain.derivatives.connected import add_ends, add_end
+from flexmb.jain.derivatives.connected import add_end, add_ends
 from flexmb.jain.derivatives.ends import fill_end
 from flexmb.jit.duals import rate
 from flexmb.jit.features import has
