@@ -14,7 +14,8 @@ V_n and W_n (phi etadot and phi etaddot for r), S_n = sum m phi_n, and the vecto
 
 from flexmb.jain.derivatives.columns import put_until
 from flexmb.jain.derivatives.rigid import moved_moments
-from flexmb.jit.kernel import helper
+from flexmb.jain.derivatives.tables import MODE_BY_RATE, MODE_FORCE
+from flexmb.jit.kernel import helper, sweep
 from flexmb.jit.strips import ROW, strip, width
 from flexmb.levels.affine_integrals import columns_of
 from flexmb.spatial.inertia import load_inertia
@@ -22,14 +23,13 @@ from flexmb.spatial.rows import put3, strips3, total3
 from flexmb.spatial.vector import add, axpy, cross, dot, scale, sub, times
 
 ZERO9 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-FORCE, SPEED_FORCE, BY_RATE = 0, 6, 12  # rows of `own`
 
 
-@helper
+@sweep
 def differentiate(c, w, d, k, V, A):
-    """Derivatives of the force of body k and of the rows of its modes, in body axes, to `own`, `local` and `matrix`."""
+    """Derivatives of the force of body k and of the rows of its modes, in body axes, to `mode`, `local` and `matrix`."""
     nm, row, first, nu = c.body[k].modes, c.body[k].product, d.places[k].modes, d.speed.shape[0]
-    omega, v = V
+    mode, (omega, v) = d.mode[k], V
     B, spin = _centripetal(A[0], omega), _cross_matrix(scale(2.0, omega))
     flow, momentum = ZERO9, ZERO9[0]
     for n in range(0, nm, width(d)):
@@ -42,11 +42,11 @@ def differentiate(c, w, d, k, V, A):
             put_until(d, d.matrix[first + i], first + n, nm - n, _contract(B, columns))
             put_until(d, d.matrix[first + i], nu + first + n, nm - n, _contract(spin, columns))
         S = strips3(d, c.mfr[k], 3, n)
-        put3(d, d.own, FORCE, n, add(cross(S, A[1]), _turned(B, spin, P, Q, W)))
-        put3(d, d.own, FORCE + 3, n, times(B, S))
-        put3(d, d.own, SPEED_FORCE, n, _moment(times(spin, P[0]), times(spin, P[1]), times(spin, P[2])))
-        put3(d, d.own, SPEED_FORCE + 3, n, times(spin, S))
-        put3(d, d.own, BY_RATE, n, _by_rate(v, spin, S, P, Q))
+        put3(d, mode, MODE_FORCE, n, add(cross(S, A[1]), _turned(B, spin, P, Q, W)))
+        put3(d, mode, MODE_FORCE + 3, n, times(B, S))
+        put3(d, mode, MODE_FORCE + 6, n, _moment(times(spin, P[0]), times(spin, P[1]), times(spin, P[2])))
+        put3(d, mode, MODE_FORCE + 9, n, times(spin, S))
+        put3(d, mode, MODE_BY_RATE, n, _by_rate(v, spin, S, P, Q))
         etad = strip(d, w.etad[k], n)
         flow, momentum = _add(etad, P, flow), axpy(etad, S, momentum)
     flow = total3(d, flow[0]), total3(d, flow[1]), total3(d, flow[2])

@@ -10,7 +10,7 @@ from flexmb.jain.derivatives.columns import put_until
 from flexmb.jain.derivatives.ends import fill_end
 from flexmb.jain.derivatives.tables import END_DISPLACED, END_MOTION, END_MOVED, END_SPEED
 from flexmb.jit.duals import rate, seeded
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import strip, width
 from flexmb.spatial.rows import strips6
@@ -21,7 +21,7 @@ from flexmb.tables.arrays import ON_GROUND
 DIRECTIONS = 24
 
 
-@helper
+@sweep
 def attach_connectors(c, w, d):
     """Loads of all connectors at their ports, and their derivatives to `link`; needs the World poses in w."""
     for i in range(c.connector.shape[0]):
@@ -87,7 +87,7 @@ def _six(a):
     return (a[0].real, a[1].real, a[2].real), (a[3].real, a[4].real, a[5].real)
 
 
-@helper
+@sweep
 def link(c, d):
     """Add the changes of all loads to the rows of the paths to both ends."""
     for i in range(c.connector.shape[0]):

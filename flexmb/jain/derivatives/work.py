@@ -8,7 +8,7 @@ from flexmb.jain.derivatives.connected import add_end, add_ends
 from flexmb.jain.derivatives.ends import fill_end
 from flexmb.jit.duals import rate
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.spatial_vector import shift_motion, vec6
 from flexmb.spatial.vector import add, cross, mat3, scale, times, vec3
 from flexmb.tables.arrays import FORCE, ON_GROUND, WORLD_AXES
@@ -25,7 +25,7 @@ from flexmb.tables.features import (
 )
 
 
-@helper
+@sweep
 def differentiate_power(c, w, d):
     """Write `work` from `matrix` before its solution: with M in its third part where anything is prescribed."""
     nu = w.u.shape[0]
