@@ -25,7 +25,7 @@ def pinocchio_aba(scene: Scene) -> Call:
 
 
 def pinocchio_derivatives(scene: Scene, x: np.ndarray, *, inverse: bool = False) -> Call:
-    """`pin.computeABADerivatives` at forces x, or `pin.computeRNEADerivatives` at accelerations x, called from Python."""
+    """`pin.computeABADerivatives` at forces x, or `pin.computeRNEADerivatives` at accelerations x, from Python."""
     import pinocchio as pin
 
     tree, q, v = pinocchio_tree(scene)

@@ -1,4 +1,4 @@
-"""Derivatives of the forces along the speeds: of springs, dampers, stops and laws of hinges, each of its own coordinate.
+"""Derivatives of the forces along the speeds: of springs, dampers, stops and laws of hinges, each by its coordinate.
 
 Because none depends on another hinge, one evaluation by duals finds them all: all scalar coordinates are changed along
 one lane, all speeds along another, and the rotations of spherical hinges along three more.

@@ -1,8 +1,8 @@
 """Wheels and node loads: what they add at their ports, and the rows and columns of the wheels.
 
-A wheel with the spin h = I thetad q acts on its node with the torque I thetadd q + w x h, which changes by s1 x h with the
-node's angular velocity. Its own row is that of I (thetadd + q . alpha). A load F that keeps its direction in World turns
-against the body, if that turns by x: it changes by -(x x F) in the body's axes.
+A wheel with the spin h = I thetad q acts on its node with the torque I thetadd q + w x h, which changes by s1 x h with
+the node's angular velocity. Its own row is that of I (thetadd + q . alpha). A load F that keeps its direction in World
+turns against the body, if that turns by x: it changes by -(x x F) in the body's axes.
 """
 
 from flexmb.jain.derivatives.columns import inboard_columns
@@ -110,7 +110,8 @@ def _with_mode(c, d, k, place, port, n, l2, l1):
     """Row of a wheel in the columns of mode n, and the other way round."""
     own, nu, mode, frame = d.places[k].modes + n, d.speed.shape[0], d.port_mode[port], d.frame_mode[k]
     # angular parts; the frame's are zero unless the modes move O in the body
-    J, s1 = add(column3(mode, MOTION, n), column3(frame, MOTION, n)), add(column3(mode, BY_RATE, n), column3(frame, BY_RATE, n))
+    J = add(column3(mode, MOTION, n), column3(frame, MOTION, n))
+    s1 = add(column3(mode, BY_RATE, n), column3(frame, BY_RATE, n))
     s2 = add(column3(mode, BY_ACCELERATION, n), column3(frame, BY_ACCELERATION, n))
     s2_speed = add(column3(mode, SPEED_BY_ACCELERATION, n), column3(frame, SPEED_BY_ACCELERATION, n))
     d.matrix[own, nu + place] = dot(J, l1)

@@ -1,7 +1,8 @@
 """Connectors between two points: their loads, and how these change, by dual numbers along 24 directions.
 
-Each end has twelve: its rotation and displacement in World axes, s0, and s1 of its velocity. The load itself acts like one
-that keeps its direction in World. What it changes by acts on all rows of the paths to both ends, for all sources there.
+Each end has twelve: its rotation and displacement in World axes, s0, and s1 of its velocity. The load itself acts like
+one that keeps its direction in World. What it changes by acts on all rows of the paths to both ends, for all sources
+there.
 """
 
 from flexmb.connectors.between import load_between

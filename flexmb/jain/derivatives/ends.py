@@ -15,7 +15,7 @@ from flexmb.tables.features import MODES
 def fill_end(c, d, side, k, port):
     """Write the motions of a port of body k, about its point, by all sources to `end`; zero for all but its path.
 
-    Rows END_MOTION: J of the mass matrix; END_DISPLACED: s0 and END_MOVED: s1 of displacements; END_SPEED: s1 of speeds.
+    Rows END_MOTION: J; END_DISPLACED: s0 and END_MOVED: s1 of displacements; END_SPEED: s1 of speeds.
     """
     a = d.end[side]
     for row in range(a.shape[0]):

@@ -1,8 +1,8 @@
 """The force of a flexible body's own inertia and elasticity, and how it changes: the level's kernels with dual numbers.
 
-The directions are the three components of the angular velocity, then the displacements and the speeds of the modes; none
-leaves the body. Accelerations stay: a change s1 = (x, y) adds x x w and 2 x x v to them, with the velocity v of the
-origin of the body frame.
+The directions are the three components of the angular velocity, then the displacements and the speeds of the modes;
+none leaves the body. Accelerations stay: a change s1 = (x, y) adds x x w and 2 x x v to them, with the velocity v of
+the origin of the body frame.
 """
 
 from flexmb.jain.derivatives import affine

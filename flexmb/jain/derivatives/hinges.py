@@ -1,8 +1,8 @@
 """Hinges that are no single axis: the derivatives of their own functions by dual numbers, once for displacements and
 once for speeds, without any recursion.
 
-With V_r = H u and the acceleration A_r relative to the inboard frame, both in outboard axes, the motion J of speed n and
-d along its displacement or change,
+With V_r = H u and the acceleration A_r relative to the inboard frame, both in outboard axes, the motion J of speed n
+and d along its displacement or change,
 
     displacement    s1 = V0 x J + dV_r    s2 = A0 x J + V0 x (V0 x J) + 2 V0 x dV_r + (dA_r + V_r x dV_r)
     speed           s1 = J                s2 = 2 V0 x J + (dA_r + V_r x J)

@@ -101,7 +101,7 @@ def move_frame(c, w, d, k, R, r, V, A):
 
 @helper
 def _seed_frame(d, k, n, R, r, J, V_r, A_r, V_body, A_body):
-    """What a strip of modes does to the body frame. The axes of O stay, in which V_r and A_r change by more than in the body's."""
+    """What a strip of modes does to the body frame; the axes of O stay, which turn against those of the body."""
     moved = d.frame_mode[k]
     change = sum6(to_world(R, r, strips_of(d, d.change, 0, n)), motion_cross(J, V_r))
     dV = scale6(-1.0, change)

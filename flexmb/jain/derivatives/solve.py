@@ -1,4 +1,4 @@
-"""M x = -T for many columns T at once, by the factors that `flexmb.jain.sweeps.inward` has left: (55), (56) in World axes.
+"""M x = -T for many columns T at once, by the factors that `flexmb.jain.sweeps.inward` has left: (55), (56).
 
 The columns are solved in blocks of `BLOCK` strips. What passes from body to body is six numbers for each column, as in
 `flexmb.jain.innovations`; in World axes they are added without a rotation.
@@ -42,7 +42,7 @@ from flexmb.tables.features import MODES, SEVERAL, WHEELS
 
 @helper
 def solve(c, w, d, columns):
-    """Replace the first `columns` columns of `matrix` by those of -M^-1 times them; rows of prescribed speeds vanish."""
+    """Replace the first `columns` columns of `matrix` by -M^-1 times them; rows of prescribed speeds vanish."""
     for k in range(c.body.shape[0]):
         _gains(c, w, d, k)
         if has(c, MODES):

@@ -63,7 +63,7 @@ def differentiate_power(c, w, d):
 
 @helper
 def _along(d, nu, place, law):
-    """The power of a law along a coordinate, as `applied` has evaluated it by duals: lane 0 its coordinate, 1 its speed."""
+    """The power of a law along a coordinate; `applied` has changed the coordinate along lane 0, the speed along 1."""
     d.work[place] += rate(law.power, 0)
     d.work[nu + place] += rate(law.power, 1)
 

@@ -29,7 +29,8 @@ SOURCE = Path(__file__).with_name("pinocchio_odeint.cpp")
 FOLDER = ROOT / ".benchmarks"
 FLAGS = (
     "-O3", "-march=native", "-DNDEBUG", "-std=c++17", "-shared", "-fPIC",
-    "-DBOOST_FUSION_INVOKE_MAX_ARITY=10", "-DBOOST_MPL_LIMIT_LIST_SIZE=30", "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",  # for Pinocchio's list of joints
+    "-DBOOST_MPL_LIMIT_LIST_SIZE=30", "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",  # for Pinocchio's list of joints
+    "-DBOOST_FUSION_INVOKE_MAX_ARITY=10",  # for the arguments of its derivatives
 )  # fmt: skip
 REMEDY = "the compiled rival needs g++ and the headers of Eigen: pip install flexmb[race]"
 

@@ -1,4 +1,4 @@
-"""Derivatives of the accelerations and of inverse dynamics: of rigid chains over Pinocchio, of flexible ones in evaluations."""
+"""Derivatives of accelerations and inverse dynamics: of rigid chains over Pinocchio, flexible ones in evaluations."""
 
 from __future__ import annotations
 
@@ -55,14 +55,16 @@ def _rigid(bodies: int, *, inverse: bool) -> Measured:
 
 def _forward(scene: fm.Scene, times: int = 100) -> Call:
     system, y = _started(scene)
-    out, w = np.zeros((3, system.nu, system.nu)), derivatives.derivative_workspace(system.constants, system.nq, system.nu)
+    out = np.zeros((3, system.nu, system.nu))
+    w = derivatives.derivative_workspace(system.constants, system.nq, system.nu)
     return Call(lambda: _accelerations(times, y, *out, system.constants, w), times, lambda: out.ravel())
 
 
 def _inverse(scene: fm.Scene, times: int = 100) -> Call:
     system, y = _started(scene)
     rates = np.linspace(-1.0, 1.0, system.nu)
-    out, w = np.zeros((3, system.nu, system.nu)), derivatives.derivative_workspace(system.constants, system.nq, system.nu)
+    out = np.zeros((3, system.nu, system.nu))
+    w = derivatives.derivative_workspace(system.constants, system.nq, system.nu)
     return Call(lambda: _inverse_dynamics(times, y, rates, *out, system.constants, w), times, lambda: out.ravel())
 
 
