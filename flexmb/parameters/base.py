@@ -73,14 +73,12 @@ class BaseParameters(NamedTuple):
         weight = np.ones(len(tau)) if noise is None else 1.0 / np.broadcast_to(_positive(noise), len(tau))
         weighed, size = W * weight[:, None], np.linalg.norm(W * weight[:, None], axis=0)
         if len(tau) <= self.rank or not np.all(size > 0.0):
-            raise ValueError(
-                f"{len(tau)} measurements do not determine {self.rank} parameters: measure livelier motions"
-            )
+            raise ValueError(f"{len(tau)} measurements do not determine {self.rank} parameters: measure livelier ones")
         U, s, Vt = np.linalg.svd(weighed / size, full_matrices=False)
         if not s[-1] > s[0] / CLEAR**2:
             raise ValueError(
-                f"these motions do not determine all of the {self.rank} parameters: measure livelier ones, or name fewer "
-                "bodies"
+                f"these motions do not determine all of the {self.rank} parameters: measure livelier ones, or name "
+                "fewer bodies"
             )
         values = Vt.T @ ((U.T @ (tau * weight)) / s) / size
         left = (tau - W @ values) * weight
@@ -131,8 +129,8 @@ def _rank(pivots: Real, rows: int) -> tuple[int, float]:
     last = int(candidates[np.argmax(ratios[candidates])])
     if ratios[last] < CLEAR:
         raise ValueError(
-            f"the rank is not clear: pivot {last + 1} is only {ratios[last]:.1g} times the next; take more states, with "
-            "larger speeds and accelerations, or name fewer bodies"
+            f"the rank is not clear: pivot {last + 1} is only {ratios[last]:.1g} times the next; take more states, "
+            "with larger speeds and accelerations, or name fewer bodies"
         )
     return last + 1, float(ratios[last])
 

@@ -38,7 +38,7 @@ class Number:
 
     @property
     def scale(self) -> float:
-        """A size that the number may have: its own magnitude or that of its largest neighbour in an array; 1 if zero."""
+        """A size of the number: its own magnitude or that of its largest neighbour in an array; 1 if all are zero."""
         steps = self.name.split(".")
         neighbours = [0.0]
         if steps[-1].isdecimal():

@@ -22,9 +22,9 @@ WIDTHS = (2.0**-1, 2.0**-3, 2.0**-5, 2.0**-8, 2.0**-11, 2.0**-14)  # half-widths
 ENOUGH = 1e-11  # relative error at which no smaller width is tried
 HOPELESS = 1e-5  # an error with half of the points that all of them will not bring down to ENOUGH
 LARGEST = 1e-9  # relative error that is accepted
-# Share of values over scale that counts as rounding: that of an eigenproblem is some hundred eps, and is magnified by
-# the inverse of the width.
-ROUNDING = 1e-11
+# Shares of values over scale, and of values over width, that count as rounding. That of an eigenproblem is some hundred
+# eps, and is magnified by the inverse of the width.
+ROUNDING, MAGNIFIED = 1e-11, 2e-14
 
 
 class NotSmooth(ValueError):
@@ -78,14 +78,15 @@ def _on_interval(
         if before is not None:
             # The middle is none of the points: it must lie on the interpolant of the others.
             jump = sum(weight * even[place] for place, weight in zip(places, _rest(intervals), strict=True)) / width
-            error = max(_relative(each, now, size / scale, parts) for each in (now - before, jump))
+            rounding = size * (ROUNDING / scale + MAGNIFIED / width)
+            error = max(_relative(each, now, rounding, parts) for each in (now - before, jump))
             if error <= ENOUGH or intervals == INTERVALS[-2] and error > HOPELESS:
                 break
         before = now
     return Derivative(now, error)
 
 
-def _relative(change: Real, derivative: Real, size: Real, parts: Sequence[slice]) -> float:
+def _relative(change: Real, derivative: Real, rounding: Real, parts: Sequence[slice]) -> float:
     """The largest change of a part's derivatives beyond rounding, relative to the largest of these derivatives."""
     worst = 0.0
     for part in parts:
@@ -93,7 +94,7 @@ def _relative(change: Real, derivative: Real, size: Real, parts: Sequence[slice]
         largest = np.max(np.abs(derivative[part]), initial=0.0)
         if not np.isfinite(off):
             return np.inf
-        if off > ROUNDING * np.max(size[part], initial=0.0):
+        if off > np.max(rounding[part], initial=0.0):
             worst = max(worst, off / largest if largest > 0.0 else np.inf)
     return worst
 

@@ -1,4 +1,4 @@
-"""Derivatives of closed chains: the motion and the loads at one state, and the initial state that closes the closures."""
+"""Derivatives of closed chains: motion and loads at one state, and the initial state that closes the closures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Derivatives by interpolation: exact for polynomials, geometric for analytic functions, refused where there is none."""
+"""Derivatives by interpolation: exact for polynomials, near it for analytic functions, refused where there is none."""
 
 from __future__ import annotations
 
