@@ -3,8 +3,8 @@
     base = regressor.base(states, accelerations)
     found = base.fit(regressor.stacked(states, accelerations), tau)      from measured torques, with their covariance
 
-Many states give W pi = tau, with their rows of Y one above the other. W has fewer independent columns than parameters: QR
-with pivoting chooses r independent ones, and all others are W_2 = W_1 B, so that only pi_1 + B pi_2 has an effect
+Many states give W pi = tau, with their rows of Y one above the other. W has fewer independent columns than parameters.
+QR with pivoting chooses r independent ones, and all others are W_2 = W_1 B, so that only pi_1 + B pi_2 has an effect
 (Gautier 1991; Khalil & Dombre, Modeling, Identification and Control of Robots, ch. 12).
 """
 
@@ -24,7 +24,7 @@ NOTHING = 1e-9
 """Elements of B below this, relative to the scales of both columns, are rounding errors of zero."""
 
 
-class Fit(NamedTuple):
+class BaseFit(NamedTuple):
     """Identified base parameters: values (r,), their covariance (r,r), and the standard deviation of the torques."""
 
     values: Real
@@ -59,7 +59,7 @@ class BaseParameters(NamedTuple):
         found: Real = Y[..., self.chosen]
         return found
 
-    def fit(self, Y: Real, tau: Real, noise: Real | float | None = None) -> Fit:
+    def fit(self, Y: Real, tau: Real, noise: Real | float | None = None) -> BaseFit:
         """Least squares for measured tau (n,), less what is known, with the rows of Y (n,P).
 
         noise: standard deviation of the measurements, one or (n,); by default it is estimated from what remains. Raises
@@ -82,7 +82,7 @@ class BaseParameters(NamedTuple):
         left = (tau - W @ values) * weight
         deviation = 1.0 if noise is not None else float(np.sqrt(left @ left / (len(tau) - self.rank)))
         half = Vt.T / s / size[:, None] * deviation
-        return Fit(values, half @ half.T, float(np.sqrt(np.mean((tau - W @ values) ** 2))))
+        return BaseFit(values, half @ half.T, float(np.sqrt(np.mean((tau - W @ values) ** 2))))
 
 
 def base_parameters(parameters: Sequence[str], W: Real) -> BaseParameters:
