@@ -56,7 +56,11 @@ def derivative(function: Callable[[float], Real], x: float, scale: float, parts:
         if best.error <= ENOUGH:
             break
     if not best.error <= LARGEST:
-        raise NotSmooth(trouble or f"it is known to {best.error:.1g} of its size only: there is a kink")
+        raise NotSmooth(
+            trouble
+            or f"it is known to {best.error:.1g} of its size only: there is a kink, frequencies nearly cross, or the "
+            "effect of the number drowns in rounding"
+        )
     return best
 
 
