@@ -41,7 +41,9 @@ BATCHED: tuple[Method, ...] = ("rk4", "dop853")
 def uses() -> Iterator[tuple[str, Use]]:
     """The uses by name, those that take longest first. Neighbours share few kernels, for which one would wait."""
     yield "linear models", _linear_models
+    yield "derivatives by numbers, tree", partial(_numbers, scenes.pendulum)
     yield "laws that a scene may name", _laws
+    yield "derivatives by numbers, loop", partial(_numbers, scenes.looped)
     yield "batches", _batches
     for name, builder in LOOPS.items():
         yield f"single states of a {name}", partial(_single_states_of_a_loop, builder)
@@ -116,6 +118,17 @@ def _single_states() -> None:
     nested.motion(0.0, y)
     nested.partitions(0.0, y)
     nested.relative_motion(0.0, y)
+
+
+def _numbers(builder: Callable[[], SceneBuilder]) -> None:
+    system = compile(builder().scene())
+    state, found = system.initial_state, system.parameters(["bob.mass_kg"])
+    rates = found.accelerations(state)[:, 0]
+    found.evaluate(state)
+    found.inverse_dynamics(state, rates)
+    regressor = system.inertia_regressor()
+    regressor.at(state, rates)
+    regressor.rest(state, rates)
 
 
 def _laws() -> None:
