@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from flexmb.hinges import catalogue
 from flexmb.jain.derivatives import sweeps
-from flexmb.jain.derivatives.tables import Derivatives, derivatives
+from flexmb.jain.derivatives.tables import ALIKE, IN_ORDER, Derivatives, derivatives
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.sweeps import forward_dynamics
 from flexmb.jit.bundle import bundle
@@ -95,7 +95,7 @@ def inverse_dynamics_derivatives(t, y, rates, by_displacement, by_speed, by_acce
 def _copy(d, third, out):
     """One third of the columns of `matrix` to out (nu,nu), in the order of u."""
     nu = out.shape[0]
-    if d.shape[1]:
+    if d.shape[IN_ORDER]:
         for i in range(nu):
             row = d.matrix[i]
             for j in range(nu):
@@ -113,7 +113,7 @@ def jacobian(t, y, J, c, w):
     load_state(t, y, c, w.sweeps)
     status = forward_dynamics(c, w.sweeps)
     n, nq, nu = y.shape[0], w.sweeps.q.shape[0], w.sweeps.u.shape[0]
-    for i in range(n):
+    for i in range(nq):
         for j in range(n):
             J[i, j] = 0.0
     if status != OK:
@@ -147,6 +147,11 @@ def _hold(J, i, n):
 def _row(c, w, row, out, nq):
     """The derivatives by displacements and speeds in `row`, by coordinates and speeds in the order of y to `out`."""
     d, nu = w.tables, w.sweeps.u.shape[0]
+    out[nq + nu] = 0.0
+    if d.shape[ALIKE]:
+        for j in range(2 * nu):
+            out[j] = row[j]
+        return
     for j in range(nu):
         out[nq + j] = row[nu + d.place[j]]
     for k in range(c.body.shape[0]):

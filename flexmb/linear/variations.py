@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 
 from flexmb.entry import articulated
-from flexmb.entry.tangent import jacobian, tangent_workspace, time_derivative
+from flexmb.entry.derivatives import derivative_workspace, jacobian
+from flexmb.entry.tangent import tangent_workspace, time_derivative
 from flexmb.scene.functions import Constant, Function, Ramp
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
@@ -74,6 +75,7 @@ class Equations:
         wheels = self.constants.wheel["u_index"]
         self._indifferent: Index = wheels[self.constants.speed["stiffness"][wheels] == 0.0]
         self._w = tangent_workspace(self.constants, system.nq, system.nu)
+        self._derivatives = derivative_workspace(self.constants, system.nq, system.nu)
         self._real_w = workspace(self.constants, system.nq, system.nu)  # with a row for each of their functions
 
     @property
@@ -137,10 +139,11 @@ class Equations:
         nq, n, y = self.system.nq, len(self.free), pack(state)
         everything = np.arange(n)
         J, drift = np.empty((len(y), len(y))), np.empty(len(y))
-        self.system.check_status(jacobian(state.t, y, J, self.constants, self._w), int(self._w.fault[0]))
-        if self._w.doubt[0]:
+        w = self._derivatives
+        self.system.check_status(jacobian(state.t, y, J, self.constants, w), int(w.fault[0]))
+        if w.doubt[0]:
             self.system.digits_left(state)  # raises if pivots are at rounding level
-        rates = self._w.slope[nq + self.free, 0]  # the values, which precede their derivatives
+        rates = w.sweeps.speed["acceleration"][self.free]
         self.system.check_status(time_derivative(state.t, y, drift, self.constants, self._w), int(self._w.fault[0]))
         rows, motion = J[nq + self.free], J[:nq, nq + self.free]
         return Variations(

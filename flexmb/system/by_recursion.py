@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexmb.entry import articulated, tangent
+from flexmb.entry import articulated, derivatives
 from flexmb.entry.observation import observe
 from flexmb.integrate.problem import Linear
 from flexmb.motion import coordinates, retraction
@@ -18,7 +18,8 @@ def _fresh(system: Mechanics) -> tuple[Any, Any]:
 
 def _linear(system: Mechanics) -> Linear:
     exact = system.constants  # with every body eliminated explicitly, for Jacobians
-    return Linear(tangent.jacobian, retraction.move, exact, tangent.tangent_workspace(exact, system.nq, system.nu))
+    written = derivatives.derivative_workspace(exact, system.nq, system.nu)
+    return Linear(derivatives.jacobian, retraction.move, exact, written)
 
 
 def _route(system: Mechanics) -> Route:

@@ -5,36 +5,101 @@ leaves the body. Accelerations stay: a change s1 = (x, y) adds x x w and 2 x x v
 origin of the body frame.
 """
 
+from flexmb.jain.derivatives import affine
 from flexmb.jain.derivatives.hinges import force_to_world
 from flexmb.jain.derivatives.ports import seed_mode
 from flexmb.jit.duals import rate, seeded
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import LANES
-from flexmb.levels.body import body_inertia, is_at_rest
+from flexmb.jit.strips import put, strip, width
+from flexmb.levels import full
+from flexmb.levels.body import LEVELS, body_inertia, is_at_rest
 from flexmb.spatial.inertia import inertia_times, load_inertia, rotate_inertia, shift_inertia, store_inertia
-from flexmb.spatial.spatial_vector import axpy6, plus6, shift_motion, store6, times6_t, vec6
+from flexmb.spatial.spatial_vector import ZERO6, axpy6, plus6, shift_motion, store6, times6_t, vec6
 from flexmb.spatial.vector import add, cross, mat3, scale, store3, times, vec3
+from flexmb.tables.features import LEVEL
+
+FULL_NUMBER = LEVELS.index(full.LEVEL)
+FULL = f"{LEVEL} {FULL_NUMBER}"
 
 
 @helper
-def own_flexible_force(c, w, d, k):
+def flexible_force(c, w, d, k):
     """Inertia, `by_rate` and force of body k alone, and the rows and columns of its modes."""
-    e, nm = d.duals, c.body[k].modes
     R, V, A = mat3(d.body[k].rotation, 0), vec6(w.body[k].velocity, 0), _acceleration(d, k)
+    if has(c, FULL) and c.body[k].level == FULL_NUMBER and c.body[k].point_start == c.body[k].point_stop:
+        _by_integrals(c, w, d, k, V, A)
+        _to_world(c, d, d.plain, k, R)
+        _elastic_rows(c, d, d.plain, k)
+    else:
+        _by_duals(c, w, d, k, V, A)
+        _to_world(c, d, d.duals, k, R)
+        _elastic_rows(c, d, d.duals, k)
+
+
+@helper
+def _by_integrals(c, w, d, k, V, A):
+    e, nm = d.plain, c.body[k].modes
+    store6(e.body[k].velocity, 0, V)
+    for n in range(0, nm, width(e)):
+        put(e, e.eta[k], n, strip(w, w.eta[k], n))
+        put(e, e.etad[k], n, strip(w, w.etad[k], n))
+    body_inertia(c, e, k)
+    _force(c, w, e, k, A)
+    affine.differentiate(c, w, d, k, V, A)
+    for n in range(nm):
+        for i in range(12):
+            d.mode[k, n].force[i] = d.own[i, n]
+        for i in range(3):
+            d.mode[k, n].by_rate[i] = d.own[affine.BY_RATE + i, n]
+
+
+@helper
+def _by_duals(c, w, d, k, V, A):
+    e, nm = d.duals, c.body[k].modes
     store6(e.body[k].velocity, 0, V)
     for n in range(nm):
         e.eta[k, n], e.etad[k, n] = w.eta[k, n], w.etad[k, n]
     last = 3 if is_at_rest(c.body[k].level) else 3 + 2 * nm
+    if is_at_rest(c.body[k].level):
+        _no_rows(d, k, nm)
     for first in range(0, last, LANES):
         count = min(LANES, last - first)
         for lane in range(count):
             _seed(e, k, nm, first + lane, lane)
         body_inertia(c, e, k)
-        _force(c, w, d, k, A)
+        _force(c, w, e, k, A)
         for lane in range(count):
             _keep(c, w, d, k, first + lane, lane)
-    _to_world(c, d, k, R, V)
-    _elastic_rows(c, d, k)
+    _with_the_motion(e, d, nm, k, V)
+
+
+@helper
+def _no_rows(d, k, nm):
+    """The modes' rows of their own displacements and speeds, without elasticity, at rest shape."""
+    first, nu = d.places[k].modes, d.speed.shape[0]
+    for i in range(nm):
+        for n in range(nm):
+            d.matrix[first + i, first + n] = 0.0
+            d.matrix[first + i, nu + first + n] = 0.0
+
+
+@helper
+def _with_the_motion(e, d, nm, k, V):
+    """Add what the changes x x w and 2 x x v of the acceleration do to `local` and to the rows of the modes."""
+    inertia = _inertia(e, k)
+    for j in range(3):
+        x = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
+        torque, force = inertia_times(inertia, (cross(x, V[0]), scale(2.0, cross(x, V[1]))))
+        for i in range(3):
+            d.local[i, j] += torque[i]
+            d.local[3 + i, j] += force[i]
+    for n in range(nm):
+        # M_fr . (x x w, 2 x x v) = x . (w x angular part + 2 v x linear part)
+        M_fr = _six(e.pfr[k, n], 0)
+        change = add(cross(V[0], M_fr[0]), scale(2.0, cross(V[1], M_fr[1])))
+        store3(d.mode[k, n].by_rate, 0, add(vec3(d.mode[k, n].by_rate, 0), change))
 
 
 @helper
@@ -54,9 +119,9 @@ def _seed(e, k, nm, n, lane):
 
 
 @helper
-def _force(c, w, d, k, A):
-    """f_m = M_m alpha_m + b_m of duals, as `flexmb.jain.inverse` has it: to hinge_force and zf."""
-    e, nm, first = d.duals, c.body[k].modes, c.body[k].etad_index
+def _force(c, w, e, k, A):
+    """f_m = M_m alpha_m + b_m, as `flexmb.jain.inverse` has it, of another workspace e: to its hinge_force and zf."""
+    nm, first = c.body[k].modes, c.body[k].etad_index
     F = inertia_times(load_inertia(e.body[k].inertia, 0), A)
     for n in range(nm):
         M_fr = vec6(e.pfr[k, n], 0)
@@ -95,32 +160,26 @@ def _keep(c, w, d, k, n, lane):
 
 
 @helper
-def _to_world(c, d, k, R, V):
-    """The numbers of the body in World axes about the base point."""
-    e, nm, origin = d.duals, c.body[k].modes, vec3(d.body[k].origin, 0)
-    inertia = _inertia(e, k)
-    F = _six(e.body[k].hinge_force, 0)
-    store6(d.body[k].force, 0, force_to_world(R, origin, F))
+def _to_world(c, d, e, k, R):
+    """The numbers of the body, which are in e and in body axes, in World axes about the base point."""
+    nm, origin = c.body[k].modes, vec3(d.body[k].origin, 0)
+    store6(d.body[k].force, 0, force_to_world(R, origin, _six(e.body[k].hinge_force, 0)))
     for j in range(3):
-        # the unit vector j of World in body axes
-        x = (R[3 * j], R[3 * j + 1], R[3 * j + 2])
-        change = cross(x, V[0]), scale(2.0, cross(x, V[1]))
-        D = inertia_times(inertia, change)
-        D = axpy6(x[0], _column(d.local, 0), axpy6(x[1], _column(d.local, 1), axpy6(x[2], _column(d.local, 2), D)))
+        # R[3j] ..: the unit vector j of World in body axes
+        D = axpy6(R[3 * j], _column(d.local, 0), ZERO6)
+        D = axpy6(R[3 * j + 2], _column(d.local, 2), axpy6(R[3 * j + 1], _column(d.local, 1), D))
         torque, force = force_to_world(R, origin, D)
         for i in range(3):
             d.body[k].by_rate[3 * i + j] = torque[i]
             d.body[k].by_rate[9 + 3 * i + j] = force[i]
-    store_inertia(d.body[k].inertia, 0, shift_inertia(rotate_inertia(R, inertia), origin))
+    store_inertia(d.body[k].inertia, 0, shift_inertia(rotate_inertia(R, _inertia(e, k)), origin))
     for n in range(nm):
-        M_fr, by_rate = _six(e.pfr[k, n], 0), vec3(d.mode[k, n].by_rate, 0)
-        across = cross(V[0], M_fr[0]), cross(V[1], M_fr[1])
-        # M_fr . (x x w, 2 x x v) = x . (w x angular part + 2 v x linear part)
-        store3(d.mode[k, n].by_rate, 0, times(R, add(by_rate, add(across[0], scale(2.0, across[1])))))
-        store3(d.mode[k, n].by_turn, 0, (0.0, 0.0, 0.0))
-        store6(d.mode[k, n].row, 0, force_to_world(R, origin, M_fr))
+        mode = d.mode[k, n]
+        store3(mode.by_rate, 0, times(R, vec3(mode.by_rate, 0)))
+        store3(mode.by_turn, 0, (0.0, 0.0, 0.0))
+        store6(mode.row, 0, force_to_world(R, origin, _six(e.pfr[k, n], 0)))
         for at in range(0, 12, 6):
-            store6(d.mode[k, n].force, at, force_to_world(R, origin, vec6(d.mode[k, n].force, at)))
+            store6(mode.force, at, force_to_world(R, origin, vec6(mode.force, at)))
 
 
 @helper
@@ -130,7 +189,7 @@ def _column(a, n):
 
 @helper
 def _six(a, i):
-    """The numbers of six duals."""
+    """Six numbers, or those of duals."""
     return (a[i].real, a[i + 1].real, a[i + 2].real), (a[i + 3].real, a[i + 4].real, a[i + 5].real)
 
 
@@ -148,11 +207,11 @@ def _inertia(e, k):
 
 
 @helper
-def _elastic_rows(c, d, k):
+def _elastic_rows(c, d, e, k):
     """Stiffness and damping of the modes, and their masses in the third part of `matrix`."""
     first, nm, nu = d.places[k].modes, c.body[k].modes, d.speed.shape[0]
     for i in range(nm):
         for n in range(nm):
             d.matrix[first + i, first + n] += c.stiffness[k, i, n]
             d.matrix[first + i, nu + first + n] += c.damping[k, i, n]
-            d.matrix[first + i, 2 * nu + first + n] = d.duals.pff[k, i, n].real
+            d.matrix[first + i, 2 * nu + first + n] = e.pff[k, i, n].real

@@ -30,7 +30,7 @@ def mode_rows(c, d, k, masses):
     for i in range(c.body[k].port_start, c.body[k].port_stop):
         if d.port[i].used:
             for n in range(nm):
-                _at_port(c, d, k, i, n)
+                _at_port(c, d, k, i, n, masses)
     if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         for n in range(nm):
             _move_frame(c, d, k, n)
@@ -66,15 +66,16 @@ def _changes(c, moved, seeds, J):
 
 
 @helper
-def _at_port(c, d, k, i, n):
+def _at_port(c, d, k, i, n, masses):
     """What mode n does to all that is attached to port i."""
     first, nu, seeds, port = d.places[k].modes, d.speed.shape[0], d.port_mode[i, n], d.port[i]
     at, J = first + n, vec6(seeds.motion, 0)
     inertia = inertia_times(load_inertia(port.inertia, 0), J)
     _add_rows(c, d, d.mode[k, n], port, J)
     _add_force(d, BY_RATES, at, inertia)
-    for j in range(c.body[k].modes):
-        d.matrix[first + j, 2 * nu + at] += dot6(vec6(d.port_mode[i, j].motion, 0), inertia)
+    if masses:
+        for j in range(c.body[k].modes):
+            d.matrix[first + j, 2 * nu + at] += dot6(vec6(d.port_mode[i, j].motion, 0), inertia)
     if is_at_rest(c.body[k].level):
         return
     X, speed = _changes(c, port, seeds, J)

@@ -9,6 +9,7 @@ from flexmb.jain.derivatives.motion import move
 from flexmb.jain.derivatives.ports import clear_ports, move_ports
 from flexmb.jain.derivatives.rows import add_answer, inward
 from flexmb.jain.derivatives.solve import solve
+from flexmb.jain.derivatives.tables import BRANCHES
 from flexmb.jain.derivatives.work import differentiate_power
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
@@ -22,8 +23,9 @@ def inverse_dynamics(c, w, d, masses):
     Needs the velocity sweep in w, that of poses if there are connectors, and udot in w.speed.acceleration.
     """
     nu = d.speed.shape[0]
-    for place in range(nu):
-        _clear(d.matrix[place], 0, 3 * nu if masses else 2 * nu)
+    if d.shape[BRANCHES] or has(c, WHEELS):  # else every element is written
+        for place in range(nu):
+            _clear(d.matrix[place], 0, 3 * nu if masses else 2 * nu)
     for k in range(c.body.shape[0]):
         move(c, w, d, k)
         if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):

@@ -116,6 +116,8 @@ MODE = np.dtype(
 )
 # Rows of `seed`: what a unit of a source does to all bodies beyond.
 MOTION, BY_RATE, BY_ACCELERATION, SPEED_BY_ACCELERATION, TURN, SPEED_BY_RATE, ROWS = 0, 6, 12, 18, 24, 27, 30
+# What `shape` says: whether the tree branches; whether the order of places is that of u; whether it is that of q too.
+BRANCHES, IN_ORDER, ALIKE = range(3)
 # Rows of `end`, six each: J; s0 and s1 of displacements; s1 of speeds.
 END_MOTION, END_DISPLACED, END_MOVED, END_SPEED, END_ROWS = 0, 6, 12, 18, 24
 
@@ -136,7 +138,7 @@ class Derivatives:
     body: Record  # (N,) BODY
     speed: Index  # (nu,) number in u of a place
     place: Index  # (nu,) place of a speed
-    shape: Index  # (2,) whether the tree branches; whether places are the numbers in u
+    shape: Index  # (3,) BRANCHES, IN_ORDER, ALIKE
     # (ROWS,slots) MOTION: the motion J at unit speed; BY_RATE: s1 of a displacement; BY_ACCELERATION: its s2;
     # SPEED_BY_ACCELERATION: s2 of a speed; and only for scenes with modes, because they are else those of J, TURN
     # and SPEED_BY_RATE: angular parts of s0 of a displacement and of s1 of a speed
@@ -159,7 +161,9 @@ class Derivatives:
     link: Real
     passed_row: Real  # (24,) of one row
     work: Real  # (3nu,) derivatives of the power by displacements and speeds, and by accelerations
+    own: Real  # (15,m) of one body of level full: the same of its force by its modes, and `by_rate` of their rows
     local: Real  # (6,3) of one body: derivatives of its force by its angular velocity, body axes
+    plain: Workspace  # for the inertia of single bodies
     duals: Duals
 
 
@@ -183,7 +187,7 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
         body=np.zeros(len(c.body), BODY),
         speed=order.speed,
         place=place,
-        shape=np.array([len(runs) > 1, np.array_equal(place, np.arange(nu))], np.int64),
+        shape=_shape(c, place, nq),
         seed=strip_zeros((ROWS, slots + LANES)),
         force=strip_zeros((18, nu + LANES)),
         matrix=strip_zeros((nu, columns)),
@@ -202,9 +206,25 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
         link=np.zeros((len(c.connector), 13, 24)),
         passed_row=np.zeros(24),
         work=strip_zeros((3 * nu + LANES,)),
+        own=strip_zeros((15, m)),
         local=np.zeros((6, 3)),
+        plain=workspace(c, nq, nu),
         duals=duals(c, nq, nu),
     )
+
+
+def _shape(c: Constants, place: Index, nq: int) -> Index:
+    """(3,) for `Derivatives.shape`."""
+    body, nu = c.body, len(place)
+    in_order = np.array_equal(place, np.arange(nu))
+    coordinate = np.full(nu, -1)
+    for own in body:
+        if own["quaternion"] < 0:
+            coordinate[own["u_index"] : own["u_index"] + own["nv"]] = own["q_index"] + np.arange(own["nv"])
+        coordinate[own["etad_index"] : own["etad_index"] + own["modes"]] = own["eta_index"] + np.arange(own["modes"])
+    coordinate[c.wheel["u_index"]] = c.wheel["q_index"]
+    alike = in_order and nq == nu and np.array_equal(coordinate, np.arange(nu))
+    return np.array([len(set(body["parent"].tolist())) < len(body), in_order, alike], np.int64)
 
 
 def _ports(c: Constants) -> Record:

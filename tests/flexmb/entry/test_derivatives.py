@@ -1,0 +1,160 @@
+"""Derivatives by recursion: against dual numbers on random trees, and against the dense route's own complex step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import flexmb
+from flexmb.dense import DenseSystem
+from flexmb.entry import derivatives, tangent
+from flexmb.scene.schema import Scene
+from flexmb.tables.status import Status
+from tests import trees
+from tests.benchmarks.rivals import flexible_chain, rigid_chain
+from tests.bounds import UNIT_ROUNDOFF, algebra
+from tests.flexmb.connectors import connected_scenes
+
+H = 2.0**-100
+T = 0.3  # s: no function of the trees is at rest there
+RECIPES = {
+    "armed rigid": trees.ARMED_RIGID, "full": trees.FULL, "ruthless": trees.RUTHLESS, "linear": trees.LINEAR,
+    "stiffened": trees.STIFFENED, "armed": trees.ARMED, "mixed": trees.MIXED, "flying": trees.FREE_FLYING,
+    "later kinds": trees.LATER, "every level": trees.EVERY_LEVEL,
+}  # fmt: skip
+
+
+class Both(NamedTuple):
+    """A system, the state y of its Jacobians, by recursion and by duals, and the workspace of the former."""
+
+    system: flexmb.System
+    y: np.ndarray
+    J: np.ndarray
+    by_duals: np.ndarray
+    w: derivatives.DerivativeWorkspace
+
+
+def both(scene: Scene) -> Both | None:
+    """At the scene's initial state; None where there are no accelerations, which both routes must say."""
+    system = flexmb.compile(scene)
+    c, state = system.constants, system.initial_state
+    y = np.concatenate([state.q, state.u, [0.0]])
+    J, by_duals = np.full((2, len(y), len(y)), np.nan)
+    w = derivatives.derivative_workspace(c, system.nq, system.nu)
+    status = derivatives.jacobian(T, y, J, c, w)
+    assert status == tangent.jacobian(T, y, by_duals, c, tangent.tangent_workspace(c, system.nq, system.nu))
+    return Both(system, y, J, by_duals, w) if status == Status.OK else None
+
+
+def errors(found: Both) -> np.ndarray:
+    """By column, of its largest element. A unit displacement changes accelerations by their own size at least.
+
+    The columns of light bodies that turn fast are what is left of larger terms.
+    """
+    size = np.max(np.abs(found.by_duals), axis=0)
+    nq, rates = found.system.nq, found.w.sweeps.speed["acceleration"]
+    size[:nq] = np.where(size[:nq] > 0.0, np.maximum(size[:nq], np.max(np.abs(rates))), 0.0)
+    error = np.max(np.abs(found.J - found.by_duals), axis=0)
+    return np.divide(error, size, out=np.where(error > 1e-20, np.inf, 0.0), where=size > 0.0)
+
+
+def mass(system: flexmb.System) -> np.ndarray:
+    """Mass matrix of the free speeds, where prescribed coordinates are at time T."""
+    free = system.constants.speed["prescribed"] < 0
+    return system.mass_matrix(replace(system.initial_state, t=T))[np.ix_(free, free)]
+
+
+def bound(system: flexmb.System) -> float:
+    """1e-11, beside what rounding leaves of the solution of each route."""
+    return 1e-11 + 8.0 * float(np.linalg.cond(mass(system))) * UNIT_ROUNDOFF
+
+
+def agree(scene: Scene) -> bool:
+    """Whether both routes found derivatives; they are equal then, and a planted error of 1e-8 is noticed."""
+    found = both(scene)
+    if found is None:
+        return False
+    limit = bound(found.system)
+    assert np.max(errors(found)) <= limit
+    column = np.argmax(np.max(np.abs(found.by_duals), axis=0))
+    found.J[np.argmax(np.abs(found.J[:, column])), column] *= 1.0 + 1e3 * limit
+    assert np.max(errors(found)) > limit
+    return True
+
+
+@pytest.mark.parametrize("recipe", RECIPES)
+def test_random_trees_against_dual_numbers(recipe):
+    """Rows of qdot, udot and of the work's rate."""
+    assert sum([agree(trees.random_scene(seed, RECIPES[recipe])) for seed in range(6)]) >= 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("recipe", RECIPES)
+def test_many_random_trees_against_dual_numbers(recipe):
+    """Fifty more of each; a scene of level linear may start beyond its range."""
+    assert sum([agree(trees.random_scene(seed, RECIPES[recipe])) for seed in range(6, 56)]) >= 40
+
+
+@pytest.mark.parametrize("level", ["full", "linear", "stiffened", "rigid"])
+def test_connectors(level):
+    assert agree(connected_scenes.everything(level))
+    assert agree(connected_scenes.free_flying(lossy=True))
+
+
+@pytest.mark.parametrize("scene", [rigid_chain(1), rigid_chain(30), flexible_chain(12, 3, "full"),
+                                   flexible_chain(9, 10, "ruthless")])  # fmt: skip
+def test_chains_longer_than_a_base_point_serves(scene):
+    assert agree(scene)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_by_displacement_and_by_force(seed):
+    """Displacements move the coordinates by N; M times the derivatives by forces is 1; what is prescribed has zeros."""
+    found = both(trees.random_scene(seed, trees.EVERY_LEVEL))
+    assert found is not None
+    c, nq, nu = found.system.constants, found.system.nq, found.system.nu
+    by_displacement, by_speed, by_force = np.full((3, nu, nu), np.nan)
+    assert derivatives.acceleration_derivatives(T, found.y, by_displacement, by_speed, by_force, c, found.w) == Status.OK
+    free = c.speed["prescribed"] < 0
+    rows = found.by_duals[nq : nq + nu]
+    expected = rows[:, :nq] @ found.by_duals[:nq, nq : nq + nu]
+    assert np.max(np.abs(by_displacement - expected)) <= 1e-11 * np.max(np.abs(expected))
+    assert np.max(np.abs(by_speed - rows[:, nq : nq + nu])) <= 1e-11 * np.max(np.abs(rows[:, nq : nq + nu]))
+    identity = mass(found.system) @ by_force[np.ix_(free, free)]
+    assert np.max(np.abs(identity - np.eye(len(identity)))) <= bound(found.system)
+    for matrix in (by_displacement, by_speed, by_force):
+        assert not matrix[~free].any() and not matrix[:, ~free].any()
+
+
+@pytest.mark.parametrize(("recipe", "seed"), [("armed rigid", 0), ("full", 0), ("ruthless", 0), ("mixed", 1)])
+def test_inverse_dynamics_against_the_dense_route(recipe, seed):
+    """tau = M rates + c at random rates, by displacement, speed and rate. A planted error of 1e-9 is noticed."""
+    scene = trees.random_scene(seed, replace(RECIPES[recipe], bodies=6))
+    system, dense = flexmb.compile(scene), DenseSystem(scene)
+    c, state, nu = system.constants, system.initial_state, system.nu
+    rates = np.random.default_rng(seed).normal(size=nu)
+    found = np.full((3, nu, nu), np.nan)
+    w = derivatives.derivative_workspace(c, system.nq, nu)
+    y = np.concatenate([state.q, state.u, [0.0]])
+    derivatives.inverse_dynamics_derivatives(0.0, y, rates, *found, c, w)
+    J = np.full((len(y), len(y)), np.nan)
+    assert derivatives.jacobian(0.0, y, J, c, w) == Status.OK
+    N = J[: system.nq, system.nq : -1]
+    M = dense.mass_matrix(state.q).real
+    largest = max(len(member.model.mass) for member in dense.tree.members)
+    limit = algebra(dense.nu, len(dense.tree.members), largest)
+
+    def changes(q: np.ndarray, u: np.ndarray) -> list[np.ndarray]:
+        return [np.imag(part) / H for part in (dense.mass_matrix(q) @ rates, dense.bias(q, u))]
+
+    for j in np.flatnonzero(c.speed["prescribed"] < 0):
+        unit = 1j * H * np.eye(nu)[j]
+        for which, parts in enumerate((changes(state.q + N @ unit, state.u + 0j), changes(state.q + 0j, state.u + unit))):
+            size = sum(np.max(np.abs(part)) for part in parts) + np.max(np.abs(M))
+            error = np.max(np.abs(found[which, :, j] - sum(parts)))
+            assert error <= limit * size, (which, j)
+    assert np.max(np.abs(found[2] - M)) <= limit * np.max(np.abs(M))
+    assert np.max(np.abs(found[2] * (1.0 + 1e-9) - M)) > limit * np.max(np.abs(M))
