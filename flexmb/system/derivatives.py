@@ -151,11 +151,13 @@ class Derivatives(FreeMotion):
         for part in (by_displacement, by_speed, by_force):
             finite_result(part, t)
         of_rates = StateDerivatives(by_displacement, by_speed, by_force, self._by_time(t, y))
-        none = np.zeros((0, nu))
-        return Variation(
-            accelerations, of_rates, self._coordinate_motion(t, y), np.zeros(0),
-            StateDerivatives(none, none, none, np.zeros(0)), none.T, np.zeros((0, 0)),
-        )  # fmt: skip
+        return Variation(accelerations, of_rates, self._coordinate_motion(t, y), *self._no_rows)
+
+    @cached_property
+    def _no_rows(self) -> tuple[Real, StateDerivatives, Real, Real]:
+        """What a `Variation` has of the rows of closures, in a tree."""
+        none = np.zeros((0, self.nu))
+        return np.zeros(0), StateDerivatives(none, none, none, np.zeros(0)), none.T, np.zeros((0, 0))
 
     def _by_time(self, t: float, y: Real) -> Real:
         """Explicit derivatives (nu,) of the accelerations by time."""
@@ -256,7 +258,7 @@ class Derivatives(FreeMotion):
         self._move(t, y, N)
         return N
 
-    @cached_property
+    @per_thread  # not `cached_property`, which before Python 3.12 holds a lock while this possibly compiles
     def _constant_motion(self) -> Real:
         N = np.zeros((self.nq, self.nu))
         self._move(0.0, self._at_start, N)
