@@ -13,6 +13,7 @@ from flexmb.entry.observed_tangent import outputs_tangent
 from flexmb.entry.variation import Variation
 from flexmb.jit.direct import direct
 from flexmb.jit.pointer import STATUS
+from flexmb.system.derivative_evaluator import DerivativeEvaluator
 from flexmb.system.derivatives import Derivatives
 from flexmb.system.pushforward import Pushforward
 from flexmb.tables.per_thread import per_thread
@@ -29,6 +30,13 @@ class ChainDerivatives(Derivatives):
     def closures(self) -> Closures:
         """The closure equations with workspaces of this thread."""
         return self._closures.for_thread()
+
+    def derivative_evaluator(self) -> DerivativeEvaluator:
+        """Raises NotImplementedError: evaluators are for trees only."""
+        raise NotImplementedError(
+            f'scene "{self.scene.name}" has closures or couplings, and evaluators are for trees only: '
+            "use acceleration_derivatives(state)"
+        )
 
     def _variation(self, t: float, y: Real) -> Variation:
         self.accelerations(self.layout.known(t, y))  # with its errors and warnings

@@ -26,6 +26,7 @@ from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.system.complex_step import load_row, section_row
+from flexmb.system.derivative_evaluator import DerivativeEvaluator, fresh_derivative_evaluator
 from flexmb.system.derivative_records import (
     AccelerationDerivatives,
     By,
@@ -66,6 +67,15 @@ class Derivatives(FreeMotion):
         if forces is not None:
             at = self._under_forces(at, t, y, self.layout.rates("forces", forces))
         return AccelerationDerivatives(at.accelerations, *at.of_accelerations, at.motion)
+
+    def derivative_evaluator(self) -> DerivativeEvaluator:
+        """`acceleration_derivatives` for a loop: `udot = evaluator(t, q, u)` writes derivatives into its arrays.
+
+        A call costs 0.1 us in addition to the kernel. The kernel is compiled here, not at the first call.
+        NotImplementedError for closed chains, and scenes with controllers.
+        """
+        refuse_feedback(self.scene, "system.derivative_evaluator", _INSTEAD)
+        return fresh_derivative_evaluator(self)
 
     def inverse_dynamics_derivatives(self, state: State, accelerations: Real) -> InverseDynamicsDerivatives:
         """Derivatives of `inverse_dynamics` at these accelerations (nu,); of closed chains those of the tree alone."""
