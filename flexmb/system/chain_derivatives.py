@@ -14,15 +14,15 @@ from flexmb.entry.variation import Variation
 from flexmb.jit.direct import direct
 from flexmb.jit.pointer import STATUS
 from flexmb.system.derivative_evaluator import DerivativeEvaluator
-from flexmb.system.derivatives import Derivatives
+from flexmb.system.derivatives import DifferentiableMotion
 from flexmb.system.pushforward import Pushforward
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Real
 
 
-class ChainDerivatives(Derivatives):
-    """`Derivatives` of a system with closures or couplings."""
+class ChainDerivatives(DifferentiableMotion):
+    """Derivatives of a system with closures or couplings."""
 
     _closures: Closures
 

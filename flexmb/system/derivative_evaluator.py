@@ -44,7 +44,7 @@ def fresh_derivative_evaluator(system: Mechanics) -> DerivativeEvaluator:
     return DerivativeEvaluator(system, _DERIVATIVES, _fresh(system))
 
 
-class _Derivatives(NamedTuple):
+class _DerivativeRoute(NamedTuple):
     """In place of an algorithm."""
 
     name: str
@@ -56,7 +56,7 @@ def _fresh(system: Mechanics) -> tuple[Any, ...]:
     return system.constants, derivative_call(system.constants, system.nq, system.nu)
 
 
-_DERIVATIVES = _Derivatives("derivatives", lambda: differentiate, _fresh)
+_DERIVATIVES = _DerivativeRoute("derivatives", lambda: differentiate, _fresh)
 
 
 def _shown(array: Real) -> Real:

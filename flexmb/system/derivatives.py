@@ -48,7 +48,7 @@ from flexmb.typing import Flags, Index, Real
 _INSTEAD = "linearise the closed loop by flexmb.linearize(scene)"
 
 
-class Derivatives(FreeMotion):
+class DifferentiableMotion(FreeMotion):
     """Derivatives of what a system gives at one state.
 
     All methods raise NotImplementedError for scenes with controllers, `NotDifferentiableError` (a DynamicsError) where
