@@ -7,7 +7,6 @@ import numpy as np
 from flexmb.closure.closures import Closures
 from flexmb.closure.given_motion import observe_given, rows_tangent
 from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace
-from flexmb.closure.variation import variation
 from flexmb.entry.given_motion import motion_tangent
 from flexmb.entry.observed_tangent import outputs_tangent
 from flexmb.entry.variation import Variation
@@ -39,6 +38,8 @@ class ChainDerivatives(DifferentiableMotion):
         )
 
     def _variation(self, t: float, y: Real) -> Variation:
+        from flexmb.closure.variation import variation  # imported here, because it imports SciPy, which is slow
+
         self.accelerations(self.layout.known(t, y))  # with its errors and warnings
         mass = np.empty((self.nu, self.nu))
         self._fill_mass_matrix(t, y, mass)
