@@ -1,4 +1,4 @@
-"""Derivatives of accelerations and of inverse dynamics by displacements, speeds and forces: O(N depth), then a solution.
+"""Derivatives of accelerations and of inverse dynamics by displacements, speeds and forces, by recursion: O(N depth).
 
     w = derivative_workspace(system.constants, system.nq, system.nu)
     status = acceleration_derivatives(t, y, by_displacement, by_speed, by_force, system.constants, w)
@@ -54,8 +54,8 @@ def derivative_workspace(c: Constants, nq: int, nu: int) -> DerivativeWorkspace:
 def acceleration_derivatives(t, y, by_displacement, by_speed, by_force, c, w):
     """Derivatives (nu,nu) of udot at y = [q, u, work] by displacement, speed and force; returns a status code.
 
-    Displacements are along the speeds, see `flexmb.linear.variations`. What is prescribed has rows of zeros, and columns
-    of zeros: it is given as a function of time.
+    Displacements are along the speeds, see `flexmb.linear.variations`. What is prescribed has rows and columns of
+    zeros: it is given as a function of time.
     """
     load_state(t, y, c, w.sweeps)
     status = forward_dynamics(c, w.sweeps)
@@ -174,7 +174,9 @@ def _by_quaternion(c, w, k, row, out):
     """By the coordinates of a free or spherical hinge: xi = 2 vec(q* dq) / |q| for q of any length, and R' dx."""
     q, raw, i, place = w.sweeps.q, w.sweeps.raw, c.body[k].quaternion, w.tables.places[k].hinge
     length2 = raw[i] * raw[i] + raw[i + 1] * raw[i + 1] + raw[i + 2] * raw[i + 2] + raw[i + 3] * raw[i + 3]
-    s, x, y, z = 2.0 * raw[i] / length2, 2.0 * raw[i + 1] / length2, 2.0 * raw[i + 2] / length2, 2.0 * raw[i + 3] / length2
+    s, x, y, z = (
+        2.0 * raw[i] / length2, 2.0 * raw[i + 1] / length2, 2.0 * raw[i + 2] / length2, 2.0 * raw[i + 3] / length2,
+    )  # fmt: skip
     a, b, e = row[place], row[place + 1], row[place + 2]
     out[i] = -(a * x + b * y + e * z)
     out[i + 1] = a * s - b * z + e * y

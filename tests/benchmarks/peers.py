@@ -24,6 +24,22 @@ def pinocchio_aba(scene: Scene) -> Call:
     return Call(lambda: pin.aba(tree.model, data, q, v, tau), 1, lambda: data.ddq)
 
 
+def pinocchio_derivatives(scene: Scene, x: np.ndarray, *, inverse: bool = False) -> Call:
+    """`pin.computeABADerivatives` at forces x, or `pin.computeRNEADerivatives` at accelerations x, from Python."""
+    import pinocchio as pin
+
+    tree, q, v = pinocchio_tree(scene)
+    data = tree.model.createData()
+    function = pin.computeRNEADerivatives if inverse else pin.computeABADerivatives
+
+    def result() -> np.ndarray:
+        found = (data.dtau_dq, data.dtau_dv, data.M) if inverse else (data.ddq_dq, data.ddq_dv, data.Minv)
+        symmetric = np.triu(found[2]) + np.triu(found[2], 1).T
+        return np.concatenate([found[0].ravel(), found[1].ravel(), symmetric.ravel()])
+
+    return Call(lambda: function(tree.model, data, q, v, x), 1, result)
+
+
 def aba_in_parallel(scene: Scene, samples: int) -> Call:
     """`pin.abaInParallel` on one thread over copies of the initial state: Pinocchio's C++ without Python in between."""
     import pinocchio as pin

@@ -4,33 +4,35 @@ A point at r = x + phi eta has, for the motion of the body frame and with B = al
 
     a_p = a + B r + 2 w x phi etadot + phi etaddot
 
-so that derivatives by eta_n are sums with B phi_n, those by etadot_n with 2 w x phi_n. With the integrals P_n = sum m phi_n r',
-V_n and W_n (phi etadot and phi etaddot for r), S_n = sum m phi_n, and the vector cr(K) = sum a x b of K = sum a b',
+so that derivatives by eta_n are sums with B phi_n, those by etadot_n with 2 w x phi_n. With the integrals
+P_n = sum m phi_n r', V_n and W_n (phi etadot and phi etaddot for r), S_n = sum m phi_n, K_in = sum m phi_i phi_n', and
+the vector cr(K) = sum a x b of K = sum a b',
 
-    by eta_n       force B S_n     torque S_n x a + cr((P_n + P_n')B' + 2 V_n w~' + W_n)    mode i: B : sum m phi_i phi_n'
-    by etadot_n    2 w x S_n              2 cr(P_n' w~')                                            2 w~ : sum m phi_i phi_n'
-    by s1 = x      mode n: -2 x . cr(S_n v' + P_n w~' + V_n)
+                   force        torque                                                on mode i
+    by eta_n       B S_n        S_n x a + cr((P_n + P_n')B' + 2 V_n w~' + W_n)        B : K_in
+    by etadot_n    2 w x S_n    2 cr(P_n' w~')                                        2 w~ : K_in
+
+and s1 = (x, y) acts on mode n as -2 x . cr(S_n v' + P_n w~' + V_n).
 """
 
-from flexmb.jain.derivatives.rigid import moved_moments
 from flexmb.jain.derivatives.columns import put_until
-from flexmb.jit.kernel import helper
-from flexmb.jit.strips import ROW, put, strip, width
+from flexmb.jain.derivatives.rigid import moved_moments
+from flexmb.jain.derivatives.tables import MODE_BY_RATE, MODE_FORCE
+from flexmb.jit.kernel import helper, sweep
+from flexmb.jit.strips import ROW, strip, width
 from flexmb.levels.affine_integrals import columns_of
 from flexmb.spatial.inertia import load_inertia
 from flexmb.spatial.rows import put3, strips3, total3
-from flexmb.spatial.spatial_vector import vec6
 from flexmb.spatial.vector import add, axpy, cross, dot, scale, sub, times
 
 ZERO9 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-FORCE, SPEED_FORCE, BY_RATE = 0, 6, 12  # rows of `own`
 
 
-@helper
+@sweep
 def differentiate(c, w, d, k, V, A):
-    """Derivatives of the force of body k and of the rows of its modes, in body axes, to `own`, `local` and `matrix`."""
+    """Derivatives of the force of body k and of the rows of its modes, body axes: to `mode`, `local`, `matrix`."""
     nm, row, first, nu = c.body[k].modes, c.body[k].product, d.places[k].modes, d.speed.shape[0]
-    omega, v = V
+    mode, (omega, v) = d.mode[k], V
     B, spin = _centripetal(A[0], omega), _cross_matrix(scale(2.0, omega))
     flow, momentum = ZERO9, ZERO9[0]
     for n in range(0, nm, width(d)):
@@ -43,11 +45,11 @@ def differentiate(c, w, d, k, V, A):
             put_until(d, d.matrix[first + i], first + n, nm - n, _contract(B, columns))
             put_until(d, d.matrix[first + i], nu + first + n, nm - n, _contract(spin, columns))
         S = strips3(d, c.mfr[k], 3, n)
-        put3(d, d.own, FORCE, n, add(cross(S, A[1]), _turned(B, spin, P, Q, W)))
-        put3(d, d.own, FORCE + 3, n, times(B, S))
-        put3(d, d.own, SPEED_FORCE, n, _moment(times(spin, P[0]), times(spin, P[1]), times(spin, P[2])))
-        put3(d, d.own, SPEED_FORCE + 3, n, times(spin, S))
-        put3(d, d.own, BY_RATE, n, _by_rate(v, spin, S, P, Q))
+        put3(d, mode, MODE_FORCE, n, add(cross(S, A[1]), _turned(B, spin, P, Q, W)))
+        put3(d, mode, MODE_FORCE + 3, n, times(B, S))
+        put3(d, mode, MODE_FORCE + 6, n, _moment(times(spin, P[0]), times(spin, P[1]), times(spin, P[2])))
+        put3(d, mode, MODE_FORCE + 9, n, times(spin, S))
+        put3(d, mode, MODE_BY_RATE, n, _by_rate(v, spin, S, P, Q))
         etad = strip(d, w.etad[k], n)
         flow, momentum = _add(etad, P, flow), axpy(etad, S, momentum)
     flow = total3(d, flow[0]), total3(d, flow[1]), total3(d, flow[2])
@@ -65,7 +67,11 @@ def _centripetal(alpha, omega):
     """alpha~ + w~ w~, by rows."""
     x, y, z = omega
     a, b, e = alpha
-    return -y * y - z * z, x * y - e, x * z + b, x * y + e, -x * x - z * z, y * z - a, x * z - b, y * z + a, -x * x - y * y
+    return (
+        -y * y - z * z, x * y - e, x * z + b,
+        x * y + e, -x * x - z * z, y * z - a,
+        x * z - b, y * z + a, -x * x - y * y,
+    )  # fmt: skip
 
 
 @helper
@@ -110,7 +116,7 @@ def _by_rate(v, spin, S, P, Q):
 
 @helper
 def _whole_body(d, k, V, flow, momentum):
-    """2 (tr N - N') and 2 x x p to `local`, with N = sum m r v' and p = sum m v; `flow` is the part of the modes of N'."""
+    """2 (tr N - N') and 2 x x p to `local`, with N = sum m r v' and p = sum m v; `flow`: what modes add to N'."""
     J, coupling, mass = load_inertia(d.plain.body[k].inertia, 0)
     s = (coupling[7], coupling[2], coupling[3])  # the coupling of a rigid inertia is s~
     N = moved_moments(s, J, V)

@@ -1,4 +1,4 @@
-"""Derivatives of the forces along the speeds: of springs, dampers, stops and laws of hinges, each of its own coordinate.
+"""Derivatives of the forces along the speeds: of springs, dampers, stops and laws of hinges, each by its coordinate.
 
 Because none depends on another hinge, one evaluation by duals finds them all: all scalar coordinates are changed along
 one lane, all speeds along another, and the rotations of spherical hinges along three more.
@@ -7,7 +7,7 @@ one lane, all speeds along another, and the rotations of spherical hinges along 
 from flexmb.hinges import catalogue
 from flexmb.jit.duals import rate, seeded
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.motion.coordinates import hinge_forces
 from flexmb.tables.features import BALL_SPRINGS, COORDINATE_LAWS, DAMPERS, HINGE_SPRINGS, SPRINGS
 
@@ -29,7 +29,7 @@ def subtract_applied(c, w, d):
             d.matrix[place, nu + place] += c.speed[j].damping
 
 
-@helper
+@sweep
 def _by_duals(c, w, d):
     e, nu = d.duals, w.u.shape[0]
     for i in range(w.q.shape[0]):

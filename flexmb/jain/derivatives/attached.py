@@ -1,22 +1,24 @@
 """Wheels and node loads: what they add at their ports, and the rows and columns of the wheels.
 
-A wheel with the spin h = I thetad q acts on its node with the torque I thetadd q + w x h, which changes by s1 x h with the
-node's angular velocity. Its own row is that of I (thetadd + q . alpha). A load F that keeps its direction in World turns
-against the body, if that turns by x: it changes by -(x x F) in the body's axes.
+A wheel with the spin h = I thetad q acts on its node with the torque I thetadd q + w x h, which changes by s1 x h with
+the node's angular velocity. Its own row is that of I (thetadd + q . alpha). A load F that keeps its direction in World
+turns against the body, if that turns by x: it changes by -(x x F) in the body's axes.
 """
 
 from flexmb.jain.derivatives.columns import inboard_columns
 from flexmb.jain.derivatives.rows import BY_RATES, BY_SPEED, put_force
+from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, MOTION, SPEED_BY_ACCELERATION
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.levels.body import is_at_rest
+from flexmb.spatial.rows import column3
 from flexmb.spatial.spatial_vector import ZERO6, add6
 from flexmb.spatial.vector import add, add3, cross, dot, mat3, matmul, scale, times, vec3
 from flexmb.tables.arrays import FORCE, WORLD_AXES
-from flexmb.tables.features import LOADS, OUTBOARD_NODES, WHEELS
+from flexmb.tables.features import LOADS, WHEELS
 
 
-@helper
+@sweep
 def attach(c, w, d, k):
     """Forces of the wheels and loads of body k at their ports, and how they change."""
     if has(c, LOADS):
@@ -85,7 +87,7 @@ def wheel_axis(c, w, d, k, i):
     return times(_port_rotation(w, d, k, c.wheel[i].port), vec3(c.wheel[i].axis, 0))
 
 
-@helper
+@sweep
 def wheel_rows(c, w, d, k, masses):
     """Rows and columns of the wheels of body k."""
     nu, zero = d.speed.shape[0], (0.0, 0.0, 0.0)
@@ -106,14 +108,12 @@ def wheel_rows(c, w, d, k, masses):
 @helper
 def _with_mode(c, d, k, place, port, n, l2, l1):
     """Row of a wheel in the columns of mode n, and the other way round."""
-    mode, own, nu = d.port_mode[port, n], d.places[k].modes + n, d.speed.shape[0]
-    J, s1 = vec3(mode.motion, 0), vec3(mode.by_rate, 0)
-    s2, s2_speed = vec3(mode.by_acceleration, 0), vec3(mode.speed_by_acceleration, 0)
-    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
-        frame = d.frame_mode[k, n]
-        J, s1 = add(J, vec3(frame.motion, 0)), add(s1, vec3(frame.by_rate, 0))
-        s2 = add(s2, vec3(frame.by_acceleration, 0))
-        s2_speed = add(s2_speed, vec3(frame.speed_by_acceleration, 0))
+    own, nu, mode, frame = d.places[k].modes + n, d.speed.shape[0], d.port_mode[port], d.frame_mode[k]
+    # angular parts; the frame's are zero unless the modes move O in the body
+    J = add(column3(mode, MOTION, n), column3(frame, MOTION, n))
+    s1 = add(column3(mode, BY_RATE, n), column3(frame, BY_RATE, n))
+    s2 = add(column3(mode, BY_ACCELERATION, n), column3(frame, BY_ACCELERATION, n))
+    s2_speed = add(column3(mode, SPEED_BY_ACCELERATION, n), column3(frame, SPEED_BY_ACCELERATION, n))
     d.matrix[own, nu + place] = dot(J, l1)
     d.matrix[own, 2 * nu + place] = d.matrix[place, 2 * nu + own] = dot(J, l2)
     if not is_at_rest(c.body[k].level):

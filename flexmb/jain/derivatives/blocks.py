@@ -23,7 +23,10 @@ def put_block(d, row, n, x):
 @helper
 def block6(d, a):
     """Six rows of a block."""
-    return block(d, a[0], 0), block(d, a[1], 0), block(d, a[2], 0), block(d, a[3], 0), block(d, a[4], 0), block(d, a[5], 0)
+    return (
+        block(d, a[0], 0), block(d, a[1], 0), block(d, a[2], 0),
+        block(d, a[3], 0), block(d, a[4], 0), block(d, a[5], 0),
+    )  # fmt: skip
 
 
 @helper

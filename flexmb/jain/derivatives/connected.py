@@ -1,7 +1,8 @@
 """Connectors between two points: their loads, and how these change, by dual numbers along 24 directions.
 
-Each end has twelve: its rotation and displacement in World axes, s0, and s1 of its velocity. The load itself acts like one
-that keeps its direction in World. What it changes by acts on all rows of the paths to both ends, for all sources there.
+Each end has twelve: its rotation and displacement in World axes, s0, and s1 of its velocity. The load itself acts like
+one that keeps its direction in World. What it changes by acts on all rows of the paths to both ends, for all sources
+there.
 """
 
 from flexmb.connectors.between import load_between
@@ -10,18 +11,18 @@ from flexmb.jain.derivatives.columns import put_until
 from flexmb.jain.derivatives.ends import fill_end
 from flexmb.jain.derivatives.tables import END_DISPLACED, END_MOTION, END_MOVED, END_SPEED
 from flexmb.jit.duals import rate, seeded
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import strip, width
 from flexmb.spatial.rows import strips6
-from flexmb.spatial.spatial_vector import ZERO6, dot6, scale6, shift_force, shift_motion, store6, times6, vec6
+from flexmb.spatial.spatial_vector import ZERO6, dot6, scale6, shift_force, shift_motion, store6, vec6
 from flexmb.spatial.vector import add, cross, mat3, matmul, times, vec3
 from flexmb.tables.arrays import ON_GROUND
 
 DIRECTIONS = 24
 
 
-@helper
+@sweep
 def attach_connectors(c, w, d):
     """Loads of all connectors at their ports, and their derivatives to `link`; needs the World poses in w."""
     for i in range(c.connector.shape[0]):
@@ -87,7 +88,7 @@ def _six(a):
     return (a[0].real, a[1].real, a[2].real), (a[3].real, a[4].real, a[5].real)
 
 
-@helper
+@sweep
 def link(c, d):
     """Add the changes of all loads to the rows of the paths to both ends."""
     for i in range(c.connector.shape[0]):

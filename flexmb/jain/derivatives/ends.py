@@ -1,20 +1,21 @@
 """What every source does to one point: the end of a connector, or the node of a load."""
 
-from flexmb.jain.derivatives.tables import BY_RATE, END_DISPLACED, END_MOTION, END_MOVED, END_SPEED, SPEED_BY_RATE, TURN
+from flexmb.jain.derivatives.strips_of import six_of
+from flexmb.jain.derivatives.tables import BY_RATE, END_DISPLACED, END_MOTION, END_MOVED, END_SPEED, MOTION
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.levels.body import is_at_rest
-from flexmb.spatial.rows import column3, column6, store_column3
-from flexmb.spatial.spatial_vector import ZERO6, shift_motion, sum6, vec6
+from flexmb.spatial.rows import column6
+from flexmb.spatial.spatial_vector import shift_motion, sum6
 from flexmb.spatial.vector import add, vec3
-from flexmb.tables.features import MODES, OUTBOARD_NODES
+from flexmb.tables.features import MODES
 
 
-@helper
+@sweep
 def fill_end(c, d, side, k, port):
     """Write the motions of a port of body k, about its point, by all sources to `end`; zero for all but its path.
 
-    Rows END_MOTION: J of the mass matrix; END_DISPLACED: s0 and END_MOVED: s1 of displacements; END_SPEED: s1 of speeds.
+    Rows END_MOTION: J; END_DISPLACED: s0 and END_MOVED: s1 of displacements; END_SPEED: s1 of speeds.
     """
     a = d.end[side]
     for row in range(a.shape[0]):
@@ -39,7 +40,7 @@ def fill_end(c, d, side, k, port):
 @helper
 def _from_slot(d, a, slot, place, r, moves):
     J = shift_motion(column6(d.seed, slot), r)
-    s1 = shift_motion((column3(d.seed, BY_RATE, slot), column3(d.seed, BY_RATE + 3, slot)), r)
+    s1 = shift_motion(six_of(d.seed, BY_RATE, slot), r)
     _store(a, END_MOTION, place, J, 1.0)
     _store(a, END_DISPLACED, place, J, moves)
     _store(a, END_MOVED, place, s1, 1.0)
@@ -51,9 +52,8 @@ def _own_modes(c, d, a, k, port, r):
     """The modes of the body itself."""
     moves = 0.0 if is_at_rest(c.body[k].level) else 1.0
     for n in range(c.body[k].modes):
-        J, s1 = vec6(d.port_mode[port, n].motion, 0), vec6(d.port_mode[port, n].by_rate, 0)
-        if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
-            J, s1 = sum6(J, vec6(d.frame_mode[k, n].motion, 0)), sum6(s1, vec6(d.frame_mode[k, n].by_rate, 0))
+        J = sum6(six_of(d.port_mode[port], MOTION, n), six_of(d.frame_mode[k], MOTION, n))
+        s1 = sum6(six_of(d.port_mode[port], BY_RATE, n), six_of(d.frame_mode[k], BY_RATE, n))
         J, s1, place = shift_motion(J, r), shift_motion(s1, r), d.places[k].modes + n
         _store(a, END_MOTION, place, J, 1.0)
         _store(a, END_DISPLACED, place, J, moves)

@@ -1,23 +1,26 @@
 """The force of a flexible body's own inertia and elasticity, and how it changes: the level's kernels with dual numbers.
 
-The directions are the three components of the angular velocity, then the displacements and the speeds of the modes; none
-leaves the body. Accelerations stay: a change s1 = (x, y) adds x x w and 2 x x v to them, with the velocity v of the
-origin of the body frame.
+The directions are the three components of the angular velocity, then the displacements and the speeds of the modes;
+none leaves the body. Accelerations stay: a change s1 = (x, y) adds x x w and 2 x x v to them, with the velocity v of
+the origin of the body frame.
 """
 
 from flexmb.jain.derivatives import affine
 from flexmb.jain.derivatives.hinges import force_to_world
 from flexmb.jain.derivatives.ports import seed_mode
+from flexmb.jain.derivatives.strips_of import put_strips, strips_of
+from flexmb.jain.derivatives.tables import MODE_BY_RATE, MODE_BY_TURN, MODE_FORCE, MODE_ROW, MODE_ROWS
 from flexmb.jit.duals import rate, seeded
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import put, strip, width
 from flexmb.levels import full
 from flexmb.levels.body import LEVELS, body_inertia, is_at_rest
 from flexmb.spatial.inertia import inertia_times, load_inertia, rotate_inertia, shift_inertia, store_inertia
+from flexmb.spatial.rows import column3, put3, store_column3, strips3
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, plus6, shift_motion, store6, times6_t, vec6
-from flexmb.spatial.vector import add, cross, mat3, scale, store3, times, vec3
+from flexmb.spatial.vector import add, cross, mat3, scale, times, vec3
 from flexmb.tables.features import LEVEL
 
 FULL_NUMBER = LEVELS.index(full.LEVEL)
@@ -38,7 +41,7 @@ def flexible_force(c, w, d, k):
         _elastic_rows(c, d, d.duals, k)
 
 
-@helper
+@sweep
 def _by_integrals(c, w, d, k, V, A):
     e, nm = d.plain, c.body[k].modes
     store6(e.body[k].velocity, 0, V)
@@ -48,14 +51,9 @@ def _by_integrals(c, w, d, k, V, A):
     body_inertia(c, e, k)
     _force(c, w, e, k, A)
     affine.differentiate(c, w, d, k, V, A)
-    for n in range(nm):
-        for i in range(12):
-            d.mode[k, n].force[i] = d.own[i, n]
-        for i in range(3):
-            d.mode[k, n].by_rate[i] = d.own[affine.BY_RATE + i, n]
 
 
-@helper
+@sweep
 def _by_duals(c, w, d, k, V, A):
     e, nm = d.duals, c.body[k].modes
     store6(e.body[k].velocity, 0, V)
@@ -99,7 +97,7 @@ def _with_the_motion(e, d, nm, k, V):
         # M_fr . (x x w, 2 x x v) = x . (w x angular part + 2 v x linear part)
         M_fr = _six(e.pfr[k, n], 0)
         change = add(cross(V[0], M_fr[0]), scale(2.0, cross(V[1], M_fr[1])))
-        store3(d.mode[k, n].by_rate, 0, add(vec3(d.mode[k, n].by_rate, 0), change))
+        store_column3(d.mode[k], MODE_BY_RATE, n, add(column3(d.mode[k], MODE_BY_RATE, n), change))
 
 
 @helper
@@ -145,7 +143,7 @@ def _keep(c, w, d, k, n, lane):
         for i in range(6):
             d.local[i, n] = rate(e.body[k].hinge_force[i], lane)
         for i in range(nm):
-            d.mode[k, i].by_rate[n] = rate(e.zf[k, i], lane)
+            d.mode[k, MODE_BY_RATE + n, i] = rate(e.zf[k, i], lane)
         return
     speed = 0 if n < 3 + nm else 1
     n -= 3 + speed * nm
@@ -154,12 +152,12 @@ def _keep(c, w, d, k, n, lane):
     else:
         e.eta[k, n] = w.eta[k, n]
     for i in range(6):
-        d.mode[k, n].force[6 * speed + i] = rate(e.body[k].hinge_force[i], lane)
+        d.mode[k, MODE_FORCE + 6 * speed + i, n] = rate(e.body[k].hinge_force[i], lane)
     for i in range(nm):
         d.matrix[first + i, speed * nu + first + n] = rate(e.zf[k, i], lane)
 
 
-@helper
+@sweep
 def _to_world(c, d, e, k, R):
     """The numbers of the body, which are in e and in body axes, in World axes about the base point."""
     nm, origin = c.body[k].modes, vec3(d.body[k].origin, 0)
@@ -173,13 +171,18 @@ def _to_world(c, d, e, k, R):
             d.body[k].by_rate[3 * i + j] = torque[i]
             d.body[k].by_rate[9 + 3 * i + j] = force[i]
     store_inertia(d.body[k].inertia, 0, shift_inertia(rotate_inertia(R, _inertia(e, k)), origin))
+    mode = d.mode[k]
     for n in range(nm):
-        mode = d.mode[k, n]
-        store3(mode.by_rate, 0, times(R, vec3(mode.by_rate, 0)))
-        store3(mode.by_turn, 0, (0.0, 0.0, 0.0))
-        store6(mode.row, 0, force_to_world(R, origin, _six(e.pfr[k, n], 0)))
-        for at in range(0, 12, 6):
-            store6(mode.force, at, force_to_world(R, origin, vec6(mode.force, at)))
+        M_fr = _six(e.pfr[k, n], 0)
+        store_column3(mode, MODE_ROW, n, M_fr[0])
+        store_column3(mode, MODE_ROW + 3, n, M_fr[1])
+    zero = (0.0, 0.0, 0.0)
+    for n in range(0, nm, width(d)):
+        put3(d, mode, MODE_BY_RATE, n, times(R, strips3(d, mode, MODE_BY_RATE, n)))
+        put3(d, mode, MODE_BY_TURN, n, zero)
+        put_strips(d, mode, MODE_ROW, n, force_to_world(R, origin, strips_of(d, mode, MODE_ROW, n)))
+        for row in range(MODE_FORCE, MODE_ROWS, 6):
+            put_strips(d, mode, row, n, force_to_world(R, origin, strips_of(d, mode, row, n)))
 
 
 @helper

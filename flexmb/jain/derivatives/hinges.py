@@ -1,8 +1,8 @@
 """Hinges that are no single axis: the derivatives of their own functions by dual numbers, once for displacements and
 once for speeds, without any recursion.
 
-With V_r = H u and the acceleration A_r relative to the inboard frame, both in outboard axes, the motion J of speed n and
-d along its displacement or change,
+With V_r = H u and the acceleration A_r relative to the inboard frame, both in outboard axes, the motion J of speed n
+and d along its displacement or change,
 
     displacement    s1 = V0 x J + dV_r    s2 = A0 x J + V0 x (V0 x J) + 2 V0 x dV_r + (dA_r + V_r x dV_r)
     speed           s1 = J                s2 = 2 V0 x J + (dA_r + V_r x J)
@@ -12,7 +12,7 @@ from flexmb.hinges import catalogue
 from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_ACCELERATION, SPEED_BY_RATE, TURN
 from flexmb.jit.duals import rate, seeded
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.cross6 import motion_cross
 from flexmb.spatial.rows import column6, store_column3, store_column6
 from flexmb.spatial.spatial_vector import axpy6, shift_force, store6, sum6, times6
@@ -35,10 +35,10 @@ def put_turn(c, d, slot, J):
         store_column3(d.seed, SPEED_BY_RATE, slot, J[0])
 
 
-@helper
+@sweep
 def several(c, w, d, k, R, r, V0, A0):
     """Motion of the outboard frame and seeds of hinge k; `moved` keeps the derivatives of its H."""
-    j, slot = c.body[k].u_index, d.places[k].slot
+    slot = d.places[k].slot
     V_r, A_r = _by_displacement(c, w, d, k)
     _by_speed(c, w, d, k)
     relative = to_world(R, r, V_r)

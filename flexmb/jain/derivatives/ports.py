@@ -11,19 +11,27 @@ body, it is the body frame that moves against O, with the motion -J of d. At lev
 only their accelerations act.
 """
 
-from flexmb.jain.derivatives.hinges import put_seed, to_world
-from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_ACCELERATION, SPEED_BY_RATE, TURN
+from flexmb.jain.derivatives.hinges import to_world
+from flexmb.jain.derivatives.strips_of import put3_until, put_strips, put_strips_until, strips_of
+from flexmb.jain.derivatives.tables import (
+    BY_ACCELERATION,
+    BY_RATE,
+    MOTION,
+    MOVED_ROWS,
+    SPEED_BY_ACCELERATION,
+    SPEED_BY_RATE,
+    TURN,
+)
 from flexmb.jain.ports import mode_motion, move_port
 from flexmb.jit.duals import rate, seeded
-from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.jit.lanes import LANES
+from flexmb.jit.strips import width
 from flexmb.levels.body import is_at_rest
 from flexmb.spatial.cross6 import motion_cross
-from flexmb.spatial.rows import column3, column6, store_column3, store_column6
+from flexmb.spatial.rows import column6, strips6
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, scale6, shift_motion, store6, sub6, sum6, vec6
 from flexmb.spatial.vector import add, cross, mat3, scale, store3, sub, times, vec3
-from flexmb.tables.features import OUTBOARD_NODES
 
 
 @helper
@@ -39,7 +47,7 @@ def clear_ports(c, d, k):
             store6(d.port[i].force, 0, ZERO6)
 
 
-@helper
+@sweep
 def move_ports(c, w, d, k):
     """Motion of the ports of body k in World axes, and what its modes do to them."""
     R = mat3(d.body[k].rotation, 0)
@@ -53,7 +61,7 @@ def move_ports(c, w, d, k):
                 V_r, A_r = to_world(R, r, vec6(w.port[i].v, 0)), to_world(R, r, _relative_acceleration(c, w, k, i))
                 V, A = sum6(V_body, V_r), sum6(sum6(A_body, motion_cross(V_body, V_r)), A_r)
                 _change(c, w, d, k, i)
-                for n in range(c.body[k].modes):
+                for n in range(0, c.body[k].modes, width(w)):
                     _seed(c, w, d, k, i, n, R, r, V, A)
             store6(d.port[i].velocity, 0, V)
             store6(d.port[i].accel, 0, A)
@@ -61,22 +69,21 @@ def move_ports(c, w, d, k):
 
 @helper
 def _seed(c, w, d, k, i, n, R, r, V, A):
-    """What mode n does to port i, which moves with V and A."""
-    J, V_body = to_world(R, r, mode_motion(w, i, n)), vec6(d.body[k].velocity, 0)
-    store6(d.port_mode[i, n].motion, 0, J)
+    """What a strip of modes does to port i, which moves with V and A."""
+    J, V_body, moved = to_world(R, r, strips6(w, w.port_mode[i], n)), vec6(d.body[k].velocity, 0), d.port_mode[i]
+    put_strips(d, moved, MOTION, n, J)
     if is_at_rest(c.body[k].level):
         return
-    a, b = to_world(R, r, _six(d, 0, n)), to_world(R, r, _six(d, 6, n))
+    a, b = to_world(R, r, strips_of(d, d.change, 0, n)), to_world(R, r, strips_of(d, d.change, 6, n))
     s1 = sub6(a, motion_cross(J, V))
     s2 = sub6(sum6(motion_cross(V_body, a), b), sum6(motion_cross(J, A), motion_cross(s1, V)))
-    store6(d.port_mode[i, n].by_rate, 0, s1)
-    store6(d.port_mode[i, n].by_acceleration, 0, s2)
-    b = to_world(R, r, _six(d, 12, n))
-    s2 = sub6(sum6(motion_cross(V_body, J), b), motion_cross(J, V))
-    store6(d.port_mode[i, n].speed_by_acceleration, 0, s2)
+    put_strips(d, moved, BY_RATE, n, s1)
+    put_strips(d, moved, BY_ACCELERATION, n, s2)
+    b = to_world(R, r, strips_of(d, d.change, 12, n))
+    put_strips(d, moved, SPEED_BY_ACCELERATION, n, sub6(sum6(motion_cross(V_body, J), b), motion_cross(J, V)))
 
 
-@helper
+@sweep
 def move_frame(c, w, d, k, R, r, V, A):
     """V and A of the body frame from those of O on a deforming node of the body, and what the modes do to the frame."""
     i = c.body[k].outboard_port
@@ -84,59 +91,50 @@ def move_frame(c, w, d, k, R, r, V, A):
     V_body = sub6(V, V_r)
     A_body = sub6(A, sum6(motion_cross(V_body, V_r), A_r))
     _change(c, w, d, k, i)
-    for n in range(c.body[k].modes):
-        J = scale6(-1.0, to_world(R, r, mode_motion(w, i, n)))
-        store6(d.frame_mode[k, n].motion, 0, J)
+    for n in range(0, c.body[k].modes, width(w)):
+        J = scale6(-1.0, to_world(R, r, strips6(w, w.port_mode[i], n)))
+        put_strips(d, d.frame_mode[k], MOTION, n, J)
         if not is_at_rest(c.body[k].level):
-            # the axes of O stay, so that V_r and A_r change by more than in the body's axes
-            change = sum6(to_world(R, r, _six(d, 0, n)), motion_cross(J, V_r))
-            dV = scale6(-1.0, change)
-            dA = sum6(motion_cross(dV, V_r), motion_cross(V_body, change))
-            dA = sum6(dA, sum6(to_world(R, r, _six(d, 6, n)), motion_cross(J, A_r)))
-            s1 = sub6(dV, motion_cross(J, V_body))
-            s2 = sub6(scale6(-1.0, dA), sum6(motion_cross(J, A_body), motion_cross(s1, V_body)))
-            store6(d.frame_mode[k, n].by_rate, 0, s1)
-            store6(d.frame_mode[k, n].by_acceleration, 0, s2)
-            # speeds: V_r changes by -J, V_body by J
-            dA = sum6(motion_cross(J, V_r), motion_cross(V_body, scale6(-1.0, J)))
-            dA = sum6(dA, to_world(R, r, _six(d, 12, n)))
-            s2 = sub6(scale6(-1.0, dA), motion_cross(J, V_body))
-            store6(d.frame_mode[k, n].speed_by_acceleration, 0, s2)
+            _seed_frame(d, k, n, R, r, J, V_r, A_r, V_body, A_body)
     return V_body, A_body
 
 
 @helper
+def _seed_frame(d, k, n, R, r, J, V_r, A_r, V_body, A_body):
+    """What a strip of modes does to the body frame; the axes of O stay, which turn against those of the body."""
+    moved = d.frame_mode[k]
+    change = sum6(to_world(R, r, strips_of(d, d.change, 0, n)), motion_cross(J, V_r))
+    dV = scale6(-1.0, change)
+    dA = sum6(motion_cross(dV, V_r), motion_cross(V_body, change))
+    dA = sum6(dA, sum6(to_world(R, r, strips_of(d, d.change, 6, n)), motion_cross(J, A_r)))
+    s1 = sub6(dV, motion_cross(J, V_body))
+    put_strips(d, moved, BY_RATE, n, s1)
+    s2 = sub6(scale6(-1.0, dA), sum6(motion_cross(J, A_body), motion_cross(s1, V_body)))
+    put_strips(d, moved, BY_ACCELERATION, n, s2)
+    # speeds: V_r changes by -J, V_body by J
+    dA = sum6(motion_cross(J, V_r), motion_cross(V_body, scale6(-1.0, J)))
+    dA = sum6(dA, to_world(R, r, strips_of(d, d.change, 12, n)))
+    put_strips(d, moved, SPEED_BY_ACCELERATION, n, sub6(scale6(-1.0, dA), motion_cross(J, V_body)))
+
+
+@sweep
 def see_modes(c, d, k):
     """Seeds of the parent's modes as body k sees them at its inboard frame, about its base point."""
     p, i = c.body[k].parent, c.body[k].inboard_port
-    new_point, at_rest = d.places[k].new_point != 0, is_at_rest(c.body[p].level)
-    step = vec3(d.body[k].step, 0)
-    for n in range(d.places[k].sees):
-        slot, frame = d.places[k].seen + n, d.frame_mode[p, n]
-        J, s2, s1, s2_speed = ZERO6, ZERO6, ZERO6, ZERO6
-        if i >= 0:
-            port = d.port_mode[i, n]
-            J, s2 = vec6(port.motion, 0), vec6(port.by_acceleration, 0)
-            s1, s2_speed = vec6(port.by_rate, 0), vec6(port.speed_by_acceleration, 0)
-        if has(c, OUTBOARD_NODES) and c.body[p].outboard_port >= 0:
-            J, s2 = sum6(J, vec6(frame.motion, 0)), sum6(s2, vec6(frame.by_acceleration, 0))
-            s1 = sum6(s1, vec6(frame.by_rate, 0))
-            s2_speed = sum6(s2_speed, vec6(frame.speed_by_acceleration, 0))
-        if new_point:
-            J, s1 = shift_motion(J, step), shift_motion(s1, step)
-            s2, s2_speed = shift_motion(s2, step), shift_motion(s2_speed, step)
-        store_column6(d.seed, slot, J)
-        put_seed(d, BY_RATE, slot, s1)
-        put_seed(d, BY_ACCELERATION, slot, s2)
-        put_seed(d, SPEED_BY_ACCELERATION, slot, s2_speed)
-        turn = scale(0.0 if at_rest else 1.0, J[0])
-        store_column3(d.seed, TURN, slot, turn)
-        store_column3(d.seed, SPEED_BY_RATE, slot, turn)
-
-
-@helper
-def _six(d, row, n):
-    return column3(d.change, row, n), column3(d.change, row + 3, n)
+    moves = 0.0 if is_at_rest(c.body[p].level) else 1.0
+    step = vec3(d.body[k].step, 0) if d.places[k].new_point else (0.0, 0.0, 0.0)
+    for n in range(0, d.places[k].sees, width(d)):
+        slot, count = d.places[k].seen + n, d.places[k].sees - n
+        for row in range(MOTION, MOVED_ROWS, 6):
+            V = strips_of(d, d.frame_mode[p], row, n)  # zero unless they move O in the body
+            if i >= 0:
+                V = sum6(V, strips_of(d, d.port_mode[i], row, n))
+            V = shift_motion(V, step)
+            put_strips_until(d, d.seed, row, slot, count, V)
+            if row == MOTION:
+                turn = scale(moves, V[0])
+                put3_until(d, d.seed, TURN, slot, count, turn)
+                put3_until(d, d.seed, SPEED_BY_RATE, slot, count, turn)
 
 
 @helper
@@ -215,5 +213,5 @@ def _keep_displacement(c, d, k, i, n, lane):
         mode = (e.port_mode[i, 0, j].real, e.port_mode[i, 1, j].real, e.port_mode[i, 2, j].real)
         v = cross(moved, mode)
         for row in range(3):
-            d.bent[i, n, j, row] = rate(e.port_mode[i, row, j], lane)
-            d.bent[i, n, j, 3 + row] = rate(e.port_mode[i, 3 + row, j], lane) + v[row]
+            d.bent[i, j, row, n] = rate(e.port_mode[i, row, j], lane)
+            d.bent[i, j, 3 + row, n] = rate(e.port_mode[i, 3 + row, j], lane) + v[row]

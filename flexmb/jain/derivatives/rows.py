@@ -12,6 +12,7 @@ Armatures act along their own speed alone: they are on the diagonal of M.
 
 from flexmb.jain.derivatives.columns import at_inboard_point, inboard_columns, own_columns
 from flexmb.jain.derivatives.hinges import outboard_rotation, to_world
+from flexmb.jain.derivatives.strips_of import six_of
 from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_ACCELERATION
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
@@ -66,11 +67,11 @@ def _column(c, d, k, place, slot):
     """Change of the load across the hinge by one of its speeds, and by its displacement; I J for the mass matrix."""
     J, s1 = column6(d.seed, slot), column3(d.seed, BY_RATE, slot)
     inertia, D = load_inertia(d.body[k].inertia, 0), d.body[k].by_rate
-    X = sum6(inertia_times(inertia, _six(d, BY_ACCELERATION, slot)), by_angle(D, s1))
+    X = sum6(inertia_times(inertia, six_of(d.seed, BY_ACCELERATION, slot)), by_angle(D, s1))
     if has(c, LOADS) or has(c, CONNECTORS):
         X = sum6(X, by_angle(d.body[k].by_turn, J[0]))
     put_force(d, 0, place, sum6(X, force_cross(J, vec6(d.body[k].force, 0))))
-    X = sum6(inertia_times(inertia, _six(d, SPEED_BY_ACCELERATION, slot)), by_angle(D, J[0]))
+    X = sum6(inertia_times(inertia, six_of(d.seed, SPEED_BY_ACCELERATION, slot)), by_angle(D, J[0]))
     put_force(d, BY_SPEED, place, X)
     put_force(d, BY_RATES, place, inertia_times(inertia, J))
 
@@ -98,18 +99,6 @@ def _same_hinge(c, w, d, k):
         for i in range(c.body[k].nv):
             change = to_world(R, r, column6(d.moved[k, n], i))
             d.matrix[first + i, first + n] += dot6(sum6(motion_cross(J, column6(d.seed, slot + i)), change), F)
-
-
-@helper
-def _six(d, row, slot):
-    """Six rows of column `slot` of `seed`."""
-    return six_of(d.seed, row, slot)
-
-
-@helper
-def six_of(a, row, n):
-    """Six rows of column n as a spatial vector."""
-    return column3(a, row, n), column3(a, row + 3, n)
 
 
 @helper

@@ -1,4 +1,4 @@
-"""M x = -T for many columns T at once, by the factors that `flexmb.jain.sweeps.inward` has left: (55), (56) in World axes.
+"""M x = -T for many columns T at once, by the factors that `flexmb.jain.sweeps.inward` has left: (55), (56).
 
 The columns are solved in blocks of `BLOCK` strips. What passes from body to body is six numbers for each column, as in
 `flexmb.jain.innovations`; in World axes they are added without a rotation.
@@ -20,7 +20,6 @@ from flexmb.jain.derivatives.blocks import (
     shift_motions,
     sum_block6,
 )
-from flexmb.jain.derivatives.tables import BLOCK
 from flexmb.jain.derivatives.hinges import force_to_world
 from flexmb.jain.derivatives.solve_modes import (
     answer_modes,
@@ -30,19 +29,20 @@ from flexmb.jain.derivatives.solve_modes import (
     release_modes,
     release_wheels,
 )
+from flexmb.jain.derivatives.tables import BLOCK
 from flexmb.jain.hinge_solve import SINGLE
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.strips import width
 from flexmb.spatial.rows import column6
-from flexmb.spatial.spatial_vector import shift_force, store6, times6, vec6
+from flexmb.spatial.spatial_vector import store6, vec6
 from flexmb.spatial.vector import mat3, vec3
 from flexmb.tables.features import MODES, SEVERAL, WHEELS
 
 
 @helper
 def solve(c, w, d, columns):
-    """Replace the first `columns` columns of `matrix` by those of -M^-1 times them; rows of prescribed speeds vanish."""
+    """Replace the first `columns` columns of `matrix` by -M^-1 times them; rows of prescribed speeds vanish."""
     for k in range(c.body.shape[0]):
         _gains(c, w, d, k)
         if has(c, MODES):

@@ -2,12 +2,11 @@
 
 from flexmb.jain.derivatives.attached import wheel_axis
 from flexmb.jain.derivatives.blocks import along, block, less, plus, plus6, put_block, scaled
-from flexmb.jit.features import has
+from flexmb.jain.derivatives.tables import MOTION
 from flexmb.jit.kernel import helper
-from flexmb.spatial.rows import column6
+from flexmb.spatial.rows import column3, column6
 from flexmb.spatial.spatial_vector import vec6
-from flexmb.spatial.vector import add, dot, vec3
-from flexmb.tables.features import OUTBOARD_NODES
+from flexmb.spatial.vector import add, dot
 
 
 @helper
@@ -25,7 +24,7 @@ def release_wheels(c, w, d, k, at, z):
             z = plus6((axis, zero), y, z)
             for n in range(c.body[k].modes):
                 mode = d.matrix[d.places[k].modes + n]
-                put_block(d, mode, at, plus(dot(_turn(c, d, k, c.wheel[i].port, n), axis), y, block(d, mode, at)))
+                put_block(d, mode, at, plus(dot(_turn(d, k, c.wheel[i].port, n), axis), y, block(d, mode, at)))
     return z
 
 
@@ -38,18 +37,15 @@ def answer_wheels(c, w, d, k, at, A):
             row, axis = d.matrix[d.places[k].wheels + i - c.body[k].wheel_start], wheel_axis(c, w, d, k, i)
             x = less(scaled(1.0 / c.wheel[i].axial, block(d, row, at)), along((axis, zero), A))
             for n in range(c.body[k].modes):
-                turn = -dot(_turn(c, d, k, c.wheel[i].port, n), axis)
+                turn = -dot(_turn(d, k, c.wheel[i].port, n), axis)
                 x = plus(turn, block(d, d.matrix[d.places[k].modes + n], at), x)
             put_block(d, row, at, x)
 
 
 @helper
-def _turn(c, d, k, port, n):
+def _turn(d, k, port, n):
     """Angular velocity of a port of body k at unit speed of mode n while O is at rest."""
-    turn = vec3(d.port_mode[port, n].motion, 0)
-    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
-        return add(turn, vec3(d.frame_mode[k, n].motion, 0))
-    return turn
+    return add(column3(d.port_mode[port], MOTION, n), column3(d.frame_mode[k], MOTION, n))
 
 
 @helper

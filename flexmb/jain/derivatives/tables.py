@@ -1,13 +1,13 @@
 """The arrays of the derivatives of a tree, and the order of its rows and columns.
 
-A *place* is a row of the matrices, as in `flexmb.jain.places`: depth first. A *slot* is a source of motion as the bodies
-beyond it see it: a hinge speed has one slot, a mode has one for each body and wheel that sits on a port of its body,
-because each port moves differently. The slots from the base to a body are divided into *runs*: contiguous slots whose
+A *place* is a row of the matrices, as in `flexmb.jain.places`: depth first. A *slot* is a source of motion as the
+bodies beyond it see it: a hinge speed has one slot, a mode has one for each body that sits on its body, because each
+port moves differently. The slots from the base to a body are divided into *runs*: contiguous slots whose
 places are contiguous too, and whose spatial vectors are about one point, so that loops over them run in strips.
 
 All spatial vectors are in World axes. They are about a *base point* near the body: the hinge point of the body itself
-or of one of a few bodies inboard, `BODIES_A_POINT` in a row. A common point of the whole tree would save all shifts, but
-moments about a far point lose digits; a point for each body would need a shift at every body.
+or of one of a few bodies inboard, `BODIES_A_POINT` in a row. A common point of the whole tree would save all shifts,
+but moments about a far point lose digits; a point for each body would need a shift at every body.
 """
 
 from __future__ import annotations
@@ -94,28 +94,14 @@ PORT = np.dtype(
     ],
     align=True,
 )
-# What a mode does to a port relative to its body, or to the body frame relative to O: its motion J, then s1 and
-# s2 of a displacement, s2 of a speed. At level ruthless a mode has no other effect than its acceleration J.
-MOVED = np.dtype(
-    [
-        ("motion", _F, (6,)),
-        ("by_rate", _F, (6,)),
-        ("by_acceleration", _F, (6,)),
-        ("speed_by_acceleration", _F, (6,)),
-    ],
-    align=True,
-)
-MODE = np.dtype(
-    [
-        ("row", _F, (6,)),  # l2 without the motion of the body frame: M_fr, and what the ports add
-        ("by_rate", _F, (3,)),  # l1
-        ("by_turn", _F, (3,)),  # l0
-        ("force", _F, (12,)),  # change of the body's own force by displacement, then by speed
-    ],
-    align=True,
-)
-# Rows of `seed`: what a unit of a source does to all bodies beyond.
+# Rows of `mode`: l2 (M_fr, and what the ports and the motion of the body frame add), l1, l0, and the change of the
+# body's own force by displacement, then by speed.
+MODE_ROW, MODE_BY_RATE, MODE_BY_TURN, MODE_FORCE, MODE_ROWS = 0, 6, 9, 12, 24
+# Rows of `seed`: what a unit of a source does to all bodies beyond. The first four, six rows each, are also those of
+# what a mode does to a port relative to its body, and to the body frame relative to O. At level ruthless a mode has no
+# other effect than its acceleration J.
 MOTION, BY_RATE, BY_ACCELERATION, SPEED_BY_ACCELERATION, TURN, SPEED_BY_RATE, ROWS = 0, 6, 12, 18, 24, 27, 30
+MOVED_ROWS = 24
 # What `shape` says: whether the tree branches; whether the order of places is that of u; whether it is that of q too.
 BRANCHES, IN_ORDER, ALIKE = range(3)
 # Rows of `end`, six each: J; s0 and s1 of displacements; s1 of speeds.
@@ -151,17 +137,16 @@ class Derivatives:
     moved: Real  # (N,6,6,6) of hinges that are no single axis: derivatives of H in outboard axes by displacement
     turned: Real  # (3,6,6) of one such hinge: of V_r and A_r by displacement, of A_r by speed, in columns
     port: Record  # (P,) PORT
-    port_mode: Record  # (P,m) MOVED, relative to the body
-    frame_mode: Record  # (N,m) MOVED of the body frame relative to O; zero unless the modes move O in the body
-    mode: Record  # (N,m) MODE
-    bent: Real  # (P,m,m,6) derivatives of the motions of a port at unit speed of mode j by displacement n: [n, j]
+    port_mode: Real  # (P,MOVED_ROWS,m) what modes do to ports relative to the body
+    frame_mode: Real  # (N,MOVED_ROWS,m) to the body frame relative to O; zero unless they move O in the body
+    mode: Real  # (N,MODE_ROWS,m)
+    bent: Real  # (P,m,6,m) derivatives of the motion of a port at unit speed of mode j by displacement n: [j, ., n]
     change: Real  # (18,m) of one port: of its V_r and A_r by displacements, of A_r by speeds, in body axes
     end: Real  # (2,END_ROWS,nu) what all sources do to the two ends of a connector
     # (C,13,24) derivatives of the forces on the bodies of A and B, and of the power, by s0 and s1 of A, then of B
     link: Real
     passed_row: Real  # (24,) of one row
     work: Real  # (3nu,) derivatives of the power by displacements and speeds, and by accelerations
-    own: Real  # (15,m) of one body of level full: the same of its force by its modes, and `by_rate` of their rows
     local: Real  # (6,3) of one body: derivatives of its force by its angular velocity, body axes
     plain: Workspace  # for the inertia of single bodies
     duals: Duals
@@ -197,16 +182,15 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
         moved=np.zeros((len(c.body) if np.any(c.body["axis"] < 0) else 1, 6, 6, 6)),
         turned=np.zeros((3, 6, 6)),
         port=_ports(c),
-        port_mode=np.zeros((len(c.port), m), MOVED),
-        frame_mode=np.zeros((len(c.body), m), MOVED),
-        mode=np.zeros((len(c.body), m), MODE),
-        bent=np.zeros((len(c.port), m, m, 6)),
-        change=np.zeros((18, m)),
-        end=strip_zeros((2, END_ROWS, nu + LANES)) if len(c.connector) + len(c.load) else strip_zeros((2, END_ROWS, LANES)),
+        port_mode=strip_zeros((len(c.port), MOVED_ROWS, m)),
+        frame_mode=strip_zeros((len(c.body), MOVED_ROWS, m)),
+        mode=strip_zeros((len(c.body), MODE_ROWS, m)),
+        bent=strip_zeros((len(c.port), m, 6, m)),
+        change=strip_zeros((18, m)),
+        end=strip_zeros((2, END_ROWS, (nu if len(c.connector) + len(c.load) else 0) + LANES)),
         link=np.zeros((len(c.connector), 13, 24)),
         passed_row=np.zeros(24),
         work=strip_zeros((3 * nu + LANES,)),
-        own=strip_zeros((15, m)),
         local=np.zeros((6, 3)),
         plain=workspace(c, nq, nu),
         duals=duals(c, nq, nu),
@@ -230,7 +214,8 @@ def _shape(c: Constants, place: Index, nq: int) -> Index:
 def _ports(c: Constants) -> Record:
     """(P,) PORT with what is attached where."""
     port = np.zeros(len(c.port), PORT)
-    for attached in (c.body["inboard_port"], c.wheel["port"], c.load["port"], c.end["port"][c.end["body"] != ON_GROUND]):
+    ends = c.end["port"][c.end["body"] != ON_GROUND]
+    for attached in (c.body["inboard_port"], c.wheel["port"], c.load["port"], ends):
         port["used"][attached[attached >= 0]] = 1
     return port
 

@@ -4,11 +4,11 @@ The power of a drive is that of the load that its row of the inverse dynamics ha
 those of `applied`; a load at a node has the power of its velocity.
 """
 
-from flexmb.jain.derivatives.connected import add_ends, add_end
+from flexmb.jain.derivatives.connected import add_end, add_ends
 from flexmb.jain.derivatives.ends import fill_end
 from flexmb.jit.duals import rate
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.spatial_vector import shift_motion, vec6
 from flexmb.spatial.vector import add, cross, mat3, scale, times, vec3
 from flexmb.tables.arrays import FORCE, ON_GROUND, WORLD_AXES
@@ -25,7 +25,7 @@ from flexmb.tables.features import (
 )
 
 
-@helper
+@sweep
 def differentiate_power(c, w, d):
     """Write `work` from `matrix` before its solution: with M in its third part where anything is prescribed."""
     nu = w.u.shape[0]
@@ -63,7 +63,7 @@ def differentiate_power(c, w, d):
 
 @helper
 def _along(d, nu, place, law):
-    """The power of a law along a coordinate, as `applied` has evaluated it by duals: lane 0 its coordinate, 1 its speed."""
+    """The power of a law along a coordinate; `applied` has changed the coordinate along lane 0, the speed along 1."""
     d.work[place] += rate(law.power, 0)
     d.work[nu + place] += rate(law.power, 1)
 

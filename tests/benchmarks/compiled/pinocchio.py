@@ -1,4 +1,4 @@
-"""Pinocchio's articulated-body algorithm in a compiled loop, as a user of its C++ would have it.
+"""Pinocchio's articulated-body algorithm and its derivatives in a compiled loop, as a user of its C++ would have it.
 
 Pinocchio has no integrator of its own; Boost's odeint, whose headers come with Pinocchio's wheel, has Runge-Kutta
 methods of order 5 and 8 with error control. What is missing is a C++ compiler and the headers of Eigen, which
@@ -22,6 +22,7 @@ import numpy as np
 
 from flexmb.scene.schema import Scene
 from tests.benchmarks import peers
+from tests.benchmarks.must_hold.row import Call
 from tests.repo.project import ROOT
 
 SOURCE = Path(__file__).with_name("pinocchio_odeint.cpp")
@@ -29,6 +30,7 @@ FOLDER = ROOT / ".benchmarks"
 FLAGS = (
     "-O3", "-march=native", "-DNDEBUG", "-std=c++17", "-shared", "-fPIC",
     "-DBOOST_MPL_LIMIT_LIST_SIZE=30", "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",  # for Pinocchio's list of joints
+    "-DBOOST_FUSION_INVOKE_MAX_ARITY=10",  # for the arguments of its derivatives
 )  # fmt: skip
 REMEDY = "the compiled rival needs g++ and the headers of Eigen: pip install flexmb[race]"
 
@@ -40,6 +42,37 @@ def runs(scene: Scene, t_end: float) -> Callable[[Stepper, float], np.ndarray]:
 
     For trees without quaternions. ModuleNotFoundError where nothing can be compiled.
     """
+    library, loaded, start = _loaded(scene)
+    steppers = {name: _declared(library[f"run_{name}"]) for name in ("dopri5", "fehlberg78")}
+
+    def run(stepper: Stepper, tolerance: float) -> np.ndarray:
+        y = start.copy()
+        steppers[stepper](loaded, y, t_end, tolerance, tolerance)
+        return y
+
+    return run
+
+
+def derivatives(scene: Scene, x: np.ndarray, *, inverse: bool = False, times: int = 100) -> Call:
+    """Derivatives of forward dynamics at forces x, or of inverse dynamics at accelerations x; at the initial state.
+
+    The result has the columns of those by coordinates, speeds, and forces or accelerations, one after the other.
+    """
+    library, loaded, start = _loaded(scene)
+    n, vector = len(x), np.ctypeslib.ndpointer(float, flags="C")
+    out = np.zeros((3, n, n))
+    library.derivatives.restype = None
+    library.derivatives.argtypes = [ctypes.c_void_p, vector, vector, vector, ctypes.c_long, ctypes.c_int]
+
+    def result() -> np.ndarray:
+        symmetric = np.triu(out[2].T) + np.triu(out[2].T, 1).T
+        return np.concatenate([out[0].T.ravel(), out[1].T.ravel(), symmetric.ravel()])
+
+    return Call(lambda: library.derivatives(loaded, start, x, out, times, inverse), times, result)
+
+
+def _loaded(scene: Scene) -> tuple[ctypes.CDLL, Any, np.ndarray]:
+    """The library, the tree that it has loaded, and the initial state [q, v]."""
     library = ctypes.CDLL(str(compiled()))
     tree, q, v = peers.pinocchio_tree(scene)
     if tree.model.nq != tree.model.nv:
@@ -49,15 +82,7 @@ def runs(scene: Scene, t_end: float) -> Callable[[Stepper, float], np.ndarray]:
         tree.model.saveToBinary(str(file))
         library.load_tree.restype, library.load_tree.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
         loaded = library.load_tree(str(file).encode())
-    start = np.concatenate([q, v])
-    steppers = {name: _declared(library[f"run_{name}"]) for name in ("dopri5", "fehlberg78")}
-
-    def run(stepper: Stepper, tolerance: float) -> np.ndarray:
-        y = start.copy()
-        steppers[stepper](loaded, y, t_end, tolerance, tolerance)
-        return y
-
-    return run
+    return library, loaded, np.concatenate([q, v])
 
 
 def _declared(function: Any) -> Any:

@@ -1,10 +1,12 @@
-// Whole runs of a rigid tree in C++: the articulated-body algorithm of Pinocchio, stepped by Boost's odeint. Nothing of
-// Python is in the loop. tests/benchmarks/compiled/pinocchio.py compiles this file and calls it.
+// Whole runs of a rigid tree in C++: the articulated-body algorithm of Pinocchio, stepped by Boost's odeint; and its
+// derivatives of forward and inverse dynamics. Nothing of Python is in the loop. tests/benchmarks/compiled/pinocchio.py compiles this file and calls it.
 #include <pinocchio/multibody.hpp>
 
 #include <boost/numeric/odeint.hpp>
 #include <memory>
+#include <pinocchio/algorithm/aba-derivatives.hpp>
 #include <pinocchio/algorithm/aba.hpp>
+#include <pinocchio/algorithm/rnea-derivatives.hpp>
 #include <pinocchio/serialization.hpp>
 #include <string>
 #include <vector>
@@ -55,4 +57,22 @@ extern "C" long run_dopri5(Tree * tree, double * y, double t_end, double rtol, d
 extern "C" long run_fehlberg78(Tree * tree, double * y, double t_end, double rtol, double atol)
 {
   return stepped(*tree, y, t_end, rtol, atol, odeint::runge_kutta_fehlberg78<State>());
+}
+
+// Derivatives by q, v and forces or accelerations x, `times` times over; the last ones, (nv,nv) each, by columns to out.
+// The third matrix has its upper triangle only.
+extern "C" void derivatives(Tree * tree, const double * state, const double * x, double * out, long times, int inverse)
+{
+  const int n = tree->model.nv;
+  const Eigen::Map<const Eigen::VectorXd> q(state, n), v(state + n, n), given(x, n);
+  pinocchio::Data & data = *tree->data;
+  for (long i = 0; i < times; ++i)
+    if (inverse)
+      pinocchio::computeRNEADerivatives(tree->model, data, q, v, given);
+    else
+      pinocchio::computeABADerivatives(tree->model, data, q, v, given);
+  const auto matrix = [&](int k) { return Eigen::Map<Eigen::MatrixXd>(out + k * n * n, n, n); };
+  matrix(0) = inverse ? Eigen::MatrixXd(data.dtau_dq) : Eigen::MatrixXd(data.ddq_dq);
+  matrix(1) = inverse ? Eigen::MatrixXd(data.dtau_dv) : Eigen::MatrixXd(data.ddq_dv);
+  matrix(2) = inverse ? Eigen::MatrixXd(data.M) : Eigen::MatrixXd(data.Minv);
 }

@@ -6,6 +6,7 @@ from functools import cache
 
 from tests.benchmarks.must_hold import (
     charts,
+    derivatives,
     evaluation,
     first_use,
     floating_frames,
@@ -18,7 +19,10 @@ from tests.benchmarks.must_hold import (
 )
 from tests.benchmarks.must_hold.row import Row
 
-SOURCES = (evaluation, runs, runs_at_equal_error, missions, modes, floating_frames, growth, charts, start, first_use)
+SOURCES = (
+    evaluation, derivatives, runs, runs_at_equal_error, missions, modes, floating_frames, growth, charts, start,
+    first_use,
+)  # fmt: skip
 
 
 @cache

@@ -116,8 +116,8 @@ def test_by_displacement_and_by_force(seed):
     found = both(trees.random_scene(seed, trees.EVERY_LEVEL))
     assert found is not None
     c, nq, nu = found.system.constants, found.system.nq, found.system.nu
-    by_displacement, by_speed, by_force = np.full((3, nu, nu), np.nan)
-    assert derivatives.acceleration_derivatives(T, found.y, by_displacement, by_speed, by_force, c, found.w) == Status.OK
+    by_displacement, by_speed, by_force = matrices = np.full((3, nu, nu), np.nan)
+    assert derivatives.acceleration_derivatives(T, found.y, *matrices, c, found.w) == Status.OK
     free = c.speed["prescribed"] < 0
     rows = found.by_duals[nq : nq + nu]
     expected = rows[:, :nq] @ found.by_duals[:nq, nq : nq + nu]
@@ -152,7 +152,8 @@ def test_inverse_dynamics_against_the_dense_route(recipe, seed):
 
     for j in np.flatnonzero(c.speed["prescribed"] < 0):
         unit = 1j * H * np.eye(nu)[j]
-        for which, parts in enumerate((changes(state.q + N @ unit, state.u + 0j), changes(state.q + 0j, state.u + unit))):
+        moved = changes(state.q + N @ unit, state.u + 0j), changes(state.q + 0j, state.u + unit)
+        for which, parts in enumerate(moved):
             size = sum(np.max(np.abs(part)) for part in parts) + np.max(np.abs(M))
             error = np.max(np.abs(found[which, :, j] - sum(parts)))
             assert error <= limit * size, (which, j)

@@ -1,0 +1,120 @@
+"""Derivatives of accelerations and inverse dynamics: of rigid chains over Pinocchio, flexible ones in evaluations."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+import flexmb as fm
+from flexmb.entry import articulated, derivatives, tangent
+from flexmb.jit.kernel import kernel
+from tests.benchmarks.compiled import pinocchio
+from tests.benchmarks.must_hold.row import Call, Measured, Row, how_many_times, measured
+from tests.benchmarks.rivals import flexible_chain, rigid_chain, turns
+
+COMPILED, EVALUATIONS = "Derivatives from compiled code", "Jacobian of flexible chains"
+TO_ROUNDING = 1e-10  # of the largest element, in chains of at most 100 bodies
+BEAMS = {5: 8.0, 10: 12.0}
+"""Evaluations at most, by the number of modes."""
+
+
+def rows() -> list[Row]:
+    """Revolute chains of N bodies with general axes, then chains of ten beams."""
+    return [
+        *(
+            Row(
+                f"derivatives_{n}", COMPILED, f"pin.computeABADerivatives in C++, {n} bodies", 2.5,
+                partial(_rigid, n, inverse=False),
+            )
+            for n in (10, 35, 100)
+        ),
+        *(
+            Row(
+                f"inverse_derivatives_{n}", COMPILED, f"pin.computeRNEADerivatives in C++, {n} bodies", 2.0,
+                partial(_rigid, n, inverse=True),
+            )
+            for n in (10, 35)
+        ),
+        *(
+            Row(
+                f"jacobian_{modes}_modes", EVALUATIONS, f"10 beams of {modes} modes, level full", goal,
+                partial(_flexible, modes), "at most", "evaluations of the accelerations",
+            )
+            for modes, goal in BEAMS.items()
+        ),
+    ]  # fmt: skip
+
+
+def _rigid(bodies: int, *, inverse: bool) -> Measured:
+    scene = rigid_chain(bodies)
+    native = _inverse(scene) if inverse else _forward(scene)
+    x = np.linspace(-1.0, 1.0, bodies) if inverse else np.zeros(bodies)
+    return how_many_times(native, pinocchio.derivatives(scene, x, inverse=inverse), TO_ROUNDING)
+
+
+def _forward(scene: fm.Scene, times: int = 100) -> Call:
+    system, y = _started(scene)
+    out = np.zeros((3, system.nu, system.nu))
+    w = derivatives.derivative_workspace(system.constants, system.nq, system.nu)
+    return Call(lambda: _accelerations(times, y, *out, system.constants, w), times, lambda: out.ravel())
+
+
+def _inverse(scene: fm.Scene, times: int = 100) -> Call:
+    system, y = _started(scene)
+    rates = np.linspace(-1.0, 1.0, system.nu)
+    out = np.zeros((3, system.nu, system.nu))
+    w = derivatives.derivative_workspace(system.constants, system.nq, system.nu)
+    return Call(lambda: _inverse_dynamics(times, y, rates, *out, system.constants, w), times, lambda: out.ravel())
+
+
+def _flexible(modes: int) -> Measured:
+    """A Jacobian over an evaluation, both from compiled code; what it takes by dual numbers is in the detail."""
+    system, y = _started(flexible_chain(10, modes, "full"))
+    c, nq, nu = system.constants, system.nq, system.nu
+    J, expected = np.zeros((2, len(y), len(y)))
+    w, by_duals = derivatives.derivative_workspace(c, nq, nu), tangent.tangent_workspace(c, nq, nu)
+    evaluation = system.recursion_constants, system.recursion_workspace()
+    derivatives.jacobian(0.0, y, J, c, w)
+    tangent.jacobian(0.0, y, expected, c, by_duals)
+    difference = float(np.max(np.abs(J - expected)) / np.max(np.abs(expected)))
+    seconds = turns(lambda: _evaluations(100, y, *evaluation), lambda: _jacobians(10, y, J, c, w)) / [100, 10]
+    dual = turns(lambda: _evaluations(100, y, *evaluation), lambda: tangent.jacobian(0.0, y, J, c, by_duals)) / [100, 1]
+    today = np.median(dual[:, 1] / dual[:, 0])
+    return measured(seconds[:, 1] / seconds[:, 0], f"{today:.0f} by dual numbers", difference)
+
+
+def _started(scene: fm.Scene) -> tuple[fm.System, np.ndarray]:
+    system = fm.compile(scene)
+    state = system.initial_state
+    return system, np.concatenate([state.q, state.u, [0.0]])
+
+
+@kernel
+def _accelerations(times, y, by_displacement, by_speed, by_force, c, w):
+    status = 0
+    for _ in range(times):
+        status = max(status, derivatives.acceleration_derivatives(0.0, y, by_displacement, by_speed, by_force, c, w))
+    return status
+
+
+@kernel
+def _inverse_dynamics(times, y, rates, by_displacement, by_speed, by_acceleration, c, w):
+    for _ in range(times):
+        derivatives.inverse_dynamics_derivatives(0.0, y, rates, by_displacement, by_speed, by_acceleration, c, w)
+
+
+@kernel
+def _evaluations(times, y, c, w):
+    status = 0
+    for _ in range(times):
+        status = max(status, articulated.accelerations(0.0, y, c, w))
+    return status
+
+
+@kernel
+def _jacobians(times, y, J, c, w):
+    status = 0
+    for _ in range(times):
+        status = max(status, derivatives.jacobian(0.0, y, J, c, w))
+    return status
