@@ -6,9 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.jit.kernel import kernel
+from flexmb.jit.kernel import helper, kernel
 from flexmb.motion.coordinates import configuration_rate, load_state
 from flexmb.typing import Real
+
+MOST_SPEEDS = 6  # of a hinge
 
 
 class StateDerivatives(NamedTuple):
@@ -46,17 +48,37 @@ class Variation(NamedTuple):
 
 @kernel
 def coordinate_motion(t, y, N, c, w):
-    """N (nq,nu) = d(qdot)/du at y = [q, u, work]; the columns of prescribed speeds vanish."""
+    """N (nq,nu) = d(qdot)/du at y = [q, u, work], into zeros; the columns of prescribed speeds vanish.
+
+    One evaluation for the first speeds of all hinges, then one for the second ones ...: no hinge depends on another.
+    """
     load_state(t, y, c, w)
-    nq, nu = N.shape[0], N.shape[1]
-    for j in range(nu):
+    for j in range(N.shape[1]):
         w.u[j] = 0.0
-    for j in range(nu):
-        w.u[j] = 0.0 if c.speed[j].prescribed >= 0 else 1.0
+    for n in range(MOST_SPEEDS):
+        for k in range(c.body.shape[0]):
+            _set_speed(c, w, k, n, 1.0)
         configuration_rate(c, w, w.rate)
-        w.u[j] = 0.0
-        for i in range(nq):
-            N[i, j] = w.rate[i]
+        for k in range(c.body.shape[0]):
+            if n < c.body[k].nv:
+                first = c.body[k].q_index
+                for i in range(first, first + c.body[k].nv + (1 if c.body[k].quaternion >= 0 else 0)):
+                    N[i, c.body[k].u_index + n] = w.rate[i]
+            _set_speed(c, w, k, n, 0.0)
+    for k in range(c.body.shape[0]):
+        for n in range(c.body[k].modes):
+            N[c.body[k].eta_index + n, c.body[k].etad_index + n] = 1.0
+    for i in range(c.wheel.shape[0]):
+        if c.speed[c.wheel[i].u_index].prescribed < 0:
+            N[c.wheel[i].q_index, c.wheel[i].u_index] = 1.0
+
+
+@helper
+def _set_speed(c, w, k, n, value):
+    """Speed n of the hinge of body k, if it has so many and this one is free."""
+    j = c.body[k].u_index + n
+    if n < c.body[k].nv and c.speed[j].prescribed < 0:
+        w.u[j] = value
 
 
 def displacement_of(N: Real) -> Real:

@@ -111,6 +111,8 @@ def _single_states() -> None:
         for solve in (factors.solve, factors.half_solve, factors.half_multiply, factors.multiply):
             solve(rates)
         system.acceleration_derivatives(state)
+        system.inverse_dynamics_derivatives(state, rates)
+        system.derivative_evaluator()(state.t, state.q, state.u)
         system.evaluation_derivatives(state)
         assert np.isfinite(factors.log_determinant)
     nested = system.nested()

@@ -7,21 +7,21 @@ import numpy as np
 from flexmb.closure.closures import Closures
 from flexmb.closure.given_motion import observe_given, rows_tangent
 from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace
-from flexmb.closure.variation import variation
 from flexmb.entry.given_motion import motion_tangent
 from flexmb.entry.observed_tangent import outputs_tangent
 from flexmb.entry.variation import Variation
 from flexmb.jit.direct import direct
 from flexmb.jit.pointer import STATUS
-from flexmb.system.derivatives import Derivatives
+from flexmb.system.derivative_evaluator import DerivativeEvaluator
+from flexmb.system.derivatives import DifferentiableMotion
 from flexmb.system.pushforward import Pushforward
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Real
 
 
-class ChainDerivatives(Derivatives):
-    """`Derivatives` of a system with closures or couplings."""
+class ChainDerivatives(DifferentiableMotion):
+    """Derivatives of a system with closures or couplings."""
 
     _closures: Closures
 
@@ -30,7 +30,16 @@ class ChainDerivatives(Derivatives):
         """The closure equations with workspaces of this thread."""
         return self._closures.for_thread()
 
+    def derivative_evaluator(self) -> DerivativeEvaluator:
+        """Raises NotImplementedError: evaluators are for trees only."""
+        raise NotImplementedError(
+            f'scene "{self.scene.name}" has closures or couplings, and evaluators are for trees only: '
+            "use acceleration_derivatives(state)"
+        )
+
     def _variation(self, t: float, y: Real) -> Variation:
+        from flexmb.closure.variation import variation  # imported here, because it imports SciPy, which is slow
+
         self.accelerations(self.layout.known(t, y))  # with its errors and warnings
         mass = np.empty((self.nu, self.nu))
         self._fill_mass_matrix(t, y, mass)

@@ -26,6 +26,7 @@ from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.system.complex_step import load_row, section_row
+from flexmb.system.derivative_evaluator import DerivativeEvaluator, fresh_derivative_evaluator
 from flexmb.system.derivative_records import (
     AccelerationDerivatives,
     By,
@@ -47,7 +48,7 @@ from flexmb.typing import Flags, Index, Real
 _INSTEAD = "linearise the closed loop by flexmb.linearize(scene)"
 
 
-class Derivatives(FreeMotion):
+class DifferentiableMotion(FreeMotion):
     """Derivatives of what a system gives at one state.
 
     All methods raise NotImplementedError for scenes with controllers, `NotDifferentiableError` (a DynamicsError) where
@@ -67,15 +68,25 @@ class Derivatives(FreeMotion):
             at = self._under_forces(at, t, y, self.layout.rates("forces", forces))
         return AccelerationDerivatives(at.accelerations, *at.of_accelerations, at.motion)
 
+    def derivative_evaluator(self) -> DerivativeEvaluator:
+        """`acceleration_derivatives` for a loop: `udot = evaluator(t, q, u)` writes derivatives into its arrays.
+
+        A call costs 0.1 us in addition to the kernel. The kernel is compiled here, not at the first call.
+        NotImplementedError for closed chains, and scenes with controllers.
+        """
+        refuse_feedback(self.scene, "system.derivative_evaluator", _INSTEAD)
+        return fresh_derivative_evaluator(self)
+
     def inverse_dynamics_derivatives(self, state: State, accelerations: Real) -> InverseDynamicsDerivatives:
         """Derivatives of `inverse_dynamics` at these accelerations (nu,); of closed chains those of the tree alone."""
         t, y = self._differentiable(state, "system.inverse_dynamics_derivatives")
         rates = self.layout.rates("accelerations", accelerations)
-        parts = by_displacement, by_speed, M = np.zeros((3, self.nu, self.nu))
-        self._differentiate_inverse(t, y, rates, *parts)
+        by_displacement, by_speed, M = (np.empty((self.nu, self.nu)) for _ in range(3))
+        self._differentiate_inverse(t, y, rates, by_displacement, by_speed, M)
         held = self.constants.speed["prescribed"] >= 0
         by_displacement[:, held] = by_speed[:, held] = 0.0
-        finite_result(np.concatenate(parts), t)
+        for part in (by_displacement, by_speed, M):
+            finite_result(part, t)
         return InverseDynamicsDerivatives(
             self.inverse_dynamics(state, rates), by_displacement, by_speed, M, self._inverse_by_time(t, y, rates),
             self._coordinate_motion(t, y),
@@ -142,16 +153,21 @@ class Derivatives(FreeMotion):
 
     def _variation(self, t: float, y: Real) -> Variation:
         """How the free motion changes."""
-        accelerations = self.accelerations(self.layout.known(t, y))  # with the checks, errors and warnings
-        w, parts = self._derivative_workspace, np.zeros((3, self.nu, self.nu))
-        self.check_status(self._differentiate(t, y, *parts), int(w.fault[0]))
-        by_displacement, by_speed, by_force = finite_result(parts, t)
+        w, nu = self._derivative_workspace, self.nu
+        by_displacement, by_speed, by_force = (np.empty((nu, nu)) for _ in range(3))
+        self.check_status(self._differentiate(t, y, by_displacement, by_speed, by_force), int(w.fault[0]))
+        accelerations = finite_result(w.sweeps.speed["acceleration"].copy(), t)
+        self.check_precision(t, y, w)
+        for part in (by_displacement, by_speed, by_force):
+            finite_result(part, t)
         of_rates = StateDerivatives(by_displacement, by_speed, by_force, self._by_time(t, y))
+        return Variation(accelerations, of_rates, self._coordinate_motion(t, y), *self._no_rows)
+
+    @cached_property
+    def _no_rows(self) -> tuple[Real, StateDerivatives, Real, Real]:
+        """What a `Variation` has of the rows of closures, in a tree."""
         none = np.zeros((0, self.nu))
-        return Variation(
-            accelerations, of_rates, self._coordinate_motion(t, y), np.zeros(0),
-            StateDerivatives(none, none, none, np.zeros(0)), none.T, np.zeros((0, 0)),
-        )  # fmt: skip
+        return np.zeros(0), StateDerivatives(none, none, none, np.zeros(0)), none.T, np.zeros((0, 0))
 
     def _by_time(self, t: float, y: Real) -> Real:
         """Explicit derivatives (nu,) of the accelerations by time."""
@@ -245,9 +261,18 @@ class Derivatives(FreeMotion):
         return t, y
 
     def _coordinate_motion(self, t: float, y: Real) -> Real:
-        """N (nq,nu): derivatives of dq/dt by the speeds."""
+        """N (nq,nu): derivatives of dq/dt by the speeds, constant where there are no quaternions."""
+        if not len(self.layout.quaternions):
+            return self._constant_motion
         N = np.zeros((self.nq, self.nu))
         self._move(t, y, N)
+        return N
+
+    @per_thread  # not `cached_property`, which before Python 3.12 holds a lock while this possibly compiles
+    def _constant_motion(self) -> Real:
+        N = np.zeros((self.nq, self.nu))
+        self._move(0.0, self._at_start, N)
+        N.flags.writeable = False
         return N
 
     def _freely(self, t: float, y: Real) -> tuple[GivenMotion, Directions]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from threading import get_ident
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -13,12 +14,22 @@ from flexmb.entry.object_access import may_read_objects
 from flexmb.jit.direct import Direct, addresses, direct
 from flexmb.jit.pointer import REAL, STATUS, VECTOR
 from flexmb.system import algorithms
-from flexmb.system.algorithm import DynamicsAlgorithm
 from flexmb.system.mechanics import Mechanics
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import finite_result
 from flexmb.tables.status import OK
 from flexmb.typing import Real
+
+
+class Evaluated(Protocol):
+    """What an evaluator evaluates: an algorithm, or derivatives."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def kernel(self) -> Callable[[], Any]: ...
+    @property
+    def fresh(self) -> Callable[[Any], tuple[Any, ...]]: ...
 
 
 class Evaluator(partial):  # a partial, so that calls enter the compiled gate without a frame of Python
@@ -32,7 +43,7 @@ class Evaluator(partial):  # a partial, so that calls enter the compiled gate wi
 
     _careful: _Careful
 
-    def __new__(cls, system: Mechanics, algorithm: DynamicsAlgorithm, tables: tuple[Any, ...]) -> Evaluator:
+    def __new__(cls, system: Mechanics, algorithm: Evaluated, tables: tuple[Any, ...]) -> Evaluator:
         """tables: what the algorithm's kernel takes after t and y, the workspace second."""
         careful, w = _Careful(system, algorithm, tables), tables[1]
         call: Any = careful
@@ -49,6 +60,11 @@ class Evaluator(partial):  # a partial, so that calls enter the compiled gate wi
     def accelerations(self) -> Real:
         """The array (nu,) that calls in this thread write and return."""
         return self._careful.shown
+
+    @property
+    def tables(self) -> tuple[Any, ...]:
+        """What calls in this thread write into, behind the constants."""
+        return self._careful.tables_here
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy is a new evaluator of the copied system."""
@@ -68,7 +84,7 @@ class _Careful:
     and thereby the evaluator; no two living threads have the same number.
     """
 
-    def __init__(self, system: Mechanics, algorithm: DynamicsAlgorithm, tables: tuple[Any, ...]) -> None:
+    def __init__(self, system: Mechanics, algorithm: Evaluated, tables: tuple[Any, ...]) -> None:
         self.system, self.algorithm, self._tables, self._w = system, algorithm, tables, tables[1]
         numbers = np.zeros(system.nu)
         self.rates = numbers[:]
@@ -100,6 +116,13 @@ class _Careful:
         if (one.shape, one.dtype, one.flags.c_contiguous) != (other.shape, other.dtype, True):
             self._show()
         return self._shown
+
+    @property
+    def tables_here(self) -> tuple[Any, ...]:
+        """The tables that calls in this thread use."""
+        if self.notes.owner[0] not in (NOBODY, get_ident()):
+            return self._of_this_thread.tables
+        return self._tables
 
     def _show(self) -> None:
         shown = self._numbers.view()

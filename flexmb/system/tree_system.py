@@ -24,7 +24,7 @@ from flexmb.motion import coordinates
 from flexmb.scene import schema as s
 from flexmb.system import algorithms, labels
 from flexmb.system.algorithm import Algorithm, Route
-from flexmb.system.derivatives import Derivatives
+from flexmb.system.derivatives import DifferentiableMotion
 from flexmb.system.load_axes import Axes, referred
 from flexmb.system.mass_properties import MassProperties, mass_properties
 from flexmb.system.observables import Evaluation
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 _NO_CLOSURES = np.zeros((0, 6))
 
 
-class System(Derivatives):
+class System(DifferentiableMotion):
     """A checked scene turned into arrays; made by `compile`. Threads may share it: each has workspaces of its own."""
 
     def __init__(self, scene: s.Scene, elimination: Elimination = "fastest", like: s.Scene | None = None) -> None:

@@ -9,11 +9,13 @@ import numpy as np
 import flexmb as fm
 from flexmb.entry import articulated, derivatives, tangent
 from flexmb.jit.kernel import kernel
+from tests.benchmarks import peers
 from tests.benchmarks.compiled import pinocchio
 from tests.benchmarks.must_hold.row import Call, Measured, Row, how_many_times, measured
 from tests.benchmarks.rivals import flexible_chain, rigid_chain, turns
 
 COMPILED, EVALUATIONS = "Derivatives from compiled code", "Jacobian of flexible chains"
+PYTHON = "Derivatives from Python"
 TO_ROUNDING = 1e-10  # of the largest element, in chains of at most 100 bodies
 BEAMS = {5: 8.0, 10: 12.0}
 """Evaluations at most, by the number of modes."""
@@ -26,6 +28,13 @@ def rows() -> list[Row]:
             Row(
                 f"derivatives_{n}", COMPILED, f"pin.computeABADerivatives in C++, {n} bodies", 2.5,
                 partial(_rigid, n, inverse=False),
+            )
+            for n in (10, 35, 100)
+        ),
+        *(
+            Row(
+                f"derivatives_python_{n}", PYTHON, f"pin.computeABADerivatives, {n} bodies", 2.0,
+                partial(_from_python, n),
             )
             for n in (10, 35, 100)
         ),
@@ -51,6 +60,16 @@ def _rigid(bodies: int, *, inverse: bool) -> Measured:
     native = _inverse(scene) if inverse else _forward(scene)
     x = np.linspace(-1.0, 1.0, bodies) if inverse else np.zeros(bodies)
     return how_many_times(native, pinocchio.derivatives(scene, x, inverse=inverse), TO_ROUNDING)
+
+
+def _from_python(bodies: int) -> Measured:
+    """Both as users call them again and again, with arrays of their own."""
+    scene = rigid_chain(bodies)
+    system = fm.compile(scene)
+    q, u, evaluate = system.initial_state.q, system.initial_state.u, system.derivative_evaluator()
+    results = evaluate.by_displacement, evaluate.by_speed, evaluate.by_force
+    native = Call(lambda: evaluate(0.0, q, u), 1, lambda: np.concatenate([each.ravel() for each in results]))
+    return how_many_times(native, peers.pinocchio_derivatives(scene, np.zeros(bodies)), TO_ROUNDING)
 
 
 def _forward(scene: fm.Scene, times: int = 100) -> Call:

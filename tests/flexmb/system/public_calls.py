@@ -102,6 +102,9 @@ def calls() -> dict[str, Call]:
     in_axes = {"state": state, "axes": "outboard", "about": ("arm", "tip")}
     add("System.hinge_load_derivatives", tree.hinge_load_derivatives, in_axes, state=states,
         axes=chosen(None, "body", 5), about=chosen("tip", ("arm", "nowhere"), ("nobody", "tip"), 5))  # fmt: skip
+    differentiating = _copying(tree.derivative_evaluator())
+    add("System.derivative_evaluator", differentiating, {"t": 0.5, "q": state.q.copy(), "u": state.u.copy()},
+        t=numbers, q=quaternion_first, u=vectors)  # fmt: skip
     add("System.acceleration_derivatives", tree.acceleration_derivatives, {"state": state, "forces": rates},
         state=states, forces=but_none(vectors))  # fmt: skip
     add("System.inverse_dynamics_derivatives", tree.inverse_dynamics_derivatives, of_rates, state=states,
@@ -366,7 +369,7 @@ EXEMPT = {
     "ClosedSystem.factorise",
     "ClosedSystem.operators", "ClosedSystem.partitions", "ClosedSystem.nested",  # always refused
     "ClosedSystem.coordinate", "ClosedSystem.speed", "ClosedSystem.state", "ClosedSystem.scene_state",
-    "ClosedSystem.evaluator",  # always refused
+    "ClosedSystem.evaluator", "ClosedSystem.derivative_evaluator",  # always refused
     "ClosedSystem.workspace", "ClosedSystem.recursion_workspace", "ClosedSystem.composite_workspace",
     "load_scene", "save_scene", "SceneBuilder",  # files and data, checked where they are compiled
     "AccelerationDerivatives", "EvaluationDerivatives", "InverseDynamicsDerivatives",  # results

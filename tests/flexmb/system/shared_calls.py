@@ -90,6 +90,10 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
     found["loads_in, of a run"] = lambda s, x: once(
         shared, (s, "run"), lambda: fm.simulate(s, 2e-3, samples=5)
     ).loads_in("outboard")  # fmt: skip
+    if is_tree and not scene.controllers:
+        found["derivative_evaluator"] = lambda s, x: differentiated(
+            once(shared, (s, "derivatives"), lambda: s.derivative_evaluator()), x
+        )
     if is_tree:
         found["operators"] = lambda s, x: s.operators(x).M
         found["partitions"] = lambda s, x: s.partitions(x).matrix
@@ -126,6 +130,11 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
 def once(shared: dict[Any, Any], key: Any, make: Callable[[], Any]) -> Any:
     """One for all threads, whoever comes first."""
     return shared[key] if key in shared else shared.setdefault(key, make())
+
+
+def differentiated(evaluator: Any, state: Any) -> tuple[Any, ...]:
+    rates = evaluator(state.t, state.q, state.u).copy()
+    return rates, evaluator.by_displacement.copy(), evaluator.by_speed.copy(), evaluator.by_force.copy()
 
 
 def seen(run: Any) -> tuple[Any, ...]:
