@@ -21,23 +21,23 @@ from flexmb.sensitivity.loops import Loops
 from flexmb.sensitivity.systems import Systems
 from flexmb.typing import Real
 
-# Derivatives are integrated per hundredth of each number. The error of a step is held below rtol times them plus atol,
-# so that what changes by less than atol if a number changes by a hundredth does not shorten steps.
-PER_CENT = 0.01
+# Derivatives are integrated as changes by this part of each number. The error of a step is held below rtol times them
+# plus atol, so that what changes by less than atol if a number changes by 3 % does not shorten steps.
+SHARE = 0.03
 
 EventTimes = list[tuple[str, float, Real]]
 """Name, time (s), derivatives (P,) of the time of each event."""
 
 
 class Following:
-    """One run, followed with scaled derivatives: each is per hundredth of the `scale` of its number."""
+    """One run, followed with scaled derivatives: each is per SHARE of the `scale` of its number."""
 
     def __init__(
         self, scene: Scene, found: Sequence[Number], settings: Settings, trajectory: Trajectory, outputs: Chosen
     ) -> None:
         self._order = np.argsort([not _is_mechanical(scene, each) for each in found], kind="stable")
         self._numbers = [found[k] for k in self._order]
-        self._scales = np.array([PER_CENT * each.scale for each in self._numbers])
+        self._scales = np.array([SHARE * each.scale for each in self._numbers])
         self._scene, self._settings, self._trajectory, self._outputs = scene, settings, trajectory, outputs
         mechanical = sum(_is_mechanical(scene, each) for each in found)
         self._systems = Systems(self._numbers, self._scales, mechanical)
