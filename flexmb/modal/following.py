@@ -2,10 +2,11 @@
 
 The eigenproblem determines a mode up to its sign, and modes of equal frequency up to an orthogonal matrix; their order
 is that of the frequencies. All three may jump where a number of the beam changes by nothing. Here signs and order are
-those of a reference. Modes whose frequencies are equal in the reference are taken together: of all orthonormal bases of
-their space the one nearest to the modes of the reference is taken, in the metric of its mass matrix (the orthogonal
-Procrustes problem: Golub & Van Loan, Matrix Computations, 4th ed., 6.4.1). That basis is as smooth as the space, while
-the eigenmodes themselves have no derivatives there.
+those of a reference. Modes whose frequencies are nearly equal in the reference are taken together: of all orthonormal
+bases of their space the one nearest to the modes of the reference is taken, in the metric of the mass matrix (the
+orthogonal Procrustes problem: Golub & Van Loan, Matrix Computations, 4th ed., 6.4.1). That basis is as smooth as the
+space, while the eigenmodes themselves turn quickly, or have no derivatives. Planes of bending that nothing couples each
+keep their own modes, because their spaces are orthogonal.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ import numpy as np
 from flexmb.modal.reduce import BeamModes
 from flexmb.typing import Real
 
-# Relative difference of the squared frequencies below which modes count as repeated. Rounding errors of eigenvectors
-# grow with its inverse, and those of their derivatives, relative to these derivatives, likewise.
-REPEATED = 1e-5
+# Relative difference of the squared frequencies below which modes are taken together. Derivatives of single
+# eigenvectors grow with its inverse, and their rounding errors with its square.
+REPEATED = 1e-2
 # Least cosine of the angle between the space of modes and that of the reference: others are not the same modes.
 SAME = 0.7
 
@@ -50,7 +51,7 @@ def followed(modes: BeamModes, M: Real, reference: BeamModes) -> BeamModes:
 
 
 def _repeated(frequencies: Real) -> list[list[int]]:
-    """The modes in groups of equal frequency, in ascending order."""
+    """The modes in groups of nearly equal frequency, in ascending order."""
     groups = [[0]] if len(frequencies) else []
     for n in range(1, len(frequencies)):
         before, now = frequencies[n - 1] ** 2, frequencies[n] ** 2

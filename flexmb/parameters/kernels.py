@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.closure.couplings import relieve_drives
-from flexmb.closure.dynamics import slope as closed_slope
+from flexmb.closure.dynamics import closure_loads, linearise
 from flexmb.closure.jacobian import hold_rows
 from flexmb.closure.rows import load_on_b
 from flexmb.closure.tables import COUPLINGS, ClosureConstants
@@ -50,8 +50,6 @@ class ChainRates:
 
     w: TangentWorkspace
     cw: ClosureTangentWorkspace
-    load: Real  # (G,) of the rows at y
-    slope: Real  # (nq+nu+1,) dy/dt there
 
 
 def parameter_workspace(dual: DualConstants, c: Constants, nq: int, nu: int) -> TangentWorkspace:
@@ -65,7 +63,7 @@ def parameter_workspace(dual: DualConstants, c: Constants, nq: int, nu: int) -> 
 
 def chain_rates(w: TangentWorkspace, cc: ClosureConstants) -> ChainRates:
     """The workspace of a block of a closed chain; one per thread."""
-    return ChainRates(w=w, cw=closure_tangent_workspace(cc), load=np.zeros(len(cc.row)), slope=np.zeros(len(w.slope)))
+    return ChainRates(w=w, cw=closure_tangent_workspace(cc))
 
 
 def loads(c: Constants, closures: int) -> Loads:
@@ -108,8 +106,8 @@ def inverse(t, y, dy, rates, c, w, x):
 
 @kernel
 def closed_slopes(t, y, dy, out, s, c, cc, x):
-    """As `slopes` for a closed chain s with its own constants without derivatives. It holds for the rows that s has
-    chosen; their accelerations are zero whatever the parameters are."""
+    """As `slopes` for a closed chain s, which has the constants without derivatives. The accelerations of the rows stay
+    zero whatever the parameters are."""
     status = _closed(t, y, dy, s, c, cc, x)
     give(x.w.slope, out)
     return status
@@ -132,8 +130,11 @@ def closed_outputs(t, y, dy, s, c, cc, x, out, loads):
 @helper
 def _closed(t, y, dy, s, c, cc, x):
     """Evaluate the chain under the row loads at y, then under loads that keep the rows' accelerations."""
-    status = closed_slope(t, y, x.slope, s)
-    for r in range(x.load.shape[0]):
+    status = linearise(t, y, s)
+    if status == OK:
+        status = closure_loads(s.w, s.cc, s.cw)
+    x.w.fault[0] = s.w.fault[0]
+    for r in range(cc.row.shape[0]):
         x.cw.row[r].load = s.cw.row[r].load
     take(t, y, dy, x.w)
     if status == OK:

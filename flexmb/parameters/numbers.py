@@ -38,17 +38,17 @@ class Number:
 
     @property
     def scale(self) -> float:
-        """A size that the number may have: its own magnitude, or that of its largest neighbour in an array, or 1."""
+        """A size of the number: its own magnitude or that of its largest neighbour in an array; 1 if all are zero."""
         steps = self.name.split(".")
         neighbours = [0.0]
-        if self.value == 0.0 and steps[-1].isdecimal():
+        if steps[-1].isdecimal():
 
             def look(value: Any) -> Any:
                 neighbours.extend(abs(each) for each in value if isinstance(each, float))
                 return value
 
             changed_at(self._scene, ".".join(steps[:-1]), look)
-        return abs(self.value) or max(neighbours) or 1.0
+        return max(abs(self.value), *neighbours) or 1.0
 
 
 def _real(value: Any, name: str) -> float:

@@ -49,6 +49,11 @@ class Parameters:
     def __init__(self, plant: Plant, names: Sequence[str]) -> None:
         """PathError where the scene has no such number, ParameterError where there is no derivative by it."""
         chosen = numbers(plant.scene, names)
+        if plant.closures is not None and plant.closures.at_rest:
+            raise NotImplementedError(
+                f'scene "{plant.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
+                'closures join them: for derivatives use level "linear" or a better one'
+            )
         self.names, self.values = tuple(each.name for each in chosen), np.array([each.value for each in chosen])
         self.values.flags.writeable = False
         self.plant = plant.with_numbers(plant.scene)
@@ -152,9 +157,7 @@ class _Bound:
     def check(self, status: int) -> None:
         """DynamicsError unless a status code is OK."""
         if status != OK:
-            chain = self._chain
-            at_fault = int(self._w.fault[0]) if chain is None or not chain.fault[0] else int(chain.fault[0])
-            self._plant.check_status(status, at_fault)
+            self._plant.check_status(status, int(self._w.fault[0]))
 
     def row(self, lane: int) -> Real:
         """(width,) the derivatives of the last `observe` by the parameter of a lane."""

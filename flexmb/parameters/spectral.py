@@ -3,8 +3,8 @@
 The functions lead from a number of a scene to its tables: finite elements, an eigenproblem, integrals over modes. Most
 elements are polynomials of low degree in the number, for which the derivative of the interpolant is exact to rounding;
 for all other analytic ones it converges geometrically with the number of points (Trefethen, Approximation Theory and
-Approximation Practice, ch. 8, 21). Since the points spread over a few per cent of the number, far more than the steps
-of finite differences, rounding errors are magnified by a hundred at most.
+Approximation Practice, ch. 8, 21). The points spread over half of the number, or over a few per cent of it where a
+singularity is near: far more than the steps of finite differences, so that rounding errors are hardly magnified.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ import numpy as np
 from flexmb.typing import Real
 
 INTERVALS = (2, 4, 8, 16)  # of the points cos(pi k / n), each set of which contains the one before
-WIDTHS = (2.0**-5, 2.0**-2, 2.0**-8, 2.0**-11, 2.0**-14)  # half-widths that are tried in turn, relative to the scale
-ENOUGH = 1e-11  # relative error at which no other width is tried
+WIDTHS = (2.0**-1, 2.0**-3, 2.0**-5, 2.0**-8, 2.0**-11, 2.0**-14)  # half-widths that are tried, relative to the scale
+ENOUGH = 1e-11  # relative error at which no smaller width is tried
+HOPELESS = 1e-5  # an error with half of the points that all of them will not bring down to ENOUGH
 LARGEST = 1e-9  # relative error that is accepted
-# Share of values over scale that counts as rounding: that of an eigenproblem is some hundred eps, and is magnified by
-# the inverse of the width.
-ROUNDING = 1e-12
+# Shares of values over scale, and of values over width, that count as rounding. That of an eigenproblem is some hundred
+# eps, and is magnified by the inverse of the width.
+ROUNDING, MAGNIFIED = 1e-11, 2e-14
 
 
 class NotSmooth(ValueError):
@@ -55,7 +56,7 @@ def derivative(function: Callable[[float], Real], x: float, scale: float, parts:
         if best.error <= ENOUGH:
             break
     if not best.error <= LARGEST:
-        raise NotSmooth(trouble or f"the derivative is known to {best.error:.1g} of its size only: there is a kink")
+        raise NotSmooth(trouble or f"it is known to {best.error:.1g} of its size only: there is a kink")
     return best
 
 
@@ -77,14 +78,15 @@ def _on_interval(
         if before is not None:
             # The middle is none of the points: it must lie on the interpolant of the others.
             jump = sum(weight * even[place] for place, weight in zip(places, _rest(intervals), strict=True)) / width
-            error = max(_relative(each, now, size / width, parts) for each in (now - before, jump))
-            if error <= ENOUGH:
+            rounding = size * (ROUNDING / scale + MAGNIFIED / width)
+            error = max(_relative(each, now, rounding, parts) for each in (now - before, jump))
+            if error <= ENOUGH or intervals == INTERVALS[-2] and error > HOPELESS:
                 break
         before = now
     return Derivative(now, error)
 
 
-def _relative(change: Real, derivative: Real, size: Real, parts: Sequence[slice]) -> float:
+def _relative(change: Real, derivative: Real, rounding: Real, parts: Sequence[slice]) -> float:
     """The largest change of a part's derivatives beyond rounding, relative to the largest of these derivatives."""
     worst = 0.0
     for part in parts:
@@ -92,7 +94,7 @@ def _relative(change: Real, derivative: Real, size: Real, parts: Sequence[slice]
         largest = np.max(np.abs(derivative[part]), initial=0.0)
         if not np.isfinite(off):
             return np.inf
-        if off > ROUNDING * np.max(size[part], initial=0.0):
+        if off > np.max(rounding[part], initial=0.0):
             worst = max(worst, off / largest if largest > 0.0 else np.inf)
     return worst
 

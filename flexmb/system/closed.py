@@ -65,6 +65,8 @@ class ClosedSystem(System):
         tree = scene.constraints, self.constants, own, self.layout, self.workspace, slowest
         self._closures = self.own.closures = Closures(*tree, self.check_status)  # for this thread
         self._start: State | None = None
+        self._correction: Real | float = 0.0
+        """Of the scene's initial values before the closures are closed: see `with_numbers`."""
 
     @per_thread
     def closures(self) -> Closures:
@@ -72,9 +74,12 @@ class ClosedSystem(System):
         return self._closures.for_thread()
 
     def with_numbers(self, scene: s.Scene) -> ClosedSystem:
-        """As for a tree."""
+        """As for a tree. Its initial state is that of this system, with what the scene changes of its initial values,
+        closed once more: it is a smooth function of the numbers also where the scene's own values are rough."""
         with asking(self.kernels):
-            return ClosedSystem(scene, like=self.scene)
+            found = ClosedSystem(scene, like=self.scene)
+        found._correction = pack(self.initial_state) - self._at_start
+        return found
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As for a tree."""
@@ -91,7 +96,7 @@ class ClosedSystem(System):
         """
         if self._start is None:
             y = pack(super().initial_state)
-            y = self._as_asked(0.0, y, asked(self, y))
+            y = self._as_asked(0.0, y + self._correction, asked(self, y))
             self._start = State(y[: self.nq], y[self.nq : -1], 0.0, self.layout)
         return State(self._start.q, self._start.u, 0.0, self.layout)
 

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from flexmb.frisch.nested_system import NestedSystem, Partitions
     from flexmb.jain.operators import Operators, SpatialOperators
     from flexmb.parameters.parameters import Parameters
+    from flexmb.parameters.regressor import InertiaRegressor
     from flexmb.system.batch import Batch, BatchAccelerations
 
 _NO_CLOSURES = np.zeros((0, 6))
@@ -84,6 +85,16 @@ class System(FreeMotion):
         from flexmb.parameters.parameters import Parameters  # imported here, because few programs differentiate
 
         return Parameters(self, names)
+
+    def inertia_regressor(self, bodies: Sequence[str] | None = None) -> InertiaRegressor:
+        """Y in tau = M udot + c = Y(q, u, udot) pi + rest of the tree, for the inertia parameters pi of its bodies.
+
+        bodies: those whose parameters are taken, by default all. ValueError for unknown ones, NotImplementedError for
+        bodies of level `stiffened`.
+        """
+        from flexmb.parameters.regressor import InertiaRegressor  # imported here, because few programs identify
+
+        return InertiaRegressor(self, self.links, bodies)
 
     @property
     def elimination(self) -> dict[str, str]:
