@@ -23,6 +23,7 @@ from flexmb.integrate.adaptive import adaptive, by_error
 from flexmb.integrate.control import FACTORISATIONS, copy, derivative, linearisation, scaled_norm
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
+from flexmb.integrate.newton_matrix import NewtonMatrix, rate_blocks, unfactorised
 from flexmb.integrate.settling import prepare_settling, settle
 from flexmb.integrate.watch import Ends
 from flexmb.jit.kernel import handed_in, handed_on, helper, kernel
@@ -61,8 +62,7 @@ class Collocation(NamedTuple):
     error: np.ndarray
     term: np.ndarray
     product: np.ndarray
-    real: np.ndarray
-    real_pivots: np.ndarray
+    real: NewtonMatrix
     change: np.ndarray
     linearised_at: np.ndarray  # (1,) s, of J
 
@@ -199,7 +199,7 @@ def state_at(problem, step, ends, s, t, result, run):
 
 
 @helper
-def scratch(n):
+def scratch(n, coordinates):
     """Uninitialised arrays for n components."""
     flow = Flow(
         np.empty((n, n)), np.empty(n), np.empty((LEVELS, n, n)), np.empty((TERMS, n, n)), np.empty((5, n, n)),
@@ -208,8 +208,8 @@ def scratch(n):
     return Collocation(
         flow, np.empty(n), np.empty((n, n)), np.empty((TERMS, n)), np.empty((TERMS, n)), np.empty((LEVELS, TERMS, n)),
         np.empty((LEVELS, TERMS, n)), np.empty((4, n)), np.empty((4, n)), np.empty((4, n)), np.empty(n), np.empty(n),
-        np.empty(n), np.empty(n), np.empty(n), np.empty((n, n)), np.empty(n, np.int64), np.empty(n),
-        np.full(1, np.nan),
+        np.empty(n), np.empty(n), np.empty(n), unfactorised(n, coordinates, rate_blocks(coordinates), np.float64),
+        np.empty(n), np.full(1, np.nan),
     )  # fmt: skip
 
 
@@ -219,7 +219,7 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
 
     If the iteration does not converge, the step is halved.
     """
-    s = scratch(y.shape[0])
+    s = scratch(y.shape[0], accuracy.coordinates)
     ends = Ends(y, s.f, s.y_new, s.f_new)
     method = by_error(attempt, state_at, _ERROR_EXPONENT)
     return adaptive(method, problem, (s, ends), clock, out, (accuracy, counts), memory, watch)

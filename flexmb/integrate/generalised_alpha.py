@@ -21,6 +21,7 @@ from flexmb.integrate.equal_steps import FixedMethod, equal_steps
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import FACTORED, FRESH, TAKEN_UP
+from flexmb.integrate.newton_matrix import RateBlocks, find_blocks, rate_blocks
 from flexmb.integrate.watch import Ends
 from flexmb.jit.kernel import handed_in, handed_on, helper, kernel, sweep
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
@@ -37,6 +38,7 @@ class NewmarkArrays(NamedTuple):
     J: np.ndarray
     matrix: np.ndarray
     pivots: np.ndarray
+    blocks: RateBlocks
     a: np.ndarray
     a_new: np.ndarray
     rate: np.ndarray
@@ -72,15 +74,31 @@ def factorise(s, h, accuracy, counts):
     alpha_m, alpha_f, beta, gamma = parameters(accuracy.radius)
     weight = (1.0 - alpha_f) / (1.0 - alpha_m)
     nq, nu = accuracy.coordinates, s.matrix.shape[0]
+    find_blocks(s.blocks, s.J, nq)
     for i in range(nu):
+        row, given = s.matrix[i], s.J[nq + i]
         for j in range(nu):
-            total = 0.0
-            for k in range(nq):
-                total += s.J[nq + i, k] * s.J[k, nq + j]
-            s.matrix[i, j] = -weight * (h * gamma * s.J[nq + i, nq + j] + h * h * beta * total)
-        s.matrix[i, i] += 1.0
+            row[j] = -weight * h * gamma * given[nq + j]
+        _add_motion(s, given, -weight * h * h * beta, row)
+        row[i] += 1.0
     counts[FACTORISATIONS] += 1
     return lu_factorise(s.matrix, s.pivots)
+
+
+@helper
+def _add_motion(s, given, factor, row):
+    """row (nu,) += factor d(udot_i)/dq dq/du, for a row `given` of J; of dq/du only the blocks that are not zero."""
+    b, nu = s.blocks, row.shape[0]
+    nq = b.start.shape[0]
+    for place in range(b.count[0]):
+        start, stop, first, last = b.start[place], b.stop[place], b.first[place], min(b.last[place], nu)
+        if b.single[place] == 1:
+            for k in range(last - first):
+                row[first + k] += factor * given[start + k] * s.J[start + k, nq + first + k]
+        else:
+            for k in range(start, stop):
+                for j in range(first, last):
+                    row[j] += factor * given[k] * s.J[k, nq + j]
 
 
 @helper
@@ -241,12 +259,12 @@ def recall(memory, s, known, accuracy, counts):
 
 
 @helper
-def arrays(n, a, rate, f):
-    """Arrays for n components; a, udot and the slope at the start of a step are given."""
+def arrays(n, coordinates, a, rate, f):
+    """Arrays for n components, the first of which are coordinates; a, udot and the slope at the start are given."""
     nu = a.shape[0]
     return NewmarkArrays(
-        np.empty((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), a, np.empty(nu), rate, np.empty(nu),
-        np.empty(nu), np.empty(nu), f, np.empty(n), np.zeros(n), np.empty(n),
+        np.empty((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), rate_blocks(coordinates), a, np.empty(nu), rate,
+        np.empty(nu), np.empty(nu), np.empty(nu), f, np.empty(n), np.zeros(n), np.empty(n),
     )  # fmt: skip
 
 
@@ -258,15 +276,15 @@ def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
     start and after every segment end, where udot may jump, a is set to udot.
     """
     n, nu = y.shape[0], accuracy.controlled - accuracy.coordinates
-    s = arrays(n, np.empty(nu), np.empty(nu), np.empty(n))
+    s = arrays(n, accuracy.coordinates, np.empty(nu), np.empty(nu), np.empty(n))
     ends = Ends(y, s.f, np.empty(n), s.f_new)
-    looking = arrays(n, s.a, s.rate, s.f)
+    looking = arrays(n, accuracy.coordinates, s.a, s.rate, s.f)
     method = FixedMethod(attempt, no_detour, accept, enter, recall, keep, inside, looking)
     return equal_steps(method, problem, (s, ends), clock, out, (accuracy, counts), memory, watch)
 
 
 INTEGRATOR = Integrator(
     "generalised_alpha", generalised_alpha, order=2, fixed=True, linearises=True, keeps_jacobian=True,
-    damps=True, algebra=(2.0 / 3.0, 2.0),
+    damps=True, algebra=(2.0 / 24.0, 1.0),  # a real matrix of the speeds
     summary="rough answers at large steps, with damping that is chosen",
 )  # fmt: skip

@@ -12,8 +12,8 @@ import math
 from flexmb.integrate.adaptive import Method, adaptive
 from flexmb.integrate.control import SAFETY, SHRINK, copy, derivative, linearisation, next_step, retreat, scaled_norm
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.lu import lu_solve
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE
+from flexmb.integrate.newton_matrix import solve
 from flexmb.integrate.radau5_stages import ITERATIONS, evaluate_polynomial, factorise, guess, newton, scratch
 from flexmb.integrate.radau5_tableau import REAL, E
 from flexmb.integrate.settling import settle
@@ -36,7 +36,7 @@ def estimate(y, slope, h, s, accuracy):
     for i in range(y.shape[0]):
         s.error[i] = slope[i] + (E[0] * s.Z[0, i] + E[1] * s.Z[1, i] + E[2] * s.Z[2, i]) / h
         s.trial[i] = max(abs(y[i]), abs(s.y_new[i]))
-    lu_solve(s.real, s.real_pivots, s.error)
+    solve(s.real, s.J, s.error)
     return scaled_norm(s.error, s.trial, accuracy)
 
 
@@ -213,7 +213,7 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
     Where Newton's method does not converge, an old Jacobian is renewed, then the step is shortened by how far it is
     from converging.
     """
-    s = scratch(y.shape[0])
+    s = scratch(y.shape[0], accuracy.coordinates)
     ends = Ends(y, s.f, s.y_new, s.f_new)
     method = Method(attempt, accept, reject, after_leap, enter, recall, keep, state_at, _ERROR_EXPONENT)
     return adaptive(method, problem, (s, ends), clock, out, (accuracy, counts), memory, watch)
@@ -221,6 +221,6 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
 
 INTEGRATOR = Integrator(
     "radau5", radau5, order=5, linearises=True, keeps_jacobian=True,
-    algebra=(10.0 / 3.0, 10.0),  # a real and a complex matrix
+    algebra=(10.0 / 24.0, 4.0),  # a real and a complex matrix of the speeds, half the state
     summary="modes or springs that are damped or hardly ring; moderate accuracy; the smallest cost of a step",
 )  # fmt: skip

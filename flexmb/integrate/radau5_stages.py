@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flexmb.integrate import newton_matrix
 from flexmb.integrate.control import FACTORISATIONS, derivative, scaled_norm
-from flexmb.integrate.lu import lu_factorise, lu_solve
+from flexmb.integrate.newton_matrix import NewtonMatrix
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, P
 from flexmb.jit.kernel import helper
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
@@ -26,10 +27,8 @@ class RadauStages(NamedTuple):
 
     f: np.ndarray
     J: np.ndarray
-    real: np.ndarray
-    paired: np.ndarray
-    real_pivots: np.ndarray
-    paired_pivots: np.ndarray
+    real: NewtonMatrix
+    paired: NewtonMatrix
     Z: np.ndarray
     Z_before: np.ndarray
     F: np.ndarray
@@ -47,15 +46,9 @@ class RadauStages(NamedTuple):
 @helper
 def factorise(s, h, counts):
     """Factors of REAL/h - J and COMPLEX/h - J; returns whether both are regular."""
-    n = s.J.shape[0]
-    for i in range(n):
-        for j in range(n):
-            s.real[i, j] = -s.J[i, j]
-            s.paired[i, j] = -s.J[i, j]
-        s.real[i, i] += REAL / h
-        s.paired[i, i] += COMPLEX / h
     counts[FACTORISATIONS] += 1
-    return lu_factorise(s.real, s.real_pivots) and lu_factorise(s.paired, s.paired_pivots)
+    newton_matrix.find_blocks(s.real.blocks, s.J, s.real.inner.shape[0])
+    return newton_matrix.factorise(s.real, s.J, REAL / h) and newton_matrix.factorise(s.paired, s.J, COMPLEX / h)
 
 
 @helper
@@ -75,8 +68,8 @@ def correct(s, h):
     for i in range(s.w.shape[0]):
         s.dw[i] = W_REAL[0] * F[0, i] + W_REAL[1] * F[1, i] + W_REAL[2] * F[2, i] - REAL / h * s.w[i]
         s.dv[i] = W_COMPLEX[0] * F[0, i] + W_COMPLEX[1] * F[1, i] + W_COMPLEX[2] * F[2, i] - COMPLEX / h * s.v[i]
-    lu_solve(s.real, s.real_pivots, s.dw)
-    lu_solve(s.paired, s.paired_pivots, s.dv)
+    newton_matrix.solve(s.real, s.J, s.dw)
+    newton_matrix.solve(s.paired, s.J, s.dv)
     for i in range(s.w.shape[0]):
         s.w[i] += s.dw[i]
         s.v[i] += s.dv[i]
@@ -152,11 +145,13 @@ def guess(before, h_before, h, Z):
 
 
 @helper
-def scratch(n):
-    """For n components."""
+def scratch(n, coordinates):
+    """For n components, of which the first are coordinates."""
+    blocks = newton_matrix.rate_blocks(coordinates)
     return RadauStages(
-        np.empty(n), np.empty((n, n)), np.empty((n, n)), np.empty((n, n), np.complex128), np.empty(n, np.int64),
-        np.empty(n, np.int64), np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty(n),
+        np.empty(n), np.empty((n, n)), newton_matrix.unfactorised(n, coordinates, blocks, np.float64),
+        newton_matrix.unfactorised(n, coordinates, blocks, np.complex128), np.empty((3, n)), np.empty((3, n)),
+        np.empty((3, n)), np.empty(n),
         np.empty(n, np.complex128), np.empty(n), np.empty(n, np.complex128), np.empty(n), np.empty(n), np.empty(n),
         np.empty(n), np.empty(n),
     )  # fmt: skip

@@ -12,13 +12,13 @@ for its rate. Then little is left to project.
 """
 
 from flexmb.integrate.control import copy
-from flexmb.integrate.lu import lu_factorise, lu_solve
+from flexmb.integrate.newton_matrix import factorise, find_blocks, solve
 from flexmb.jit.kernel import helper, sweep
 
 
 @sweep
 def settle(problem, t, rate, y, s, accuracy):
-    """Put y on its manifold at time t; s: J (n,n), factors `real` and `real_pivots` of rate - J, and `change` (n,)."""
+    """Put y on its manifold at time t; s: J (n,n), factors `real` of rate - J, and `change` (n,)."""
     if problem.settles:
         n = accuracy.controlled
         copy(y, s.change)
@@ -28,7 +28,7 @@ def settle(problem, t, rate, y, s, accuracy):
         for i in range(accuracy.coordinates):
             for j in range(accuracy.coordinates, n):
                 s.change[i] -= s.J[i, j] * s.change[j] / rate
-        lu_solve(s.real, s.real_pivots, s.change)
+        solve(s.real, s.J, s.change)
         for i in range(n):
             y[i] += rate * s.change[i]
     problem.project(t, y, problem.constants)
@@ -38,8 +38,5 @@ def settle(problem, t, rate, y, s, accuracy):
 def prepare_settling(problem, rate, s):
     """Factorise rate - J, for methods that have no factors of their own."""
     if problem.settles:
-        for i in range(s.J.shape[0]):
-            for j in range(s.J.shape[0]):
-                s.real[i, j] = -s.J[i, j]
-            s.real[i, i] += rate
-        lu_factorise(s.real, s.real_pivots)
+        find_blocks(s.real.blocks, s.J, s.real.inner.shape[0])
+        factorise(s.real, s.J, rate)
