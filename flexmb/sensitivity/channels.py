@@ -134,7 +134,7 @@ def _signal(i: int) -> Channel:
 
 
 def _quaternion(first: int, k: int) -> Channel:
-    """Component k of the quaternion of the rotation (9,) from `first` on, with the sign of the nonnegative scalar part."""
+    """Component k of the quaternion of the rotation (9,) from `first` on, whose scalar part is not negative."""
 
     def rates(seen: Seen) -> Real:
         assert seen.observed is not None

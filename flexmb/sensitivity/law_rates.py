@@ -1,8 +1,9 @@
-"""Derivatives of the numbers of controllers, of what they drive and of events, which are smooth functions of a scene's."""
+"""Derivatives of the numbers of controllers, of what they drive and of events, all functions of a scene's numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,7 +49,7 @@ def law_rates(system: System, numbers: Sequence[Number | None], scales: Real) ->
     found = np.zeros((len(of_laws(system.scene, is_gain=False)), len(numbers)))
     for is_gain in (False, True):
         chosen = [each if _concerns_laws(each, system.scene, is_gain) else None for each in numbers]
-        found += _by_numbers(lambda scene, gain=is_gain: of_laws(scene, gain), system.scene, chosen, scales)
+        found += _by_numbers(partial(of_laws, is_gain=is_gain), system.scene, chosen, scales)
     shapes = wiring.number.shape, wiring.initial.shape, wiring.drive.shape, (len(wiring.course), 4), wiring.piece.shape
     stops = np.cumsum([np.prod(shape, dtype=int) for shape in shapes])
     parts = np.split(found, stops[:-1])
@@ -61,7 +62,7 @@ def event_rates(scene: Scene, numbers: Sequence[Number | None], scales: Real) ->
     numbers = [each if _changes(each, scene, lambda of: of.events) else None for each in numbers]
     for event in scene.events:
         impacts = [i for i, action in enumerate(event.actions) if isinstance(action, Impact)]
-        rates = _by_numbers(lambda scene, name=event.name: _of_event(scene, name), scene, numbers, scales)
+        rates = _by_numbers(partial(_of_event, name=event.name), scene, numbers, scales)
         found[event.name] = EventRates(rates[0], dict(zip(impacts, rates[1:], strict=True)))
     return found
 
@@ -93,12 +94,14 @@ def _by_numbers(
 ) -> Real:
     """Scaled derivatives (n,P) of a function of a scene."""
     now = function(scene)
-    found = np.zeros((len(now), len(numbers)))
+    found, finite = np.zeros((len(now), len(numbers))), np.isfinite(now)  # limits may be infinite
+
+    def at(value: float, number: Number) -> Real:
+        return np.where(finite, function(number.scene_at(value)), 0.0)
+
     for k, number in enumerate(numbers):
-        if number is None:
-            continue
-        finite = np.isfinite(now)
-        rates = derivative(lambda value, of=number: np.where(finite, function(of.scene_at(value)), 0.0), number.value,
-                           number.scale, [slice(i, i + 1) for i in range(len(now))])  # fmt: skip
-        found[:, k] = scales[k] * rates.values
+        if number is not None:
+            parts = [slice(i, i + 1) for i in range(len(now))]
+            rates = derivative(partial(at, number=number), number.value, number.scale, parts)
+            found[:, k] = scales[k] * rates.values
     return found

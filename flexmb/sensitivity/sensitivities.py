@@ -87,8 +87,8 @@ def sensitivities(
 
     The variational equations are integrated beside the motion, exact to the tolerance, through latches, impacts,
     releases and changes of values, closures, and sampled and continuous controllers. Raises what `simulate` raises;
-    PathError or ParameterError (ValueErrors) for a number that is none or by which there is no derivative; DynamicsError
-    for a run that fails, or that has no derivative beyond an event, with the time and the event;
+    PathError or ParameterError (ValueErrors) for a number that is none or by which there is no derivative;
+    DynamicsError for a run that fails, or that has no derivative beyond an event, with the time and the event;
     NotImplementedError for what derivatives do not pass yet.
     """
     refuse_unknown("sensitivities", settings)

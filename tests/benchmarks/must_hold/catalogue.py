@@ -14,11 +14,15 @@ from tests.benchmarks.must_hold import (
     modes,
     runs,
     runs_at_equal_error,
+    sensitivity,
     start,
 )
 from tests.benchmarks.must_hold.row import Row
 
-SOURCES = (evaluation, runs, runs_at_equal_error, missions, modes, floating_frames, growth, charts, start, first_use)
+SOURCES = (
+    evaluation, runs, runs_at_equal_error, missions, sensitivity, modes, floating_frames, growth, charts, start,
+    first_use,
+)  # fmt: skip
 
 
 @cache

@@ -94,7 +94,7 @@ def test_a_wrong_model_shows_in_chi_square(ring_down):
 
 
 def test_what_measurements_do_not_tell_is_named(ring_down):
-    """Only the ratio of stiffness and inertia sets a frequency; the mass has no effect about a fixed axis at its centre."""
+    """The ratio of stiffness and inertia alone sets a frequency, and inertia about another axis has no effect."""
     scene = scenes.pendulum().scene().with_values({"gravity_m_s2.1": 0.0, "pivot.rotation.angle_rad": 0.2})
     run = fm.simulate(scene, 3.0, samples=31)
     data = {"t": run.t, "pivot.rotation": run.q[:, 0]}
@@ -115,7 +115,9 @@ def test_files_and_gaps(tmp_path, ring_down):
     rows = zip(data["t"], data["attitude.rotation"], data["tip.acceleration.y"], strict=True)
     lines += [f"{t},{angle}," + (f"{a}" if i % 2 else "") for i, (t, angle, a) in enumerate(rows)]
     path.write_text("\n".join(lines[:1] + lines[3:]) + "\n")  # the first times were not measured
-    found = fm.fit(panel(), path, list(TRUTH)[:2], sigma=NOISE, bounds={"panel.modes.damping_ratio": (0.0, 0.1)}, **LOOSE)
+    found = fm.fit(
+        panel(), path, list(TRUTH)[:2], sigma=NOISE, bounds={"panel.modes.damping_ratio": (0.0, 0.1)}, **LOOSE
+    )
     assert found.channels == ("attitude.rotation", "tip.acceleration.y") and len(found.t) == 119
     assert np.sum(np.isfinite(found.residuals)) == 119 + 59 + (119 % 2 == 0)
 

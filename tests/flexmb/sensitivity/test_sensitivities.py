@@ -26,7 +26,9 @@ def arm(name: str = "arm") -> fm.SceneBuilder:
         fm.SceneBuilder(name, gravity=(0, 0, -9.81))
         .rigid_body("rod", mass=2.0, inertia=(0.1, 0.2, 0.3))
         .rigid_body("arm", mass=1.0, inertia=(0.05, 0.06, 0.07))
-        .revolute("pivot", "ground", "rod", axis=(0, 1, 0), angle=0.8, damping=0.1, stiffness=2.0, child_position=(0, 0, 0.5))
+        .revolute(
+            "pivot", "ground", "rod", axis=(0, 1, 0), angle=0.8, damping=0.1, stiffness=2.0, child_position=(0, 0, 0.5)
+        )
         .revolute(
             "elbow", "rod", "arm", axis=(0, 1, 0), angle=0.5, stiffness=1.0, damping=0.02, parent_position=(0, 0, -0.5),
             child_position=(0, 0, 0.3),
@@ -48,7 +50,9 @@ def agrees(scene, t_end, by, of=tuple(STATES), step=STEP, tolerance=CLOSE, **set
         other = differences(scene, t_end, name, of, h)
         assert np.max(relative_error(found, name, other, apart)) < tolerance, name
         for event, moved in zip(found.events, other.events, strict=True):
-            assert abs(event.derivatives[k] - moved) <= tolerance * max(abs(moved), abs(event.t / found.parameter_values[k])), name
+            assert abs(event.derivatives[k] - moved) <= tolerance * max(
+                abs(moved), abs(event.t / found.parameter_values[k])
+            ), name
     return found
 
 
@@ -75,7 +79,9 @@ def test_an_oscillator_has_its_closed_form():
 
 def test_a_pendulum_scales_with_gravity():
     """Its angle depends on g by sqrt(g) t alone, from rest: d theta/dg = t theta'/(2 g), however large the swing is."""
-    scene = scenes.pendulum().scene().with_values({"pivot.rotation.stiffness_Nm_rad": 0.0, "pivot.rotation.angle_rad": 0.9})
+    scene = (
+        scenes.pendulum().scene().with_values({"pivot.rotation.stiffness_Nm_rad": 0.0, "pivot.rotation.angle_rad": 0.9})
+    )
     found = fm.sensitivities(scene, 4.0, ["gravity_m_s2.1"], ["pivot.rotation"])
     exact = found.t * found.trajectory.u[:, 0] / (2.0 * -9.81)
     assert np.max(np.abs(found.derivatives[:, 0, 0] - exact)) < 1e-8 * np.max(np.abs(exact))
@@ -142,7 +148,12 @@ def test_leaving_out_a_part_of_the_jump_is_noticed(monkeypatch, left_out):
 def test_a_ring_down_of_a_flexible_body_agrees_with_differences():
     scene = scenes.panelled(2, "full").scene()
     scene = scene.with_values({"panel.stations.*.EIy_Nm2": 20.0, "panel.modes.damping_ratio": 0.02})
-    by = ["panel.stations.*.EIz_Nm2", "panel.modes.damping_ratio", "panel.stations.*.mass_per_length_kg_m", "bob.mass_kg"]
+    by = [
+        "panel.stations.*.EIz_Nm2",
+        "panel.modes.damping_ratio",
+        "panel.stations.*.mass_per_length_kg_m",
+        "bob.mass_kg",
+    ]
     of = ["pivot.rotation", "tip.position.x", "tip.acceleration.y", "root.torque.z", "root.force.x"]
     agrees(scene, 0.5, by, of)
 
@@ -150,7 +161,9 @@ def test_a_ring_down_of_a_flexible_body_agrees_with_differences():
 @pytest.mark.parametrize("sampling", [{}, {"period": 0.05, "delay": 0.01}], ids=["continuous", "sampled"])
 def test_controllers_agree_with_differences(sampling):
     """A PID controller with a filter, and one of states that reads an acceleration; both push."""
-    builder = scenes.pendulum().sense_marker("place", "centre", "position").sense_marker("acc", "centre", "acceleration")
+    builder = (
+        scenes.pendulum().sense_marker("place", "centre", "position").sense_marker("acc", "centre", "acceleration")
+    )
     builder.pid("servo", "place[1]", kp=1.0, ki=1.0, kd=0.5, filter=0.1, **sampling)
     law = {"A": [[-1.0]], "B": [[0.1, 0.2]], "C": [[1.0]], "D": [[0.0, 0.1]]}
     builder.state_space("law", ["acc[0]", "place[0]"], **law, **sampling)
@@ -159,17 +172,33 @@ def test_controllers_agree_with_differences(sampling):
     scene = builder.torque("push", "bob", direction=(0, 0, 1), function=push).scene()
     by = ["bob.mass_kg", "controllers.servo.kp", "servo.ki", "servo.kd", "servo.filter_s", "law.A.0.0", "law.B.0.1",
           "twist.function.gain", "pivot.rotation.stiffness_Nm_rad"]  # fmt: skip
-    of = ["pivot.rotation", "pivot.rotation.rate", "centre.acceleration.x", "signal.servo[0]", "signal.law[0]", "signal.acc[1]"]
+    of = [
+        "pivot.rotation",
+        "pivot.rotation.rate",
+        "centre.acceleration.x",
+        "signal.servo[0]",
+        "signal.law[0]",
+        "signal.acc[1]",
+    ]
     agrees(scene, 1.0, by, of, tolerance=1e-6)
 
 
 def test_a_four_bar_agrees_with_differences():
     """By masses and by lengths, on which the closure depends, through an impulse that its rows carry on."""
     scene = fm.load_scene(ROOT / "cases" / "closed_chains" / "four_bar" / "scene.toml")
-    hit = fm.SceneEvent(name="hit", watch="drive.rotation", level=1.2, actions=(fm.Impact(coordinate="drive.rotation"),))
+    hit = fm.SceneEvent(
+        name="hit", watch="drive.rotation", level=1.2, actions=(fm.Impact(coordinate="drive.rotation"),)
+    )
     scene = msgspec.structs.replace(scene, events=(hit,))
     by = ["crank.mass_kg", "coupler.com_m.0", "drive.rotation.rate_rad_s", "bodies.rocker.nodes.tip.position_m.0"]
-    of = ["drive.rotation", "pivot.rotation", "joint.position.x", "joint.acceleration.y", "loop.force.x", "energy.total"]
+    of = [
+        "drive.rotation",
+        "pivot.rotation",
+        "joint.position.x",
+        "joint.acceleration.y",
+        "loop.force.x",
+        "energy.total",
+    ]
     agrees(scene, 0.4, by, of, step=3e-4, tolerance=1e-6)
 
 
@@ -178,7 +207,9 @@ def test_an_event_on_a_load_agrees_with_differences():
     builder = scenes.pendulum().sense_marker("place", "centre", "position").sense_load("load", "pivot")
     builder.event("low", "place[0]", 0.5, fm.Impact(coordinate="pivot.rotation", restitution=0.5))
     builder.event("heavy", "load[4]", 12.0, fm.Change(path="pivot.rotation.stiffness_Nm_rad", value=10.0))
-    found = agrees(builder.scene(), 1.0, ["bob.mass_kg", "low.level", "pivot.rotation.stiffness_Nm_rad"], ["pivot.rotation"])
+    found = agrees(
+        builder.scene(), 1.0, ["bob.mass_kg", "low.level", "pivot.rotation.stiffness_Nm_rad"], ["pivot.rotation"]
+    )
     assert [event.name for event in found.events] == ["heavy", "heavy", "low", "heavy"]
 
 

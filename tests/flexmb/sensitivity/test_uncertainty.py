@@ -45,7 +45,11 @@ def test_correlation_changes_the_variance_as_it_should():
 def test_a_fit_brings_its_covariance():
     run = fm.simulate(swinging(), 2.0, samples=41)
     noisy = run.q[:, 0] + 1e-3 * np.random.default_rng(2).standard_normal(41)
-    fit = fm.fit(swinging(), {"t": run.t, "pivot.rotation": noisy}, ["pivot.rotation.stiffness_Nm_rad", "pivot.rotation.angle_rad"])
+    fit = fm.fit(
+        swinging(),
+        {"t": run.t, "pivot.rotation": noisy},
+        ["pivot.rotation.stiffness_Nm_rad", "pivot.rotation.angle_rad"],
+    )
     found = fm.uncertainty(fit.scene, 1.0, fit, OUTPUTS, samples=3)
     assert np.array_equal(found.covariance, fit.covariance)
     assert found.sigma[0, 0] == pytest.approx(fit.sigma[1])  # the initial angle itself
