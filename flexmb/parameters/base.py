@@ -1,10 +1,10 @@
 """Base parameters: the combinations of inertia parameters that motions and loads along the speeds can determine.
 
-    base = base_parameters(regressor, states, accelerations)
-    found = base.fit(Y, tau)                    from measured torques, with their covariance
+    base = regressor.base(states, accelerations)
+    found = base.fit(regressor.stacked(states, accelerations), tau)      from measured torques, with their covariance
 
-Many states give W pi = tau with the rows of Y one above the other. W has fewer independent columns than parameters: QR
-with pivoting chooses r independent ones, and all others are W_2 = W_1 B, so that only pi_1 + B pi_2 has an effect
+Many states give W pi = tau, with their rows of Y one above the other. W has fewer independent columns than parameters.
+QR with pivoting chooses r independent ones, and all others are W_2 = W_1 B, so that only pi_1 + B pi_2 has an effect
 (Gautier 1991; Khalil & Dombre, Modeling, Identification and Control of Robots, ch. 12).
 """
 
@@ -15,18 +15,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.parameters.regressor import InertiaRegressor
 from flexmb.tables import arguments
-from flexmb.tables.state import State
 from flexmb.typing import Index, Real
 
 CLEAR = 1e4
-"""Least ratio of two neighbouring pivots between which the rank is taken: rounding leaves 1e8 and more in most scenes."""
+"""Least ratio of two neighbouring pivots between which the rank is taken: rounding leaves 1e8 and more as a rule."""
 NOTHING = 1e-9
 """Elements of B below this, relative to the scales of both columns, are rounding errors of zero."""
 
 
-class Fit(NamedTuple):
+class BaseFit(NamedTuple):
     """Identified base parameters: values (r,), their covariance (r,r), and the standard deviation of the torques."""
 
     values: Real
@@ -61,7 +59,7 @@ class BaseParameters(NamedTuple):
         found: Real = Y[..., self.chosen]
         return found
 
-    def fit(self, Y: Real, tau: Real, noise: Real | float | None = None) -> Fit:
+    def fit(self, Y: Real, tau: Real, noise: Real | float | None = None) -> BaseFit:
         """Least squares for measured tau (n,), less what is known, with the rows of Y (n,P).
 
         noise: standard deviation of the measurements, one or (n,); by default it is estimated from what remains. Raises
@@ -84,22 +82,16 @@ class BaseParameters(NamedTuple):
         left = (tau - W @ values) * weight
         deviation = 1.0 if noise is not None else float(np.sqrt(left @ left / (len(tau) - self.rank)))
         half = Vt.T / s / size[:, None] * deviation
-        return Fit(values, half @ half.T, float(np.sqrt(np.mean((tau - W @ values) ** 2))))
+        return BaseFit(values, half @ half.T, float(np.sqrt(np.mean((tau - W @ values) ** 2))))
 
 
-def base_parameters(
-    regressor: InertiaRegressor, states: Sequence[State], accelerations: Sequence[Real] | Real
-) -> BaseParameters:
-    """The base parameters that motions through these states, with accelerations (n,nu), can determine.
+def base_parameters(parameters: Sequence[str], W: Real) -> BaseParameters:
+    """The base parameters of these names (P,) that the rows of W (n,P) can determine.
 
-    Random states find those of the mechanism; states of an experiment find what it can tell apart. Raises ValueError
-    where the rank is not clear, because pivots become small without a gap.
+    ValueError where no parameter has an effect, or the rank is not clear because pivots become small without a gap.
     """
-    if len(states) != len(accelerations) or not len(states):
-        raise ValueError(f"{len(states)} states and {len(accelerations)} accelerations: give as many, at least one")
     from scipy.linalg import qr, solve_triangular  # slow to import, and only identification needs it
 
-    W = np.concatenate([regressor.at(*each) for each in zip(states, accelerations, strict=True)])
     size = np.linalg.norm(W, axis=0)
     acting = np.flatnonzero(size > 0.0)
     if not len(acting):
@@ -110,12 +102,12 @@ def base_parameters(
     B = solve_triangular(R[:rank, :rank], R[:rank, rank:])
     B = np.where(np.abs(B) > NOTHING * max(1.0, float(np.max(np.abs(B), initial=0.0))), B, 0.0)
     chosen, others = acting[order[:rank]], acting[order[rank:]]
-    matrix = np.zeros((rank, len(regressor.names)))
+    matrix = np.zeros((rank, len(parameters)))
     matrix[np.arange(rank), chosen] = 1.0
     matrix[:, others] = B / size[chosen, None] * size[others]
     in_order = np.argsort(chosen)
     matrix, chosen = matrix[in_order], chosen[in_order]
-    names = tuple(_name(regressor.names, row, int(first)) for row, first in zip(matrix, chosen, strict=True))
+    names = tuple(_name(parameters, row, int(first)) for row, first in zip(matrix, chosen, strict=True))
     return BaseParameters(names, matrix, chosen, gap)
 
 

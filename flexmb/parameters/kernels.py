@@ -88,9 +88,9 @@ def slopes(t, y, dy, out, c, w):
 
 
 @kernel
-def outputs(t, y, dy, c, w, out):
-    """Everything observable of the free motion with its derivatives, left in `out`; returns a status code."""
-    take(t, y, dy, w)
+def outputs(t, y, c, w, out):
+    """Everything observable of the free motion at a fixed state with its derivatives, left in `out`; a status code."""
+    hold(t, y, w)
     status = slope(w.time[0], w.state, w.slope, c, w)
     if status == OK:
         observe(c, w, out)
@@ -98,9 +98,9 @@ def outputs(t, y, dy, c, w, out):
 
 
 @kernel
-def inverse(t, y, dy, rates, c, w, x):
-    """tau and hinge loads of inverse dynamics for given rates (nu,) with their derivatives, left in x."""
-    take(t, y, dy, w)
+def inverse(t, y, rates, c, w, x):
+    """tau and hinge loads of inverse dynamics at a fixed state for rates (nu,) with their derivatives, left in x."""
+    hold(t, y, w)
     articulated.inverse_dynamics(w.time[0], w.state, rates, c, w, x.tau, x.hinges)
 
 
@@ -108,15 +108,17 @@ def inverse(t, y, dy, rates, c, w, x):
 def closed_slopes(t, y, dy, out, s, c, cc, x):
     """As `slopes` for a closed chain s, which has the constants without derivatives. The accelerations of the rows stay
     zero whatever the parameters are."""
-    status = _closed(t, y, dy, s, c, cc, x)
+    take(t, y, dy, x.w)
+    status = _closed(t, y, s, c, cc, x)
     give(x.w.slope, out)
     return status
 
 
 @kernel
-def closed_outputs(t, y, dy, s, c, cc, x, out, loads):
+def closed_outputs(t, y, s, c, cc, x, out, loads):
     """As `outputs` for a closed chain; the loads of closures are left in loads.closures."""
-    status = _closed(t, y, dy, s, c, cc, x)
+    hold(t, y, x.w)
+    status = _closed(t, y, s, c, cc, x)
     if status != OK:
         return status
     if has(cc, COUPLINGS):
@@ -128,7 +130,7 @@ def closed_outputs(t, y, dy, s, c, cc, x, out, loads):
 
 
 @helper
-def _closed(t, y, dy, s, c, cc, x):
+def _closed(t, y, s, c, cc, x):
     """Evaluate the chain under the row loads at y, then under loads that keep the rows' accelerations."""
     status = linearise(t, y, s)
     if status == OK:
@@ -136,7 +138,6 @@ def _closed(t, y, dy, s, c, cc, x):
     x.w.fault[0] = s.w.fault[0]
     for r in range(cc.row.shape[0]):
         x.cw.row[r].load = s.cw.row[r].load
-    take(t, y, dy, x.w)
     if status == OK:
         status = evaluate(c, x.w, cc, x.cw)
     if status == OK:
@@ -147,11 +148,18 @@ def _closed(t, y, dy, s, c, cc, x):
 
 
 @helper
-def take(t, y, dy, w):
-    """Set time and state with their derivatives."""
+def hold(t, y, w):
+    """Set time and state without derivatives."""
     w.time[0] = t
     for i in range(y.shape[0]):
         w.state[i] = y[i]
+
+
+@helper
+def take(t, y, dy, w):
+    """Set time, and the state with its derivatives."""
+    hold(t, y, w)
+    for i in range(y.shape[0]):
         for lane in range(LANES):
             x = w.state[i]
             w.state[i] = x + dy[i, lane] * (seeded(x, lane) - x)

@@ -25,7 +25,7 @@ from flexmb.parameters import kernels
 from flexmb.parameters.numbers import Number, numbers
 from flexmb.parameters.plant import Plant
 from flexmb.parameters.spectral import NotSmooth, derivative
-from flexmb.parameters.tables import Block, Tables, blocks, diagonal, numbers_of, parts, structure
+from flexmb.parameters.tables import ParameterBlock, Tables, blocks, diagonal, numbers_of, parts, structure
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.tables.per_thread import Own, per_thread
@@ -62,7 +62,7 @@ class Parameters:
         rates = [found.by(each) for each in chosen]
         self.errors = np.array([each.error for each in rates])
         of_tables = np.column_stack([each.values for each in rates])
-        self.blocks: tuple[Block, ...] = blocks(found.tables, found.diagonal, self.names, of_tables)
+        self.blocks: tuple[ParameterBlock, ...] = blocks(found.tables, found.diagonal, self.names, of_tables)
         self.initial_state: Real = of_tables[-len(found.tables.start) :].copy()
         for each in (self.errors, self.initial_state):
             each.flags.writeable = False
@@ -99,7 +99,7 @@ class Parameters:
         t, y = self.plant.layout.entering(state)
         found = dict[str, Any]()
         for start, bound in self._bound:
-            bound.check(bound.observe(t, y, np.zeros((len(y), LANES))))
+            bound.check(bound.observe(t, y))
             for lane in range(bound.count):
                 row = finite_result(bound.row(lane), t)
                 found[self.names[start + lane]] = self.plant.observation.evaluation(row + self._open(t, y))
@@ -116,11 +116,11 @@ class Parameters:
         rates = self.plant.layout.rates("accelerations", accelerations)
         found = np.empty((self.plant.nu, len(self.names)))
         for start, bound in self._bound:
-            bound.invert(t, y, np.zeros((len(y), LANES)), rates)
+            bound.invert(t, y, rates)
             found[:, start : start + bound.count] = bound.loads.tau[:, 1 : 1 + bound.count]
         return finite_result(found, t)
 
-    def workspace(self, block: Block) -> Any:
+    def workspace(self, block: ParameterBlock) -> Any:
         """A new workspace for kernels that take the constants of a block; one per thread."""
         plant = self.plant
         return kernels.parameter_workspace(block.constants, plant.constants, plant.nq, plant.nu)
@@ -142,15 +142,15 @@ class Parameters:
 class _Bound:
     """The kernels of one block, with workspaces of one thread."""
 
-    def __init__(self, parameters: Parameters, block: Block) -> None:
+    def __init__(self, parameters: Parameters, block: ParameterBlock) -> None:
         self._plant, self._block, self.count = parameters.plant, block, len(block.names)
         self._w = parameters.workspace(block)
         closures = self._plant.closures
+        self.loads = kernels.loads(self._plant.constants, 0 if closures is None else len(closures.scene))
         self._chain: Closed | None = None
         if closures is not None:
             self._chain = closures.chain("articulated")
             self._rates = kernels.chain_rates(self._w, closures.constants[1])
-        self.loads = kernels.loads(self._plant.constants, 0 if closures is None else len(closures.scene))
         self._out = kernels.dual_outputs(self._plant.observation.outputs())
         self.own = Own()
 
@@ -176,18 +176,18 @@ class _Bound:
 
     @per_thread
     def observe(self) -> Direct:
-        """(t, y, dy)."""
+        """(t, y)."""
         c = self._block.constants
         if self._chain is None:
-            return direct(kernels.outputs, STATUS, REAL, VECTOR, MATRIX, c, self._w, self._out)
+            return direct(kernels.outputs, STATUS, REAL, VECTOR, c, self._w, self._out)
         tables = self._chain, c, self._block.closures, self._rates, self._out, self.loads
-        return direct(kernels.closed_outputs, STATUS, REAL, VECTOR, MATRIX, *tables)
+        return direct(kernels.closed_outputs, STATUS, REAL, VECTOR, *tables)
 
     @per_thread
     def invert(self) -> Direct:
-        """(t, y, dy, rates)."""
+        """(t, y, rates)."""
         tables = self._block.constants, self._w, self.loads
-        return direct(kernels.inverse, VOID, REAL, VECTOR, MATRIX, VECTOR, *tables)
+        return direct(kernels.inverse, VOID, REAL, VECTOR, VECTOR, *tables)
 
 
 class _Differentiation:

@@ -12,7 +12,7 @@ from flexmb.tables.state import Layout, State
 from flexmb.typing import Real
 
 
-class Columns(Protocol):
+class ObservedRows(Protocol):
     """The arrays of everything observable, and a row of them by the names of the scene."""
 
     width: int
@@ -38,7 +38,7 @@ class Plant(Protocol):
     def closures(self) -> Closures | None: ...
 
     @property
-    def observation(self) -> Columns: ...
+    def observation(self) -> ObservedRows: ...
 
     def observe_row(self, t: float, y: Real, algorithm: Any, row: Real) -> None: ...
 

@@ -21,6 +21,7 @@ from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, VECTOR, VOID
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.parameters import kernels
+from flexmb.parameters.base import BaseParameters, base_parameters
 from flexmb.parameters.inertia import body_parameters, places, table_numbers, without
 from flexmb.parameters.inertia_kernels import regressor
 from flexmb.parameters.plant import Plant
@@ -71,6 +72,20 @@ class InertiaRegressor:
             found[:, place] = found[:, place] @ each
             start += len(each)
         return finite_result(found, t)
+
+    def stacked(self, states: Sequence[State], accelerations: Sequence[Real] | Real) -> Real:
+        """(n nu,P) Y of n states with accelerations (n,nu), one above the other."""
+        if len(states) != len(accelerations) or not len(states):
+            raise ValueError(f"{len(states)} states and {len(accelerations)} accelerations: give as many, at least one")
+        return np.concatenate([self.at(*each) for each in zip(states, accelerations, strict=True)])
+
+    def base(self, states: Sequence[State], accelerations: Sequence[Real] | Real) -> BaseParameters:
+        """The combinations of parameters that motions through these states, with accelerations (n,nu), can determine.
+
+        Random states find those of the mechanism, states of an experiment those that it can tell apart. ValueError
+        where no parameter has an effect, or their number is not clear.
+        """
+        return base_parameters(self.names, self.stacked(states, accelerations))
 
     def rest(self, state: State, accelerations: Real) -> Real:
         """(nu,) what tau contains beside Y pi: of other bodies, wheels, armatures, loads, connectors, and what levels

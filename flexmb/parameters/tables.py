@@ -50,7 +50,7 @@ class Tables(NamedTuple):
     start: Real
 
 
-class Block(NamedTuple):
+class ParameterBlock(NamedTuple):
     """Parameters `names` (k,), at most LANES of them, in the lanes of the constants, in this order."""
 
     names: tuple[str, ...]
@@ -58,7 +58,7 @@ class Block(NamedTuple):
     closures: DualClosureConstants | None
 
 
-class Column(NamedTuple):
+class TableFloats(NamedTuple):
     """Floats of a table, or of one field of its records."""
 
     table: str
@@ -66,7 +66,7 @@ class Column(NamedTuple):
     values: Real
 
 
-def columns(tables: Tables) -> Iterator[Column]:
+def columns(tables: Tables) -> Iterator[TableFloats]:
     """All floats that depend on the numbers of a scene, in a fixed order."""
     for kind, table in (("tree", tables.tree), ("closures", tables.closures)):
         for each in () if table is None else fields(table):
@@ -74,8 +74,8 @@ def columns(tables: Tables) -> Iterator[Column]:
             for field in array.dtype.names or (None,):
                 values = array if field is None else array[field]
                 if values.dtype == np.float64 and (field or each.name) not in _STEADY:
-                    yield Column(f"{kind}.{each.name}", field, values)
-    yield Column("start", None, tables.start)
+                    yield TableFloats(f"{kind}.{each.name}", field, values)
+    yield TableFloats("start", None, tables.start)
 
 
 def numbers_of(tables: Tables) -> Real:
@@ -113,7 +113,7 @@ def diagonal(tables: Tables) -> Real:
     return np.array([tables.tree.body[field] for field in sorted(_DIAGONAL)])
 
 
-def blocks(tables: Tables, is_diagonal: Real, names: Sequence[str], rates: Real) -> tuple[Block, ...]:
+def blocks(tables: Tables, is_diagonal: Real, names: Sequence[str], rates: Real) -> tuple[ParameterBlock, ...]:
     """Dual tables for the derivatives (n,P) of `numbers_of` by all parameters.
 
     is_diagonal: `diagonal`, of the scene and of those with other numbers.
@@ -132,7 +132,7 @@ def blocks(tables: Tables, is_diagonal: Real, names: Sequence[str], rates: Real)
     return tuple(found)
 
 
-def _block(tables: Tables, names: tuple[str, ...], rates: Real) -> Block:
+def _block(tables: Tables, names: tuple[str, ...], rates: Real) -> ParameterBlock:
     """Dual tables for the derivatives (n,k) by k parameters."""
     duals = {kind: _duals(table) for kind, table in (("tree", tables.tree), ("closures", tables.closures))}
     start = 0
@@ -147,7 +147,7 @@ def _block(tables: Tables, names: tuple[str, ...], rates: Real) -> Block:
     moving = moving_columns(np.max(np.abs(tree["product"]), axis=-1))
     tree["moves"][..., 0] = np.maximum(tree["moves"][..., 0], moving)
     closures = None if tables.closures is None else DualClosureConstants(**duals["closures"])
-    return Block(names, DualConstants(**tree), closures)
+    return ParameterBlock(names, DualConstants(**tree), closures)
 
 
 def _duals(table: Constants | ClosureConstants | None) -> dict[str, Any]:

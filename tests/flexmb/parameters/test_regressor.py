@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb.parameters.base import base_parameters
 from flexmb.scene.build import SceneBuilder
 from tests import trees
 from tests.bounds import algebra
@@ -85,7 +84,7 @@ SKEW = [(0.6, 0.0, 0.8), (0.48, 0.8, 0.36), (0.36, -0.48, 0.8), (0.8, 0.36, 0.48
 def test_known_numbers_of_base_parameters(axes, gravity, expected):
     """Khalil & Dombre, ch. 9; with a clear gap between what counts and rounding errors."""
     system = arm(axes, gravity, twist=0.0 if axes[1] == Z else 0.1)
-    base = base_parameters(system.inertia_regressor(), *randomly(system, 80))
+    base = system.inertia_regressor().base(*randomly(system, 80))
     assert base.rank == expected, base.names
     assert base.gap > 1e6
 
@@ -94,7 +93,7 @@ def test_a_free_body_shows_all_ten():
     builder = SceneBuilder("free", gravity=(0.0, 0.0, -9.81))
     builder.rigid_body("box", mass=2.0, com=(0.1, 0.2, 0.3), inertia=(0.2, 0.3, 0.4)).free("flight", "ground", "box")
     system = flexmb.compile(builder.scene())
-    base = base_parameters(system.inertia_regressor(), *randomly(system, 20))
+    base = system.inertia_regressor().base(*randomly(system, 20))
     assert base.rank == 10 and base.names == system.inertia_regressor().names and base.gap == np.inf
 
 
@@ -102,7 +101,7 @@ def test_planar_arm_has_its_known_combinations():
     """ZZ_1 + m_2 l^2 and MX_1 + m_2 l, of a second link at the distance l = 0.5 (and 0.2 along the axis)."""
     system = arm([Z, Z], (0.0, -9.81, 0.0), twist=0.0)
     regressor = system.inertia_regressor()
-    base = base_parameters(regressor, *randomly(system, 30))
+    base = regressor.base(*randomly(system, 30))
     shown = dict(zip(base.names, base.matrix @ regressor.values, strict=True))
     assert "l0.first_moment.x + 0.5 l1.mass" in shown and "l0.inertia.zz + 0.25 l1.mass" in shown
     assert shown["l0.inertia.zz + 0.25 l1.mass"] == pytest.approx(0.04 + 1.0 * (0.2**2 + 0.03**2) + 0.25 * 2.0)
@@ -117,8 +116,8 @@ def test_identification_from_noisy_torques():
     system = arm([Z, Z], (0.0, -9.81, 0.0), twist=0.0)
     regressor = system.inertia_regressor()
     states, rates = randomly(system, 200)
-    base = base_parameters(regressor, states, rates)
-    W = np.concatenate([regressor.at(*each) for each in zip(states, rates, strict=True)])
+    base = regressor.base(states, rates)
+    W = regressor.stacked(states, rates)
     true, tau, rng = base.matrix @ regressor.values, W @ regressor.values, np.random.default_rng(1)
     squares = []
     for _ in range(200):
@@ -137,7 +136,7 @@ def test_motions_that_say_too_little_are_refused():
     system = arm([Z, Z], (0.0, -9.81, 0.0), twist=0.0)
     regressor = system.inertia_regressor()
     states, rates = randomly(system, 30)
-    base = base_parameters(regressor, states, rates)
+    base = regressor.base(states, rates)
     still = [system.state(np.array([0.1 * i, 0.0]), np.zeros(2)) for i in range(10)]
     W = np.concatenate([regressor.at(each, np.zeros(2)) for each in still])
     with pytest.raises(ValueError, match="livelier"):
@@ -145,7 +144,7 @@ def test_motions_that_say_too_little_are_refused():
     with pytest.raises(ValueError, match="livelier"):
         base.fit(W[:4], np.zeros(4))
     with pytest.raises(ValueError, match="as many"):
-        base_parameters(regressor, states, rates[:3])
+        regressor.base(states, rates[:3])
     with pytest.raises(ValueError, match="deviation"):
         base.fit(np.ones((50, 20)), np.zeros(50), noise=0.0)
 
