@@ -22,7 +22,6 @@ from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Real
 
-
 # Derivatives are as smooth as the motion, but for singular positions: they take about its number of steps.
 MORE_STEPS = 30
 FEW_STEPS = 1000  # allowed in any case, where the motion itself takes hardly a step

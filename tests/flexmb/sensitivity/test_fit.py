@@ -89,7 +89,8 @@ def test_true_values_lie_within_the_sigmas_in_as_many_of_a_hundred_fits_as_they_
 def test_a_wrong_model_shows_in_chi_square(ring_down):
     """Negative control: with a damping of the panel that is wrong and not fitted, what is left is no noise."""
     names = [name for name in TRUTH if name != "panel.modes.damping_ratio"]
-    found = fm.fit(panel().with_values({"panel.modes.damping_ratio": 0.03}), measured(1, ring_down), names, sigma=NOISE, **LOOSE)
+    scene = panel().with_values({"panel.modes.damping_ratio": 0.03})
+    found = fm.fit(scene, measured(1, ring_down), names, sigma=NOISE, **LOOSE)
     assert found.chi_square > chi2.ppf(0.999, found.freedom)
 
 
