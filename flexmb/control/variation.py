@@ -1,4 +1,4 @@
-"""Controllers in dual numbers, which carry derivatives along: the helpers of `flexmb.control.loop` on a `LoopVariation`.
+"""Controllers in dual numbers, which carry derivatives: the helpers of `flexmb.control.loop` on a `LoopVariation`.
 
 Sampled controllers act in the first evaluation at their instant, as in the loop of floats: the derivatives of their
 states and of the outputs that they hold change there by the chain rule.

@@ -25,6 +25,7 @@ from flexmb.run.simulate_batch import simulate_batch
 from flexmb.scene.bodies import Level
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
+from flexmb.sensitivity.sensitivities import sensitivities
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS, ON_CHAINS, RUNNING, WITH_JACOBIAN
 from flexmb.system.compile import compile, compile_batch
@@ -40,6 +41,8 @@ BATCHED: tuple[Method, ...] = ("rk4", "dop853")
 
 def uses() -> Iterator[tuple[str, Use]]:
     """The uses by name, those that take longest first. Neighbours share few kernels, for which one would wait."""
+    for name, builder in {"tree": scenes.pendulum, "loop": scenes.looped}.items():
+        yield f"derivatives of runs, {name}", partial(_derivatives, builder)
     yield "linear models", _linear_models
     yield "derivatives by numbers, tree", partial(_numbers, scenes.pendulum)
     yield "laws that a scene may name", _laws
@@ -74,6 +77,16 @@ def _eventful(builder: Callable[[], SceneBuilder], method: Method) -> None:
 def _regulated(builder: Callable[[], SceneBuilder], method: Method) -> None:
     _run(scenes.with_feedback(builder(), period=4e-4, delay=1e-4), method)
     _run(scenes.with_feedback(builder()), method)
+
+
+def _derivatives(builder: Callable[[], SceneBuilder]) -> None:
+    of = ["pivot.rotation", "centre.position.x", "signal.place[1]"]
+    for scene in (
+        scenes.with_events(builder(), "pivot.rotation"),
+        scenes.with_feedback(builder(), period=4e-4, delay=1e-4),
+        scenes.with_feedback(builder()),
+    ):
+        sensitivities(scene, T_END, ["bob.mass_kg"], of, samples=3)
 
 
 def _linear_models() -> None:

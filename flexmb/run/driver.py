@@ -71,8 +71,8 @@ class Driver:
         self, system: System, times: Real, settings: Settings, algorithm: Algorithm, stabilise: float,
         taken_up: EventMemory | None = None, made_by: Making | None = None, course: list[Leg] | None = None,
     ) -> None:  # fmt: skip
-        """times (T,) s: output times; taken_up: the events' state at the end of the run that is resumed, if any; course:
-        a list to which the parts of the run are appended."""
+        """times (T,) s: output times; taken_up: the events' state at the end of the run that is resumed, if any;
+        course: a list to which the parts of the run are appended."""
         self._course = course
         self._times, self._settings, self._taken_up, self._made_by = times, settings, taken_up, made_by
         given = None if taken_up is None else taken_up.given

@@ -79,7 +79,10 @@ class Blocks:
             assert each.closures is not None
             found.append(
                 chain.ChainBlock(
-                    chain=self._chain, c=each.constants, cc=each.closures, y=np.zeros(len(self.state[0])),
+                    chain=self._chain,
+                    c=each.constants,
+                    cc=each.closures,
+                    y=np.zeros(len(self.state[0])),
                     slope=np.zeros(len(self.state[0])),
                     x=chain_rates(w, system.closures.constants[1]),
                 )  # fmt: skip
@@ -148,8 +151,8 @@ class Blocks:
                 parts.append((rates.copy(), w.speed["drive"].copy(), block.x.cw.row["rate"].copy()))
             (gained, drive, _), (own, idle, rate) = parts
             found.append((gained - own, drive - idle, rate))
-        gains, drives, rates = zip(*found, strict=True)
-        return Response(gains[0][:, 0], self.joined(gains), self.joined(drives), self.joined(rates))
+        gains, drives, of_rows = (self.joined([each[i] for each in found]) for i in range(3))
+        return Response(found[0][0][:, 0], gains, drives, of_rows)
 
     def joined(self, duals: Sequence[Real]) -> Real:
         """The derivatives (...,P) of one array of duals (...,9) for each block."""

@@ -70,7 +70,7 @@ def motion(t, s):
 
 @kernel
 def manifold(t, s):
-    """Project s.x.w.state; its derivatives, which are tangent to the closures, keep their values but for quaternions and
+    """Project s.x.w.state; its derivatives, which are tangent to the closures, stay as they are but for quaternions and
     prescribed coordinates."""
     w = s.x.w
     put_back(t, w.state, s.c)

@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from flexmb.control.wiring import wired
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.problems import closest
+from flexmb.scene.tree import watches_signals
 from flexmb.sensitivity.blocks import Observed
 from flexmb.system.observables import ENERGIES
 from flexmb.system.tree_system import System
@@ -42,18 +44,31 @@ class Chosen(NamedTuple):
         return not all(name.startswith("signal.") for name in self.names)
 
 
-def chosen(trajectory: Trajectory, names: Sequence[str]) -> Chosen:
-    """The channels of these names; ValueError or TypeError for others."""
+def refuse_unknown_outputs(system: System, names: Sequence[str]) -> None:
+    """ValueError or TypeError, before a run, for names of channels that it will not have.
+
+    Loads of drives are looked for afterwards, since events may hold further coordinates.
+    """
     if isinstance(names, str):
         raise TypeError(f"outputs are a list of names, not the string {names!r}: write [{names!r}]")
+    scene = system.scene
+    has_loop = bool(scene.controllers) or watches_signals(scene)
+    known = [*channels(system, wired(system).names if has_loop else {})]
+    if not names:
+        raise ValueError(f"no outputs are named: give at least one of {', '.join(known)}")
+    for name in names:
+        if str(name).startswith("power."):
+            raise NotImplementedError(f"output {name!r}: derivatives of powers of controllers are not available")
+        if name not in known and ".drive[" not in str(name):
+            raise ValueError(f"there is no output {name!r}: {closest(str(name), known)}")
+
+
+def chosen(trajectory: Trajectory, names: Sequence[str]) -> Chosen:
+    """The channels of these names; ValueError for others."""
     known = {name: (unit, values) for name, unit, values in trajectory.columns() if name != "t"}
     for name in names:
         if name not in known:
             raise ValueError(f"there is no output {name!r}: {closest(str(name), known)}")
-        if name.startswith("power."):
-            raise NotImplementedError(f"output {name!r}: derivatives of powers of controllers are not available")
-    if not names:
-        raise ValueError(f"no outputs are named: give at least one of {', '.join(known)}")
     values = np.column_stack([known[name][1] for name in names])
     return Chosen(tuple(names), tuple(known[name][0] for name in names), values)
 
@@ -134,7 +149,7 @@ def _signal(i: int) -> Channel:
 
 
 def _quaternion(first: int, k: int) -> Channel:
-    """Component k of the quaternion of the rotation (9,) from `first` on, with the sign of the nonnegative scalar part."""
+    """Component k of the quaternion of the rotation (9,) from `first` on, whose scalar part is not negative."""
 
     def rates(seen: Seen) -> Real:
         assert seen.observed is not None

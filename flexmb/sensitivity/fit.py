@@ -11,19 +11,20 @@ these weights until they agree.
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
-from flexmb.sensitivity.rows import aligned
 from flexmb.parameters.numbers import numbers
 from flexmb.run.simulate import RunSettings, simulate
 from flexmb.run.trajectory import Trajectory
-from flexmb.scene.problems import SceneError, closest
+from flexmb.scene.problems import SceneError, SceneWarning, closest
 from flexmb.scene.schema import Scene
 from flexmb.sensitivity.measurements import Measurements, measurements
+from flexmb.sensitivity.rows import aligned
 from flexmb.sensitivity.sensitivities import sensitivities
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError
@@ -82,7 +83,9 @@ class Fit:
         for k, channel in enumerate(self.channels):
             own = self.residuals[np.isfinite(self.residuals[:, k]), k]
             kind = "estimated" if self.estimated else "given"
-            lines.append(f"{channel}: {len(own)} values, rms of residuals {_rms(own):.3g}, sigma {self.noise[k]:.3g} ({kind})")
+            lines.append(
+                f"{channel}: {len(own)} values, rms of residuals {_rms(own):.3g}, sigma {self.noise[k]:.3g} ({kind})"
+            )
         if not self.estimated:
             lines.append(f"chi-square {self.chi_square:.4g} with {self.freedom} degrees of freedom")
         if self.unidentifiable:
@@ -117,6 +120,12 @@ class _Problem(NamedTuple):
         return found
 
     def model(self, x: Real) -> Trajectory:
+        """The run with these scaled parameters; what is doubtful in trial values is not said."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SceneWarning)
+            return self._run(x)
+
+    def _run(self, x: Real) -> Trajectory:
         return simulate(self.scene_at(x), float(self.times[-1]), samples=self.times, **self.settings)
 
     def seen(self, trajectory: Trajectory) -> Real:
@@ -153,7 +162,9 @@ def fit(
     start = np.array([each.value for each in found]) / problem.scales
     limits = _limits(bounds or {}, names, start, problem.scales)
     if int(np.sum(problem.known)) < len(names):
-        raise ValueError(f"there are {int(np.sum(problem.known))} measured values for {len(names)} parameters: give more")
+        raise ValueError(
+            f"there are {int(np.sum(problem.known))} measured values for {len(names)} parameters: give more"
+        )
     first = problem.model(start)
     _refuse_unknown_channels(first, given.channels)
     _refuse_unfinished(first)
@@ -193,7 +204,16 @@ def _searched(problem: _Problem, start: Real, limits: tuple[Real, Real], noise: 
     x = start
     for _ in range(1 if noise is not None else REWEIGHTED):
         solution = least_squares(
-            residuals, x, jacobian, limits, method="trf", x_scale="jac", max_nfev=max_runs, ftol=FLAT, xtol=FLAT, gtol=None
+            residuals,
+            x,
+            jacobian,
+            limits,
+            method="trf",
+            x_scale="jac",
+            max_nfev=max_runs,
+            ftol=FLAT,
+            xtol=FLAT,
+            gtol=None,
         )
         x, before = solution.x, weights
         if noise is not None:
@@ -208,9 +228,7 @@ def _searched(problem: _Problem, start: Real, limits: tuple[Real, Real], noise: 
     return _found(problem, x, solution, J, weights, noise is None, runs)
 
 
-def _found(
-    problem: _Problem, x: Real, solution: Any, J: Real, weights: Real, estimated: bool, runs: int
-) -> Fit:
+def _found(problem: _Problem, x: Real, solution: Any, J: Real, weights: Real, estimated: bool, runs: int) -> Fit:
     run = problem.model(x)
     off = np.where(problem.known, problem.seen(run) - problem.data.values, np.nan)
     covariance, unseen = _covariance(J, x)
@@ -219,8 +237,9 @@ def _found(
         correlation = covariance / np.outer(sigma, sigma)
     hidden = tuple(name for name, is_hidden in zip(problem.names, unseen, strict=True) if is_hidden)
     return Fit(
-        problem.names, x * problem.scales, sigma * problem.scales, covariance * np.outer(problem.scales, problem.scales),
-        correlation, hidden, problem.data.t, problem.data.channels, off, weights, estimated,
+        problem.names, x * problem.scales, sigma * problem.scales,
+        covariance * np.outer(problem.scales, problem.scales), correlation, hidden, problem.data.t,
+        problem.data.channels, off, weights, estimated,
         float(np.nansum((off / weights) ** 2)), int(np.sum(problem.known)) - len(x), problem.scene_at(x), run, runs,
         str(solution.message),
     )  # fmt: skip

@@ -21,23 +21,23 @@ from flexmb.sensitivity.loops import Loops
 from flexmb.sensitivity.systems import Systems
 from flexmb.typing import Real
 
-# Derivatives are integrated per hundredth of each number. The error of a step is held below rtol times them plus atol,
-# so that what changes by less than atol if a number changes by a hundredth does not shorten steps.
-PER_CENT = 0.01
+# Derivatives are integrated as changes by this part of each number. The error of a step is held below rtol times them
+# plus atol, so that what changes by less than atol if a number changes by 3 % does not shorten steps.
+SHARE = 0.03
 
 EventTimes = list[tuple[str, float, Real]]
 """Name, time (s), derivatives (P,) of the time of each event."""
 
 
 class Following:
-    """One run, followed with scaled derivatives: each is per hundredth of the `scale` of its number."""
+    """One run, followed with scaled derivatives: each is per SHARE of the `scale` of its number."""
 
     def __init__(
         self, scene: Scene, found: Sequence[Number], settings: Settings, trajectory: Trajectory, outputs: Chosen
     ) -> None:
         self._order = np.argsort([not _is_mechanical(scene, each) for each in found], kind="stable")
         self._numbers = [found[k] for k in self._order]
-        self._scales = np.array([PER_CENT * each.scale for each in self._numbers])
+        self._scales = np.array([SHARE * each.scale for each in self._numbers])
         self._scene, self._settings, self._trajectory, self._outputs = scene, settings, trajectory, outputs
         mechanical = sum(_is_mechanical(scene, each) for each in found)
         self._systems = Systems(self._numbers, self._scales, mechanical)
@@ -63,15 +63,18 @@ class Following:
             with integration(leg.system, "articulated", 0.0, self._settings.integrator) as solve:
                 is_last, stop = i + 1 == len(course), leg.raw.t
                 times = self._times(leg, is_last)
-                y, clock = clock_of_leg(solve, leg, np.unique([leg.begin.state.t, *self._trajectory.t[times], stop]), self._settings)
+                y, clock = clock_of_leg(
+                    solve, leg, np.unique([leg.begin.state.t, *self._trajectory.t[times], stop]), self._settings
+                )
                 loops = self._loops(solve, blocks, loops, is_last and bool(i) and leg.begin.state.t == stop)
                 variation = Variation(leg, blocks, loops)
                 at = self._begun(variation, y, start, before, after)
-                states = variation.integrate(at, clock.times, clock, self._settings) if stop > leg.begin.state.t else [at]
+                states = (
+                    variation.integrate(at, clock.times, clock, self._settings) if stop > leg.begin.state.t else [at]
+                )
                 before = Course(leg.raw.y, states[-1].Y)
                 self._see(variation, solve, clock.times, states, times, is_last)
-                held = {} if after is None else after.held
-                after = self._jumped(variation, before, held)
+                after = self._jumped(variation, before, {} if after is None else after.held)
                 start = after.D
         order = np.argsort(self._order)
         scaled = self._derivatives / self._scales
@@ -94,9 +97,7 @@ class Following:
             self._laws = law_rates(solve.system, alive, self._scales)
         return Loops(solve.feedback, blocks, self._laws, before, ends)
 
-    def _begun(
-        self, variation: Variation, y: Real, start: Real, before: Course | None, after: Jumped | None
-    ) -> Course:
+    def _begun(self, variation: Variation, y: Real, start: Real, before: Course | None, after: Jumped | None) -> Course:
         """The state at the start of a part of the run, with its derivatives."""
         loops, t = variation.loops, variation.leg.begin.state.t
         if before is None or after is None:  # the run begins
@@ -112,8 +113,8 @@ class Following:
         at = Course(y, after.D.copy())
         if np.any(after.dt) and loops is not None and loops.is_due(t):
             raise EventError(
-                f'event "{after.crossings[0].event.name}" happens at t = {t:g} s, when a sampled controller acts: which '
-                "comes first changes what follows, so that the run has no derivative beyond; move one of them"
+                f'event "{after.crossings[0].event.name}" happens at t = {t:g} s, when a sampled controller acts: '
+                "which comes first changes what follows, so that the run has no derivative beyond; move one of them"
             )
         if after.changes:  # the work includes the energy that changes of values bring
             at.Y[-1] += variation.energy_rates(t, at) - self._energy
@@ -139,7 +140,13 @@ class Following:
         return bool(_changed(other, self._changes) != _changed(self._scene, self._changes))
 
     def _see(
-        self, variation: Variation, solve: Integration, times: Real, states: Sequence[Course], wanted: slice, is_last: bool
+        self,
+        variation: Variation,
+        solve: Integration,
+        times: Real,
+        states: Sequence[Course],
+        wanted: slice,
+        is_last: bool,
     ) -> None:
         """Derivatives of the outputs at the output times of a part of the run."""
         loops, system = variation.loops, variation.blocks.system

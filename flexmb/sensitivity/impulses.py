@@ -98,7 +98,7 @@ class Striking:
         return impulses, change[:nu], change[nu : nu + k]
 
     def _put(self, u: Real, D: Real, with_speeds: bool = True) -> None:
-        """Set the states of the blocks to the coordinates and these speeds (nu,), with the change of the coordinates."""
+        """Set the states of the blocks to the coordinates and these speeds (nu,), and their changes along D."""
         nq, nu = self._variation.blocks.system.nq, self._variation.blocks.system.nu
         y, along = self._y.copy(), D.copy()
         y[nq : nq + nu] = u

@@ -116,21 +116,21 @@ def _refuse(leg: Leg) -> None:
     for record in leg.records:
         if record.name.endswith(REST):
             raise EventError(
-                f'at t = {t:g} s "{record.name.removesuffix(REST)}" comes to rest, after rebounds that become too small '
-                "to be told apart: derivatives end here; end the run before, or latch the coordinate by an event of its "
-                "own"
+                f'at t = {t:g} s "{record.name.removesuffix(REST)}" comes to rest, after rebounds that become too '
+                "small to be told apart: derivatives end here; end the run before, or latch the coordinate by an event "
+                "of its own"
             )
     if leg.early:
         raise EventError(
-            f'event "{leg.events[0].name}" at t = {t:g} s lies near a singular position of a closed chain, where it has '
-            "no derivative; move the event"
+            f'event "{leg.events[0].name}" at t = {t:g} s lies near a singular position of a closed chain, where it '
+            "has no derivative; move the event"
         )
     changes = [isinstance(action, Change) for event in leg.events for action in event.actions]
     strikes = [isinstance(action, Latch | Impact) for event in leg.events for action in event.actions]
     if any(changes) and any(strikes):
         raise NotImplementedError(
-            f"at t = {t:g} s a value of the scene changes at the same instant as a latch or an impact: derivatives need "
-            "them at two instants; let one happen a moment later"
+            f"at t = {t:g} s a value of the scene changes at the same instant as a latch or an impact: derivatives "
+            "need them at two instants; let one happen a moment later"
         )
 
 

@@ -1,8 +1,9 @@
-"""Derivatives of the numbers of controllers, of what they drive and of events, which are smooth functions of a scene's."""
+"""Derivatives of the numbers of controllers, of what they drive and of events, all functions of a scene's numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,10 +11,7 @@ import numpy as np
 from flexmb.control.wiring import law_numbers, profile_tables, wired
 from flexmb.parameters.numbers import Number
 from flexmb.parameters.spectral import derivative
-from flexmb.scene.check.walk import values
-from flexmb.scene.convert import ROOT
 from flexmb.scene.events import Impact
-from flexmb.scene.functions import ControlSignal
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
 from flexmb.typing import Real
@@ -42,13 +40,16 @@ def law_rates(system: System, numbers: Sequence[Number | None], scales: Real) ->
     wiring = wired(system)
     inputs = wiring.controller["inputs"].tolist()
 
-    def of_laws(scene: Scene) -> Real:
+    def of_laws(scene: Scene, is_gain: bool) -> Real:
         course, piece = profile_tables(scene)
         laws = law_numbers(scene.controllers, inputs)
-        return np.concatenate([*laws, _gains(system, scene), course["data"].ravel(), piece.ravel()])
+        gains = _gains(system.with_numbers(scene) if is_gain else system)
+        return np.concatenate([*laws, gains, course["data"].ravel(), piece.ravel()])
 
-    relevant = [each if _changes(each, system.scene, _laws) else None for each in numbers]
-    found = _by_numbers(of_laws, system.scene, relevant, scales)
+    found = np.zeros((len(of_laws(system.scene, is_gain=False)), len(numbers)))
+    for is_gain in (False, True):
+        chosen = [each if _concerns_laws(each, system.scene, is_gain) else None for each in numbers]
+        found += _by_numbers(partial(of_laws, is_gain=is_gain), system.scene, chosen, scales)
     shapes = wiring.number.shape, wiring.initial.shape, wiring.drive.shape, (len(wiring.course), 4), wiring.piece.shape
     stops = np.cumsum([np.prod(shape, dtype=int) for shape in shapes])
     parts = np.split(found, stops[:-1])
@@ -61,7 +62,7 @@ def event_rates(scene: Scene, numbers: Sequence[Number | None], scales: Real) ->
     numbers = [each if _changes(each, scene, lambda of: of.events) else None for each in numbers]
     for event in scene.events:
         impacts = [i for i, action in enumerate(event.actions) if isinstance(action, Impact)]
-        rates = _by_numbers(lambda scene, name=event.name: _of_event(scene, name), scene, numbers, scales)
+        rates = _by_numbers(partial(_of_event, name=event.name), scene, numbers, scales)
         found[event.name] = EventRates(rates[0], dict(zip(impacts, rates[1:], strict=True)))
     return found
 
@@ -76,21 +77,16 @@ def _changes(number: Number | None, scene: Scene, part: Callable[[Scene], Any]) 
     return number is not None and part(number.scene_at(number.value + 2.0**-6 * number.scale)) != part(scene)
 
 
-def _laws(scene: Scene) -> Any:
-    """What the tables of controllers are made from."""
-    return scene.controllers, scene.sensors, _signals(scene)
+def _concerns_laws(number: Number | None, scene: Scene, is_gain: bool) -> bool:
+    """Whether the tables of controllers depend on a number that is the gain of what a signal drives, or none."""
+    if number is None or number.name.endswith(".gain") != is_gain:
+        return False
+    return is_gain or _changes(number, scene, lambda of: (of.controllers, of.sensors))
 
 
-def _signals(scene: Scene) -> list[ControlSignal]:
-    """What signals drive, in the order of the scene."""
-    return [each for _, _, each in values(ROOT, scene) if isinstance(each, ControlSignal)]
-
-
-def _gains(system: System, scene: Scene) -> Real:
-    """Gains of what signals drive, in the order of the system."""
-    if _signals(scene) == _signals(system.scene):  # a system takes much longer to make
-        return np.array([signal.gain for signal in system.signals.values()])
-    return np.array([signal.gain for signal in system.with_numbers(scene).signals.values()])
+def _gains(system: System) -> Real:
+    """Gains of what signals drive."""
+    return np.array([signal.gain for signal in system.signals.values()])
 
 
 def _by_numbers(
@@ -98,12 +94,14 @@ def _by_numbers(
 ) -> Real:
     """Scaled derivatives (n,P) of a function of a scene."""
     now = function(scene)
-    found = np.zeros((len(now), len(numbers)))
+    found, finite = np.zeros((len(now), len(numbers))), np.isfinite(now)  # limits may be infinite
+
+    def at(value: float, number: Number) -> Real:
+        return np.where(finite, function(number.scene_at(value)), 0.0)
+
     for k, number in enumerate(numbers):
-        if number is None:
-            continue
-        finite = np.isfinite(now)
-        rates = derivative(lambda value, of=number: np.where(finite, function(of.scene_at(value)), 0.0), number.value,
-                           number.scale, [slice(i, i + 1) for i in range(len(now))])  # fmt: skip
-        found[:, k] = scales[k] * rates.values
+        if number is not None:
+            parts = [slice(i, i + 1) for i in range(len(now))]
+            rates = derivative(partial(at, number=number), number.value, number.scale, parts)
+            found[:, k] = scales[k] * rates.values
     return found

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.control import COUNTS, SAMPLES, STOP
+from flexmb.integrate.control import ACCEPTED, COUNTS, REJECTED, SAMPLES, STOP
 from flexmb.integrate.problem import Accuracy, Clock, problem
 from flexmb.integrate.settings import Settings
 from flexmb.jit.direct import undispatched
@@ -21,6 +21,10 @@ from flexmb.sensitivity.loops import Loops
 from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Real
+
+# Derivatives are as smooth as the motion, but for singular positions: they take about its number of steps.
+MORE_STEPS = 30
+FEW_STEPS = 1000  # allowed in any case, where the motion itself takes hardly a step
 
 
 class Course(NamedTuple):
@@ -97,7 +101,9 @@ class Variation:
         """The state with its derivatives at these times (T,) s, from the first to the last."""
         z, P = self.joined(start), self.blocks.directions
         plain = settings.accuracy(self.blocks.system.nq, self.blocks.system.nu)
-        accuracy: Accuracy = plain._replace(controlled=(self._width - 1) * (1 + P))
+        steps = self.leg.raw.counts[ACCEPTED] + self.leg.raw.counts[REJECTED]
+        most = min(settings.max_steps, MORE_STEPS * steps + FEW_STEPS)
+        accuracy: Accuracy = plain._replace(controlled=(self._width - 1) * (1 + P), max_steps=most)
         posed = problem(flow.rhs, flow.project, self.flow, self.flow)
         method, counts, out = settings.integrator, np.zeros(COUNTS, np.int64), np.empty((len(times), len(z)))
         given = z, clock._replace(times=times), accuracy, out, counts, method.memory(len(z)), None
@@ -105,6 +111,12 @@ class Variation:
         (status, t), interrupted = interruptible(lambda *given: run(posed, *given), given, counts[STOP : STOP + 1])
         if interrupted:
             raise KeyboardInterrupt
+        if status == Status.MAX_STEPS and most < settings.max_steps:
+            raise DynamicsError(
+                f"derivatives stopped at t = {t:g} s: they would take more than {MORE_STEPS} times the steps of the "
+                "run, because they grow without bound there: a closed chain has no derivative beyond a singular "
+                "position, where branches of its motion meet; start elsewhere, or end the run before"
+            )
         self.check(status, t)
         return [self.parted(row) for row in out[: counts[SAMPLES]]]
 

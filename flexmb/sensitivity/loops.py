@@ -132,9 +132,7 @@ def _plain(made: Loop) -> PlainLaw:
     )  # fmt: skip
 
 
-def _variation(
-    made: Loop, feedback: Feedback, plain: PlainLaw, blocks: Blocks, b: int, **own: Real
-) -> LoopVariation:
+def _variation(made: Loop, feedback: Feedback, plain: PlainLaw, blocks: Blocks, b: int, **own: Any) -> LoopVariation:
     w, out, c = blocks.workspaces[b], blocks.outputs[b], blocks.duals[b].constants
     arrays: dict[str, Any] = {
         each.name: as_duals(getattr(made, each.name))
@@ -152,5 +150,6 @@ def _variation(
     held[: len(made.held)] = made.held
     return LoopVariation(
         **arrays, **own, plain=plain, address=where, instant=as_duals(table), held=as_duals(held), function=c.function,
-        drive=as_duals(wired(blocks.system).drive), y=w.state, dy=w.slope, rates=out.rates, markers=out.markers, loads=out.loads, drives=out.drives,
+        drive=as_duals(wired(blocks.system).drive), y=w.state, dy=w.slope, rates=out.rates, markers=out.markers,
+        loads=out.loads, drives=out.drives,
     )  # fmt: skip

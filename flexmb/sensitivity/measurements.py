@@ -59,7 +59,14 @@ def _checked(where: str, columns: dict[str, Real]) -> Measurements:
     t = columns.pop(TIME)
     if not columns:
         raise ValueError(f"{where}: there are times, but no channels")
-    if t.ndim != 1 or not np.isfinite(t).all() or np.any(np.diff(t) <= 0.0) or len(t) == 0 or t[0] < 0.0 or t[-1] <= 0.0:
+    if (
+        t.ndim != 1
+        or not np.isfinite(t).all()
+        or np.any(np.diff(t) <= 0.0)
+        or len(t) == 0
+        or t[0] < 0.0
+        or t[-1] <= 0.0
+    ):
         raise ValueError(f"{where}: the times must be finite and increase, from 0 s on, where the run starts")
     for name, each in columns.items():
         if each.shape != t.shape:

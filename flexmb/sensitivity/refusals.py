@@ -12,6 +12,7 @@ from flexmb.scene.functions import Pulse
 from flexmb.scene.schema import Scene
 
 _SCHEDULE = "period_s", "offset_s", "delay_s"
+_ENDS = "start_s", "duration_s"
 
 
 def refuse_moving_instants(scene: Scene, numbers: Sequence[Number]) -> None:
@@ -23,7 +24,7 @@ def refuse_moving_instants(scene: Scene, numbers: Sequence[Number]) -> None:
                 f'parameter "{number.name}" moves the instants at which a sampled controller acts: derivatives by it '
                 "are not available; compare runs with other values"
             )
-        if _pulses(other) != _pulses(scene):
+        if number.name.rpartition(".")[2] in _ENDS and _pulses(other) != _pulses(scene):
             raise ParameterError(
                 f'parameter "{number.name}" moves the start or the end of a pulse, at which a load jumps: derivatives '
                 'by it are not available; use a function of kind "smooth_step", or events on time with their levels as '

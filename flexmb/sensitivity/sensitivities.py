@@ -17,7 +17,7 @@ from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
-from flexmb.sensitivity.channels import chosen
+from flexmb.sensitivity.channels import chosen, refuse_unknown_outputs
 from flexmb.sensitivity.following import Following
 from flexmb.sensitivity.refusals import refuse_moving_instants
 from flexmb.system.compile import assembled
@@ -87,8 +87,8 @@ def sensitivities(
 
     The variational equations are integrated beside the motion, exact to the tolerance, through latches, impacts,
     releases and changes of values, closures, and sampled and continuous controllers. Raises what `simulate` raises;
-    PathError or ParameterError (ValueErrors) for a number that is none or by which there is no derivative; DynamicsError
-    for a run that fails, or that has no derivative beyond an event, with the time and the event;
+    PathError or ParameterError (ValueErrors) for a number that is none or by which there is no derivative;
+    DynamicsError for a run that fails, or that has no derivative beyond an event, with the time and the event;
     NotImplementedError for what derivatives do not pass yet.
     """
     refuse_unknown("sensitivities", settings)
@@ -101,6 +101,7 @@ def sensitivities(
     refuse_moving_instants(scene, found)
     given = Settings(method, **settings).checked(abs(t_end))
     system, times = assembled(scene), sample_times(samples, t_end, 0.0)
+    refuse_unknown_outputs(system, of)
     trajectory, course = run_with_course(system, times, given)
     if not trajectory.finished:
         raise DynamicsError(f"there are no derivatives of a run that does not finish: {trajectory.message}")

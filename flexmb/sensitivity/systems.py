@@ -25,7 +25,10 @@ from flexmb.system.tree_system import System
 from flexmb.tables.state import State, pack
 from flexmb.typing import Real
 
-_DIAGONAL = "orthogonal", "uncoupled"  # integers of a body that hold for other numbers too, see flexmb.parameters.tables
+_DIAGONAL = (
+    "orthogonal",
+    "uncoupled",
+)  # integers of a body that hold for other numbers too, see flexmb.parameters.tables
 _OF_TIME = "function", "table"  # tables of functions, of which events make others
 
 
@@ -72,21 +75,27 @@ class Systems:
         return self._blocks(found, held)
 
     def _differentiated(self, system: System, chosen: Sequence[int], start: Real) -> Known:
-        """The tables of a system by those of the numbers that are chosen; their part of its initial state to `start`."""
+        """The tables of a system by those of the numbers that are chosen; the part of its initial state to `start`."""
         P = len(self._numbers)
         if not chosen:
             plant = system.with_numbers(system.scene)
             plant.initial_state  # noqa: B018  (counts the rows of closures)
-            sources: list[tuple[Any, Any]] = []
+            sources = list[tuple[Any, Any]]()
         else:
             parameters = system.parameters([self._numbers[k].name for k in chosen])
-            plant, sources = parameters.plant, [(each.constants, each.closures) for each in parameters.blocks]
+            sources = [(each.constants, each.closures) for each in parameters.blocks]
+            assert isinstance(parameters.plant, System)  # it is the same one with its functions of time kept apart
+            plant = parameters.plant
             start[:, list(chosen)] = parameters.initial_state * self._scales[list(chosen)]
-        tree = [_arranged(plant.constants, [each[0] for each in sources], chosen, self._scales, b) for b in range(_count(P))]
+        tree = [
+            _arranged(plant.constants, [each[0] for each in sources], chosen, self._scales, b) for b in range(_count(P))
+        ]
         closed: list[DualClosureConstants | None] = [None] * _count(P)
         if plant.closures is not None:
             own = plant.closures.constants[1]
-            of_closures = [_arranged(own, [each[1] for each in sources], chosen, self._scales, b) for b in range(_count(P))]
+            of_closures = [
+                _arranged(own, [each[1] for each in sources], chosen, self._scales, b) for b in range(_count(P))
+            ]
             closed = [DualClosureConstants(**each) for each in of_closures]
         found = [DualTables(DualConstants(**each), other) for each, other in zip(tree, closed, strict=True)]
         _alike(found)

@@ -1,4 +1,4 @@
-"""The equations of motion of a tree in dual numbers, for one block of directions of a `flexmb.sensitivity.flow.Flow`."""
+"""The equations of motion of a tree in dual numbers, for one block of directions of `flexmb.sensitivity.flow`."""
 
 from __future__ import annotations
 

@@ -58,7 +58,9 @@ class Uncertainty:
             lines.append(f"{output}: sigma at most {self.sigma[i, k]:.3g} {self.units[k]}, at t = {self.t[i]:g} s")
             order = np.argsort(-self.contributions[i, k])
             shares = self.shares[i, k]
-            lines += [f"  {line}" for line in aligned([(self.parameters[p], f"{100.0 * shares[p]:.1f} %") for p in order])]
+            lines += [
+                f"  {line}" for line in aligned([(self.parameters[p], f"{100.0 * shares[p]:.1f} %") for p in order])
+            ]
         return "\n".join(lines)
 
 
@@ -104,7 +106,11 @@ def _covariance(given: Mapping[str, float] | Fit, correlation: Any) -> tuple[tup
         raise ValueError("no parameters are given: give standard deviations by name")
     if not np.all(sigma >= 0.0):
         raise ValueError(f"given: {list(given)[int(np.argmin(sigma))]} has a negative standard deviation")
-    R = np.eye(len(sigma)) if correlation is None else arguments.finite("correlation", arguments.array("correlation", correlation))
+    R = (
+        np.eye(len(sigma))
+        if correlation is None
+        else arguments.finite("correlation", arguments.array("correlation", correlation))
+    )
     if R.shape != (len(sigma), len(sigma)):
         raise ValueError(f"correlation has the shape {R.shape}, but there are {len(sigma)} parameters")
     if not np.allclose(R, R.T, rtol=0.0, atol=SYMMETRIC) or not np.allclose(np.diag(R), 1.0, rtol=0.0, atol=SYMMETRIC):

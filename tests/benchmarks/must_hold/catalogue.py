@@ -16,13 +16,14 @@ from tests.benchmarks.must_hold import (
     modes,
     runs,
     runs_at_equal_error,
+    sensitivity,
     start,
 )
 from tests.benchmarks.must_hold.row import Row
 
 SOURCES = (
-    evaluation, derivatives, runs, runs_at_equal_error, missions, implicit, modes, floating_frames, growth, charts,
-    start, first_use,
+    evaluation, derivatives, runs, runs_at_equal_error, missions, sensitivity, implicit, modes, floating_frames, growth,
+    charts, start, first_use,
 )  # fmt: skip
 
 

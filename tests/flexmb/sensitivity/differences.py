@@ -36,7 +36,10 @@ def differences(
     value = Number(scene, name).value
 
     def difference(h: float) -> tuple[Real, Real]:
-        runs = [fm.simulate(scene.with_values({name: value + side * h}), t_end, samples=samples, **TIGHT) for side in (1, -1)]
+        runs = [
+            fm.simulate(scene.with_values({name: value + side * h}), t_end, samples=samples, **TIGHT)
+            for side in (1, -1)
+        ]
         ahead, behind = (outputs(run, of) for run in runs)
         times = [np.array([event.t for event in run.events]) for run in runs]
         return (ahead - behind) / (2.0 * h), (times[0] - times[1]) / (2.0 * h)
