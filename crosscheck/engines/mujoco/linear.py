@@ -3,7 +3,8 @@
 `mjd_transitionFD` differentiates one step by its state, with central differences. A semi-implicit Euler step of 1 s,
 without implicit damping, makes v + qacc of a speed v, so that its derivatives are those of the accelerations whatever
 the step. Those of several step sizes make differences of fourth order (`crosscheck.engines.linear.differences`). The
-inverse of the mass matrix is by MuJoCo's factors.
+inverse of the mass matrix is by MuJoCo's factors. Inertias that MuJoCo makes us raise (`mujoco.tree`) change it by
+their share, which is part of the errors.
 
 Displacements of MuJoCo's joints are those of their speeds. For free flight, three slides in inboard axes and a ball,
 ours are in outboard axes (`crosscheck.engines.linear.axes`).
@@ -26,7 +27,7 @@ from crosscheck.engines.linear.matrices import EPS, Errors, StateDerivatives, no
 from crosscheck.engines.linear.slots import slot_names
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.mujoco.forces import Forces
-from crosscheck.engines.mujoco.tree import MujocoSlot, MujocoTree
+from crosscheck.engines.mujoco.tree import LEAST_INERTIA, MujocoSlot, MujocoTree
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -43,6 +44,8 @@ class MujocoLinear:
         model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_EULER, 1.0
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
         self._data = mujoco.MjData(model)
+        moments = (np.linalg.eigvalsh(link.inertia.inertia)[0] for link in tree.links)
+        self._raised = sum(bool(moment < LEAST_INERTIA) for moment in moments)
         own = [""] * model.nv
         self._turning: list[int] = []
         self._flying: list[MujocoSlot] = []
@@ -76,7 +79,12 @@ class MujocoLinear:
             step = cache(self._step)
             by_q, apart = fourth_order(lambda eps: step(eps)[nv:, :nv], noise)
             by_v, asunder = fourth_order(lambda eps: step(eps)[nv:, nv:] - np.eye(nv), noise)
-        errors = Errors(apart + asunder * axes.kept, asunder, unit * norm(by_force))
+        share = self._raised * LEAST_INERTIA * norm(by_force)
+        errors = Errors(
+            apart + asunder * axes.kept + share * (norm(by_q) + norm(axes.udot[self._places])),
+            asunder + share * norm(by_v),
+            (unit + share) * norm(by_force),
+        )
         transport = swapped_transport(axes.u, self._turning, [slot.v for slot in self._flying])
         parts = (axes.by_displacement(by_q, by_v), axes.by_speed(by_v))
         return StateDerivatives(*(part[self._square] for part in parts), by_force, transport[self._square], errors)
