@@ -19,6 +19,7 @@ from flexmb.linear.linearize import displacement_names
 from flexmb.linear.variations import Equations, Variations
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
+from flexmb.system.evaluator import Evaluator
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
 from flexmb.typing import Real
@@ -32,15 +33,22 @@ def linear_outputs(
     if not asked or scene.controllers or scene.events:
         return NOTHING
     if scene.constraints:
-        wanted = [part for part in asked if part == "frequencies" and algorithm == "articulated"]
-        equations = equations_of(system) if wanted else None
-        return outputs(wanted, (_exact(equations, state) for state in states) if equations is not None else ())
+        return _of_closed(system, states) if "frequencies" in asked and algorithm == "articulated" else NOTHING
     if obstacle(scene):
         return NOTHING
     equations = Equations(system)
     order = places(coordinate_names(scene), displacement_names(equations)[0])
     found = _exactly(equations, states) if algorithm == "articulated" else _by_differences(equations, algorithm, states)
     return outputs(asked, (at.ordered(order) for at in found), _offered(algorithm))
+
+
+def _of_closed(system: System, states: Iterable[State]) -> LinearOutputs:
+    """The frequencies of a closed chain, where it has a linear model."""
+    try:
+        equations = equations_of(system)
+    except NotImplementedError:
+        return NOTHING
+    return outputs(("frequencies",), _exactly(equations, states))
 
 
 def _offered(algorithm: Algorithm) -> Sequence[str]:
@@ -64,7 +72,7 @@ def _by_differences(equations: Equations, algorithm: Algorithm, states: Iterable
         yield _differenced(equations, equations.variations(state), accelerations)
 
 
-def _differenced(equations: Equations, at: Variations, accelerations) -> StateDerivatives:  # type: ignore[no-untyped-def]
+def _differenced(equations: Equations, at: Variations, accelerations: Evaluator) -> StateDerivatives:
     state, free, n = at.state, equations.free, len(at.rates)
 
     def displaced(xi: Real) -> Real:

@@ -92,8 +92,9 @@ All keys, with defaults in brackets; the structs below explain them:
   ``split_body`` [every beam] alone; ``level`` [the scene's] of all flexible bodies; ``refined`` [none] with
   ``segments``, ``pieces`` or ``elements`` and ``order`` [2.0]; ``engines``; ``also`` [none]; ``efforts`` [the
   engine's own], each with ``engine``, ``kind`` ("tolerance" or "step"), ``method`` and falling ``values``;
-  ``duration_s`` and ``samples`` [the case's]; ``linear`` [none], what its engines are asked of the linearised motion at
-  every sample: "derivatives", "frequencies" or both; ``note`` [none], shown in the report;
+  ``duration_s`` and ``samples`` [the case's]; ``start`` [the scene's], "equilibrium" near it; ``linear`` [none],
+  what its engines are asked of the linearised motion at every sample: "derivatives", "frequencies" or both; ``note``
+  [none], shown in the report;
 - ``comparison``: ``name``; ``variant`` with ``engines`` [all of the variant's], or ``a`` and ``b``, each with a
   ``variant`` and an ``engine``; ``goals``; ``scales`` [the ranges] (SI); ``expect`` ["agree"]; ``band``, ``diverged_s``
   or ``because``, as ``expect`` needs; ``reason``;
@@ -141,6 +142,7 @@ MutationKind = Literal[
     "sensor_sign", "sensor_component", "event_level", "event_crossing", "event_dropped", "event_hold",
     "event_restitution", "event_value", "event_order",
 ]  # fmt: skip
+Start = Literal["equilibrium"]
 Family = Literal["closed_form", "published", "converged", "agreed"]
 ReferenceKind = Literal[
     "published", "closed form", "independent codes", "native, two formulations", "high precision"
@@ -186,7 +188,8 @@ class Variant(_CasePart, frozen=True, kw_only=True):
     beam, or `split_body` only, as `segments` rigid segments) or "substructures" (likewise as `pieces` flexible pieces
     welded together, each with `eigenmodes` besides its attachment modes). `level` replaces the level of every flexible
     body. `engines` are compared engine by engine; those in `also` run the variant too, for its charts and for what
-    names them. `duration_s` and `samples` replace the case's. `linear` asks for derivatives of accelerations and for
+    names them. `duration_s` and `samples` replace the case's. `start` = "equilibrium" replaces the initial state by the
+    equilibrium that flexmb finds from it. `linear` asks for derivatives of accelerations and for
     eigenfrequencies at every sample. `note` is shown in the report.
     """
 
@@ -204,7 +207,8 @@ class Variant(_CasePart, frozen=True, kw_only=True):
     efforts: tuple[EffortLadder, ...] = ()
     duration_s: float | None = None
     samples: int | None = None
-    linear: tuple[LinearPart, ...] | msgspec.UnsetType = msgspec.UNSET  # not among the keys of records without it
+    start: Start | msgspec.UnsetType = msgspec.UNSET  # neither is among the keys of records without it
+    linear: tuple[LinearPart, ...] | msgspec.UnsetType = msgspec.UNSET
     note: str = ""
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import replace
 from pathlib import Path
+from typing import assert_never
 
 import msgspec
 import numpy as np
@@ -92,10 +93,14 @@ def _with_efforts(run: RunFile, case: Case) -> RunFile:
 
 
 def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None) -> Scene:
-    """The scene with the variant's levels and its transformation; `refined` sets the number of beam elements."""
+    """The scene with the variant's levels, transformation and start; `refined` sets the number of beam elements."""
     scene = at_level(scene, variant)
     if refined is not None and refined.elements is not None:
         scene = _on_beams(scene, elements=refined.elements)
+    return _begun(_transformed(scene, variant), variant)
+
+
+def _transformed(scene: Scene, variant: Variant) -> Scene:
     match variant.transform:
         case "rigidify":
             return rigidify(scene)
@@ -108,6 +113,19 @@ def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None
             assert variant.pieces is not None
             return substructured(scene, variant.split_body, variant.pieces, eigenmodes=variant.eigenmodes)
     return scene
+
+
+def _begun(scene: Scene, variant: Variant) -> Scene:
+    """The scene in the state in which the variant begins; a mutated one in its own equilibrium."""
+    match variant.start:
+        case msgspec.UnsetType():
+            return scene
+        case "equilibrium":
+            from crosscheck.running.at_rest import at_rest  # loads the compiler
+
+            return at_rest(scene)
+        case _:
+            assert_never(variant.start)
 
 
 def at_level(scene: Scene, variant: Variant) -> Scene:

@@ -2,8 +2,9 @@
 
 `mjd_transitionFD` differentiates one step by its state, with central differences. A semi-implicit Euler step of 1 s,
 without implicit damping, makes v + qacc of a speed v, so that its derivatives are those of the accelerations whatever
-the step. Those of three step sizes of the differences make differences of fourth order with two
-(`crosscheck.engines.linear.differences`). The inverse of the mass matrix is by MuJoCo's factors.
+the step. Those of several step sizes make differences of fourth order (`crosscheck.engines.linear.differences`). The
+inverse of the mass matrix is by MuJoCo's factors. Inertias that MuJoCo makes us raise (`mujoco.tree`) change it by
+their share, which is part of the errors.
 
 Displacements of MuJoCo's joints are those of their speeds. For free flight, three slides in inboard axes and a ball,
 ours are in outboard axes (`crosscheck.engines.linear.axes`).
@@ -12,6 +13,7 @@ ours are in outboard axes (`crosscheck.engines.linear.axes`).
 from __future__ import annotations
 
 from copy import copy
+from functools import cache
 from typing import assert_never
 
 import mujoco
@@ -20,12 +22,12 @@ import numpy as np
 from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.linear.axes import OutboardAxes, swapped_transport
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
-from crosscheck.engines.linear.differences import STEP, fourth_order
+from crosscheck.engines.linear.differences import fourth_order
 from crosscheck.engines.linear.matrices import EPS, Errors, StateDerivatives, norm, rounding
 from crosscheck.engines.linear.slots import slot_names
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.mujoco.forces import Forces
-from crosscheck.engines.mujoco.tree import MujocoSlot, MujocoTree
+from crosscheck.engines.mujoco.tree import LEAST_INERTIA, MujocoSlot, MujocoTree
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -42,6 +44,8 @@ class MujocoLinear:
         model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_EULER, 1.0
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
         self._data = mujoco.MjData(model)
+        moments = (np.linalg.eigvalsh(link.inertia.inertia)[0] for link in tree.links)
+        self._raised = sum(bool(moment < LEAST_INERTIA) for moment in moments)
         own = [""] * model.nv
         self._turning: list[int] = []
         self._flying: list[MujocoSlot] = []
@@ -58,6 +62,7 @@ class MujocoLinear:
                 case _:
                     assert_never(slot.freedom)
         self._places = places(coordinate_names(scene), own)
+        self._square = np.ix_(self._places, self._places)
 
     def at(self, t: float, qpos: Real, qvel: Real) -> StateDerivatives:
         """The derivatives at a state, in the order that all engines share."""
@@ -67,11 +72,22 @@ class MujocoLinear:
             mujoco.mj_forward(model, data)
             inverse = np.empty((nv, nv))
             mujoco.mj_solveM(model, data, inverse, np.eye(nv))
-            acceleration = data.qacc.copy()
-            steps = [self._step(factor * STEP) for factor in (1.0, 2.0, 4.0)]
-        by_q, apart = fourth_order(*(step[nv:, :nv] for step in steps))
-        by_v, asunder = fourth_order(*(step[nv:, nv:] - np.eye(nv) for step in steps))
-        return self._converted(by_q, by_v, inverse, apart, asunder, acceleration)
+            axes = self._axes(data.qacc)
+            by_force = axes.by_force(inverse)[self._square]
+            unit = rounding(by_force, nv)
+            noise = np.sqrt(nv) * (unit * norm(axes.udot[self._places]) + EPS * norm(axes.u))
+            step = cache(self._step)
+            by_q, apart = fourth_order(lambda eps: step(eps)[nv:, :nv], noise)
+            by_v, asunder = fourth_order(lambda eps: step(eps)[nv:, nv:] - np.eye(nv), noise)
+        share = self._raised * LEAST_INERTIA * norm(by_force)
+        errors = Errors(
+            apart + asunder * axes.kept + share * (norm(by_q) + norm(axes.udot[self._places])),
+            asunder + share * norm(by_v),
+            (unit + share) * norm(by_force),
+        )
+        transport = swapped_transport(axes.u, self._turning, [slot.v for slot in self._flying])
+        parts = (axes.by_displacement(by_q, by_v), axes.by_speed(by_v))
+        return StateDerivatives(*(part[self._square] for part in parts), by_force, transport[self._square], errors)
 
     def _step(self, eps: float) -> Real:
         """d [q; v] after a step by d [q; v] before it (2nv,2nv)."""
@@ -80,21 +96,12 @@ class MujocoLinear:
         mujoco.mjd_transitionFD(model, self._data, eps, True, found, None, None, None)
         return found
 
-    def _converted(
-        self, by_q: Real, by_v: Real, inverse: Real, apart: float, asunder: float, acceleration: Real
-    ) -> StateDerivatives:
-        """In outboard axes of free flights and in the shared order; the errors with the rounding of the differences."""
-        nv, axes = self._model.nv, OutboardAxes(self._data.qvel, acceleration)
+    def _axes(self, acceleration: Real) -> OutboardAxes:
+        """The change to outboard axes of the shifts of free flights."""
+        axes = OutboardAxes(self._data.qvel, acceleration)
         for slot in self._flying:
             quaternion = self._data.qpos[slot.q + 3 : slot.q + 7]
             R = rotation_matrix(quaternion / np.linalg.norm(quaternion))
             turning = slice(slot.v + 3, slot.v + 6)
             axes.turned(R, slice(slot.v, slot.v + 3), turning, self._data.qvel[turning])
-        square = np.ix_(self._places, self._places)
-        by_force = axes.by_force(inverse)[square]
-        unit = rounding(by_force, nv)
-        noise = 1.5 * np.sqrt(nv) / STEP * (unit * norm(axes.udot[self._places]) + EPS * norm(axes.u))
-        errors = Errors(apart + asunder * axes.kept + noise, asunder + noise, unit * norm(by_force))
-        transport = swapped_transport(axes.u, self._turning, [slot.v for slot in self._flying])
-        by_displacement, by_speed = axes.by_displacement(by_q, by_v), axes.by_speed(by_v)
-        return StateDerivatives(by_displacement[square], by_speed[square], by_force, transport[square], errors)
+        return axes

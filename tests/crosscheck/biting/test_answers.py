@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -14,8 +16,9 @@ from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.signals import signals_of
 from crosscheck.judging.outcome import conclude
 from crosscheck.judging.results import collect
+from crosscheck.library.case import Comparison
 from crosscheck.library.channels import is_judged
-from crosscheck.library.find import load_case
+from crosscheck.library.find import load_case, shipped_folder
 from crosscheck.records.kinds import Record, RunRecord
 from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan
@@ -121,3 +124,37 @@ goals = {{ "marker:tip" = 1e-6, "load" = 1e-6, "energy" = 1e-6, "momentum" = 1e-
     for name in CAUGHT:
         against = [each.status for each in verdicts if (each.engine_a, each.engine_b) == ("fine", name)]
         assert "differ" in against, name
+
+
+LINEAR = {
+    "derivative_transposed": {"derivatives.by_displacement", "derivatives.by_speed"},
+    "derivative_order": {"derivatives.by_displacement", "derivatives.by_speed", "derivatives.by_force"},
+    "derivative_of_position": {"derivatives.by_displacement"},
+    "derivative_of_speed": {"derivatives.by_speed"},
+    "frequency_unit": {"frequencies"},
+}
+"""The channels in which each fault differs; the inverse of a mass matrix is its own transpose."""
+
+
+def test_wrong_derivatives_are_caught_in_an_ordinary_session() -> None:
+    case = load_case(shipped_folder() / "manipulators" / "six_axis_arm")
+    variant = msgspec.structs.replace(case.run.variant("linearised"), engines=("native", "pinocchio", *LINEAR))
+    goals = {"derivatives": 1e-6, "frequencies": 1e-4}
+    comparison = Comparison(name="all", variant="linearised", goals=goals)
+    run = msgspec.structs.replace(case.run.alone(variant), comparisons=(comparison,))
+    provider = "tests.crosscheck.biting.faulty_engine:peers"
+    record, jobs = plan(replace(case, run=run), (), provider)
+    records: list[Record] = [record]
+    for job in jobs:
+        execute(job, lambda content: records.append(content) if isinstance(content, RunRecord) else None)
+    if any("not installed" in each.message for each in records if isinstance(each, RunRecord)):
+        pytest.skip("Pinocchio is not installed")
+    verdicts = [each for each in conclude(collect(records)).all if each.engine_a == "native"]
+    assert {each.channel: each.status for each in verdicts if each.engine_b == "pinocchio"} == dict.fromkeys(
+        ("derivatives.by_displacement", "derivatives.by_speed", "derivatives.by_force", "frequencies"), "agree"
+    )
+    for name, channels in LINEAR.items():
+        found = {each.channel for each in verdicts if each.engine_b == name and each.status == "differ"}
+        assert found == channels, name
+    reasons = [each.reason for each in verdicts if each.status == "differ" and each.channel != "frequencies"]
+    assert all("farthest apart" in reason and "d udot[" in reason for reason in reasons)
