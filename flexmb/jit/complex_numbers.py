@@ -1,7 +1,7 @@
 """Complex numbers as the numbers of kernels: elementary functions that numba has for them under other names only.
 
 A kernel whose workspace holds complex numbers is compiled from the same source as for floats. It solves the equations
-of implicit methods, whose matrices are complex (`flexmb.entry.implicit`). Comparisons use the real part, `.real`.
+of implicit methods, whose matrices are complex (`flexmb.entry.stiff_part`). Comparisons use the real part, `.real`.
 """
 
 from __future__ import annotations
