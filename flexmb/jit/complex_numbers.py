@@ -30,12 +30,12 @@ class _OfOne(AbstractTemplate):
 
 
 @infer_global(math.sqrt)
-class _SquareRoot(_OfOne):
+class _ComplexSquareRoot(_OfOne):
     pass
 
 
 @infer_global(sincos)
-class _SineCosine(AbstractTemplate):
+class _ComplexSineCosine(AbstractTemplate):
     def generic(self, args, kws):
         return signature(types.UniTuple(COMPLEX, 2), COMPLEX) if args == (COMPLEX,) else None
 
@@ -56,7 +56,7 @@ def _sincos(context, builder, sig, args):
 
 
 @infer_global(nonzero)
-class _Nonzero(AbstractTemplate):
+class _ComplexNonzero(AbstractTemplate):
     def generic(self, args, kws):
         return signature(types.boolean, COMPLEX) if args == (COMPLEX,) else None
 
