@@ -38,6 +38,10 @@ _HOME = {
     "flexmb.scene.open_loop": "open_loop",
     "flexmb.scene.problems": "SceneError SceneWarning",
     "flexmb.scene.user_code": "no_user_code",
+    "flexmb.sensitivity.fit": "Fit fit",
+    "flexmb.sensitivity.jump": "EventError",
+    "flexmb.sensitivity.sensitivities": "EventSensitivity Sensitivities sensitivities",
+    "flexmb.sensitivity.uncertainty": "Uncertainty uncertainty",
     "flexmb.system.batch": "Batch",
     "flexmb.system.compile": "compile compile_batch",
     "flexmb.system.derivative_records": "AccelerationDerivatives EvaluationDerivatives InverseDynamicsDerivatives",
@@ -86,6 +90,14 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.scene.problems import SceneWarning as SceneWarning
     from flexmb.scene.schema import *  # noqa: F403
     from flexmb.scene.user_code import no_user_code as no_user_code
+    from flexmb.sensitivity.fit import Fit as Fit
+    from flexmb.sensitivity.fit import fit as fit
+    from flexmb.sensitivity.jump import EventError as EventError
+    from flexmb.sensitivity.sensitivities import EventSensitivity as EventSensitivity
+    from flexmb.sensitivity.sensitivities import Sensitivities as Sensitivities
+    from flexmb.sensitivity.sensitivities import sensitivities as sensitivities
+    from flexmb.sensitivity.uncertainty import Uncertainty as Uncertainty
+    from flexmb.sensitivity.uncertainty import uncertainty as uncertainty
     from flexmb.system.batch import Batch as Batch
     from flexmb.system.compile import compile as compile
     from flexmb.system.compile import compile_batch as compile_batch

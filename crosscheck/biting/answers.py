@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.contract import ENERGIES, OUTPUTS, MarkerPath, Trajectory
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene
@@ -147,6 +148,24 @@ def _work_reversed(run: Trajectory, scene: Scene) -> Trajectory:
     return replace(run, work=None if run.work is None else -run.work)
 
 
+def _matrices(change: Callable[[Real], Real], *names: str) -> Falsify:
+    """Derivatives of these names, by default all, with every matrix (n, n) changed."""
+
+    def falsify(run: Trajectory, scene: Scene) -> Trajectory:
+        derivatives = dict(run.derivatives)
+        for name in names or derivatives:
+            if name in derivatives:
+                n = round(np.sqrt(derivatives[name].shape[1]))
+                derivatives[name] = change(derivatives[name].reshape(-1, n, n)).reshape(-1, n * n)
+        return replace(run, derivatives=derivatives)
+
+    return falsify
+
+
+def _in_hertz(run: Trajectory, scene: Scene) -> Trajectory:
+    return replace(run, frequencies=None if run.frequencies is None else run.frequencies / (2.0 * np.pi))
+
+
 def _late(run: Trajectory, scene: Scene) -> Trajectory:
     """Every sample is the one before it."""
     at = np.maximum(np.arange(len(run.times)) - 1, 0)
@@ -236,6 +255,31 @@ FAULTS = (
         for kind in ENERGIES
     ),
     AnswerFault("work_sign", "work negated", "work done by the system for work done on it", _work_reversed),
+    AnswerFault(
+        "derivative_transposed",
+        "derivatives transposed",
+        "columns for rows",
+        _matrices(lambda each: each.transpose(0, 2, 1)),
+    ),
+    AnswerFault(
+        "derivative_order",
+        "derivatives with coordinates in reverse order",
+        "another order of the coordinates",
+        _matrices(lambda each: each[:, ::-1, ::-1]),
+    ),
+    AnswerFault(
+        "derivative_of_position",
+        "no derivatives by displacements",
+        "gravity and stiffness taken for constant",
+        _matrices(lambda each: 0.0 * each, "by_displacement"),
+    ),
+    AnswerFault(
+        "derivative_of_speed",
+        "derivatives by speeds negated",
+        "Coriolis and damping terms moved to the other side",
+        _matrices(lambda each: -each, "by_speed"),
+    ),
+    AnswerFault("frequency_unit", "frequencies in Hz", "Hz for rad/s", _in_hertz),
     AnswerFault("late", "every sample is the one before it", "state before the step for that after it", _late),
 )
 
@@ -272,4 +316,8 @@ def run_of(times: Real, channels: dict[str, Real]) -> Trajectory:
         energy={kind: channels[f"energy.{kind}"][:, 0] for kind in ENERGIES if f"energy.{kind}" in channels},
         momentum=pair("momentum", "angular", "linear") if "momentum.linear" in channels else None,
         work=channels["work"][:, 0] if "work" in channels else None,
+        derivatives={
+            name: channels[f"derivatives.{name}"] for name in DERIVATIVES if f"derivatives.{name}" in channels
+        },
+        frequencies=channels.get(FREQUENCIES),
     )

@@ -19,6 +19,7 @@ from crosscheck.biting.by_reference import ByReference, by_reference
 from crosscheck.biting.mutants import Litter, PassedOver, litter
 from crosscheck.biting.score import CaseBite, Mutant, ShownIn, bite, outcome
 from crosscheck.biting.subject import JudgedVariant, subject
+from crosscheck.engines.signals import signals_of
 from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import roundoff_floor
@@ -33,7 +34,7 @@ from crosscheck.running.plan import plan, variant_scene
 from crosscheck.running.scheduler import BY_DEFAULT, Limits
 from crosscheck.running.sweep import PROVIDER, Listener, run_planned
 from flexmb.output.whole import take_away, write_whole
-from flexmb.run.channels import channels_of, distance, family, magnitude
+from flexmb.run.channels import distance, family, magnitude
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -175,7 +176,7 @@ def _rounding(true: Result) -> dict[str, float]:
 def _falsified(true: Result, scene: Scene, fault: AnswerFault, rounding: dict[str, float]) -> dict[str, Real]:
     """The channels (T, k) with the fault, those that it changes by more than their rounding."""
     right = {name: true.values(name) for name in true.channels}
-    wrong = channels_of(fault.falsify(run_of(true.times, right), scene))
+    wrong = signals_of(fault.falsify(run_of(true.times, right), scene))
     return {
         name: values
         for name, values in wrong.items()

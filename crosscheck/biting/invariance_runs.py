@@ -108,7 +108,7 @@ def run_invariances(
 
 
 def _planned(what: JudgedVariant, provider: str, limits: Limits) -> _Set:
-    record, (true,) = plan(reduced(what), (), provider, limits.time_s)
+    record, (true,) = plan(_of_motion(reduced(what)), (), provider, limits.time_s)
     counterparts: dict[str, Counterpart] = {}
     without: dict[str, str] = {}
     jobs = [true]
@@ -127,6 +127,12 @@ def _planned(what: JudgedVariant, provider: str, limits: Limits) -> _Set:
     bare = msgspec.structs.replace(what.variant, efforts=())
     record = msgspec.structs.replace(record, run=msgspec.structs.replace(record.run, variants=(bare,)))
     return _Set(what, counterparts, without, record, jobs)
+
+
+def _of_motion(case: Case) -> Case:
+    """The case without the linearised motion, whose matrices depend on units and on the order of the coordinates."""
+    variants = tuple(msgspec.structs.replace(each, linear=msgspec.UNSET) for each in case.run.variants)
+    return replace(case, run=msgspec.structs.replace(case.run, variants=variants))
 
 
 def _job(true: Job, name: str, counterpart: Counterpart) -> Job:
@@ -178,6 +184,9 @@ def _judged(each: _Set, results: CaseResults) -> list[InvarianceVerdict]:
         ended = next((one for one in (true, other) if one.status != "finished"), None)
         if ended is not None:
             found.append(msgspec.structs.replace(head, status=ended.status, reason=ended.message))
+            continue
+        if true.rests:
+            found.append(msgspec.structs.replace(head, reason="nothing moves"))
             continue
         found.append(_verdict(head, _findings(what, true, other, each.counterparts[invariance.name])))
     return found

@@ -114,6 +114,28 @@ class TreeMechanics:
         )  # fmt: skip
         return [self._answer(t, y[:n], y[n:]) for t, y in zip(times, run.y.T, strict=True)]
 
+    def accelerations(self, q: Real, u: Real) -> Real:
+        """Those of the free coordinates where the initial q and u are changed by these, at t = 0.
+
+        Coordinates of ball joints and of free flight stay.
+        """
+        return np.asarray(self._solve(0.0, self._start[0] + q, self._start[1] + u)[1][self._free])
+
+    def mass_matrix(self) -> Real:
+        """Of the free coordinates in the initial state."""
+        now = _Instant(self, 0.0, *self._prescribed(0.0, *self._start))
+        return np.asarray(_mass_matrix(now.parts, self._size)[np.ix_(self._free, self._free)])
+
+    @property
+    def free(self) -> list[int]:
+        """The numbers of the free coordinates among all."""
+        return self._free
+
+    @property
+    def size(self) -> int:
+        """The number of all coordinates."""
+        return self._size
+
     def _add(self, item: str, freedom: Freedom) -> list[tuple[float, float]]:
         """Number the speeds of a freedom; its initial coordinates and speeds."""
         match freedom:
@@ -151,10 +173,9 @@ class TreeMechanics:
         """The instant, the accelerations of all coordinates, and the loads that prescribed ones need beyond others."""
         q, u = self._prescribed(t, q, u)
         now = _Instant(self, t, q, u)
-        M, f = np.zeros((self._size, self._size)), self._own_forces(t, q, u)
+        M, f = _mass_matrix(now.parts, self._size), self._own_forces(t, q, u)
         for lump in now.parts:
             w, J = lump.at.w, lump.at.R @ lump.inertia @ lump.at.R.T
-            M += lump.mass * lump.at.Jv.T @ lump.at.Jv + lump.at.Jw.T @ J @ lump.at.Jw
             f += lump.at.Jv.T @ (lump.mass * (self._gravity - lump.at.a))
             f -= lump.at.Jw.T @ (J @ lump.at.alpha + cross(w, J @ w))
         for push in now.pushes:
@@ -324,3 +345,11 @@ class _Instant:
 
 def _acceleration(at: PlacedFrame, udot: Real) -> Real:
     return np.concatenate([at.alpha + at.Jw @ udot, at.a + at.Jv @ udot])
+
+
+def _mass_matrix(parts: list[RigidPart], size: int) -> Real:
+    M = np.zeros((size, size))
+    for lump in parts:
+        J = lump.at.R @ lump.inertia @ lump.at.R.T
+        M += lump.mass * lump.at.Jv.T @ lump.at.Jv + lump.at.Jw.T @ J @ lump.at.Jw
+    return M

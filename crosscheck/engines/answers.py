@@ -26,6 +26,8 @@ from crosscheck.engines.contract import (
     Support,
     Trajectory,
 )
+from crosscheck.engines.linear.answer import fault as fault_of_linear
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.trajectories import first_samples
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.schema import Scene
@@ -117,6 +119,8 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
         evaluations=_count(found.evaluations),
         undetermined=_undetermined(found),
     )
+    wrong = fault_of_linear(run.derivatives, run.frequencies, run.known_to, scene)
+    _require(not wrong, wrong)
     good = _finite_samples(run, finished)
     run = run if good == count else first_samples(run, good)
     for name, path in run.markers.items():
@@ -165,6 +169,8 @@ def _known(scene: Scene) -> dict[str, set[str]]:
         "connectors": _names(each for each in scene.connectors if isinstance(each, BetweenNodes)),
         "hinge_forces": _names(each for each in scene.connectors if not isinstance(each, BetweenNodes)),
         "energy": set(ENERGIES),
+        "derivatives": set(DERIVATIVES),
+        "known_to": {*DERIVATIVES, FREQUENCIES},
     }
 
 
@@ -234,6 +240,8 @@ def _signals(run: Trajectory) -> Iterator[tuple[str, Real]]:
             yield f"markers[{name!r}].{part.name}", getattr(path, part.name)
     for output in OUTPUTS:
         found = getattr(run, output)
+        if output == "known_to":
+            continue  # an engine may say that it does not know: infinity
         if isinstance(found, dict):
             for name, values in found.items():
                 yield f"{output}[{name!r}]", _determined(run, output, name, values)

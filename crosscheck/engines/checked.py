@@ -74,4 +74,5 @@ class CheckedModel:
         return self.model.evaluate()
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
-        return checked_run(self.model.simulate(Run(times=run.times.copy()), effort), run.times, self.scene)
+        own = Run(times=run.times.copy(), linear=run.linear)
+        return checked_run(self.model.simulate(own, effort), run.times, self.scene)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, Protocol, runtime_checkable
 
+from crosscheck.engines.linear.parts import LinearPart as LinearPart
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -31,9 +32,12 @@ class Run:
 
     The first time is 0, unless the engine's `takes` names "t_start". The scene's initial state belongs to the first
     time; functions of time, controllers and events use the times as given.
+    `linear`: what of the linearised motion is wanted at every sample, "derivatives", "frequencies" or both; an engine
+    that does not offer it leaves it out.
     """
 
     times: Real
+    linear: tuple[LinearPart, ...] = ()
 
     @property
     def t_start(self) -> float:
@@ -121,7 +125,12 @@ class Trajectory:
     Names are those of the scene. A marker, load or energy that is left out is a channel that the engine does not offer.
     `loads`, `wheel_loads`, `connectors` (T,6); `drives` (T,n); `hinge_forces` (T,1); `energy` of each kind (T,);
     `momentum` (T,6); `work` (T,): the work done so far by drives, motors, dampers, friction, actuators and loads, if
-    the engine integrates it. `wall_s` is the time of the solve alone. `undetermined`: the channels
+    the engine integrates it. `wall_s` is the time of the solve alone, without that of `derivatives` and `frequencies`,
+    which are given only where the run asks for them: `derivatives` "by_displacement", "by_speed" and "by_force"
+    (T,n*n) are those of the accelerations of the n free speeds at every sample, row by row in the order and by the
+    displacements of `crosscheck.engines.linear.coordinates`; `frequencies` (T,n) rad/s as
+    `crosscheck.engines.linear.frequencies` defines them; `known_to` (T,), by these names and "frequencies", says how
+    far (Frobenius norm) they may be from those of the same state in exact arithmetic. `undetermined`: the channels
     "load:<name>.torque", "load:<name>.force" or "drive:<name>" that redundant closures leave undetermined; they may
     hold NaN and are not compared.
     """
@@ -138,6 +147,9 @@ class Trajectory:
     energy: dict[str, Real] = _by_name()
     momentum: Real | None = _single(6)
     work: Real | None = _single()
+    derivatives: dict[str, Real] = _by_name(None)
+    frequencies: Real | None = _single(None)
+    known_to: dict[str, Real] = _by_name()
     wall_s: float = 0.0
     evaluations: int = 0
     undetermined: tuple[str, ...] = ()
@@ -147,6 +159,8 @@ OUTPUTS: dict[str, tuple[int | None, ...]] = {
     each.name: each.metadata["columns"] for each in fields(Trajectory) if "columns" in each.metadata
 }
 """The outputs of a run other than markers, with the shape of each array without its axis of T samples; None is any."""
+LINEAR = ("derivatives", "frequencies", "known_to")
+"""The outputs that a run has only if it asks for them."""
 
 
 @runtime_checkable

@@ -11,6 +11,7 @@ the same kinematics. They are of first order in the deformation, which is level 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 
@@ -18,6 +19,7 @@ import numpy as np
 
 from crosscheck.engines.answers import LOAD_PARTS
 from crosscheck.engines.contract import (
+    LINEAR,
     OUTPUTS,
     Effort,
     MarkerPath,
@@ -28,6 +30,7 @@ from crosscheck.engines.contract import (
     Support,
     Trajectory,
 )
+from crosscheck.engines.native_linear import linear_outputs
 from crosscheck.engines.pace import fastest_mode, pace
 from crosscheck.engines.steps import USUAL_S, ladder
 from crosscheck.engines.trajectories import first_samples
@@ -199,12 +202,15 @@ class NativeModel:
             markers={
                 name: MarkerPath(path.position, path.quaternion, path.velocity) for name, path in done.markers.items()
             },
-            **{name: getattr(done, name) for name in OUTPUTS},
+            **{name: getattr(done, name) for name in OUTPUTS if name not in LINEAR},
             wall_s=done.statistics.run_s,
             evaluations=done.statistics.evaluations,
             undetermined=tuple(_undetermined(done)),
         )
-        return first_samples(found, int(np.isin(done.t, run.times).sum()))  # Zeno events end a run between samples
+        found = first_samples(found, int(np.isin(done.t, run.times).sum()))  # Zeno events end a run between samples
+        states = (done.state_at(sample) for sample in range(len(found.times)))
+        asked = linear_outputs(self._system, self._algorithm, states, run.linear)
+        return replace(found, **asked.as_outputs)
 
 
 def _undetermined(done: NativeTrajectory) -> Iterator[str]:

@@ -12,6 +12,8 @@ from scipy.integrate import solve_ivp
 
 from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
+from crosscheck.engines.linear.matrices import StateDerivatives
+from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs, outputs
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.functions import Function
 from flexmb.scene.schema import Scene
@@ -39,11 +41,17 @@ class Observer(Protocol):
     def observe(self, t: float, state: Any) -> Snapshot: ...
 
 
-class ScipyModel:
-    """A scene compiled for a peer that SciPy's DOP853 steps."""
+class Linearised(Protocol):
+    def at(self, t: float, state: Any) -> StateDerivatives: ...
 
-    def __init__(self, scene: Scene, dynamics: EquationsOfMotion, observer: Observer) -> None:
-        self._dynamics, self._observer = dynamics, observer
+
+class ScipyModel:
+    """A scene compiled for a peer that SciPy's DOP853 steps; `linear` gives its derivatives, None if it has none."""
+
+    def __init__(
+        self, scene: Scene, dynamics: EquationsOfMotion, observer: Observer, linear: Linearised | None = None
+    ) -> None:
+        self._dynamics, self._observer, self._linear = dynamics, observer, linear
         self._functions = scene_functions(scene)
 
     def warm_up(self) -> None:
@@ -61,7 +69,17 @@ class ScipyModel:
         wall = time.perf_counter() - start
         samples = [self._observed(t, y) for t, y in zip(run.times, states, strict=False)]
         work = np.array([y[-1] for y in states])
-        return stack(run.times, samples, message=message, wall_s=wall, evaluations=evaluations, work=work)
+        linear = self._linearised(run, states)
+        return stack(
+            run.times, samples, message=message, wall_s=wall, evaluations=evaluations, work=work, linear=linear
+        )
+
+    def _linearised(self, run: Run, states: list[Real]) -> LinearOutputs:
+        at = self._linear
+        if at is None:
+            return NOTHING
+        pairs = zip(run.times, states, strict=False)
+        return outputs(run.linear, (at.at(t, self._dynamics.state(t, y)) for t, y in pairs))
 
     def _observed(self, t: float, y: Real) -> Snapshot:
         return self._observer.observe(t, self._dynamics.state(t, y))

@@ -8,12 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.contract import OUTPUTS, MarkerPath, Snapshot, Trajectory
+from crosscheck.engines.contract import LINEAR, OUTPUTS, MarkerPath, Snapshot, Trajectory
+from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs
 from flexmb.typing import Real
+
+OF_A_STATE = tuple(name for name in OUTPUTS if name not in ("work", *LINEAR))
+"""The outputs that a snapshot has too."""
 
 
 def stack(
-    asked: Real, samples: Sequence[Snapshot], *, message: str, wall_s: float, evaluations: int, work: Real | None = None
+    asked: Real,
+    samples: Sequence[Snapshot],
+    *,
+    message: str,
+    wall_s: float,
+    evaluations: int,
+    work: Real | None = None,
+    linear: LinearOutputs = NOTHING,
 ) -> Trajectory:
     """One trajectory from the snapshot of each sample time reached; diverged unless all of `asked` (T,) were reached.
 
@@ -32,7 +43,8 @@ def stack(
             )
             for name in first.markers
         },
-        **{name: _stacked([getattr(sample, name) for sample in samples]) for name in OUTPUTS if name != "work"},
+        **{name: _stacked([getattr(sample, name) for sample in samples]) for name in OF_A_STATE},
+        **linear.as_outputs,
         work=work,
         wall_s=wall_s,
         evaluations=evaluations,

@@ -7,12 +7,13 @@ up to there and that of the reference. Goals and scales are those of the engine'
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from crosscheck.judging.entries import coordinates_of, with_worst_entry
 from crosscheck.judging.finer import finer_efforts
 from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
@@ -77,20 +78,21 @@ def judge_reference(case: CaseResults) -> Iterator[Verdict]:
             absent = Finding("did not run", f"the stored reference cannot be used: {recorded.fault}")
             yield from (question.verdict(pattern, goal, absent) for pattern, goal in asked.goals.items())
             continue
-        for channel, goal, finding in hold(result, signals, asked, goal_of=question.goal):
+        names = coordinates_of(case.case.variants.get(recorded.variant))
+        for channel, goal, finding in hold(result, signals, asked, goal_of=question.goal, coordinates=names):
             advice = finer_efforts(case.case, channel, question.goal(channel, goal), finding, (result,))
             yield question.verdict(channel, goal, finding, advice=advice)
 
 
 def hold(
     result: Result, reference: ReferenceSignals, asked: Asked, like: Result | None = None,
-    goal_of: Callable[[str, float], float] = lambda channel, goal: goal,
+    goal_of: Callable[[str, float], float] = lambda channel, goal: goal, coordinates: Sequence[str] = (),
 ) -> Iterator[tuple[str, float, Finding]]:
     """The finding on every channel of the reference that has a goal, with that goal. Never raises.
 
-    `goal_of` replaces the goal of a channel. `like` is the result whose U is used: for a control that of the unmutated
-    run. A kind of energy that the engine does not offer is left out; any other channel counts as refused. A result that
-    did not finish has its status for each goal.
+    `goal_of` replaces the goal of a channel. `coordinates` name the rows of derivatives. `like` is the result whose U
+    is used: for a control that of the unmutated run. A kind of energy that the engine does not offer is left out; any
+    other channel counts as refused. A result that did not finish has its status for each goal.
     """
     if result.status != "finished":
         ending = result.ending
@@ -111,7 +113,10 @@ def hold(
             scaled = most_specific(asked.scales, channel)
             scale = asked.scales[scaled] if scaled is not None else None
             own = at_samples(result.control_signal(channel, like or result, across=False), places)
-            yield channel, goal, compare(channel, own, reference.signal(channel), goal_of(channel, goal), scale)
+            stored = reference.signal(channel)
+            found = compare(channel, own, stored, goal_of(channel, goal), scale)
+            apart = with_worst_entry(found, channel, own.values, stored.values, reference.times, coordinates)
+            yield channel, goal, apart
         elif channel in result.undetermined:
             yield channel, goal, not_determined(result.engine)
         elif not channel.startswith("energy."):

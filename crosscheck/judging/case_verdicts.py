@@ -8,6 +8,7 @@ import numpy as np
 
 from crosscheck.judging.against_reference import judge_reference
 from crosscheck.judging.basis import basis
+from crosscheck.judging.entries import coordinates_of, with_worst_entry
 from crosscheck.judging.expectation import outside
 from crosscheck.judging.finer import finer_efforts
 from crosscheck.judging.question import Question
@@ -46,7 +47,10 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
         wanted = question.goal(channel, goal)
         if finding is None:
             scale = _scale(item.scales, channel)
-            finding = compare(channel, a.signal(channel, across), b.signal(channel, across), wanted, scale)
+            one, other = a.signal(channel, across), b.signal(channel, across)
+            finding = compare(channel, one, other, wanted, scale)
+            names = coordinates_of(case.case.variants.get(a.variant))
+            finding = with_worst_entry(finding, channel, one.values, other.values, a.times, names)
         beyond = outside(item, channel, finding) if finding.status == item.expect else ""
         advice = finer_efforts(case.case, channel, wanted, finding, (a, b))
         yield question.verdict(channel, goal, finding, beyond, advice)
@@ -93,8 +97,10 @@ def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
         if finding is None:
             finding = _absent(twin, channel)
         if finding is None:
-            signal = faulty.control_signal(channel, twin, across)
-            finding = compare(channel, signal, b.signal(channel, across), goal, _scale(item.scales, channel))
+            signal, other = faulty.control_signal(channel, twin, across), b.signal(channel, across)
+            finding = compare(channel, signal, other, goal, _scale(item.scales, channel))
+            names = coordinates_of(case.case.variants.get(b.variant))
+            finding = with_worst_entry(finding, channel, signal.values, other.values, b.times, names)
         yield question.verdict(channel, goal, finding)
     if _missing(faulty, b) is None and _elsewhere(faulty, b) is None:
         for pattern, finding in _unused(item.goals, {"scale": item.scales}, faulty, b):

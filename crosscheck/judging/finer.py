@@ -14,14 +14,15 @@ MOST = 6  # efforts more; if they do not do, the goal is beyond the method
 NO_GOAL = 0.1  # a U above this part of the range resolves nothing that could be claimed
 FIRST_TRY = 3  # efforts more, where nothing is resolved yet
 FIRST_ORDER = 1.0
+HALF = 0.5
 BEYOND = "more efforts will not do"
 
 
 def finer_efforts(case: CaseRecord, channel: str, goal: float, finding: Finding, results: Iterable[Result]) -> str:
     """What to add to the command, or to claim, if finished runs agree but for a U above the goal; else "".
 
-    U is expected to fall with the observed order, else with the first; with tolerances as they do. The advice is for
-    the engine whose U is the largest.
+    U is expected to fall with the observed order, else with the first; with tolerances as they do. What an engine says
+    of its own derivatives does not fall. The advice is for the engine whose U is the largest.
     """
     U = finding.U
     if finding.status != "unresolved" or U is None or not (0.0 < goal < U < inf):
@@ -37,7 +38,8 @@ def finer_efforts(case: CaseRecord, channel: str, goal: float, finding: Finding,
     count = ceil(log(U / goal) / (max(order or FIRST_ORDER, FIRST_ORDER) * log(ratio)))
     unresolved = U > NO_GOAL  # no accuracy to claim: whatever more efforts reach, they come first
     more = continued("step" if kind == "step" else "tolerance", values, min(count, FIRST_TRY if unresolved else MOST))
-    if not more or (not unresolved and len(more) < count):
+    inherent = worst.own_account(channel) > HALF * worst.uncertainty(channel).value  # of differences, at any effort
+    if inherent or not more or (not unresolved and len(more) < count):
         reached = float(f"{2.0 * U:.1g}")
         return f"{BEYOND}: claim what it reaches, such as --goal {worst.engine}={min(reached, 1.0):g}"
     wanted = ",".join(f"{value:g}" for value in (*case.claims.efforts_of(worst.engine), *more))

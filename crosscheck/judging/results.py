@@ -9,13 +9,16 @@ from functools import cached_property
 import numpy as np
 
 from crosscheck.judging.sizes import Sizes
-from crosscheck.judging.uncertainty import RUNGS, RungSignal, Uncertainty, estimate, spatial, unknown
+from crosscheck.judging.uncertainty import RUNGS, RungSignal, Uncertainty, at_rest, estimate, spatial, unknown
 from crosscheck.judging.verdict import Ending, Signal
+from crosscheck.library.channels import is_judged, known_to
 from crosscheck.records.drawing import FILM
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record, RunRecord, RunStatus
 from crosscheck.records.packing import Packed, unpack
+from flexmb.run.channels import signal_range
 from flexmb.typing import Real
 
+AT_REST = 1e-12  # m or rad: what stays within it has not moved
 NEEDED = 3  # the last efforts, which must all be recorded for an estimate of U
 Key = tuple[str, str, str]  # variant, engine, role
 
@@ -49,7 +52,7 @@ class Result:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        return tuple(self.finest.channels) if self.status == "finished" else ()
+        return tuple(filter(is_judged, self.finest.channels)) if self.status == "finished" else ()
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -88,10 +91,37 @@ class Result:
         if gap:
             return unknown(len(self.values(channel)), gap)
         ladder = [run for run in self._ladder() if run.status == "finished" and channel in run.channels]
+        size = self._sizes.magnitude(channel, finest.evaluations)
         if _without_effect(ladder):
+            if known_to(channel) in finest.channels and self.rests:
+                return self._with_own(channel, at_rest(len(self.values(channel)), size, finest.evaluations))
             ladder = ladder[-1:]
         rungs = [RungSignal(run.effort_value, self.values(channel, run), run.evaluations) for run in ladder]
-        return estimate(channel, finest.effort_kind, rungs, self._sizes.magnitude(channel, finest.evaluations))
+        return self._with_own(channel, estimate(channel, finest.effort_kind, rungs, size))
+
+    @property
+    def rests(self) -> bool:
+        """Whether nothing that is seen moves: then efforts that give the same are no sign that they are ignored."""
+        seen = [name for name in self.finest.channels if name.endswith((".position", ".orientation"))]
+        return bool(seen) and all(signal_range(name, self.values(name)) <= AT_REST for name in seen)
+
+    def _with_own(self, channel: str, of_run: Uncertainty) -> Uncertainty:
+        """U with what the engine says of how well it knows a derivative or a frequency of a state."""
+        own = self._own(channel)
+        if own is None:
+            return of_run
+        envelope = of_run.envelope + np.maximum.accumulate(own)
+        how = f"{of_run.how}; {self.own_account(channel):.1e} by the engine's own account"
+        return Uncertainty(envelope, float(envelope[-1]), how, of_run.order)
+
+    def own_account(self, channel: str) -> float:
+        """How well the engine says that it knows a derivative or a frequency of a state (SI); 0 for other channels."""
+        own = self._own(channel)
+        return 0.0 if own is None else float(np.max(own))
+
+    def _own(self, channel: str) -> Real | None:
+        packed = self.finest.channels.get(known_to(channel))
+        return None if packed is None else self._array(packed)[:, 0]
 
     def _ladder(self) -> list[RunRecord]:
         method = (self.finest.effort_kind, self.finest.effort_method)

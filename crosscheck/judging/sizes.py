@@ -2,7 +2,8 @@
 
 By symmetry a force, a momentum or a rate may vanish; then its range is only rounding, and a goal relative to that would
 mean nothing. Such a signal is measured by the size of its family. If the whole family vanishes, the size follows from
-other signals of the scene: of a linear momentum 2 T/v, of an angular one 2 T/w, of a force a torque over the extent.
+other signals of the scene: of a linear momentum 2 T/v, of an angular one 2 T/w, of a force a torque over the extent, of
+frequencies and of derivatives by speeds w, of derivatives by displacements w^2.
 """
 
 from __future__ import annotations
@@ -78,6 +79,10 @@ class Sizes:
                 return _ratio(action, max(speed, turning * extent))
             case "angular":
                 return _ratio(action, max(turning, _ratio(speed, extent)))
+            case "by_displacement":
+                return max(turning, _ratio(speed, extent)) ** 2
+            case "by_speed" | "frequencies":
+                return max(turning, _ratio(speed, extent))
         return 0.0
 
     @cached_property

@@ -37,6 +37,9 @@ the size of the signal (Henrici 1962); systematic growth beyond that shows in th
 largest signal of the same family (all hinge torques, all positions): a backward-stable solve has errors relative to the
 norm of all unknowns.
 
+**Rest.** Efforts that made as many evaluations and gave the same result in every channel were ignored by the engine,
+and tell nothing. Derivatives of a state that rests are the exception: where nothing moves, every effort has that state.
+
 Runs that are not a ladder of finite results at decreasing efforts have an infinite U with the reason, and comparisons
 with it are unresolved.
 """
@@ -94,6 +97,14 @@ class RungSignal:
 def unknown(samples: int, why: str) -> Uncertainty:
     """An infinite U, for the reason `why`."""
     return Uncertainty(np.full(samples, np.inf), float("inf"), f"unknown: {why}")
+
+
+def at_rest(samples: int, size: float, evaluations: int) -> Uncertainty:
+    """That of a state which rests, and is the same at every effort: round-off of signals of that size."""
+    if not (0.0 <= size < np.inf and 0 <= evaluations < np.inf):
+        return unknown(samples, f"{evaluations} evaluations of a signal of size {size:g} leave no round-off to be told")
+    floor = roundoff_floor(size, max(evaluations, samples))
+    return Uncertainty(np.full(samples, floor), floor, "the state rests at every effort")
 
 
 def estimate(channel: str, kind: str, rungs: Sequence[RungSignal], size: float) -> Uncertainty:

@@ -69,10 +69,11 @@ A case is a folder ``cases/<family>/<case>/`` with ``scene.toml`` (and further s
 
 Channels are named ``marker:<name>.position | orientation | velocity | angular_velocity``, ``energy.<kind>``,
 ``energy.total``, ``momentum.angular | linear``, ``load:<hinge>.torque | force``,
-``wheel_load:<wheel>.torque | force`` and ``drive:<name>``. A pattern is a channel, a shell pattern of one
-(``marker:*.position``), or its beginning (``load``, ``load:elbow``, ``energy``); the longest that names a channel
-counts. A goal is the largest uncertainty, relative to the channel's range, with which a comparison still counts as
-resolved.
+``wheel_load:<wheel>.torque | force`` and ``drive:<name>``; of the linearised motion, where a variant asks for it,
+``derivatives.by_displacement | by_speed | by_force`` and ``frequencies`` (`crosscheck.engines.linear`). A pattern is a
+channel, a shell pattern of one (``marker:*.position``), or its beginning (``load``, ``load:elbow``, ``energy``); the
+longest that names a channel counts. A goal is the largest uncertainty, relative to the channel's range, with which a
+comparison still counts as resolved.
 
 An expectation other than *agree* needs its reason in words, and bounds within which it is as expected:
 ``band`` for E (*differ*) or U (*unresolved*), for each pattern of channels ``[low, high]`` with high at
@@ -91,7 +92,9 @@ All keys, with defaults in brackets; the structs below explain them:
   ``split_body`` [every beam] alone; ``level`` [the scene's] of all flexible bodies; ``refined`` [none] with
   ``segments``, ``pieces`` or ``elements`` and ``order`` [2.0]; ``engines``; ``also`` [none]; ``efforts`` [the
   engine's own], each with ``engine``, ``kind`` ("tolerance" or "step"), ``method`` and falling ``values``;
-  ``duration_s`` and ``samples`` [the case's]; ``note`` [none], shown in the report;
+  ``duration_s`` and ``samples`` [the case's]; ``start`` [the scene's], "equilibrium" near it; ``linear`` [none],
+  what its engines are asked of the linearised motion at every sample: "derivatives", "frequencies" or both; ``note``
+  [none], shown in the report;
 - ``comparison``: ``name``; ``variant`` with ``engines`` [all of the variant's], or ``a`` and ``b``, each with a
   ``variant`` and an ``engine``; ``goals``; ``scales`` [the ranges] (SI); ``expect`` ["agree"]; ``band``, ``diverged_s``
   or ``because``, as ``expect`` needs; ``reason``;
@@ -113,6 +116,7 @@ from typing import Literal
 
 import msgspec
 
+from crosscheck.engines.contract import LinearPart
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.recipe import EffortLadder, ReferenceRecipe
 from flexmb.scene.schema import Level
@@ -138,6 +142,7 @@ MutationKind = Literal[
     "sensor_sign", "sensor_component", "event_level", "event_crossing", "event_dropped", "event_hold",
     "event_restitution", "event_value", "event_order",
 ]  # fmt: skip
+Start = Literal["equilibrium"]
 Family = Literal["closed_form", "published", "converged", "agreed"]
 ReferenceKind = Literal[
     "published", "closed form", "independent codes", "native, two formulations", "high precision"
@@ -183,7 +188,9 @@ class Variant(_CasePart, frozen=True, kw_only=True):
     beam, or `split_body` only, as `segments` rigid segments) or "substructures" (likewise as `pieces` flexible pieces
     welded together, each with `eigenmodes` besides its attachment modes). `level` replaces the level of every flexible
     body. `engines` are compared engine by engine; those in `also` run the variant too, for its charts and for what
-    names them. `duration_s` and `samples` replace the case's. `note` is shown in the report.
+    names them. `duration_s` and `samples` replace the case's. `start` = "equilibrium" replaces the initial state by the
+    equilibrium that flexmb finds from it. `linear` asks for derivatives of accelerations and for
+    eigenfrequencies at every sample. `note` is shown in the report.
     """
 
     name: str
@@ -200,7 +207,14 @@ class Variant(_CasePart, frozen=True, kw_only=True):
     efforts: tuple[EffortLadder, ...] = ()
     duration_s: float | None = None
     samples: int | None = None
+    start: Start | msgspec.UnsetType = msgspec.UNSET  # neither is among the keys of records without it
+    linear: tuple[LinearPart, ...] | msgspec.UnsetType = msgspec.UNSET
     note: str = ""
+
+    @property
+    def asks(self) -> tuple[LinearPart, ...]:
+        """What its engines are asked of the linearised motion."""
+        return () if isinstance(self.linear, msgspec.UnsetType) else self.linear
 
 
 class Comparison(_CasePart, frozen=True, kw_only=True):

@@ -1,7 +1,7 @@
 """A table of the kinds of channels, for patterns, records, reports and `crosscheck verify`.
 
 A channel of an item of the scene is named `<kind>:<item>.<part>` (`load:elbow.torque`, `drive:elbow`), any other
-`<kind>.<part>` (`energy.total`) or `<kind>` (`work`). `flexmb.run.channels` extracts the channels of a
+`<kind>.<part>` (`energy.total`) or `<kind>` (`work`). `crosscheck.engines.signals` extracts the channels of a
 trajectory; a test compares this table with it.
 """
 
@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from crosscheck.engines.contract import ENERGIES
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.signals import KNOWN_TO
 
 
 @dataclass(frozen=True)
@@ -76,13 +78,42 @@ KINDS = (
     ChannelKind("hinge_force", "Connector loads", of_items=True, parts=(Part("", "Loads along hinges", None),)),
     ChannelKind("drive", "Drive loads", of_items=True, parts=(Part("", "Drive loads", None),)),
     ChannelKind("work", "", of_items=False, parts=(Part("", "work", 1, "J"),)),
+    ChannelKind(
+        "derivatives",
+        "Derivatives of accelerations",
+        of_items=False,
+        parts=(
+            Part("by_displacement", "Derivatives by displacements", None),
+            Part("by_speed", "Derivatives by speeds", None),
+            Part("by_force", "Derivatives by forces", None),
+        ),
+    ),
+    ChannelKind(FREQUENCIES, "Eigenfrequencies", of_items=False, parts=(Part("", "Eigenfrequencies", None, "rad/s"),)),
+    ChannelKind(
+        KNOWN_TO,
+        "",
+        of_items=False,
+        parts=tuple(Part(name, f"how well {name} is known", 1) for name in (*DERIVATIVES, FREQUENCIES)),
+    ),
 )
+LINEAR_KINDS = ("derivatives", "frequencies", KNOWN_TO)
+"""Kinds of the linearised motion, which a run has only where its variant asks for them."""
 CONSERVED = {"energy": "energy.total", "linear_momentum": "momentum.linear", "angular_momentum": "momentum.angular"}
 
 
 def kind_named(name: str) -> ChannelKind:
     """The kind of channels called `name`."""
     return next(kind for kind in KINDS if kind.name == name)
+
+
+def is_judged(channel: str) -> bool:
+    """Whether a recorded channel is a signal, and not what an engine says of how well it knows one."""
+    return not channel.startswith(f"{KNOWN_TO}.")
+
+
+def known_to(channel: str) -> str:
+    """The channel by which an engine says how well it knows another one; no run has one of most channels."""
+    return f"{KNOWN_TO}.{channel.removeprefix('derivatives.')}"
 
 
 def part_of(channel: str) -> Part | None:

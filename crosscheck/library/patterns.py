@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
 
+from crosscheck.engines.signals import KNOWN_TO
 from crosscheck.library.channels import KINDS
 from flexmb.run.channels import matches
 
 PARTS = {kind.name: tuple(part.name for part in kind.parts if part.name) for kind in KINDS if kind.of_items}
-WHOLE = {kind.name: tuple(part.name for part in kind.parts if part.name) for kind in KINDS if not kind.of_items}
+WHOLE = {
+    kind.name: tuple(part.name for part in kind.parts if part.name)
+    for kind in KINDS
+    if not kind.of_items and kind.name != KNOWN_TO
+}
 
 
 def most_specific(patterns: Iterable[str], channel: str) -> str | None:

@@ -95,7 +95,8 @@ def scene_digest(case: Case, variant: Variant) -> str:
     try:
         scene = json.dumps(parse_toml(_text(case.folder / variant.scene)), sort_keys=True, default=str)
         model = msgspec.structs.replace(
-            variant, engines=(), also=(), efforts=(), refined=None, duration_s=None, samples=None, note=""
+            variant, engines=(), also=(), efforts=(), refined=None, duration_s=None, samples=None, linear=msgspec.UNSET,
+            note="",
         )
         found = hashlib.sha256(scene.encode() + msgspec.json.encode(model))
         for body in case.scene(variant).bodies:
@@ -128,7 +129,8 @@ def column_names(channel: str, width: int) -> list[str]:
     """Names of a channel's columns, with its unit: "marker:tip.position.x [m]"; a quaternion has no unit."""
     symbol = "1" if channel.endswith(".orientation") else unit(channel)
     letters = {1: [""], 3: [".x", ".y", ".z"], 4: [".w", ".x", ".y", ".z"]}
-    endings = [f".{i}" for i in range(width)] if channel.startswith("drive:") else letters[width]
+    numbered = channel.startswith(("drive:", "derivatives.", "frequencies"))
+    endings = [f".{i}" for i in range(width)] if numbered else letters[width]
     return [f"{channel}{ending} [{symbol}]" for ending in endings]
 
 

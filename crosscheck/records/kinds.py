@@ -42,7 +42,8 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """What the report needs of a variant's scene: levels of its bodies, its drawing, or why it could not be made.
 
     `drawing` uses the markers of every run, `film` those of a run made for the animation. `basis` identifies scene,
-    transformation and sample times as given in the case's files ("" in older records).
+    transformation and sample times as given in the case's files ("" in older records). `coordinates` are the names of
+    those by which derivatives are given, where the variant asks for them.
     """
 
     level: str
@@ -50,6 +51,7 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     error: str = ""
     film: Drawing | None = None
     basis: str = ""
+    coordinates: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):

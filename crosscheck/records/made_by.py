@@ -28,6 +28,8 @@ RECORDING = (
     "crosscheck.engines.checked",
     "crosscheck.engines.answers",
     "crosscheck.engines.contract",
+    "crosscheck.engines.linear.answer",
+    "crosscheck.engines.signals",
     "crosscheck.engines.trajectories",
     "crosscheck.records.kinds",
     "crosscheck.records.packing",

@@ -13,6 +13,7 @@ import numpy as np
 
 from crosscheck.judging.against_reference import REFERENCE
 from crosscheck.judging.case_verdicts import drift_of
+from crosscheck.judging.entries import SYMBOL
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import Verdict
 from crosscheck.library.channels import CONSERVED, KINDS
@@ -20,7 +21,7 @@ from crosscheck.report.animation import animations
 from crosscheck.report.store import Store
 from crosscheck.report.workprecision import WorkPrecision, work_precision
 from flexmb.output.printable import printable
-from flexmb.run.channels import distance, family, matches, signal_range, unit
+from flexmb.run.channels import distance, family, matches, norms, signal_range, unit
 from flexmb.typing import Real
 
 COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}
@@ -85,24 +86,29 @@ def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]
             if result.runs and channel in result.finest.channels:
                 sides[result.variant, result.engine] = result
     several = len({variant for variant, _ in sides}) > 1
-    width = next(iter(sides.values())).values(channel).shape[1]
+    width = _shown(channel, next(iter(sides.values())).values(channel)).shape[1]
     return {
         "name": channel,
         "unit": unit(channel),
-        "components": COMPONENTS.get(width, [str(i + 1) for i in range(width)]),
+        "components": ["norm"] if channel in SYMBOL else COMPONENTS.get(width, [str(i + 1) for i in range(width)]),
         "size": min(signal_range(channel, result.values(channel)) for result in sides.values()),
-        "range": _shown_range([result.values(channel) for result in sides.values()]),
+        "range": _shown_range([_shown(channel, result.values(channel)) for result in sides.values()]),
         "sides": [
             {
                 "label": _label(result, several),
                 "engine": result.engine,
                 "times": store.times(result.times),
-                "values": store.signal(result, channel),
+                "values": store.samples(_shown(channel, result.values(channel))),
             }
             for result in sides.values()
         ],
         "pairs": [_pair(store, case, channel, verdict) for verdict in pairs if verdict.E is not None],
     }
+
+
+def _shown(channel: str, values: Real) -> Real:
+    """The curves (T, k) of a channel: of a matrix its norm, as its verdict names the entry that differs most."""
+    return norms(values)[:, None] if channel in SYMBOL else values
 
 
 def _pair(store: Store, case: CaseResults, channel: str, verdict: Verdict) -> dict[str, Any]:

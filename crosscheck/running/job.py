@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from crosscheck.engines.contract import Effort
+from crosscheck.engines.contract import Effort, LinearPart
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from flexmb.scene.schema import Scene
@@ -32,7 +32,8 @@ class Job:
     efforts more (`crosscheck.running.ladder`). `finest_only` runs only the last effort. Efforts too coarse to enter the
     uncertainty store only the channels `kept`. `done` are the runs already recorded for this very scene. A job with an
     `error` cannot be run. It is stopped after `time_limit_s`; `expected_s` is what it took the last time, None if
-    unknown. A `lean` job runs each effort once, even a short one, and stores only `kept`.
+    unknown. A `lean` job runs each effort once, even a short one, and stores only `kept`. `linear` is what it asks of
+    the linearised motion.
     """
 
     case: str
@@ -54,6 +55,7 @@ class Job:
     time_limit_s: float = TIME_LIMIT_S
     expected_s: float | None = None
     lean: bool = False
+    linear: tuple[LinearPart, ...] = ()
 
     @property
     def work(self) -> tuple[str, str, str, str]:

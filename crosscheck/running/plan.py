@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import replace
 from pathlib import Path
+from typing import assert_never
 
 import msgspec
 import numpy as np
@@ -12,7 +13,8 @@ import numpy as np
 from crosscheck.drawing.draw import draw
 from crosscheck.drawing.film import EFFORT as FILM_EFFORT
 from crosscheck.drawing.film import ENGINE, FRAMES, film, film_channels
-from crosscheck.engines.contract import Effort
+from crosscheck.engines.contract import Effort, LinearPart
+from crosscheck.engines.linear.coordinates import coordinate_names, is_counted
 from crosscheck.engines.registry import home
 from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, RunFile, Variant
 from crosscheck.library.digests import case_digests
@@ -91,10 +93,14 @@ def _with_efforts(run: RunFile, case: Case) -> RunFile:
 
 
 def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None) -> Scene:
-    """The scene with the variant's levels and its transformation; `refined` sets the number of beam elements."""
+    """The scene with the variant's levels, transformation and start; `refined` sets the number of beam elements."""
     scene = at_level(scene, variant)
     if refined is not None and refined.elements is not None:
         scene = _on_beams(scene, elements=refined.elements)
+    return _begun(_transformed(scene, variant), variant)
+
+
+def _transformed(scene: Scene, variant: Variant) -> Scene:
     match variant.transform:
         case "rigidify":
             return rigidify(scene)
@@ -107,6 +113,19 @@ def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None
             assert variant.pieces is not None
             return substructured(scene, variant.split_body, variant.pieces, eigenmodes=variant.eigenmodes)
     return scene
+
+
+def _begun(scene: Scene, variant: Variant) -> Scene:
+    """The scene in the state in which the variant begins; a mutated one in its own equilibrium."""
+    match variant.start:
+        case msgspec.UnsetType():
+            return scene
+        case "equilibrium":
+            from crosscheck.running.at_rest import at_rest  # loads the compiler
+
+            return at_rest(scene)
+        case _:
+            assert_never(variant.start)
 
 
 def at_level(scene: Scene, variant: Variant) -> Scene:
@@ -128,19 +147,21 @@ def sample_times(run: RunFile, variant: Variant) -> Real:
 def jobs_at(jobs: list[Job], times: Real) -> list[Job]:
     """The same jobs with samples at `times` (T,) s, which need not be equally spaced."""
     return [
-        replace(job, times=times, scene_id="" if job.scene is None else scene_identity(job.scene, times))
+        replace(job, times=times, scene_id="" if job.scene is None else scene_identity(job.scene, times, job.linear))
         for job in jobs
     ]
 
 
-def scene_identity(scene: Scene, times: Real) -> str:
-    """Digest of a scene, of the files it refers to, and of the sample times: the same runs have the same digest."""
+def scene_identity(scene: Scene, times: Real, linear: tuple[LinearPart, ...] = ()) -> str:
+    """Digest of a scene, of the files it refers to, of the sample times, and of what is asked of the linearised motion:
+    the same runs have the same digest."""
     digest = hashlib.sha256(msgspec.json.encode(scene))
     for body in scene.bodies:
         file = getattr(body, "file", None)
         if file is not None:
             digest.update(Path(file).read_bytes())
     digest.update(times.tobytes())
+    digest.update(" ".join(sorted(linear)).encode())
     return digest.hexdigest()[:16]
 
 
@@ -165,12 +186,13 @@ def _job(
     case: Case, run: RunFile, variant: Variant, role: str, engine: str, scene: Scene | None, error: str, provider: str
 ) -> Job:
     times = sample_times(run, variant)
-    scene_id = "" if scene is None else scene_identity(scene, times)
+    linear = () if role == FILM else variant.asks
+    scene_id = "" if scene is None else scene_identity(scene, times, linear)
     return Job(
         case.name, variant.name, role, engine, scene, scene_id, times, provider, home(engine),
         efforts=prescribed(variant, engine), extra=case.claims.efforts_of(engine),
         finer=run.finer if joining(case.run, [engine]) else 0, finest_only=role != MAIN,
-        kept=tuple(chart.observable for chart in run.charts), error=error,
+        kept=tuple(chart.observable for chart in run.charts), error=error, linear=linear,
     )  # fmt: skip
 
 
@@ -208,7 +230,10 @@ def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> Vari
     drawn = case.scene(variant) if variant.transform in TAKES_APART else scene
     drawable = all(not isinstance(body, SidBody) for body in drawn.bodies)  # a SID body's nodes are in its file
     drawing = draw(drawn) if drawable else None
-    return VariantInfo(level=_levels(scene), drawing=drawing, basis=scene_basis(case, variant))
+    info = VariantInfo(level=_levels(scene), drawing=drawing, basis=scene_basis(case, variant))
+    if not (variant.asks and is_counted(scene)):
+        return info
+    return msgspec.structs.replace(info, coordinates=coordinate_names(scene))
 
 
 def scene_basis(case: Case, variant: Variant) -> str:

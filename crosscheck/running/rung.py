@@ -12,9 +12,9 @@ import numpy as np
 
 from crosscheck.engines.answers import BrokenContract, describe
 from crosscheck.engines.contract import Effort, Model, Run, Trajectory
+from crosscheck.engines.signals import signals_of
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.job import MAIN, Job
-from flexmb.run.channels import channels_of
 from flexmb.typing import Real
 
 REPEATS = ((0.03, 3), (0.1, 2))
@@ -54,17 +54,17 @@ def solve_rung(model: Model, job: Job, effort: Effort, blank: RunRecord, stores_
 
 def _timed(model: Model, job: Job, effort: Effort, coarsest: bool) -> tuple[Trajectory, float]:
     """The run and its time (s), the shortest if it was repeated. BrokenContract if a repetition differs."""
-    first_part = Run(job.times[: max(2, ceil(FIRST_PART * len(job.times)))])
+    first_part = Run(job.times[: max(2, ceil(FIRST_PART * len(job.times)))], job.linear)
     begun = model.simulate(first_part, effort) if coarsest and not job.lean else None
     start = time.perf_counter()
-    run = model.simulate(Run(job.times), effort)
+    run = model.simulate(Run(job.times, job.linear), effort)
     took_s = time.perf_counter() - start  # by this process' clock: the engine's `wall_s` may claim anything
     if run.status != "finished" or job.lean:
         return run, run.wall_s
     wall_s = run.wall_s
     repeats = repeats_of(min(took_s, wall_s)) if job.role == MAIN else 1  # no chart shows the times of other roles
     for _ in range(repeats - 1):
-        again = model.simulate(Run(job.times), effort)
+        again = model.simulate(Run(job.times, job.linear), effort)
         _require_the_same(run, again)
         wall_s = min(wall_s, again.wall_s)
     if begun is not None and repeats == 1:
@@ -89,4 +89,4 @@ def _require_the_same(first: Trajectory, again: Trajectory) -> None:
 
 def _determined(run: Trajectory) -> dict[str, Real]:
     """All channels (T, k) of a run, without those that the motion leaves undetermined."""
-    return {name: values for name, values in channels_of(run).items() if name not in run.undetermined}
+    return {name: values for name, values in signals_of(run).items() if name not in run.undetermined}

@@ -14,7 +14,7 @@ import numpy as np
 
 from crosscheck.judging.against_reference import CLOCK, shared_times
 from crosscheck.library.case import CaseError
-from crosscheck.library.channels import KINDS, kind_named, part_of
+from crosscheck.library.channels import KINDS, LINEAR_KINDS, kind_named, part_of
 from crosscheck.library.reference import channels_by_column
 from flexmb.scene.reading import MIB, Unreadable, read_text
 from flexmb.typing import Real
@@ -212,7 +212,7 @@ def _channels(filled: dict[str, Real]) -> dict[str, Real]:
 def _whole(columns: Iterable[str]) -> list[str]:
     """Possible channels that are no vectors of items: energies, momentum, work, and drives."""
     drives = dict.fromkeys(name.partition(f".{DRIVE}")[0] for name in columns if f".{DRIVE}" in name)
-    known = [kind for kind in KINDS if not kind.of_items]
+    known = [kind for kind in KINDS if not kind.of_items and kind.name not in LINEAR_KINDS]
     named = [f"{kind.name}.{part.name}" if part.name else kind.name for kind in known for part in kind.parts]
     return [*named, *(f"drive:{item}" for item in drives)]
 

@@ -30,16 +30,23 @@ Item = TypeVar("Item", s.Wheel, s.Load)
 
 
 class Functions:
-    """Numbers the functions of time of a scene; equal functions share a number."""
+    """Numbers the functions of time of a scene; equal functions share a number unless they are kept `apart`."""
 
-    def __init__(self) -> None:
+    def __init__(self, apart: bool = False) -> None:
+        self._apart = apart
         self._number: dict[s.Function, int] = {}
+        self._all: list[s.Function] = []
 
     def number(self, function: s.Function | None) -> int:
-        return -1 if function is None else self._number.setdefault(function, len(self._number))
+        if function is None:
+            return -1
+        if self._apart or function not in self._number:
+            self._number[function] = len(self._all)
+            self._all.append(function)
+        return self._number[function]
 
     def all(self) -> list[s.Function]:
-        return list(self._number)
+        return self._all
 
 
 @dataclass(frozen=True)
@@ -52,17 +59,25 @@ class Assembled:
     signals: dict[int, s.ControlSignal]  # the functions that controllers drive, by their numbers
 
 
-def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_partitions: bool = False) -> Assembled:
+def assemble(
+    scene: s.Scene,
+    chain: list[BodyLink],
+    numbering: Numbering,
+    *,
+    null_partitions: bool = False,
+    like: s.Scene | None = None,
+) -> Assembled:
     """The arrays of a scene, from its links and the places of its coordinates.
 
     With `null_partitions`, inboard hinge frames at nodes that do not deform also get a port, so that the terms that
-    vanish for them are computed nevertheless.
+    vanish for them are computed nevertheless. `like`: the same scene with slightly other numbers (see
+    `flexmb.building.links.links`); equal functions of time are then kept apart, because those of `like` may differ.
     """
     index = {link.name: k for k, link in enumerate(chain) if not isinstance(link.body, s.PointMass)}
     parent = [index.get(link.parent, -1) for link in chain]
     wheels, loads = _by_body(scene.wheels, index), _by_body(scene.loads, index)
     placement, hinges = inboard_frames_and_ports(chain, parent, null_partitions)
-    ports_by_body, at = attached(scene, chain, index, hinges, wheels, loads)
+    ports_by_body, at = attached(scene, chain, index, hinges, wheels, loads, like)
     ports = [port for ports in ports_by_body for port in ports]
 
     m = whole(max((link.mode_count for link in chain), default=0))
@@ -80,7 +95,7 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
         group(body, name, np.bincount(np.array([index[item.body] for item in items], int), minlength=len(chain)))
     _mark_first_contributions(body)
 
-    functions = Functions()
+    functions = Functions(apart=like is not None)
     speed = _speeds(chain, wheels, numbering, functions, body)
     load = _loads(loads, at.loads, functions)
     connected = connector_arrays(scene, at.connectors, numbering, functions.number)

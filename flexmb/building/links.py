@@ -161,27 +161,42 @@ def _seen_from(m: FlexibleModel, origin: tuple[float, ...], frame: tuple[float, 
     )
 
 
-def links(scene: s.Scene) -> list[BodyLink]:
-    """All links base to tip: bodies depth-first, then point masses.
+def links(scene: s.Scene, like: s.Scene | None = None) -> list[BodyLink]:
+    """All links base to tip: bodies depth-first, then point masses. `like`: see `Models`.
 
     NotImplementedError for SID bodies.
     """
-    models = Models(scene)
+    models = Models(scene, like)
+    followed = {} if like is None else {each.name: each for each in (*like.hinges, *like.point_masses)}
     found = []
     for body, hinge in ordered(scene):
-        kind, axes = kind_of(hinge)
+        kind, axes = _kind(hinge, followed.get(hinge.name))
         inboard = End(hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
         outboard = End(hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
         level, parent = level_of(body), hinge.parent
         if isinstance(body, s.SidBody):
             models[body.name]  # raises the NotImplementedError
         found.append(BodyLink(body.name, hinge, parent, level, kind, axes, inboard, outboard, body, models))
-    return found + [_point_mass(mass, models) for mass in scene.point_masses]
+    return found + [_point_mass(mass, models, followed.get(mass.name)) for mass in scene.point_masses]
 
 
-def _point_mass(mass: s.PointMass, models: Models) -> BodyLink:
+def _kind(item: s.Hinge | s.PointMass, like: s.Hinge | s.PointMass | None) -> tuple[HingeKind, Reduced]:
+    """The kind and the axes of a hinge; a single axis is turned to z as that of `like` is."""
+    kind, axes = kind_of(item)
+    own, followed = _axis(item), None if like is None else _axis(like)
+    return kind, axes if own is None or followed is None else axes._replace(turn=z_to(own, followed))
+
+
+def _axis(item: s.Hinge | s.PointMass) -> s.Vector | None:
+    """The axis of its own that a hinge or point mass has."""
+    if isinstance(item, s.PointMass):
+        return item.directions[0] if len(item.directions) == 1 else None
+    return getattr(item, "axis", None)
+
+
+def _point_mass(mass: s.PointMass, models: Models, like: s.Hinge | s.PointMass | None) -> BodyLink:
     """A point mass as a body without rotary inertia on translations along its directions."""
-    kind, axes = kind_of(mass)
+    kind, axes = _kind(mass, like)
     inboard, outboard = End(mass.node, mass.offset_m, IDENTITY), End("origin", ZERO, IDENTITY)
     return BodyLink(mass.name, mass, mass.body, BY_NAME["rigid"], kind, axes, inboard, outboard, mass, models)
 
@@ -201,9 +216,15 @@ class Side:
         return port(link.node(self.node), self.offset, self.quaternion, self.turn)
 
 
-def closure_sides(closure: s.Closure) -> tuple[Side, Side]:
-    """Frames A and B of a closure."""
-    turn = z_to(closure.axis) if closure.type in WITH_AXIS else np.eye(3)
+def sides_of_closures(scene: s.Scene, like: s.Scene | None = None) -> list[tuple[s.Closure, tuple[Side, Side]]]:
+    """The closures of a scene, each with its frames A and B. `like`: see `links`."""
+    followed = [None] * len(scene.closures) if like is None else [closure.axis for closure in like.closures]
+    return [(each, closure_sides(each, axis)) for each, axis in zip(scene.closures, followed, strict=True)]
+
+
+def closure_sides(closure: s.Closure, like: s.Vector | None = None) -> tuple[Side, Side]:
+    """Frames A and B of a closure; `like`: an axis around which they are smooth functions of its axis."""
+    turn = z_to(closure.axis, like) if closure.type in WITH_AXIS else np.eye(3)
     return (
         Side(closure.body_a, closure.node_a, closure.position_a_m, closure.quaternion_a, turn),
         Side(closure.body_b, closure.node_b, closure.position_b_m, closure.quaternion_b, turn),

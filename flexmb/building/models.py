@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import assert_never
 
 import numpy as np
@@ -24,8 +25,10 @@ ORIGIN = FlexibleNode(np.zeros(3), np.eye(3), _NO_MODES, _NO_MODES)
 class Models:
     """The models of bodies and of the ground, by name. Wheels are parts of their bodies, despun (Frisch)."""
 
-    def __init__(self, scene: s.Scene) -> None:
+    def __init__(self, scene: s.Scene, like: s.Scene | None = None) -> None:
+        """like: the same scene with slightly other numbers; see `flexmb.modal.flexible.flexible_model`."""
         self.body: dict[str, s.Body] = {body.name: body for body in scene.bodies}
+        self._like: dict[str, s.Body] = {} if like is None else {body.name: body for body in like.bodies}
         self.wheels = wheels_by_body(scene)
         self._made: dict[str, FlexibleModel] = {}
         self._frames: dict[str, dict[str, NodeFrame]] = {}
@@ -41,8 +44,7 @@ class Models:
             return self[name].nodes[node]
         if node == "origin":
             return ORIGIN
-        frame = self.frame(name, node)
-        return FlexibleNode(np.array(frame.position, float), rotation_matrix(frame.quaternion), _NO_MODES, _NO_MODES)
+        return _at(self.frame(name, node))
 
     def frame(self, name: str, node: str) -> NodeFrame:
         """Rest frame of a node of a body of the scene."""
@@ -56,10 +58,13 @@ class Models:
         body = self.body[name]
         match body:
             case s.RigidBody():
-                nodes = {node: self.node(name, node) for node in rest_frames(body)}
-                model = one_point(body.mass_kg, body.com_m, body.inertia_kg_m2, nodes)
+                if self._like and name in self.wheels:
+                    return _kept(body, tuple(self.wheels[name]))
+                model = _rigid(body)
             case s.BeamBody() | s.ModalBody():
-                model = flexible_model(body)
+                followed = self._like.get(name)
+                assert not isinstance(followed, s.RigidBody | s.SidBody)  # it is the same body with other numbers
+                model = flexible_model(body, like=followed)
                 model = model if level_of(body).flexible else _without_modes(model)
             case s.SidBody():
                 raise NotImplementedError(f'body "{name}": SID files are not supported yet; use kind = "modal"')
@@ -68,6 +73,25 @@ class Models:
         for wheel in self.wheels.get(name, ()):
             model = _with_wheel(model, wheel)
         return model
+
+
+def _rigid(body: s.RigidBody) -> FlexibleModel:
+    nodes = {node: ORIGIN if node == "origin" else _at(frame) for node, frame in rest_frames(body).items()}
+    return one_point(body.mass_kg, body.com_m, body.inertia_kg_m2, nodes)
+
+
+@lru_cache(maxsize=64)
+def _kept(body: s.RigidBody, wheels: tuple[s.Wheel, ...]) -> FlexibleModel:
+    """A rigid body with its wheels, of which many copies of a scene with other numbers elsewhere share the tables."""
+    model = _rigid(body)
+    for wheel in wheels:
+        model = _with_wheel(model, wheel)
+    return model
+
+
+def _at(frame: NodeFrame) -> FlexibleNode:
+    """A node that does not move in its body."""
+    return FlexibleNode(np.array(frame.position, float), rotation_matrix(frame.quaternion), _NO_MODES, _NO_MODES)
 
 
 def wheels_by_body(scene: s.Scene) -> dict[str, list[s.Wheel]]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.building.connector_arrays import end_ports
-from flexmb.building.links import BodyLink, Port, closure_sides, port
+from flexmb.building.links import BodyLink, Port, port, sides_of_closures
 from flexmb.building.models import ORIGIN
 from flexmb.building.rigid_arrays import Frames, inboard_frames, outboard_frames
 from flexmb.scene import schema as s
@@ -59,9 +59,9 @@ class Attached(NamedTuple):
 
 def attached(
     scene: s.Scene, chain: list[BodyLink], index: dict[str, int], hinges: list[Port | None],
-    wheels: list[s.Wheel], loads: list[s.Load],
+    wheels: list[s.Wheel], loads: list[s.Load], like: s.Scene | None = None,
 ) -> tuple[list[list[Port]], Attached]:  # fmt: skip
-    """The ports of all bodies, and what is attached to them.
+    """The ports of all bodies, and what is attached to them. `like`: see `flexmb.building.links.links`.
 
     index: number of a body by its name; hinges: for each link the port of its inboard hinge frame, if it needs one.
     """
@@ -83,8 +83,8 @@ def attached(
     markers = {marker.name: at_node(marker) for marker in scene.markers}
     sides = [
         None if side.body == GROUND else ports.add(index[side.body], side.port(chain[index[side.body]]))
-        for closure in scene.closures
-        for side in closure_sides(closure)
+        for _, both in sides_of_closures(scene, like)
+        for side in both
     ]
     ends = [None if end is None else ports.add(*end) for end in end_ports(scene, chain, index)]
     numbered = ([ports.on_body(at)[1] for at in places] for places in (inboard, outboard, at_wheels, at_loads))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexmb.building.links import BodyLink, closure_sides
+from flexmb.building.links import BodyLink, sides_of_closures
 from flexmb.closure import tables as t
 from flexmb.closure.groups import clusters, group_tables, path, path_of_coupling
 from flexmb.scene import schema as s
@@ -28,17 +28,21 @@ SUPPRESSED = {
 
 
 def closure_constants(
-    scene: s.Scene, constants: Constants, ports: Sequence[tuple[int, int]], chain: list[BodyLink]
+    scene: s.Scene,
+    constants: Constants,
+    ports: Sequence[tuple[int, int]],
+    chain: list[BodyLink],
+    like: s.Scene | None = None,
 ) -> t.ClosureConstants:
-    """Constants of a scene's closures and couplings.
+    """Constants of a scene's closures and couplings. `like`: see `flexmb.building.links.links`.
 
     ports: (body, port) of both sides of each closure, (-1, -1) on the ground.
     """
     sides = np.zeros((len(scene.constraints), 2), t.SIDE)
     sides["body"] = t.ON_GROUND
     closures = np.zeros(len(scene.constraints), t.CLOSURE)
-    for i, closure in enumerate(scene.closures):
-        for j, side in enumerate(closure_sides(closure)):
+    for i, (_, both) in enumerate(sides_of_closures(scene, like)):
+        for j, side in enumerate(both):
             sides[i, j]["body"], sides[i, j]["port"] = ports[2 * i + j]
             if sides[i, j]["body"] == t.ON_GROUND:
                 sides[i, j]["position"] = side.offset

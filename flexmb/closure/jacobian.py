@@ -73,7 +73,7 @@ def jacobian(t, y, J, s, x):
             status = evaluate(s.c, w, s.cc, cw)
         if status == OK:
             for lane in range(count):
-                _hold_rows(s, cw, lane)
+                hold_rows(s, cw, lane)
             status = evaluate(s.c, w, s.cc, cw)
         for lane in range(count):
             j = w.column[first + lane]
@@ -84,7 +84,7 @@ def jacobian(t, y, J, s, x):
 
 
 @helper
-def _hold_rows(s, cw, lane):
+def hold_rows(s, cw, lane):
     """Set the change of the loads along each direction that keeps the row accelerations at their values at y."""
     for g in range(s.cc.group.shape[0]):
         first = s.cc.group[g].row_start

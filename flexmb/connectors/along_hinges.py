@@ -40,8 +40,8 @@ def _spring(c, w, i):
     elastic, energy = resistance(q - c.hinge_spring[i].rest, c.law, c.hinge_spring[i].start, c.hinge_spring[i].stop)
     lower, upper, k = c.hinge_spring[i].lower, c.hinge_spring[i].upper, c.hinge_spring[i].stop_stiffness
     # 0.0 * q is a zero of q's own type: a float, a dual number or lanes.
-    beyond = select(q.real > upper, q - upper, select(q.real < lower, q - lower, 0.0 * q))
-    pressing = 1.0 + c.hinge_spring[i].stop_dissipation * select(q.real < lower, -v, v)
+    beyond = select(q.real > upper.real, q - upper, select(q.real < lower.real, q - lower, 0.0 * q))
+    pressing = 1.0 + c.hinge_spring[i].stop_dissipation * select(q.real < lower.real, -v, v)
     pushed = k * beyond * select(pressing.real > 0.0, pressing, 0.0 * pressing)
     # The elastic part k `beyond` of the stop's load has an energy; all else of it is dissipation, so part of the work.
     lost = c.hinge_spring[i].damping * v + (pushed - k * beyond)

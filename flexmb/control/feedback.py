@@ -22,7 +22,7 @@ from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID, pointer
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
-from flexmb.typing import Index, Real
+from flexmb.typing import Index, Real, Record
 
 DISPLACEMENT = 1e-6  # m, rad: displacement of the finite difference for signal rates before integration starts
 SLOWEST = 1e-100  # m/s, rad/s: slower motion counts as rest, since DISPLACEMENT over the speed would overflow
@@ -164,6 +164,21 @@ class Feedback:
     def _rows_for(self, table: Any) -> Real:
         """The array in which sampled outputs are held until they are applied."""
         return np.zeros((max(int(np.sum(table["kind"] == a.SAMPLE)), 1), widest(self._wiring.controller)))
+
+    @property
+    def names(self) -> dict[str, slice]:
+        """Places of the signals of sensors and controllers, by name."""
+        return self._wiring.names
+
+    @property
+    def schedule(self) -> Record:
+        """INSTANT records of the last run, those at its end included."""
+        return self._instants
+
+    @property
+    def samples(self) -> int:
+        """Number of rows of held outputs that the schedule needs."""
+        return int(np.sum(self._instants["kind"] == a.SAMPLE))
 
     def is_sampled(self, signal: str) -> bool:
         """Whether a signal is an output of a sampled controller."""

@@ -3,11 +3,11 @@
 A change is the rate of a state; for a sampled controller it is the next value of the state.
 """
 
-import math
-
-from flexmb.control.tables import CALLED, CLAMP, COMPILED, LINEAR, LOOKUP, PID
+from flexmb.control.foreign_laws import called_along, compiled_along
+from flexmb.control.tables import CALLED, CLAMP, COMPILED, LINEAR, LOOKUP, PID, LoopVariation
 from flexmb.jit.direct import nothing_at, status_at
-from flexmb.jit.kernel import helper, sweep
+from flexmb.jit.kernel import by_bundle, helper, sweep
+from flexmb.spatial.scalar import exp
 from flexmb.tables.status import OK
 
 # Indices of the parameters of a PID controller.
@@ -28,9 +28,9 @@ def act(t, i, s):
     elif law == LOOKUP:
         _lookup(i, s)
     elif law == COMPILED:
-        _compiled(t, i, s)
+        _compiled(s, t, i)
     elif law == CALLED:
-        return status_at(s.controller[i].function, (t,))
+        return _called(s, t, i)
     return OK
 
 
@@ -65,18 +65,18 @@ def _pid(i, s):
     p = o.number
     e, filtered = pid_error(i, s), s.state[o.state + FILTERED]
     filter_s, period = s.number[p + FILTER], s.number[p + PERIOD]
-    if o.sampled and s.state[o.state + BEGUN] == 0.0:
+    if o.sampled and s.state[o.state + BEGUN].real == 0.0:
         filtered = e  # no previous error exists before the first instant
-    slope = (e - filtered) / filter_s if filter_s > 0.0 else 0.0
-    if filter_s == 0.0 and o.sampled:
+    slope = (e - filtered) / filter_s if filter_s.real > 0.0 else 0.0 * e
+    if filter_s.real == 0.0 and o.sampled:
         slope = (e - filtered) / period
     asked = s.number[p + KP] * e + s.state[o.state + INTEGRAL] + s.number[p + KD] * slope
-    given = min(max(asked, s.number[p + LOWER]), s.number[p + UPPER])
+    given = clamped(asked, s.number[p + LOWER], s.number[p + UPPER])
     gain = s.number[p + KI] * e + (given - asked) / s.number[p + TRACKING]
     s.output[o.output] = given
     if o.sampled:
         s.change[o.state + INTEGRAL] = s.state[o.state + INTEGRAL] + period * gain
-        left = math.exp(-period / filter_s) if filter_s > 0.0 else 0.0
+        left = exp(-period / filter_s) if filter_s.real > 0.0 else 0.0 * filter_s
         s.change[o.state + FILTERED] = e + left * (filtered - e)
         s.change[o.state + BEGUN] = 1.0
     else:
@@ -88,7 +88,15 @@ def _pid(i, s):
 def _clamp(i, s):
     o = s.controller[i]
     for j in range(o.outputs):
-        s.output[o.output + j] = min(max(s.input[o.input + j], s.number[o.number]), s.number[o.number + 1])
+        s.output[o.output + j] = clamped(s.input[o.input + j], s.number[o.number], s.number[o.number + 1])
+
+
+@helper
+def clamped(x, lower, upper):
+    """x, or the bound that it exceeds."""
+    if x.real < lower.real:
+        return lower
+    return upper if x.real > upper.real else x
 
 
 @helper
@@ -96,9 +104,9 @@ def _lookup(i, s):
     """Linear interpolation; the parameters are the points, then the values."""
     o = s.controller[i]
     n, p = o.numbers // 2, o.number
-    x = min(max(s.input[o.input], s.number[p]), s.number[p + n - 1])
+    x = clamped(s.input[o.input], s.number[p], s.number[p + n - 1])
     j = 0
-    while j + 2 < n and x > s.number[p + j + 1]:
+    while j + 2 < n and x.real > s.number[p + j + 1].real:
         j += 1
     gain = s.number[p + n + j]
     if n > 1:
@@ -111,7 +119,13 @@ def _lookup(i, s):
 
 
 @helper
-def _compiled(t, i, s):
+def _called_alone(s, t, i):
+    """Call a Python function, which finds its arrays itself; returns a status code."""
+    return status_at(s.controller[i].function, (t,))
+
+
+@helper
+def _compiled_alone(s, t, i):
     """Call a user function by its address."""
     o = s.controller[i]
     nothing_at(
@@ -125,3 +139,7 @@ def _compiled(t, i, s):
             s.change[o.state : o.state + o.states],
         ),
     )
+
+
+_called = by_bundle(LoopVariation, called_along, _called_alone)
+_compiled = by_bundle(LoopVariation, compiled_along, _compiled_alone)

@@ -13,7 +13,7 @@ from flexmb.control import tables as a
 from flexmb.control.laws import FILTERED, act, pid_error
 from flexmb.control.measuring import measure_at_once, measure_motion
 from flexmb.jit.direct import nothing_at, real_at, status_at
-from flexmb.jit.kernel import helper, kernel, sweep
+from flexmb.jit.kernel import by_bundle, helper, kernel, sweep
 from flexmb.tables.status import CLOSURE_SINGULAR, OK
 
 
@@ -23,7 +23,7 @@ def rhs(t, y, dy, s, same):
     if s.stuck[0]:
         return CLOSURE_SINGULAR
     take(y, s)
-    status = _set(t, s)
+    status = set_drives(t, s)
     if status == OK:
         status = accelerate(t, s)
     if status == OK and s.follows[0]:
@@ -58,6 +58,13 @@ def start(t, y, s):
     controllers listed before. Those of sampled ones start at the error of their first instant (`flexmb.control.laws`).
     """
     take(y, s)
+    begin_laws(t, s)
+    give(s.y, s.state, s, y)
+
+
+@helper
+def begin_laws(t, s):
+    """Begin the continuous controllers at s.y, as `start` does."""
     measure_motion(t, s)
     for i in range(s.controller.shape[0]):
         o = s.controller[i]
@@ -69,7 +76,6 @@ def start(t, y, s):
                 break  # the first evaluation fails too, and reports it
             for j in range(o.outputs):
                 s.signal[o.signal + j] = s.output[o.output + j]
-    give(s.y, s.state, s, y)
 
 
 @kernel
@@ -93,14 +99,14 @@ def retrace(times, states, s, course):
 def hold(t, y, s):
     """Set the functions of the mechanics to the controller outputs at t and y; returns a status code."""
     take(y, s)
-    return _set(t, s)
+    return set_drives(t, s)
 
 
 @kernel
 def look(t, y, signal, s):
     """All signals (S,) at t and y, between instants; returns a status code."""
     take(y, s)
-    status = _look(t, s)
+    status = sense(t, s)
     for i in range(signal.shape[0]):
         signal[i] = s.signal[i]
     return status
@@ -132,7 +138,7 @@ def keep_good(s):
 
 
 @helper
-def _set(t, s):
+def set_drives(t, s):
     """Set the drive values at t; returns a status code. Sensors are evaluated only for continuous controllers."""
     status = _keep_time(t, s)
     if status == OK and s.continuous[0]:
@@ -174,21 +180,21 @@ def _keep_time(t, s):
     """Execute all pending instants up to t; returns a status code."""
     reached = t
     if s.replaying[0]:
-        if t < s.now[0]:
+        if t < s.now[0].real:
             _rewind(s)
         s.now[0] = t
-        reached = t + s.slack[0]
+        reached = t + s.slack[0].real
     looked_at = -1.0
-    while s.following[0] < s.instant.shape[0] and reached >= s.instant[s.following[0]].time:
+    while s.following[0] < s.instant.shape[0] and reached >= s.instant[s.following[0]].time.real:
         due = s.instant[s.following[0]]
         if due.kind == a.APPLY:
             _put_out(due.controller, due.row, s)
         elif not s.replaying[0]:
-            if looked_at != due.time:
-                status = _look(t, s)
+            if looked_at != due.time.real:
+                status = sense(t, s)
                 if status != OK:
                     return status
-                looked_at = due.time
+                looked_at = due.time.real
             status = _sample(t, due.controller, due.row, s)
             if status != OK:
                 return status
@@ -209,7 +215,7 @@ def _rewind(s):
 
 
 @helper
-def _look(t, s):
+def sense(t, s):
     """Evaluate everything that a sampled controller may read at t: all sensors and the continuous controllers."""
     status = steer(t, s)
     if status == OK and s.has_at_once[0]:
@@ -293,8 +299,21 @@ def _act_continuously(t, s):
 
 @helper
 def accelerate(t, s):
-    """Evaluate the mechanics' right-hand side into s.dy."""
+    """Evaluate the mechanics' right-hand side into s.dy; returns a status code."""
+    return _move(s, t)
+
+
+@helper
+def _move_alone(s, t):
     return status_at(s.address[a.MOTION], (t, s.y, s.dy, s.address[a.CONSTANTS], s.address[a.WORKSPACE]))
+
+
+@helper
+def _move_varied(s, t):
+    return status_at(s.address[a.MOTION], (t, s.address[a.WORKSPACE]))
+
+
+_move = by_bundle(a.LoopVariation, _move_varied, _move_alone)
 
 
 @helper

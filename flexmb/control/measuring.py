@@ -2,7 +2,7 @@
 
 from flexmb.control import tables as a
 from flexmb.jit.direct import nothing_at, status_at
-from flexmb.jit.kernel import helper, sweep
+from flexmb.jit.kernel import by_bundle, helper, sweep
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.vector import dot, mat3, store3, sub, times_t, vec3
 from flexmb.tables.functions import evaluate
@@ -26,10 +26,7 @@ def measure_at_once(t, s):
     first = s.y.shape[0] - 1 - s.rates.shape[0]
     for j in range(s.rates.shape[0]):
         s.rates[j] = s.dy[first + j]
-    if s.address[a.OBSERVING]:
-        nothing_at(s.address[a.OBSERVING], (s.address[a.CONSTANTS], s.address[a.WORKSPACE], s.address[a.OUTPUTS]))
-    if s.address[a.ASKING]:
-        status_at(s.address[a.ASKING], (t,))  # an exception in Python ends the run by itself
+    _observe(s, t)
     if s.has_markers[0]:
         see_markers(t, s)
     for i in range(s.sensor.shape[0]):
@@ -38,12 +35,42 @@ def measure_at_once(t, s):
 
 
 @helper
+def _observe_alone(s, t):
+    """Evaluate the loads where the equations of motion were just evaluated."""
+    if s.address[a.OBSERVING]:
+        nothing_at(s.address[a.OBSERVING], (s.address[a.CONSTANTS], s.address[a.WORKSPACE], s.address[a.OUTPUTS]))
+    if s.address[a.ASKING]:
+        status_at(s.address[a.ASKING], (t,))  # an exception in Python ends the run by itself
+
+
+@helper
+def _observe_varied(s, t):
+    nothing_at(s.address[a.OBSERVING], (s.address[a.WORKSPACE], s.address[a.OUTPUTS]))
+
+
+_observe = by_bundle(a.LoopVariation, _observe_varied, _observe_alone)
+
+
+@helper
 def see_markers(t, s):
     """Evaluate the rows of all markers into s.markers, with the accelerations in s.rates."""
+    _see(s, t)
+
+
+@helper
+def _see_alone(s, t):
     nothing_at(
         s.address[a.MARKERS],
         (t, s.y, s.address[a.TREE], s.address[a.TREE_WORKSPACE], s.address[a.OUTPUTS]),
     )
+
+
+@helper
+def _see_varied(s, t):
+    nothing_at(s.address[a.MARKERS], (t, s.address[a.TREE], s.address[a.TREE_WORKSPACE], s.address[a.OUTPUTS]))
+
+
+_see = by_bundle(a.LoopVariation, _see_varied, _see_alone)
 
 
 @helper
@@ -78,7 +105,7 @@ def _distance(row_a, row_b):
     """Distance of two markers, and its rate; where they coincide, the rate is the relative speed."""
     along, moving = sub(vec3(row_b, 0), vec3(row_a, 0)), sub(vec3(row_b, _VELOCITY + 3), vec3(row_a, _VELOCITY + 3))
     length = sqrt(dot(along, along))
-    return length, dot(along, moving) / length if length > 0.0 else sqrt(dot(moving, moving))
+    return length, dot(along, moving) / length if length.real > 0.0 else sqrt(dot(moving, moving))
 
 
 @helper
@@ -107,19 +134,19 @@ def _store_quaternion(row, signal, first):
     yx, yy, yz = row[_R + 3], row[_R + 4], row[_R + 5]
     zx, zy, zz = row[_R + 6], row[_R + 7], row[_R + 8]
     trace = xx + yy + zz
-    if trace >= xx and trace >= yy and trace >= zz:
+    if trace.real >= xx.real and trace.real >= yy.real and trace.real >= zz.real:
         d = 2.0 * sqrt(1.0 + trace)
         w, x, y, z = 0.25 * d, (zy - yz) / d, (xz - zx) / d, (yx - xy) / d
-    elif xx >= yy and xx >= zz:
+    elif xx.real >= yy.real and xx.real >= zz.real:
         d = 2.0 * sqrt(1.0 + xx - yy - zz)
         w, x, y, z = (zy - yz) / d, 0.25 * d, (xy + yx) / d, (xz + zx) / d
-    elif yy >= zz:
+    elif yy.real >= zz.real:
         d = 2.0 * sqrt(1.0 - xx + yy - zz)
         w, x, y, z = (xz - zx) / d, (xy + yx) / d, 0.25 * d, (yz + zy) / d
     else:
         d = 2.0 * sqrt(1.0 - xx - yy + zz)
         w, x, y, z = (yx - xy) / d, (xz + zx) / d, (yz + zy) / d, 0.25 * d
-    sign = -1.0 if w < 0.0 else 1.0
+    sign = -1.0 if w.real < 0.0 else 1.0
     signal[first] = sign * w
     signal[first + 1] = sign * x
     signal[first + 2] = sign * y

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.jit.bundle import bundle
+from flexmb.jit.duals import DUAL
 from flexmb.typing import Index, Real, Record
 
 COORDINATE, RATE, POSITION, ORIENTATION, VELOCITY, ANGULAR_VELOCITY, DISTANCE, TIME, PROFILE = range(9)
@@ -115,6 +116,66 @@ class Loop:
     loads: Real  # (N+C,6) of hinges, then of closures
     drives: Real  # (nu,)
     doubt: Index  # (1,) of the mechanics' workspace
+
+
+@bundle
+class PlainLaw:
+    """Arrays of floats for laws that take no other numbers: those of the loop of floats, in which Python laws look."""
+
+    input: Real
+    state: Real
+    number: Real
+    output: Real
+    change: Real
+    value: Real  # (most outputs and states of a controller,) of the law at one point ...
+    coarse: Real  # ... and its differences over a step and over half of it
+    fine: Real
+
+
+@bundle
+class LoopVariation:
+    """A closed loop in dual numbers, whose eight lanes carry derivatives along eight directions.
+
+    Entries of equal names are those of `Loop`; its helpers are compiled for both. In `address` are the kernels of the
+    motion in dual numbers, which find its state themselves: MOTION (t, WORKSPACE), OBSERVING (WORKSPACE, OUTPUTS),
+    MARKERS (t, TREE, TREE_WORKSPACE, OUTPUTS).
+    """
+
+    numbers = DUAL
+
+    plain: PlainLaw
+    address: Index
+    sensor: Record
+    controller: Record
+    wire: Index
+    number: Real
+    drive: Record
+    course: Record
+    piece: Real
+    function: Record
+    instant: Record
+    has_markers: Index
+    continuous: Index
+    has_at_once: Index
+    follows: Index
+    gravity: Real
+    slack: Real
+
+    signal: Real
+    input: Real
+    state: Real
+    output: Real
+    change: Real
+    held: Real
+    following: Index
+    replaying: Index
+    now: Real
+    y: Real
+    dy: Real
+    rates: Real
+    markers: Real
+    loads: Real
+    drives: Real
 
 
 @bundle

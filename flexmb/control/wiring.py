@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import Any, NamedTuple, assert_never
 
@@ -30,7 +30,9 @@ from flexmb.scene.control import (
     UserLaw,
 )
 from flexmb.scene.convert import ROOT, label
+from flexmb.scene.functions import Function
 from flexmb.scene.loaded import called
+from flexmb.scene.schema import Scene
 from flexmb.scene.tree import rate_name, scalar_paths
 from flexmb.system.tree_system import System
 from flexmb.tables.functions import pack
@@ -115,7 +117,7 @@ def _sensors(system: System) -> tuple[Record, Record, Real, dict[str, slice]]:
     """SENSOR records, functions of profiles with their spline pieces, and signals by name."""
     sensors = system.scene.sensors
     record, names, first = np.zeros(len(sensors), a.SENSOR), dict[str, slice](), 0
-    profiles = [each.function for each in sensors if isinstance(each, ProfileSensor)]
+    profiles = _profiles(system.scene)
     for row, sensor in zip(record, sensors, strict=True):
         row["kind"], row["place"], row["width"], row["axes"] = _sensor(system, sensor)
         if isinstance(sensor, ProfileSensor):
@@ -124,6 +126,15 @@ def _sensors(system: System) -> tuple[Record, Record, Real, dict[str, slice]]:
         names[sensor.name] = slice(first, first + int(row["width"]))
         first += int(row["width"])
     return record, *pack(profiles), names
+
+
+def profile_tables(scene: Scene) -> tuple[Record, Real]:
+    """FUNCTION records of the functions that sensors read, and their spline pieces."""
+    return pack(_profiles(scene))
+
+
+def _profiles(scene: Scene) -> list[Function]:
+    return [each.function for each in scene.sensors if isinstance(each, ProfileSensor)]
 
 
 def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
@@ -171,6 +182,12 @@ def numbers_of(names: dict[str, slice], reference: str) -> list[int]:
     if at.number >= len(every):
         raise ValueError(f'signal "{reference}": "{at.name}" has {len(every)} numbers, 0 to {len(every) - 1}')
     return [every[at.number]]
+
+
+def law_numbers(controllers: Sequence[Controller], inputs: Sequence[int]) -> tuple[Real, Real]:
+    """The parameters of all controllers with so many inputs each, and the initial values of their states."""
+    numbers = [value for each, count in zip(controllers, inputs, strict=True) for value in _numbers(each, count)]
+    return np.array(numbers), np.array([value for each in controllers for value in _states(each)])
 
 
 def _states(controller: Controller) -> list[float]:

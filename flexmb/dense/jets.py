@@ -89,7 +89,8 @@ class MovingFrame:
 
 def constant(value: ArrayLike) -> Jet:
     """A jet with zero derivatives."""
-    array = np.asarray(value, dtype=float)
+    array = np.asarray(value)
+    array = array.astype(np.result_type(array, float))  # complex numbers stay complex, for complex steps
     return Jet(array, np.zeros_like(array), np.zeros_like(array))
 
 

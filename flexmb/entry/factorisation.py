@@ -1,7 +1,7 @@
 """Entry points of the innovations factorisation of a mass matrix, M = F F': Jain & Rodriguez (54)-(56)."""
 
 from flexmb.jain import innovations, precision
-from flexmb.jain.response import clear, read_speeds, write_speeds
+from flexmb.jain.response import clear, clear_forces, read_speeds, write_speeds
 from flexmb.jit.kernel import helper, kernel
 from flexmb.motion.coordinates import load_state
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
@@ -10,6 +10,12 @@ from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 @kernel
 def factorise(t, y, scene, c, w):
     """Factors to w, with the functions of time of `scene` and the free speeds of c; returns a status code."""
+    return factorise_at(t, y, scene, c, w)
+
+
+@helper
+def factorise_at(t, y, scene, c, w):
+    """`factorise` as a part of other kernels."""
     load_state(t, y, scene, w)
     return OK if innovations.factorise(c, w) else NOT_POSITIVE_DEFINITE
 
@@ -18,10 +24,17 @@ def factorise(t, y, scene, c, w):
 def solve(c, w, x, b):
     """Rows of b (m,nu) replaced by M^-1 b."""
     for row in range(b.shape[0]):
-        _enter(c, x, b[row])
-        innovations.innovations(c, w, x)
-        innovations.respond(c, w, x)
+        read_speeds(x, b[row])
+        answer(c, w, x)
         write_speeds(x, b[row])
+
+
+@helper
+def answer(c, w, x):
+    """x.speed := M^-1 x.speed."""
+    clear_forces(c, x)
+    innovations.innovations(c, w, x)
+    innovations.respond(c, w, x)
 
 
 @kernel

@@ -94,7 +94,7 @@ def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partition
     """
     chain = links(scene)
     numbering = Numbering(chain, scene)
-    constants = assemble(scene, chain, numbering, null_partitions).constants
+    constants = assemble(scene, chain, numbering, null_partitions=null_partitions).constants
     return NestedSystem(constants, chain, numbering.layout, errata, null_partitions)
 
 

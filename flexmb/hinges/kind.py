@@ -94,11 +94,11 @@ def scalar_hinge(
     )
 
 
-def z_to(axis: Vector) -> Real:
-    """A rotation whose third column is `axis`."""
+def z_to(axis: Vector, like: Vector | None = None) -> Real:
+    """A rotation whose third column is `axis`; around the axis `like`, if there is one, a smooth function of `axis`."""
     length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2])
     z = axis[0] / length, axis[1] / length, axis[2] / length
-    sizes = abs(z[0]), abs(z[1]), abs(z[2])
+    sizes = [abs(component) for component in (z if like is None else like)]
     i = sizes.index(min(sizes))
     j, k = (i + 1) % 3, (i + 2) % 3
     beside = sqrt(z[j] * z[j] + z[k] * z[k])

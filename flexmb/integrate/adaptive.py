@@ -47,7 +47,8 @@ class Method(NamedTuple):
     reject(step, status, verdict, s, known, exponent) does so after a step that failed or had too large an error.
     after_leap(length, cut, known, exponent) does so after a leap of this length (s).
     enter(known) discards what is not valid across the end of a segment.
-    recall(memory, s, known, counts) and keep(memory, s) read and write all else that the method needs to resume a run.
+    recall(problem, memory, s, known, counts) and keep(memory, s) read and write all else that the method needs to
+    resume a run.
     state_at: see `flexmb.integrate.watch`.
     exponent: the error estimate is O(h^exponent).
     """
@@ -76,7 +77,7 @@ def adaptive(method, problem, arrays, clock, out, run, memory, watch):
     y, samples = ends.y, (times, out)
     t = begin(problem, times, y, ends.y_new, memory, out, counts)
     known, kept = memory.numbers.copy(), False
-    recall(memory, s, known, counts)
+    recall(problem, memory, s, known, counts)
     for i in range(segment_ends.shape[0]):
         end, is_last = segment_ends[i], i + 1 == segment_ends.shape[0]
         last = np.nextafter(end, t)
@@ -161,7 +162,7 @@ def enter_afresh(known):
 
 
 @handed_in
-def recall_nothing(memory, s, known, counts):
+def recall_nothing(problem, memory, s, known, counts):
     """For methods whose only memory is the numbers of `Memory`."""
 
 

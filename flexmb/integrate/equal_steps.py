@@ -27,8 +27,8 @@ class FixedMethod(NamedTuple):
     of a step that met a singular position, or further.
     accept(s) is called after a successful step.
     enter(known) discards what is not valid across the end of a segment.
-    recall(memory, s, known, accuracy, counts) and keep(memory, s) read and write all else that the method needs to
-    resume a run.
+    recall(problem, memory, s, known, accuracy, counts) and keep(memory, s) read and write all else that the method
+    needs to resume a run.
     state_at: see `flexmb.integrate.watch`; it is given the arrays `looking`, which only it uses.
     """
 
@@ -55,7 +55,7 @@ def equal_steps(method, problem, arrays, clock, out, run, memory, watch):
     y, samples = ends.y, (times, out)
     t = begin(problem, times, y, ends.y_new, memory, out, counts)
     known = memory.numbers.copy()
-    recall(memory, s, known, accuracy, counts)
+    recall(problem, memory, s, known, accuracy, counts)
     start, done, segment = known[STRETCH], int(known[DONE]), 0
     for sample in range(counts[SAMPLES], times.shape[0]):
         while t < times[sample]:

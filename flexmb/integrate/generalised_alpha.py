@@ -22,11 +22,25 @@ from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import FACTORED, FRESH, TAKEN_UP
 from flexmb.integrate.newton_matrix import RateBlocks, find_blocks, rate_blocks
+from flexmb.integrate.stiff_place import (
+    StiffPlace,
+    begin_without_jacobian,
+    filtered,
+    give_up,
+    keep_place,
+    pulled_back,
+    recall_place,
+    settle_at,
+    shift,
+    stiff_place,
+    suffices,
+)
 from flexmb.integrate.watch import Ends
 from flexmb.jit.kernel import handed_in, handed_on, helper, kernel, sweep
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
 _ITERATIONS = 12  # maximum number of Newton iterations
+_INEXACT = 30  # the same without the Jacobian, whose cost is that of many iterations
 _ROUNDING = 2.0**-46  # relative size of corrections that count as rounding of accelerations: 64 ulp
 _WORN = 8  # number of iterations from which the Jacobian is renewed; fewer cost less than a new Jacobian
 _SAME = 1e-9  # relative difference of steps that share factors
@@ -49,6 +63,7 @@ class NewmarkArrays(NamedTuple):
     f_new: np.ndarray
     y_new: np.ndarray
     y_before: np.ndarray
+    stiff: StiffPlace
 
 
 @helper
@@ -69,17 +84,27 @@ def largest(values):
 
 
 @helper
-def factorise(s, h, accuracy, counts):
-    """Factors of d(udot_1 - f)/d(udot_1); dq/du is the block of J that maps speeds to rates of coordinates."""
-    alpha_m, alpha_f, beta, gamma = parameters(accuracy.radius)
+def shifts(h, radius):
+    """a and b of the matrix of Newton's method, 1 - a J_u - b J_q N."""
+    alpha_m, alpha_f, beta, gamma = parameters(radius)
     weight = (1.0 - alpha_f) / (1.0 - alpha_m)
+    return weight * h * gamma, weight * h * h * beta
+
+
+@helper
+def factorise(problem, s, h, accuracy, counts):
+    """Factors of d(udot_1 - f)/d(udot_1); dq/du is the block of J that maps speeds to rates of coordinates."""
+    a, b = shifts(h, accuracy.radius)
+    if suffices(s.stiff):
+        counts[FACTORISATIONS] += 1
+        return shift(problem, a, b, 0)
     nq, nu = accuracy.coordinates, s.matrix.shape[0]
     find_blocks(s.blocks, s.J, nq)
     for i in range(nu):
         row, given = s.matrix[i], s.J[nq + i]
         for j in range(nu):
-            row[j] = -weight * h * gamma * given[nq + j]
-        _add_motion(s, given, -weight * h * h * beta, row)
+            row[j] = -a * given[nq + j]
+        _add_motion(s, given, -b, row)
         row[i] += 1.0
     counts[FACTORISATIONS] += 1
     return lu_factorise(s.matrix, s.pivots)
@@ -123,22 +148,18 @@ def newton(problem, t_new, y, h, s, accuracy, counts):
     nq, nu = accuracy.coordinates, s.a.shape[0]
     copy(s.rate, s.rate_new)
     end_of_step(problem, y, h, s, accuracy)
-    for j in range(nu):
-        total = 0.0
-        for k in range(nq + nu):
-            total += s.J[nq + j, k] * (s.y_new[k] - y[k])
-        s.correction[j] = total
-    lu_solve(s.matrix, s.pivots, s.correction)
+    _foresee(problem, y, s, nq)
     for j in range(nu):
         s.rate_new[j] += s.correction[j]
     end_of_step(problem, y, h, s, accuracy)
-    for iteration in range(1, _ITERATIONS + 1):
+    permitted = _INEXACT if suffices(s.stiff) else _ITERATIONS
+    for iteration in range(1, permitted + 1):
         status = derivative(problem, t_new, s.y_new, s.f_new, counts)
         if status != OK:  # an iterate that is not finite does not mean that the motion diverges
             return NOT_CONVERGED if status == NONFINITE else status, iteration
         for j in range(nu):
             s.correction[j] = s.f_new[nq + j] - s.rate_new[j]
-        lu_solve(s.matrix, s.pivots, s.correction)
+        _correct(problem, h, s, accuracy)
         for j in range(nu):
             s.rate_new[j] += s.correction[j]
         copy(s.y_new, s.y_before)
@@ -150,7 +171,39 @@ def newton(problem, t_new, y, h, s, accuracy, counts):
         size = scaled_norm(s.y_before, s.y_new, accuracy)
         if size <= 1.0 or largest(s.correction) <= _ROUNDING * largest(s.rate_new):
             return OK, iteration
-    return NOT_CONVERGED, _ITERATIONS
+    return NOT_CONVERGED, permitted
+
+
+@helper
+def _foresee(problem, y, s, nq):
+    """Correction of udot for the step from y to y_new, with f linearised."""
+    if suffices(s.stiff):
+        pulled_back(problem, y, s.y_new, s.correction, s.stiff)
+        return
+    for j in range(s.correction.shape[0]):
+        total = 0.0
+        for k in range(nq + s.correction.shape[0]):
+            total += s.J[nq + j, k] * (s.y_new[k] - y[k])
+        s.correction[j] = total
+    lu_solve(s.matrix, s.pivots, s.correction)
+
+
+@helper
+def _correct(problem, h, s, accuracy):
+    """Newton's correction of udot for the residual in s.correction, in place."""
+    if suffices(s.stiff):
+        a, b = shifts(h, accuracy.radius)
+        filtered(problem, a, b, s.correction, s.stiff)
+    else:
+        lu_solve(s.matrix, s.pivots, s.correction)
+
+
+@helper
+def _linearise(problem, t, y, s, counts):
+    """Linearise at (t, y): the Jacobian, or the place of the stiff part where this suffices; returns a status code."""
+    if suffices(s.stiff):
+        return settle_at(problem, t, y, s.stiff)
+    return linearisation(problem, t, y, s.J, counts)
 
 
 @sweep
@@ -161,18 +214,21 @@ def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
     """
     status, iterations = NOT_CONVERGED, 0
     if h_factored > 0.0 and abs(h - h_factored) > _SAME * h:
-        h_factored = h if factorise(s, h, accuracy, counts) else 0.0
+        h_factored = h if factorise(problem, s, h, accuracy, counts) else 0.0
     if h_factored > 0.0:
         status, iterations = newton(problem, min(step.end, step.last), y, h, s, accuracy, counts)
-    if status == NOT_CONVERGED:
-        status = linearisation(problem, step.start, y, s.J, counts)
+    if status != NOT_CONVERGED:
+        return status, h_factored if iterations < _WORN else 0.0
+    for _ in range(2):  # without the Jacobian where it may be missed, then with it
+        status = _linearise(problem, step.start, y, s, counts)
         if status != OK:
             return status, 0.0
-        if not factorise(s, h, accuracy, counts):
-            return NOT_CONVERGED, 0.0
-        status, iterations = newton(problem, min(step.end, step.last), y, h, s, accuracy, counts)
-        return status, h
-    return status, h_factored if iterations < _WORN else 0.0
+        status = NOT_CONVERGED
+        if factorise(problem, s, h, accuracy, counts):
+            status, _ = newton(problem, min(step.end, step.last), y, h, s, accuracy, counts)
+        if status != NOT_CONVERGED or not give_up(s.stiff):
+            break
+    return status, h if status == OK else 0.0
 
 
 @helper
@@ -233,17 +289,19 @@ def enter(known):
 
 @handed_in
 def keep(memory, s):
-    """Store the Jacobian, slopes and a."""
+    """Store the Jacobian, or the place of the stiff part, slopes and a."""
     n, nu = s.f.shape[0], s.a.shape[0]
     for i in range(n):
         copy(s.J[i], memory.rows[i])
+    if suffices(s.stiff):
+        keep_place(s.stiff, memory.rows)
     copy(s.f, memory.rows[n])
     for j in range(nu):
         memory.rows[n + 1, j], memory.rows[n + 2, j] = s.rate[j], s.a[j]
 
 
 @handed_in
-def recall(memory, s, known, accuracy, counts):
+def recall(problem, memory, s, known, accuracy, counts):
     """Restore these for a resumed run and factorise again; in any other run the first step starts without them."""
     n, nu = s.f.shape[0], s.a.shape[0]
     if known[TAKEN_UP] == 0.0:
@@ -251,11 +309,12 @@ def recall(memory, s, known, accuracy, counts):
         return
     for i in range(n):
         copy(memory.rows[i], s.J[i])
+    recall_place(problem, s.stiff, memory.rows)
     copy(memory.rows[n], s.f)
     for j in range(nu):
         s.rate[j], s.a[j] = memory.rows[n + 1, j], memory.rows[n + 2, j]
     if known[FACTORED] > 0.0:
-        factorise(s, known[FACTORED], accuracy, counts)
+        factorise(problem, s, known[FACTORED], accuracy, counts)
 
 
 @helper
@@ -263,8 +322,9 @@ def arrays(n, coordinates, a, rate, f):
     """Arrays for n components, the first of which are coordinates; a, udot and the slope at the start are given."""
     nu = a.shape[0]
     return NewmarkArrays(
-        np.empty((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), rate_blocks(coordinates), a, np.empty(nu), rate,
+        np.zeros((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), rate_blocks(coordinates), a, np.empty(nu), rate,
         np.empty(nu), np.empty(nu), np.empty(nu), f, np.empty(n), np.zeros(n), np.empty(n),
+        stiff_place(n, coordinates, nu),
     )  # fmt: skip
 
 
@@ -277,8 +337,10 @@ def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
     """
     n, nu = y.shape[0], accuracy.controlled - accuracy.coordinates
     s = arrays(n, accuracy.coordinates, np.empty(nu), np.empty(nu), np.empty(n))
+    begin_without_jacobian(problem, s.stiff)
     ends = Ends(y, s.f, np.empty(n), s.f_new)
     looking = arrays(n, accuracy.coordinates, s.a, s.rate, s.f)
+    begin_without_jacobian(problem, looking.stiff)
     method = FixedMethod(attempt, no_detour, accept, enter, recall, keep, inside, looking)
     return equal_steps(method, problem, (s, ends), clock, out, (accuracy, counts), memory, watch)
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from flexmb.jit.bundle import AnyBundle
 from flexmb.jit.kernel import kernel
-from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID, Pointer, pointer
+from flexmb.jit.pointer import COMPLEX, COMPLEX_VECTOR, MATRIX, REAL, STATUS, VECTOR, VOID, WHOLE, Pointer, pointer
+from flexmb.tables.status import NOT_CONVERGED
 
 
 class Problem(NamedTuple):
@@ -38,6 +39,8 @@ class StiffProblem(NamedTuple):
     jacobian(t, y, J, exact, tangent) puts df/dy (n,n) into J and returns a status code.
     move(y, increment, result, constants) puts y = [q, u, ...] with q o exp(increment) into result, for methods on Lie
     groups; increment (nu,). settles: whether `project` displaces stiff components: see `flexmb.integrate.settling`.
+    separates: whether the functions of `StiffPart` exist, with its tables in `stiff`: Newton's method may then do
+    without the Jacobian, see `flexmb.integrate.stiff_place`.
     """
 
     rhs: Pointer
@@ -51,6 +54,12 @@ class StiffProblem(NamedTuple):
     exact: AnyBundle
     tangent: AnyBundle
     settles: bool
+    separates: bool
+    settle_at: Pointer
+    shift: Pointer
+    along: Pointer
+    restore: Pointer
+    stiff: AnyBundle
 
 
 class Clock(NamedTuple):
@@ -106,6 +115,22 @@ class Leaping(NamedTuple):
     noticed: Callable[[Any], tuple[float, int] | None]
 
 
+class StiffPart(NamedTuple):
+    """Kernels for equations M udot = f of which the stiff part of f, -K (q - q0) - D (u - u0), is known; their tables.
+
+    settle_at(t, y, tables) takes K, D, M and N = dqdot/du there; returns a status code. shift(a, b, second, tables)
+    factorises M + a D + b K, as the first or the second of two matrices; returns a status code. along(u, q, tables)
+    puts N u into q (nq,). restore(q, u, second, tables) replaces u (nu,) by (M + a D + b K)^-1 (K q + D u). Numbers are
+    complex.
+    """
+
+    settle_at: Any
+    shift: Any
+    along: Any
+    restore: Any
+    tables: Any
+
+
 class Linear(NamedTuple):
     """What a `StiffProblem` has in addition to a `Problem`: kernels jacobian and move, bundles exact and tangent."""
 
@@ -114,6 +139,27 @@ class Linear(NamedTuple):
     exact: Any
     tangent: Any
     settles: bool = False
+    stiff: StiffPart | None = None
+
+
+@kernel
+def _no_settling(t, y, tables):
+    return NOT_CONVERGED
+
+
+@kernel
+def _no_shift(a, b, second, tables):
+    return NOT_CONVERGED
+
+
+@kernel
+def _no_motion(u, q, tables):
+    pass
+
+
+@kernel
+def _no_answer(q, u, second, tables):
+    pass
 
 
 @kernel
@@ -145,7 +191,10 @@ def stiff_problem(
     rhs: Any, project: Any, constants: Any, workspace: Any, linear: Linear, leaping: Leaping | None = None
 ) -> StiffProblem:
     """A `StiffProblem` from kernels and bundles, see `problem`."""
-    jacobian, move, exact, tangent, settles = linear
+    jacobian, move, exact, tangent, settles, stiff = linear
+    nothing = StiffPart(_no_settling, _no_shift, _no_motion, _no_answer, exact)
+    settle_at, shift, along, restore, tables = stiff or nothing
+    known = tables if stiff else AnyBundle._numba_type_
     return StiffProblem(
         *problem(rhs, project, constants, workspace, leaping),
         pointer(jacobian, STATUS, REAL, VECTOR, MATRIX, exact, tangent),
@@ -153,4 +202,10 @@ def stiff_problem(
         AnyBundle(exact),
         AnyBundle(tangent),
         settles,
+        stiff is not None,
+        pointer(settle_at, STATUS, REAL, VECTOR, known),
+        pointer(shift, STATUS, COMPLEX, COMPLEX, WHOLE, known),
+        pointer(along, VOID, COMPLEX_VECTOR, COMPLEX_VECTOR, known),
+        pointer(restore, VOID, COMPLEX_VECTOR, COMPLEX_VECTOR, WHOLE, known),
+        AnyBundle(tables),
     )

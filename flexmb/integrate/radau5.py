@@ -10,13 +10,22 @@ from __future__ import annotations
 import math
 
 from flexmb.integrate.adaptive import Method, adaptive
-from flexmb.integrate.control import SAFETY, SHRINK, copy, derivative, linearisation, next_step, retreat, scaled_norm
+from flexmb.integrate.control import SAFETY, SHRINK, copy, derivative, next_step, retreat, scaled_norm
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE
-from flexmb.integrate.newton_matrix import solve
-from flexmb.integrate.radau5_stages import ITERATIONS, evaluate_polynomial, factorise, guess, newton, scratch
+from flexmb.integrate.radau5_stages import (
+    ITERATIONS,
+    evaluate_polynomial,
+    factorise,
+    guess,
+    newton,
+    renew,
+    scratch,
+    solve,
+)
 from flexmb.integrate.radau5_tableau import REAL, E
 from flexmb.integrate.settling import settle
+from flexmb.integrate.stiff_place import begin_without_jacobian, give_up, keep_place, recall_place, suffices
 from flexmb.integrate.watch import Ends
 from flexmb.jit.kernel import handed_in, handed_on, helper, kernel
 from flexmb.tables.status import NOT_CONVERGED, OK
@@ -25,18 +34,19 @@ _GROW = 8.0  # strongest growth of a step
 _KEEP = 1.2  # the step is kept for a growth below this, to avoid a new factorisation
 _SAME = 1e-9  # relative difference of steps that share factors
 _SLOW, _POOR = 1e-3, 0.03  # a contraction above this asks for a new Jacobian, after three iterations or more; after two
+_INEXACT = 0.1  # the same for the stiff part in place of the Jacobian, which contracts no faster where it is new
 _CONTRACTION = 0.15  # target contraction of Newton's method, where convergence limits the step
 _CUT = 0.7  # upper bound of the factor on a step for which Newton's method failed
 _ERROR_EXPONENT = 4.0  # the error estimate is O(h^4)
 
 
 @helper
-def estimate(y, slope, h, s, accuracy):
+def estimate(problem, y, slope, h, s, accuracy):
     """Scaled norm of the embedded formula's error (8.19): the defect at the start, stiff parts filtered out."""
     for i in range(y.shape[0]):
         s.error[i] = slope[i] + (E[0] * s.Z[0, i] + E[1] * s.Z[1, i] + E[2] * s.Z[2, i]) / h
         s.trial[i] = max(abs(y[i]), abs(s.y_new[i]))
-    solve(s.real, s.J, s.error)
+    solve(problem, s, h, s.error)
     return scaled_norm(s.error, s.trial, accuracy)
 
 
@@ -63,13 +73,13 @@ def try_step(problem, step, ends, s, filter_again, accuracy, counts):
         return status, (math.inf, iterations, rate)
     for i in range(y.shape[0]):
         s.y_new[i] = y[i] + s.Z[2, i]
-    error = estimate(y, s.f, h, s, accuracy)
+    error = estimate(problem, y, s.f, h, s, accuracy)
     if error >= 1.0 and filter_again:
         for i in range(y.shape[0]):
             s.trial[i] = y[i] + s.error[i]
         status = derivative(problem, step.start, s.trial, s.f_new, counts)
         if status == OK:
-            error = estimate(y, s.f_new, h, s, accuracy)
+            error = estimate(problem, y, s.f_new, h, s, accuracy)
     if status == OK and error < 1.0:
         settle(problem, step.end, REAL / h, s.y_new, s, accuracy)
         status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
@@ -81,13 +91,13 @@ def attempt(problem, step, ends, s, known, accuracy, counts):
     """See `flexmb.integrate.adaptive.Method`; verdict: error norm, iterations, contraction of Newton's method."""
     length, nothing = step.end - step.start, (math.inf, 0, 0.0)
     if known[RENEW] != 0.0:
-        status = linearisation(problem, step.start, ends.y, s.J, counts)
+        status = renew(problem, step.start, ends.y, s, counts)
         if status != OK:
             return status, nothing
         known[RENEW], known[FRESH], known[FACTORED] = 0.0, 1.0, 0.0
     # Equal steps differ by the rounding of time: the factors are good for all of them.
     if abs(length - known[FACTORED]) > _SAME * length:
-        known[FACTORED] = length if factorise(s, length, counts) else 0.0
+        known[FACTORED] = length if factorise(problem, s, length, counts) else 0.0
     if known[FACTORED] == 0.0:
         return NOT_CONVERGED, nothing
     guess(s.Z_before, known[STEP_BEFORE], length, s.Z)
@@ -108,16 +118,18 @@ def state_at(problem, step, ends, s, t, result, run):
 
 @handed_in
 def keep(memory, s):
-    """Store the Jacobian and the stages of the step before."""
+    """Store the Jacobian, or the place of the stiff part, and the stages of the step before."""
     n = s.f.shape[0]
     for i in range(n):
         copy(s.J[i], memory.rows[i])
+    if suffices(s.stiff):
+        keep_place(s.stiff, memory.rows)
     for stage in range(3):
         copy(s.Z_before[stage], memory.rows[n + stage])
 
 
 @handed_in
-def recall(memory, s, known, counts):
+def recall(problem, memory, s, known, counts):
     """Restore these for a resumed run and factorise again; in any other run the first step starts without them."""
     n = s.f.shape[0]
     if known[STEP_BEFORE] == 0.0 and known[FACTORED] == 0.0:
@@ -125,10 +137,11 @@ def recall(memory, s, known, counts):
         return
     for i in range(n):
         copy(memory.rows[i], s.J[i])
+    recall_place(problem, s.stiff, memory.rows)
     for stage in range(3):
         copy(memory.rows[n + stage], s.Z_before[stage])
     if known[FACTORED] > 0.0:
-        factorise(s, known[FACTORED], counts)
+        factorise(problem, s, known[FACTORED], counts)
 
 
 @helper
@@ -172,7 +185,7 @@ def by_trend(length, verdict, known):
 def accept(step, cut, verdict, s, known, exponent):
     """See `flexmb.integrate.adaptive.Method`."""
     length, (error, iterations, rate) = step.end - step.start, verdict
-    worn = rate > (_SLOW if iterations > 2 else _POOR)
+    worn = rate > (_INEXACT if suffices(s.stiff) else _SLOW if iterations > 2 else _POOR)
     factor = min(by_trend(length, verdict, known), by_contraction(rate))
     known[STEP] = after_acceptance(known[STEP], length, cut, factor, known[RETRIED] != 0.0, worn)
     known[STEP_BEFORE], known[ERROR_BEFORE] = length, max(1e-2, error)
@@ -186,7 +199,8 @@ def reject(step, status, verdict, s, known, exponent):
     """See `flexmb.integrate.adaptive.Method`."""
     length, rate = step.end - step.start, verdict[2]
     factor = by_trend(length, verdict, known) if status == OK else 1.0
-    known[STEP], renew = after_rejection(length, status, factor, rate, known[FRESH] != 0.0)
+    fresh = known[FRESH] != 0.0 and not (status == NOT_CONVERGED and give_up(s.stiff))
+    known[STEP], renew = after_rejection(length, status, factor, rate, fresh)
     known[RENEW] = 1.0 if renew else 0.0
     if known[STEP] < length:
         known[RETRIED] = 1.0
@@ -213,7 +227,8 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
     Where Newton's method does not converge, an old Jacobian is renewed, then the step is shortened by how far it is
     from converging.
     """
-    s = scratch(y.shape[0], accuracy.coordinates)
+    s = scratch(y.shape[0], accuracy.coordinates, accuracy.controlled - accuracy.coordinates)
+    begin_without_jacobian(problem, s.stiff)
     ends = Ends(y, s.f, s.y_new, s.f_new)
     method = Method(attempt, accept, reject, after_leap, enter, recall, keep, state_at, _ERROR_EXPONENT)
     return adaptive(method, problem, (s, ends), clock, out, (accuracy, counts), memory, watch)

@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.integrate import newton_matrix
-from flexmb.integrate.control import FACTORISATIONS, derivative, scaled_norm
+from flexmb.integrate.control import FACTORISATIONS, derivative, linearisation, scaled_norm
 from flexmb.integrate.newton_matrix import NewtonMatrix
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, P
+from flexmb.integrate.stiff_place import StiffPlace, answer, settle_at, shift, stiff_place, suffices
 from flexmb.jit.kernel import helper
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
@@ -41,12 +42,24 @@ class RadauStages(NamedTuple):
     error: np.ndarray
     trial: np.ndarray
     change: np.ndarray
+    stiff: StiffPlace
 
 
 @helper
-def factorise(s, h, counts):
-    """Factors of REAL/h - J and COMPLEX/h - J; returns whether both are regular."""
+def renew(problem, t, y, s, counts):
+    """Linearise at (t, y): the Jacobian, or the place of the stiff part where this suffices; returns a status code."""
+    if suffices(s.stiff):
+        return settle_at(problem, t, y, s.stiff)
+    return linearisation(problem, t, y, s.J, counts)
+
+
+@helper
+def factorise(problem, s, h, counts):
+    """Factors of REAL/h - J and COMPLEX/h - J, or of the stiff parts; returns whether both are regular."""
     counts[FACTORISATIONS] += 1
+    if suffices(s.stiff):
+        a, b = h / REAL, h / COMPLEX
+        return shift(problem, a, a * a, 0) and shift(problem, b, b * b, 1)
     newton_matrix.find_blocks(s.real.blocks, s.J, s.real.inner.shape[0])
     return newton_matrix.factorise(s.real, s.J, REAL / h) and newton_matrix.factorise(s.paired, s.J, COMPLEX / h)
 
@@ -62,14 +75,36 @@ def evaluate_polynomial(Z, x, result):
 
 
 @helper
-def correct(s, h):
+def solve(problem, s, h, x):
+    """x := (REAL/h - J)^-1 x."""
+    if suffices(s.stiff):
+        for i in range(x.shape[0]):
+            s.stiff.z[i] = x[i]
+        answer(problem, h / REAL, 0, s.stiff.z, s.stiff)
+        for i in range(x.shape[0]):
+            x[i] = s.stiff.z[i].real
+    else:
+        newton_matrix.solve(s.real, s.J, x)
+
+
+@helper
+def solve_paired(problem, s, h, x):
+    """x := (COMPLEX/h - J)^-1 x."""
+    if suffices(s.stiff):
+        answer(problem, h / COMPLEX, 1, x, s.stiff)
+    else:
+        newton_matrix.solve(s.paired, s.J, x)
+
+
+@helper
+def correct(problem, s, h):
     """One Newton correction (dw real, dv complex) of the decoupled stages (w, v)."""
     F = s.F
     for i in range(s.w.shape[0]):
         s.dw[i] = W_REAL[0] * F[0, i] + W_REAL[1] * F[1, i] + W_REAL[2] * F[2, i] - REAL / h * s.w[i]
         s.dv[i] = W_COMPLEX[0] * F[0, i] + W_COMPLEX[1] * F[1, i] + W_COMPLEX[2] * F[2, i] - COMPLEX / h * s.v[i]
-    newton_matrix.solve(s.real, s.J, s.dw)
-    newton_matrix.solve(s.paired, s.J, s.dv)
+    solve(problem, s, h, s.dw)
+    solve_paired(problem, s, h, s.dv)
     for i in range(s.w.shape[0]):
         s.w[i] += s.dw[i]
         s.v[i] += s.dv[i]
@@ -118,7 +153,7 @@ def newton(problem, step, y, s, accuracy, counts):
             status = derivative(problem, min(step.start + C[stage] * h, step.last), s.trial, s.F[stage], counts)
             if status != OK:
                 return status, iteration, rate
-        correct(s, h)
+        correct(problem, s, h)
         to_stages(s.dw, s.dv, s.F)
         size = stage_norm(s.F, y, accuracy)
         to_stages(s.w, s.v, s.Z)
@@ -145,13 +180,13 @@ def guess(before, h_before, h, Z):
 
 
 @helper
-def scratch(n, coordinates):
-    """For n components, of which the first are coordinates."""
+def scratch(n, coordinates, speeds):
+    """For n components, of which the first are coordinates, then speeds."""
     blocks = newton_matrix.rate_blocks(coordinates)
     return RadauStages(
-        np.empty(n), np.empty((n, n)), newton_matrix.unfactorised(n, coordinates, blocks, np.float64),
+        np.empty(n), np.zeros((n, n)), newton_matrix.unfactorised(n, coordinates, blocks, np.float64),
         newton_matrix.unfactorised(n, coordinates, blocks, np.complex128), np.empty((3, n)), np.empty((3, n)),
         np.empty((3, n)), np.empty(n),
         np.empty(n, np.complex128), np.empty(n), np.empty(n, np.complex128), np.empty(n), np.empty(n), np.empty(n),
-        np.empty(n), np.empty(n),
+        np.empty(n), np.empty(n), stiff_place(n, coordinates, speeds),
     )  # fmt: skip

@@ -6,6 +6,7 @@ from flexmb.jain.connected import evaluate_connectors
 from flexmb.jain.forces import load_at_port
 from flexmb.jain.ports import port_velocity
 from flexmb.jain.wheels import spin_axis
+from flexmb.jit.duals import nonzero
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
 from flexmb.levels.body import body_inertia
@@ -52,10 +53,10 @@ def energy_and_momentum(c, w, energy, momentum):
             i = c.speed[j].coordinate
             if i >= 0:
                 stretch = w.q[i] - c.speed[j].rest
-                energy[SPRING] += 0.5 * c.speed[j].stiffness * stretch * stretch
+                energy[SPRING] += 0.5 * c.speed[j].stiffness * (stretch * stretch)
     if has(c, BALL_SPRINGS):
         for k in range(c.body.shape[0]):
-            if c.body[k].ball_spring != 0.0:
+            if nonzero(c.body[k].ball_spring):
                 i = c.body[k].q_index
                 theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
                 energy[SPRING] += 0.5 * c.body[k].ball_spring * dot(theta, theta)

@@ -8,7 +8,7 @@ from flexmb.spatial.pivots import is_small
 @helper
 def note_mode(c, w, k, n, pivot):
     """Note the pivot of mode n of body k if it is small."""
-    if not every(pivot.real > c.speed[c.body[k].etad_index + n].doubtful):
+    if not every(pivot.real > c.speed[c.body[k].etad_index + n].doubtful.real):
         w.doubt[0] = 1
 
 

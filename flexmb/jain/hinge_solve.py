@@ -27,6 +27,7 @@ from flexmb.jain.doubt import note_hinge
 from flexmb.jain.explicit import about_hinge, cholesky
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.variants import to_parent
+from flexmb.jit.duals import nonzero
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import kept, some
@@ -99,7 +100,7 @@ def eliminate(c, w, k):
     G = scale6(s, PH)
     store6(w.body[k].gain, 0, G)
     if c.body[k].parent >= 0:
-        if has(c, ARMATURES) and some(c.speed[j].armature != 0.0):
+        if has(c, ARMATURES) and some(nonzero(c.speed[j].armature)):
             row = NO_AXIS  # P_R^+ keeps inertia along the axis, in series with the armature
         to_parent(c, w, k, less_outer(P, G, PH), axpy6(epsilon, G, z), row)
     return True

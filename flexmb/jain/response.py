@@ -52,10 +52,16 @@ def response(c: Constants) -> Response:
 @helper
 def clear(c, x):
     """Set all forces on bodies, modes and speeds to zero."""
-    for k in range(c.body.shape[0]):
-        clear_body(c, x, k)
+    clear_forces(c, x)
     for j in range(x.speed.shape[0]):
         x.speed[j] = 0.0
+
+
+@helper
+def clear_forces(c, x):
+    """Set all forces on bodies and modes to zero; those on speeds stay."""
+    for k in range(c.body.shape[0]):
+        clear_body(c, x, k)
 
 
 @helper

@@ -4,7 +4,7 @@ A kernel whose workspace holds such dual numbers is compiled from the same sourc
 quotients and elementary functions carry the derivatives along by the rules of calculus: nothing is approximated and
 nothing cancels (forward differentiation: Griewank & Walther, Evaluating Derivatives, 2nd ed., ch. 3). The derivatives
 are the lanes of one vector, so that a product costs one scalar multiplication and two of vectors. Comparisons use the
-number alone, `.real`.
+number alone, `.real`; whether a term that is usually zero may be left out is asked by `nonzero`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_global, signature
 from numba.extending import infer_getattr, lower_builtin, lower_cast, lower_getattr, models, register_model
 
-from flexmb.jit.lanes import LANE, LANES, repeated, sincos
+from flexmb.jit.lanes import LANE, LANES, MASK, LaneType, repeated, sincos
 
 
 class DualType(types.Type):
@@ -87,6 +87,12 @@ def seeded(x: Any, lane: int) -> Any:
 def rate(x: Any, lane: int) -> Any:
     """Derivative of x along the direction of this lane; zero for a float."""
     return 0.0
+
+
+def nonzero(x: Any) -> Any:
+    """Whether x, or for a dual a derivative of it, differs from zero; a mask for lanes. Where not, a term that has x as
+    a factor may be left out."""
+    return x != 0.0
 
 
 @lower_cast(types.Float, DualType)
@@ -190,6 +196,11 @@ def _cosine(call, builder, x):
     return call(math.cos, x), builder.fneg(call(math.sin, x))
 
 
+def _exponential(call, builder, x):
+    power = call(math.exp, x)
+    return power, power
+
+
 _binary(_add, operator.add, operator.iadd)
 _binary(_subtract, operator.sub, operator.isub)
 _binary(_multiply, operator.mul, operator.imul)
@@ -197,6 +208,7 @@ _binary(_divide, operator.truediv, operator.itruediv)
 _unary(math.sqrt, _square_root)
 _unary(math.sin, _sine)
 _unary(math.cos, _cosine)
+_unary(math.exp, _exponential)
 infer_global(operator.neg)(_Unary)
 infer_global(math.atan2)(_Binary)
 
@@ -255,3 +267,30 @@ class _Rate(AbstractTemplate):
 @lower_builtin(rate, DualType, types.Integer)
 def _lower_rate(context, builder, sig, args):
     return builder.extract_element(builder.extract_value(args[0], 1), args[1])
+
+
+@infer_global(nonzero)
+class _Nonzero(AbstractTemplate):
+    def generic(self, args, kws):
+        [x] = args
+        if x == LANE:
+            return signature(MASK, LANE)
+        if isinstance(x, types.Complex):
+            return None  # see `flexmb.jit.complex_numbers`
+        return signature(types.boolean, x if x == DUAL else types.float64)
+
+
+@lower_builtin(nonzero, types.Float)
+@lower_builtin(nonzero, LaneType)
+def _lower_nonzero(context, builder, sig, args):
+    return builder.fcmp_unordered("!=", args[0], ir.Constant(args[0].type, 0.0 if sig.args[0] != LANE else None))
+
+
+@lower_builtin(nonzero, DualType)
+def _nonzero_dual(context, builder, sig, args):
+    value, rates = _parts(builder, args[0])
+    different = builder.fcmp_unordered("!=", rates, ir.Constant(_RATES, None))
+    bits = builder.bitcast(different, ir.IntType(LANES))
+    return builder.or_(
+        builder.fcmp_unordered("!=", value, _NUMBER(0.0)), builder.icmp_unsigned("!=", bits, bits.type(0))
+    )

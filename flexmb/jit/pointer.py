@@ -20,6 +20,7 @@ from flexmb.jit.hooks import HOOKS
 
 REAL, VECTOR, MATRIX, INDEX = types.float64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
 STATUS, WHOLE, VOID = types.int64, types.int64, types.none
+COMPLEX, COMPLEX_VECTOR = types.complex128, types.complex128[::1]
 
 
 class Pointer(WrapperAddressProtocol):  # type: ignore[misc]

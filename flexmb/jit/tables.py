@@ -4,8 +4,8 @@ Numba's own arrays have owners, strides and reference counts, which cost time in
 to, at compilation and in a run. Kernels do not need them: the bundle keeps its arrays, and they are contiguous. In a
 kernel a table is used like an array (`c.body[k].parent`, `w.pff[k, n, i] = x`, `U[m, m + 1 : n]`, `a.shape[0]`); a
 nested array of a record is a table with constant extents. Indices are not checked, and negative ones do not count from
-the end. The floats of a record with a field PADDING are lanes or duals, depending on the length of their last axis: see
-`flexmb.jit.wide_arrays`.
+the end. The floats of a record with a field PADDING are lanes, duals or complex, depending on the length of their last
+axis: see `flexmb.jit.wide_arrays`.
 """
 
 from __future__ import annotations
@@ -29,12 +29,13 @@ from numba.extending import (
     register_model,
 )
 
+from flexmb.jit import complex_numbers
 from flexmb.jit.duals import DUAL
 from flexmb.jit.lanes import LANE
 
 WORD, BYTE = ir.IntType(64), ir.IntType(8)
-PADDING = "padding"  # the last field of records whose floats are lanes or duals
-_WIDE = {kind.width: kind for kind in (LANE, DUAL)}
+PADDING = "padding"  # the last field of records whose floats are lanes, duals or complex
+_WIDE = {LANE.width: LANE, DUAL.width: DUAL, complex_numbers.WIDTH: complex_numbers.COMPLEX}
 
 
 @cache

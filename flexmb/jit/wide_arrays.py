@@ -1,4 +1,4 @@
-"""Arrays whose floats are lanes or duals: each float gets a last axis, aligned for vector instructions.
+"""Arrays whose floats are lanes, duals or complex: each float gets a last axis, aligned for vector instructions.
 
 Integers get none: the structure of a scene is the same in all lanes.
 """
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from flexmb.jit.complex_numbers import WIDTH
 from flexmb.jit.duals import DualType
 from flexmb.jit.lanes import BYTES, LANES
 from flexmb.jit.tables import PADDING
@@ -59,7 +60,17 @@ def in_lanes(copies: list[Any]) -> Any:
 
 def as_duals(array: Any) -> Any:
     """The same numbers as duals with zero derivatives."""
-    out = wide_zeros(array.shape, array.dtype, DualType.width)
+    return _widened(array, DualType.width)
+
+
+def as_complex(array: Any) -> Any:
+    """The same numbers as complex ones with zero imaginary parts."""
+    return _widened(array, WIDTH)
+
+
+def _widened(array: Any, width: int) -> Any:
+    """The same numbers, each the first of `width` floats, the others zero."""
+    out = wide_zeros(array.shape, array.dtype, width)
     if array.dtype == np.float64:
         out[..., 0] = array
     elif array.dtype.names is None:

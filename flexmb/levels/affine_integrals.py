@@ -25,13 +25,13 @@ def sum_integrals(w, k, product, moves, nm, n):
     x = y = z = (0.0, 0.0, 0.0)
     for i in range(nm):
         slope, eta, etad = blocks[1 + i], w.eta[k, i], w.etad[k, i]
-        if some(moves[i, 0] != 0.0):
+        if some(moves[i, 0].real != 0.0):
             column = _column(w, slope, 0, at)
             X, x = axpy(eta, column, X), axpy(etad, column, x)
-        if some(moves[i, 1] != 0.0):
+        if some(moves[i, 1].real != 0.0):
             column = _column(w, slope, 1, at)
             Y, y = axpy(eta, column, Y), axpy(etad, column, y)
-        if some(moves[i, 2] != 0.0):
+        if some(moves[i, 2].real != 0.0):
             column = _column(w, slope, 2, at)
             Z, z = axpy(eta, column, Z), axpy(etad, column, z)
     return (X, Y, Z), (x, y, z)

@@ -21,11 +21,11 @@ def is_out_of_range(c, eta, k):
     diagonal = 0.0
     for n in range(c.body[k].modes):
         diagonal += eta[n] * c.mff[k, n, n] * eta[n]
-    if every(c.body[k].modes * diagonal.real <= limit):  # an upper bound of the sum below, by Cauchy-Schwarz
+    if every(c.body[k].modes * diagonal.real <= limit.real):  # an upper bound of the sum below, by Cauchy-Schwarz
         return False
     squares = 0.0
     for n in range(c.body[k].modes):
         for i in range(c.body[k].modes):
             squares += eta[n] * c.mff[k, n, i] * eta[i]
-    eta[0] = kept(squares.real <= limit, eta[0])
-    return every(squares.real > limit)
+    eta[0] = kept(squares.real <= limit.real, eta[0])
+    return every(squares.real > limit.real)

@@ -15,28 +15,30 @@ from dataclasses import replace
 import numpy as np
 
 from flexmb.modal.flexible_model import FlexibleModel, SecondOrder, join_second
-from flexmb.typing import Real
+from flexmb.typing import Flags, Real
 
 NEGLIGIBLE = 1e-12
 """A field of unit norm whose remainder orthogonal to the others is below this is taken to lie in their span."""
 
 
-def with_equivalent_masses(model: FlexibleModel) -> FlexibleModel:
+def with_equivalent_masses(model: FlexibleModel, like: FlexibleModel | None = None) -> FlexibleModel:
     """The body with the fewest possible point masses if it has a second-order field; else the body itself.
 
-    Masses with an offset are kept. Inertia tensors are kept on points without mass.
+    Masses with an offset are kept. Inertia tensors are kept on points without mass. `like`: the same body with slightly
+    other numbers, also with all its points. The basis is then turned such that it is nearest to that of `like`, and
+    depends smoothly on the numbers of the body.
     """
     if model.second is None:
         return model
-    still = (model.mass > 0.0) & ~np.any(model.com_offset != 0.0, axis=1)
+    still = _still(model)
     m, count = model.mass[still], int(np.count_nonzero(still))
     if count == 0:
         return model
-    # Columns times sqrt(m): their scalar products are the integrals sum m a b, which an orthogonal map keeps.
-    fields = [np.ones((count, 1)), model.position[still], model.translation[still].reshape(count, -1)]
-    basis = _basis(np.concatenate(fields, axis=1) * np.sqrt(m)[:, None])
+    basis = _basis(_fields(model, still))
     if basis.shape[1] >= count:
         return model
+    if like is not None:
+        basis = _turned(basis, _basis(_fields(like, _still(like))))
     to_points = _equal_masses(basis, m) * np.sqrt(m)
     turning = ~still | np.any(model.inertia != 0.0, axis=(1, 2))
     size, none = len(to_points), np.zeros_like
@@ -58,6 +60,28 @@ def with_equivalent_masses(model: FlexibleModel) -> FlexibleModel:
         rotation=joined(none(translation), model.rotation),
         second=join_second(SecondOrder(G, none(G)), model.second.map(lambda each: each[turning])),
     )
+
+
+def _still(model: FlexibleModel) -> Flags:
+    """Which points (n,) have a mass without an offset."""
+    found: Flags = (model.mass > 0.0) & ~np.any(model.com_offset != 0.0, axis=1)
+    return found
+
+
+def _fields(model: FlexibleModel, still: Flags) -> Real:
+    """Columns of 1, r and phi at these points, times sqrt(m): their scalar products are the integrals sum m a b, which
+    an orthogonal map keeps."""
+    m, count = model.mass[still], int(np.count_nonzero(still))
+    fields = [np.ones((count, 1)), model.position[still], model.translation[still].reshape(count, -1)]
+    return np.concatenate(fields, axis=1) * np.sqrt(m)[:, None]
+
+
+def _turned(basis: Real, reference: Real) -> Real:
+    """The orthonormal basis of the same space that is nearest to a reference basis (Procrustes)."""
+    if basis.shape != reference.shape:
+        raise ValueError(f"the equivalent masses change their number, {reference.shape[1]} to {basis.shape[1]}")
+    U, _, Vt = np.linalg.svd(basis.T @ reference)
+    return np.asarray(basis @ (U @ Vt))
 
 
 def _basis(fields: Real) -> Real:

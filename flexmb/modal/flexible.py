@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from typing import assert_never
+from typing import TypeVar, assert_never
 
 import numpy as np
 from msgspec.structs import replace
@@ -13,8 +13,9 @@ from flexmb.modal.beam import BeamElements, beam_elements
 from flexmb.modal.element_points import Points, axis_points, join, massy_lump, on_axis, section_points, turning_lump
 from flexmb.modal.equivalent import with_equivalent_masses
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, SecondOrder, undeforming_node
+from flexmb.modal.following import followed
 from flexmb.modal.raw import raw_model
-from flexmb.modal.reduce import beam_modes, damping_matrix
+from flexmb.modal.reduce import BeamModes, beam_modes, damping_matrix
 from flexmb.modal.second_order import beam_second_order
 from flexmb.modal.stations import Lump, Stations, inertia_stations, lumps
 from flexmb.scene.bodies import IDENTITY, BeamBody, ModalBody, Quaternion
@@ -22,39 +23,59 @@ from flexmb.scene.quaternions import rotation_matrix
 from flexmb.typing import Real
 
 
-def flexible_model(body: BeamBody | ModalBody, folder: Path | None = None) -> FlexibleModel:
+def flexible_model(
+    body: BeamBody | ModalBody, folder: Path | None = None, like: BeamBody | ModalBody | None = None
+) -> FlexibleModel:
     """Inertia points, modes, stiffness, damping and nodes of one flexible body.
 
     `folder` contains a modal body's `.npz` (the folder of the scene file). Node "origin" is the body frame, which does
     not deform; a beam also has "root" and "tip". At level "stiffened" few equivalent masses replace the inertia points
-    (`flexmb.modal.equivalent`). Equal beams share one model: its arrays must not be written to. Raises ValueError for
-    inconsistent data.
+    (`flexmb.modal.equivalent`). Equal beams share one model: its arrays must not be written to. `like`: the same body
+    with slightly other numbers; modes and equivalent masses are then chosen such that the model is a smooth function of
+    the numbers of `body` around those of `like` (`flexmb.modal.following`). Raises ValueError for inconsistent data.
     """
     match body:
         case ModalBody():
-            return with_equivalent_masses(raw_model(body, folder))
+            reference = None if like is None else raw_model(_of_kind(like, ModalBody), folder)
+            return with_equivalent_masses(raw_model(body, folder), reference)
         case BeamBody():
+            followed = None if like is None else replace(_of_kind(like, BeamBody), name="beam")
             try:
-                return _beam(replace(body, name="beam"))
+                return _beam(replace(body, name="beam"), followed)
             except ValueError:
-                return _beam(body)  # equal beams of any name share the cache; this raises again, with the name
+                return _beam(body, followed)  # equal beams of any name share the cache; this raises again, by name
         case _:
             assert_never(body)
 
 
+Body = TypeVar("Body", BeamBody, ModalBody)
+
+
+def _of_kind(body: BeamBody | ModalBody, kind: type[Body]) -> Body:
+    if not isinstance(body, kind):
+        raise ValueError(f"body '{body.name}' cannot follow one of another kind")
+    return body
+
+
 @lru_cache(maxsize=128)
-def _beam(body: BeamBody) -> FlexibleModel:
-    return with_equivalent_masses(beam_model(body))
+def _beam(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
+    return with_equivalent_masses(beam_model(body, like), None if like is None else beam_model(like))
 
 
-def beam_model(body: BeamBody) -> FlexibleModel:
-    """Finite elements, modes and inertia points of a beam; unit modal masses, stiffness diag(omega^2)."""
+def beam_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
+    """Finite elements, modes and inertia points of a beam; unit modal masses, stiffness diag(omega^2).
+
+    `like`: see `flexible_model`; the stiffness of modes that had one frequency in it may have other elements too.
+    """
     elements = beam_elements(body)
     stations = inertia_stations(body, elements.mesh, elements.table)
     rigid_lumps = lumps(body)
+    M = elements.mass(stations, rigid_lumps)
     try:
-        modes = beam_modes(elements, elements.stiffness(), elements.mass(stations, rigid_lumps), body.modes)
-        damping = damping_matrix(modes.frequencies, body.modes.damping_ratio)
+        modes = beam_modes(elements, elements.stiffness(), M, body.modes)
+        if like is not None:
+            modes = followed(modes, M, _modes_of(like))
+        damping = damping_matrix(modes.roots, body.modes.damping_ratio)
     except ValueError as error:
         raise ValueError(f"beam '{body.name}': {error}") from error
     points = points_of(body, elements, modes.columns, stations, rigid_lumps)
@@ -65,12 +86,19 @@ def beam_model(body: BeamBody) -> FlexibleModel:
         inertia=points.inertia,
         translation=points.translation,
         rotation=points.rotation,
-        stiffness=np.diag(modes.frequencies**2),
+        stiffness=modes.stiffness,
         damping=damping,
         nodes=_nodes(body, elements, modes.columns),
         clamped=body.modes.boundary == "clamped-free",
         second=second_order_of(body, elements, modes.columns, points.x, points.position - on_axis(points.x)),
     )
+
+
+@lru_cache(maxsize=8)  # one body is followed at a time, by models for all of its numbers
+def _modes_of(body: BeamBody) -> BeamModes:
+    elements = beam_elements(body)
+    M = elements.mass(inertia_stations(body, elements.mesh, elements.table), lumps(body))
+    return beam_modes(elements, elements.stiffness(), M, body.modes)
 
 
 def points_of(

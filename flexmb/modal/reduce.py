@@ -19,10 +19,29 @@ _ROUND_OFF = 64 * np.finfo(float).eps
 
 @dataclass(frozen=True)
 class BeamModes:
-    """Coordinate columns (size, m) with unit modal mass and angular frequencies (m,) rad/s, ascending."""
+    """Coordinate columns (size, m) with unit modal mass and angular frequencies (m,) rad/s, ascending.
+
+    `turn` (m,m), orthogonal: the columns are those of the eigenmodes times `turn`; None for the eigenmodes themselves.
+    """
 
     columns: Real
     frequencies: Real
+    turn: Real | None = None
+
+    @property
+    def stiffness(self) -> Real:
+        """Modal stiffness (m,m), N/m for unit modal mass."""
+        return self._turned(self.frequencies**2)
+
+    @property
+    def roots(self) -> Real:
+        """The square root (m,m) of the modal stiffness, rad/s."""
+        return self._turned(self.frequencies)
+
+    def _turned(self, values: Real) -> Real:
+        if self.turn is None:
+            return np.diag(values)
+        return self.turn.T @ (values[:, None] * self.turn)
 
 
 @dataclass(frozen=True)
@@ -74,11 +93,15 @@ def beam_modes(elements: BeamElements, K: Real, M: Real, modes: Modes) -> BeamMo
     return BeamModes(columns * _tip_signs(elements, columns), np.array([omega for omega, _, _ in chosen]))
 
 
-def damping_matrix(frequencies: Real, ratio: float | tuple[float, ...]) -> Real:
-    """Modal damping diag(2 zeta_n omega_n) (m,m) in N s/m for unit modal mass; one ratio for all modes or one each."""
-    if isinstance(ratio, tuple) and len(ratio) != len(frequencies):
-        raise ValueError(f"damping_ratio has {len(ratio)} entries for {len(frequencies)} modes")
-    return np.diag(2.0 * np.broadcast_to(np.asarray(ratio, dtype=float), frequencies.shape) * frequencies)
+def damping_matrix(roots: Real, ratio: float | tuple[float, ...]) -> Real:
+    """Modal damping diag(2 zeta_n omega_n) (m,m) in N s/m for unit modal mass; one ratio for all modes or one each.
+
+    roots (m,m): `BeamModes.roots`. Where these are not diagonal, the ratios Z act as Z roots + roots Z.
+    """
+    if isinstance(ratio, tuple) and len(ratio) != len(roots):
+        raise ValueError(f"damping_ratio has {len(ratio)} entries for {len(roots)} modes")
+    zeta = np.broadcast_to(np.asarray(ratio, dtype=float), len(roots))
+    return (zeta[:, None] + zeta) * roots
 
 
 def _order(mode: tuple[float, int, Real]) -> tuple[float, int]:

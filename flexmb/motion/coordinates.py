@@ -5,6 +5,7 @@ The recursion and Frisch's equations share this module.
 
 from flexmb.connectors.along_hinges import add_loads_along_hinges, power_along_hinges
 from flexmb.hinges import catalogue
+from flexmb.jit.duals import nonzero
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.jit.lanes import some
@@ -159,7 +160,7 @@ def hinge_forces(c, w):
 def _ball_springs(c, w):
     """Subtract the torques of the isotropic springs of spherical hinges from w.speed.applied."""
     for k in range(c.body.shape[0]):
-        if some(c.body[k].ball_spring != 0.0):
+        if some(nonzero(c.body[k].ball_spring)):
             i = c.body[k].q_index
             theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
             for n in range(3):

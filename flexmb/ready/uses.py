@@ -25,6 +25,7 @@ from flexmb.run.simulate_batch import simulate_batch
 from flexmb.scene.bodies import Level
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
+from flexmb.sensitivity.sensitivities import sensitivities
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS, ON_CHAINS, RUNNING, WITH_JACOBIAN
 from flexmb.system.compile import compile, compile_batch
@@ -40,8 +41,12 @@ BATCHED: tuple[Method, ...] = ("rk4", "dop853")
 
 def uses() -> Iterator[tuple[str, Use]]:
     """The uses by name, those that take longest first. Neighbours share few kernels, for which one would wait."""
+    for name, builder in {"tree": scenes.pendulum, "loop": scenes.looped}.items():
+        yield f"derivatives of runs, {name}", partial(_derivatives, builder)
     yield "linear models", _linear_models
+    yield "derivatives by numbers, tree", partial(_numbers, scenes.pendulum)
     yield "laws that a scene may name", _laws
+    yield "derivatives by numbers, loop", partial(_numbers, scenes.looped)
     yield "batches", _batches
     for name, builder in LOOPS.items():
         yield f"single states of a {name}", partial(_single_states_of_a_loop, builder)
@@ -72,6 +77,16 @@ def _eventful(builder: Callable[[], SceneBuilder], method: Method) -> None:
 def _regulated(builder: Callable[[], SceneBuilder], method: Method) -> None:
     _run(scenes.with_feedback(builder(), period=4e-4, delay=1e-4), method)
     _run(scenes.with_feedback(builder()), method)
+
+
+def _derivatives(builder: Callable[[], SceneBuilder]) -> None:
+    of = ["pivot.rotation", "centre.position.x", "signal.place[1]"]
+    for scene in (
+        scenes.with_events(builder(), "pivot.rotation"),
+        scenes.with_feedback(builder(), period=4e-4, delay=1e-4),
+        scenes.with_feedback(builder()),
+    ):
+        sensitivities(scene, T_END, ["bob.mass_kg"], of, samples=3)
 
 
 def _linear_models() -> None:
@@ -118,6 +133,17 @@ def _single_states() -> None:
     nested.motion(0.0, y)
     nested.partitions(0.0, y)
     nested.relative_motion(0.0, y)
+
+
+def _numbers(builder: Callable[[], SceneBuilder]) -> None:
+    system = compile(builder().scene())
+    state, found = system.initial_state, system.parameters(["bob.mass_kg"])
+    rates = found.accelerations(state)[:, 0]
+    found.evaluate(state)
+    found.inverse_dynamics(state, rates)
+    regressor = system.inertia_regressor()
+    regressor.at(state, rates)
+    regressor.rest(state, rates)
 
 
 def _laws() -> None:

@@ -110,6 +110,8 @@ def unit(channel: str) -> str:
         return "J"
     if channel.startswith(("drive:", "hinge_force:")):
         return "N or Nm"
+    if channel == "frequencies":
+        return "rad/s"
     return next((symbol for ending, symbol in UNITS.items() if channel.endswith(ending)), "")
 
 

@@ -41,6 +41,22 @@ CAN_GO_ON = (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED)
 """Statuses of runs that can be resumed."""
 
 
+class Leg(NamedTuple):
+    """A part of a run between two instants at which events happen, for those who follow the run again.
+
+    system: the system as the events before have left it. begin: where the part begins. raw: the end of the integration,
+    before the events there. events: those that happened there, with their records, `early` (s) before their instant.
+    A run that ends after events ends with a part without duration.
+    """
+
+    system: System
+    begin: Beginning
+    raw: Raw
+    events: list[SceneEvent]
+    records: list[EventRecord]
+    early: float
+
+
 class AfterEvents(NamedTuple):
     """The state after all events of one instant, and whether one of them ends the run."""
 
@@ -53,9 +69,11 @@ class Driver:
 
     def __init__(
         self, system: System, times: Real, settings: Settings, algorithm: Algorithm, stabilise: float,
-        taken_up: EventMemory | None = None, made_by: Making | None = None,
+        taken_up: EventMemory | None = None, made_by: Making | None = None, course: list[Leg] | None = None,
     ) -> None:  # fmt: skip
-        """times (T,) s: output times; taken_up: the events' state at the end of the run that is resumed, if any."""
+        """times (T,) s: output times; taken_up: the events' state at the end of the run that is resumed, if any;
+        course: a list to which the parts of the run are appended."""
+        self._course = course
         self._times, self._settings, self._taken_up, self._made_by = times, settings, taken_up, made_by
         given = None if taken_up is None else taken_up.given
         self._situation = Situation(system, settings, algorithm, stabilise, given)
@@ -80,13 +98,16 @@ class Driver:
         if begin.events is not None:
             self._sides.recall(begin.events)
         elif self._situation.system.scene.events:
-            start = unmoved(begin)
-            instant = self._at_instant(start, self._agenda.due_at_start(start.t))
+            start, due = unmoved(begin), self._agenda.due_at_start(begin.state.t)
+            self._keep_leg(begin, start)
+            instant = self._at_instant(start, due)
             if instant.ends:
                 return self._over_after_events(instant)
             begin = self._situation.going_on(instant.raw)
         while True:
+            starting = begin._replace(y=begin.y.copy())
             segment = self._after_sample(self._next(begin))
+            self._keep_leg(starting, segment.raw, segment.early)
             match segment.end:
                 case SegmentEnd.TIME | SegmentEnd.FAILURE:
                     return self._over(segment.raw)
@@ -103,6 +124,11 @@ class Driver:
             if self._chattering.is_endless:
                 return self._over_anew(instant.raw, ends=False)
             begin = self._situation.going_on(instant.raw)
+
+    def _keep_leg(self, begin: Beginning, end: Raw, early: float = 0.0) -> None:
+        """Append a part of the run to its course, before the events at its end change the system."""
+        if self._course is not None:
+            self._course.append(Leg(self._situation.system, begin, end._replace(y=end.y.copy()), [], [], early))
 
     def _next(self, begin: Beginning) -> Segment:
         """Integrate the next segment, append its outputs and update the sides to those at its end."""
@@ -131,7 +157,7 @@ class Driver:
         """Process one instant: first the events that were found, in the order of the scene, then bodies in contact with
         stops. Controllers that are due act later, when the next segment starts or the run ends.
         """
-        y, _ = self._situation.apart(raw.y)
+        y, before = self._situation.apart(raw.y)[0], len(self._happened)
         arrived = found if early else self._sides.arriving(raw, found, levels, y)
         for event in arrived:
             records = self._situation.happen(event, raw, y)
@@ -147,6 +173,9 @@ class Driver:
         self._agenda.take()  # coming to rest on a stop adds an event
         self._sides.make_known()
         ends = any(isinstance(action, EndRun) for event in (*arrived, *struck) for action in event.actions)
+        if self._course:
+            self._course[-1].events.extend((*arrived, *struck))
+            self._course[-1].records.extend(self._happened[before:])
         return AfterEvents(raw, ends)
 
     def _stand(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> list[SceneEvent]:
@@ -196,6 +225,7 @@ class Driver:
         """End the run after events: the state after them is one more output, and a run that resumes from here starts
         with an integrator without memory."""
         chatters = not ends and raw.t < self._times[-1]
+        self._keep_leg(self._situation.going_on(raw), raw)
         last = raw._replace(states=raw.y[None], status=Status.CHATTERING if chatters else raw.status)
         with self._situation.integration() as solve:
             if solve.feedback is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
-from flexmb.run.driver import Driver
+from flexmb.run.driver import Driver, Leg
 from flexmb.run.interruption import Interrupted
 from flexmb.run.making import Making
 from flexmb.run.origin import Given, Values, origin, start_time
@@ -138,10 +138,23 @@ def run_stages(
     return whole
 
 
+def run_with_course(system: System, times: Real, settings: Settings) -> tuple[Trajectory, list[Leg]]:
+    """The trajectory of a scene from its own initial state, as `simulate` makes it, and its parts between events."""
+    refuse_too_many(len(times), system)
+    course: list[Leg] = []
+    run, warned, was_interrupted = _run(RunPart(system, times), None, settings, "articulated", 0.0, course)
+    for warning in warned:
+        warnings.warn(warning, stacklevel=3)
+    if was_interrupted or run.status is Status.INTERRUPTED:
+        raise Interrupted(run)
+    return run, course
+
+
 def _run(
-    stage: RunPart, state: Given, settings: Settings, algorithm: Algorithm, stabilise: float
-) -> tuple[Trajectory, list[Warning], bool]:
-    """The trajectory of one stage, what there is to warn of, and whether Ctrl-C ended it."""
+    stage: RunPart, state: Given, settings: Settings, algorithm: Algorithm, stabilise: float,
+    course: list[Leg] | None = None,
+) -> tuple[Trajectory, list[Warning], bool]:  # fmt: skip
+    """The trajectory of one stage, what there is to warn of, and whether Ctrl-C ended it; course: see `Driver`."""
     system, times = stage
     t = float(times[0])
     begin = origin(system, t, state, settings.method)
@@ -152,7 +165,7 @@ def _run(
             return observed(system, times, raw, algorithm, solve), [], False
     again = partial(_again, stage, state, algorithm, stabilise)
     made_by = None if system.scene.events else Making(system, times, settings, again)
-    driver = Driver(system, times, settings, algorithm, stabilise, begin.events, made_by)
+    driver = Driver(system, times, settings, algorithm, stabilise, begin.events, made_by, course)
     trajectory = driver(begin)
     warned: list[Warning] = [SceneWarning(doubt) for doubt in driver.doubts]
     if start is not None and start.is_low:

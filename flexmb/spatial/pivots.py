@@ -19,7 +19,7 @@ def is_small(c, w, j, pivot, diagonal):
 
     In lanes: whether it is so in any of them.
     """
-    if every(pivot.real > c.speed[j].doubtful) and every(pivot.real > SMALL * diagonal.real):
+    if every(pivot.real > c.speed[j].doubtful.real) and every(pivot.real > SMALL * diagonal.real):
         return False
     w.doubt[0] = 1
     return True

@@ -5,9 +5,9 @@ The type of the workspace's numbers decides at compile time which functions are 
 derivatives.
 """
 
-from math import atan2, cos, sin, sqrt
+from math import atan2, cos, exp, sin, sqrt
 
 from flexmb.jit import lane_functions  # noqa: F401  (what they are of lanes, and how `sincos` is compiled)
 from flexmb.jit.lanes import sincos, sines
 
-__all__ = ["atan2", "cos", "sin", "sincos", "sines", "sqrt"]
+__all__ = ["atan2", "cos", "exp", "sin", "sincos", "sines", "sqrt"]

@@ -37,6 +37,7 @@ from flexmb.system.observables import Evaluation
 from flexmb.system.section_loads import AllLoads, SectionBalance
 from flexmb.system.tree_system import System, copied
 from flexmb.tables import arguments
+from flexmb.tables.features import asking
 from flexmb.tables.state import DynamicsError, State, finite_result, pack
 from flexmb.typing import Flags, Index, Real, Record
 
@@ -56,13 +57,24 @@ class ClosedSystem(ChainDerivatives, System):
     of a tree, raise NotImplementedError.
     """
 
-    def __init__(self, scene: s.Scene) -> None:
-        super().__init__(scene)
-        own = closure_constants(scene, self.constants, self.closure_ports, self.links)
+    def __init__(self, scene: s.Scene, *, like: s.Scene | None = None) -> None:
+        """like: see `SceneArrays`."""
+        super().__init__(scene, like=like)
+        own = closure_constants(scene, self.constants, self.closure_ports, self.links, like)
         slowest = slowest_mode(self.links)
         tree = scene.constraints, self.constants, own, self.layout, self.workspace, slowest
         self._closures = self.own.closures = Closures(*tree, self.check_status)  # for this thread
         self._start: State | None = None
+        self._correction: Real | float = 0.0
+        """Of the scene's initial values before the closures are closed: see `with_numbers`."""
+
+    def with_numbers(self, scene: s.Scene) -> ClosedSystem:
+        """As for a tree. Its initial state is that of this system, with what the scene changes of its initial values,
+        closed once more: it is a smooth function of the numbers also where the scene's own values are rough."""
+        with asking(self.kernels):
+            found = ClosedSystem(scene, like=self.scene)
+        found._correction = pack(self.initial_state) - self._at_start
+        return found
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As for a tree."""
@@ -79,7 +91,7 @@ class ClosedSystem(ChainDerivatives, System):
         """
         if self._start is None:
             y = pack(super().initial_state)
-            y = self._as_asked(0.0, y, asked(self, y))
+            y = self._as_asked(0.0, y + self._correction, asked(self, y))
             self._start = State(y[: self.nq], y[self.nq : -1], 0.0, self.layout)
         return State(self._start.q, self._start.u, 0.0, self.layout)
 

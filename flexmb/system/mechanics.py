@@ -84,8 +84,8 @@ class Mechanics(SceneArrays):
     Methods that take a `State` check it. Methods that take t and y = [q, u, work] expect that these have been checked.
     """
 
-    def __init__(self, scene: s.Scene, elimination: Elimination) -> None:
-        super().__init__(scene, elimination)
+    def __init__(self, scene: s.Scene, elimination: Elimination, like: s.Scene | None = None) -> None:
+        super().__init__(scene, elimination, like)
         self.own = Own()
         self._nested: dict[Set[Erratum], NestedSystem] = {}
 

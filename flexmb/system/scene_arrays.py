@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from flexmb.jain.elimination import Elimination, with_elimination
 from flexmb.scene import schema as s
 from flexmb.scene.connectors import AlongHinge, HingeSpring
 from flexmb.system.observables import Names
+from flexmb.tables.arrays import Constants
 from flexmb.tables.features import GENERAL
 from flexmb.tables.status import Status
 from flexmb.typing import Index
@@ -28,17 +30,25 @@ class SceneArrays:
     numbers; they are zero outside of runs.
     """
 
-    def __init__(self, scene: s.Scene, elimination: Elimination) -> None:
+    def __init__(self, scene: s.Scene, elimination: Elimination, like: s.Scene | None = None) -> None:
+        """like: the same scene with slightly other numbers; the tables are then smooth functions of the numbers around
+        those of `like`: modes follow its modes, and equal functions of time are kept apart."""
         self.scene = scene
-        self.links = links(scene)
+        self.links = links(scene, like)
         numbering = Numbering(self.links, scene)
-        assembled = assemble(scene, self.links, numbering)
+        assembled = assemble(scene, self.links, numbering, like=like)
         self.constants, self.markers, self.closure_ports = assembled.constants, assembled.markers, assembled.closures
-        self.recursion_constants = with_elimination(self.constants, elimination)
-        """The same constants with bodies eliminated as chosen."""
+        self._elimination = elimination
+        if like is None:
+            self.recursion_constants  # noqa: B018 - raises for an elimination that does not apply
         self.signals = assembled.signals
         self.layout = numbering.layout
         self.nq, self.nu = self.layout.nq, self.layout.nu
+
+    @cached_property
+    def recursion_constants(self) -> Constants:
+        """The same constants with bodies eliminated as chosen."""
+        return with_elimination(self.constants, self._elimination)
 
     @property
     def kernels(self) -> Literal["general", "special"]:

@@ -11,11 +11,13 @@ speeds in the same order. `system.coordinate(name)` and `system.speed(name)` giv
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flexmb.closure.closures import Closures
 from flexmb.entry import articulated
 from flexmb.jain.elimination import ELIMINATIONS, Elimination
 from flexmb.motion import coordinates
@@ -35,6 +37,8 @@ from flexmb.typing import Real
 if TYPE_CHECKING:
     from flexmb.frisch.nested_system import NestedSystem, Partitions
     from flexmb.jain.operators import Operators, SpatialOperators
+    from flexmb.parameters.parameters import Parameters
+    from flexmb.parameters.regressor import InertiaRegressor
     from flexmb.system.batch import Batch, BatchAccelerations
 
 _NO_CLOSURES = np.zeros((0, 6))
@@ -43,8 +47,9 @@ _NO_CLOSURES = np.zeros((0, 6))
 class System(DifferentiableMotion):
     """A checked scene turned into arrays; made by `compile`. Threads may share it: each has workspaces of its own."""
 
-    def __init__(self, scene: s.Scene, elimination: Elimination = "fastest") -> None:
-        super().__init__(scene, elimination)
+    def __init__(self, scene: s.Scene, elimination: Elimination = "fastest", like: s.Scene | None = None) -> None:
+        """like: see `SceneArrays`."""
+        super().__init__(scene, elimination, like)
         self._asked: Elimination = elimination
         self.rhs, self.project = articulated.rhs, coordinates.project
         self.kept: dict[Any, Any] = {}
@@ -54,6 +59,42 @@ class System(DifferentiableMotion):
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles hold the scene only: addresses belong to one process, and arrays share memory."""
         return copied, (System, self.kernels, self.scene, self._asked)
+
+    @property
+    def closures(self) -> Closures | None:
+        """The closure equations with workspaces of this thread; None for a tree."""
+        return None
+
+    def with_numbers(self, scene: s.Scene) -> System:
+        """The system of the same scene with slightly other numbers, whose tables are smooth functions of these.
+
+        Modes follow those of this scene, and equal functions of time are kept apart. The scene is not checked.
+        """
+        with asking(self.kernels):
+            return System(scene, self._asked, self.scene)
+
+    def parameters(self, names: Sequence[str]) -> Parameters:
+        """Derivatives by numbers of the scene, which are named as in `Scene.with_values`.
+
+            p = system.parameters(["rod.mass_kg", "pivot.rotation.stiffness_Nm_rad"])
+            p.accelerations(state)      (nu,2)
+
+        PathError (a ValueError) where the scene has no such number, or where it is whole, a name or a switch;
+        ParameterError (a ValueError) where motions have no derivative by it.
+        """
+        from flexmb.parameters.parameters import Parameters  # imported here, because few programs differentiate
+
+        return Parameters(self, names)
+
+    def inertia_regressor(self, bodies: Sequence[str] | None = None) -> InertiaRegressor:
+        """Y in tau = M udot + c = Y(q, u, udot) pi + rest of the tree, for the inertia parameters pi of its bodies.
+
+        bodies: those whose parameters are taken, by default all. ValueError for unknown ones, NotImplementedError for
+        bodies of level `stiffened`.
+        """
+        from flexmb.parameters.regressor import InertiaRegressor  # imported here, because few programs identify
+
+        return InertiaRegressor(self, self.links, bodies)
 
     @property
     def elimination(self) -> dict[str, str]:

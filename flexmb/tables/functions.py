@@ -79,7 +79,7 @@ def _smooth_step(a, b, begin, duration, t):
 
 @helper
 def _spin_up(rate, duration, t):
-    after = t.real >= duration
+    after = t.real >= duration.real
     if every(after):
         return rate * (t - 0.5 * duration), rate, 0.0
     k = 2.0 * pi / duration
@@ -120,7 +120,7 @@ def evaluate(kind, data, first, last, table, t):
     if kind == _SPIN_UP:
         return _spin_up(data[0], data[1], t)
     if kind == _PULSE:
-        return select((data[1] <= t.real) & (t.real < data[2]), data[0], 0.0), 0.0, 0.0
+        return select((data[1].real <= t.real) & (t.real < data[2].real), data[0], 0.0), 0.0, 0.0
     if kind == _TABLE:
         return _spline(table, first, last, t)
     return data[0], 0.0, 0.0

@@ -11,7 +11,7 @@ from flexmb.jit.lanes import select, some
 @helper
 def _one_piece(x, table, first, last):
     row = first
-    while row + 1 < last and x.real >= table[row + 1, 0]:
+    while row + 1 < last and x.real >= table[row + 1, 0].real:
         row += 1
     return _piece(table, row)
 

@@ -12,7 +12,7 @@ MOUNTING = Rotation.from_rotvec(0.8 * np.array([1.0, 2.0, -1.0]) / np.sqrt(6.0))
 
 
 def exact(times):
-    """Motion of the corner and kinetic energy at `times` (s), World axes, SI."""
+    """Motion of the corner, kinetic energy, and the linearised motion at `times` (s), World axes, SI."""
     axis, arm = MOUNTING.apply(AXIS), MOUNTING.apply(COM)
     inertia = AXIS @ INERTIA @ AXIS + MASS * np.sum(np.cross(AXIS, COM) ** 2)
     down, side = GRAVITY - axis * (axis @ GRAVITY), np.cross(axis, GRAVITY)
@@ -27,6 +27,10 @@ def exact(times):
         "marker:corner.velocity": np.cross(omega, corner),
         "marker:corner.angular_velocity": omega,
         "energy.kinetic": 0.5 * inertia * rate**2,
+        "derivatives.by_displacement": -(w**2) * np.cos(theta),
+        "derivatives.by_speed": np.zeros_like(theta),
+        "derivatives.by_force": np.full_like(theta, 1.0 / inertia),
+        "frequencies": w * np.sqrt(np.maximum(np.cos(theta), 0.0)),
     }
 
 

@@ -12,7 +12,7 @@ MOUNTING = Rotation.from_rotvec(0.7 * np.array([1.0, -1.0, 0.5]) / 1.5)
 
 
 def exact(times):
-    """Motion of the mark, load of the guide and energies at `times` (s), World axes, SI."""
+    """Motion of the mark, load of the guide, energies, and the linearised motion at `times` (s), World axes, SI."""
     axis = MOUNTING.apply(AXIS)
     rest = REST + MASS * GRAVITY @ axis / STIFFNESS
     response = FORCE / (STIFFNESS - MASS * FREQUENCY**2 + 1j * DAMPING * FREQUENCY)
@@ -31,4 +31,8 @@ def exact(times):
         "load:guide.torque": np.cross(MOUNTING.apply(COM), force),
         "energy.kinetic": 0.5 * MASS * speed**2,
         "energy.spring": 0.5 * STIFFNESS * (place - REST) ** 2,
+        "derivatives.by_displacement": np.full_like(times, -STIFFNESS / MASS),
+        "derivatives.by_speed": np.full_like(times, -DAMPING / MASS),
+        "derivatives.by_force": np.full_like(times, 1.0 / MASS),
+        "frequencies": np.full_like(times, root.imag),
     }

@@ -11,9 +11,11 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder, EventSta
 
 from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.drake.actions import DrakeActions, DrakeLoads, Drives, JointActions
+from crosscheck.engines.drake.linear import linearised
 from crosscheck.engines.drake.observer import DrakeObserver
 from crosscheck.engines.drake.tree import DrakeState, build_tree, initial_state, place, recentred
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
+from crosscheck.engines.linear.outputs import outputs
 from crosscheck.engines.links import links
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
@@ -33,6 +35,7 @@ class DrakeModel:
         self._observer = DrakeObserver(build_tree(scene, chain, ballasted=False), scene)
         self._functions = scene_functions(scene)
         self._pitches = [slot.q + 1 for slot in self._tree.balls]
+        self._linear = linearised(self._tree, scene)
 
     def warm_up(self) -> None:
         """Nothing is compiled; touch the code once so that first-call costs are not timed."""
@@ -47,7 +50,10 @@ class DrakeModel:
             states, evaluations, message = self._integrate(run.times, effort)
         wall = time.perf_counter() - start
         samples = self._observed(run.times[: len(states)], states)
-        return stack(run.times, samples, message=message, wall_s=wall, evaluations=evaluations)
+        at = self._linear
+        matrices = () if at is None else (at.at(t, state) for t, state in zip(run.times, states, strict=False))
+        linear = outputs(run.linear if at is not None else (), matrices)
+        return stack(run.times, samples, message=message, wall_s=wall, evaluations=evaluations, linear=linear)
 
     def _connected(self, has_forces: bool, has_loads: bool) -> Diagram:
         """The plant with the actions that this scene needs: without any Drake integrates in C++ alone."""

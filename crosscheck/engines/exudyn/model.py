@@ -14,6 +14,7 @@ from crosscheck.engines.exudyn.modal import NodeShape
 from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.state import CarrierPath, States, carrier_path
 from crosscheck.engines.exudyn.wrench import drives, link_wrenches
+from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs
 from flexmb.scene.schema import Marker, Scene
 from flexmb.typing import Real
 
@@ -53,6 +54,7 @@ class ExudynModel:
         states.multipliers[:1] = initial_state(self.assembly).multipliers
         paths = self._paths(states)
         loads, energy, momentum, held = self._loads_and_balance(states, paths)
+        linear = self._linearised(run, states)
         return Trajectory(
             status=solution.status, message=solution.message, times=run.times[: len(states.times)],
             markers={
@@ -63,8 +65,15 @@ class ExudynModel:
             wheel_loads={name: loads[name] for name in self.assembly.wheels},
             drives=drives(self.assembly, states), energy=energy, momentum=momentum,
             connectors=held.between, hinge_forces=held.along,
-            wall_s=solution.wall_s, evaluations=solution.evaluations,
+            wall_s=solution.wall_s, evaluations=solution.evaluations, **linear.as_outputs,
         )  # fmt: skip
+
+    def _linearised(self, run: Run, states: States) -> LinearOutputs:
+        if "frequencies" not in run.linear:
+            return NOTHING
+        from crosscheck.engines.exudyn.frequencies import frequencies  # loads SciPy
+
+        return frequencies(self.assembly, states)
 
     @property
     def _loaded(self) -> list[str]:

@@ -13,8 +13,10 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
+from crosscheck.engines.linear.outputs import outputs
 from crosscheck.engines.links import Link, Scalar, closed_frames, links
 from crosscheck.engines.mujoco.forces import Forces
+from crosscheck.engines.mujoco.linear import linearised
 from crosscheck.engines.mujoco.observer import MujocoObserver
 from crosscheck.engines.mujoco.tree import MujocoClosure, MujocoCoupling, build_tree, initial_state, joint_name
 from crosscheck.engines.trajectories import stack
@@ -41,6 +43,7 @@ class MujocoModel:
         self._forces = Forces(self._tree, scene)
         self._observer = MujocoObserver(self._tree, self._forces, scene, closures)
         self._functions = scene_functions(scene)
+        self._linear = linearised(self._tree, self._forces, scene)
 
     def warm_up(self) -> None:
         """Nothing is compiled; touch the code once so that first-call costs are not timed."""
@@ -63,7 +66,11 @@ class MujocoModel:
             for t, (qpos, qvel) in zip(run.times, states, strict=False):
                 data.time, data.qpos[:], data.qvel[:] = t, qpos, qvel
                 samples.append(self._observer.observe(data))
-        return stack(run.times, samples, message=message, wall_s=wall, evaluations=stages * steps)
+            at = zip(run.times, states, strict=False)
+            linear = self._linear
+            matrices = () if linear is None else (linear.at(t, *state) for t, state in at)
+            asked = outputs(run.linear if linear is not None else (), matrices)
+        return stack(run.times, samples, message=message, wall_s=wall, evaluations=stages * steps, linear=asked)
 
     def _initial(self) -> mujoco.MjData:
         data = mujoco.MjData(self._tree.model)

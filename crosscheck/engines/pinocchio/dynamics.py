@@ -37,8 +37,10 @@ class PinocchioSolution(NamedTuple):
 
 
 class Acting(NamedTuple):
-    """Generalised forces (nv,), wrenches on joints and power (W) of all that acts but gravity and drives."""
+    """Generalised forces (nv,), wrenches on joints and power (W) at time t (s) of all that acts but gravity and drives.
+    """
 
+    t: float
     tau: Real
     wrenches: pin.StdVec_Force | None
     power: float
@@ -103,13 +105,13 @@ class Dynamics:
 
         With driven coordinates, their rows of the inverse dynamics are the drives.
         """
-        acting = self._acting(t, state)
+        acting = self.acting(t, state)
         a, drive, D = self._accelerations(state, acting), self._undriven, self._driven_v
         if self.driven:
             drive = self.inverse(state, a, acting.wrenches)[D] - acting.tau[D]
         return PinocchioSolution(a, drive, acting.power + float(drive @ state.v[D]))
 
-    def _acting(self, t: float, state: PinocchioState) -> Acting:
+    def acting(self, t: float, state: PinocchioState) -> Acting:
         """With the loads of couplings, whose power is zero."""
         acting = self._applied(t, state)
         if not self.couplings:
@@ -126,9 +128,9 @@ class Dynamics:
             tau[speed] += each.load
             power += each.power
         if not (self.loads or self.connections):
-            return Acting(tau, None, power)
+            return Acting(t, tau, None, power)
         wrenches, working = self._wrenches(t, state)
-        return Acting(tau, wrenches, power + working)
+        return Acting(t, tau, wrenches, power + working)
 
     def _accelerations(self, state: PinocchioState, acting: Acting) -> Real:
         if self.closures:  # nothing is driven beside them
@@ -176,7 +178,7 @@ class Dynamics:
         if self._moved:
             a, _, power = self.solve(t, state)
         else:
-            acting = self._acting(t, state)
+            acting = self.acting(t, state)
             a, power = self._accelerations(state, acting), acting.power
         if self._plain:
             return np.concatenate([state.v, a, [power]])

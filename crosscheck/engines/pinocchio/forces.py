@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pinocchio as pin
 
@@ -80,12 +82,33 @@ class PlacedLoads:
             power += wrench.dot(data.v[load.joint])
         return total, power
 
+    def fixed_in_world(self, t: float, data: pin.Data) -> Iterator[tuple[int, Real]]:
+        """The joint of every load in World axes, and d wrench/d xi_w (6,3) [linear; angular] by its rotation.
+
+        Both are in joint axes.
+        """
+        for load in self._loads:
+            if load.turns:
+                yield load.joint, load.turned(t, data)
+
 
 class _JointWrench:
     def __init__(self, tree: PinocchioTree, scene: Scene, load: Load) -> None:
         at = attachment(scene, tree.links, load)
         self.joint = tree.joints[at.link]
         self._load = PointLoad(load, at.frame)
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns as seen from the joint."""
+        return self._load.fixed_in_world
+
+    def turned(self, t: float, data: pin.Data) -> Real:
+        """Joint axes that turn by xi_w see a load f of World turn by -xi_w: df = f x xi_w."""
+        force = pin.skew(self._load.in_body(t, data.oMi[self.joint].rotation))
+        if self._load.is_force:
+            return np.vstack([force, pin.skew(self._load.point) @ force])
+        return np.vstack([np.zeros((3, 3)), force])
 
     def wrench(self, t: float, data: pin.Data) -> pin.Force:
         R = data.oMi[self.joint].rotation

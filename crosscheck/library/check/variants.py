@@ -36,6 +36,8 @@ def check_variant(run: RunFile, variant: Variant, place: Place) -> Iterator[Defe
         yield from check_duration(variant.duration_s, place)
     if variant.samples is not None:
         yield from check_samples(variant.samples, place)
+    if variant.asks and len(set(variant.asks)) < len(variant.asks):
+        yield problem(place.key("linear"), "it asks for the same twice", 'linear = ["derivatives", "frequencies"]')
     for key, transform in (("segments", "segments"), ("pieces", "substructures")):
         count = getattr(variant, key)
         if (count is not None) != (variant.transform == transform):

@@ -11,17 +11,19 @@ from tests.benchmarks.must_hold import (
     first_use,
     floating_frames,
     growth,
+    implicit,
     missions,
     modes,
     runs,
     runs_at_equal_error,
+    sensitivity,
     start,
 )
 from tests.benchmarks.must_hold.row import Row
 
 SOURCES = (
-    evaluation, derivatives, runs, runs_at_equal_error, missions, modes, floating_frames, growth, charts, start,
-    first_use,
+    evaluation, derivatives, runs, runs_at_equal_error, missions, sensitivity, implicit, modes, floating_frames, growth,
+    charts, start, first_use,
 )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from crosscheck.biting.answers import FAULTS, AnswerFault
 from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Support, Trajectory
+from crosscheck.engines.registry import engine
 from flexmb.scene.schema import Scene
 from tests.crosscheck.fake_engines import engines as sound_engines
 
@@ -56,3 +57,9 @@ def engines() -> dict[str, Engine]:
     """The sound ones of the pendulum, and one for each fault."""
     sound = sound_engines()
     return {**sound, **{fault.name: FaultyEngine(sound["fine"], fault) for fault in FAULTS}}
+
+
+def peers() -> dict[str, Engine]:
+    """The native engine, and Pinocchio sound and with each fault: engines that have derivatives."""
+    sound = {name: engine(name) for name in ("native", "pinocchio")}
+    return {**sound, **{fault.name: FaultyEngine(sound["pinocchio"], fault) for fault in FAULTS}}

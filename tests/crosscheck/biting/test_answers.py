@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 from crosscheck.biting.answers import FAULTS, AnswerFault, run_of
 from crosscheck.engines.answers import checked_run
 from crosscheck.engines.contract import OUTPUTS, MarkerPath, Trajectory
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.signals import signals_of
 from crosscheck.judging.outcome import conclude
 from crosscheck.judging.results import collect
-from crosscheck.library.find import load_case
+from crosscheck.library.case import Comparison
+from crosscheck.library.channels import is_judged
+from crosscheck.library.find import load_case, shipped_folder
 from crosscheck.records.kinds import Record, RunRecord
 from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan
-from flexmb.run.channels import channels_of
 from flexmb.scene.bodies import Node, RigidBody
 from flexmb.scene.connectors import AngularSpring, SpringDamper
 from flexmb.scene.hinges import AngularCoordinate, Revolute
 from flexmb.scene.schema import Marker, Scene, Wheel
+from flexmb.typing import Real
 from tests.crosscheck.sessions import copy_case
 
 TIMES = np.linspace(0.0, 1.0, 5)
@@ -64,13 +70,21 @@ def answer() -> Trajectory:
         energy={kind: rng.normal(size=5) for kind in ("kinetic", "strain", "spring", "gravity")},
         momentum=rng.normal(size=(5, 6)),
         work=rng.normal(size=5),
+        derivatives={name: rng.normal(size=(5, 4)) for name in DERIVATIVES},
+        frequencies=np.sort(rng.uniform(size=(5, 2)), axis=1),
+        known_to=dict.fromkeys((*DERIVATIVES, FREQUENCIES), np.full(5, 1e-12)),
     )
+
+
+def channels(run: Trajectory) -> dict[str, Real]:
+    """Those that are compared."""
+    return {name: values for name, values in signals_of(run).items() if is_judged(name)}
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda each: each.name)
 def test_a_fault_changes_some_channels_and_keeps_to_the_contract(fault: AnswerFault) -> None:
-    right = channels_of(answer())
-    wrong = channels_of(checked_run(fault.falsify(answer(), SCENE), TIMES, SCENE))
+    right = channels(answer())
+    wrong = channels(checked_run(fault.falsify(answer(), SCENE), TIMES, SCENE))
     changed = {name for name, values in wrong.items() if not np.allclose(values, right[name])}
     assert set(wrong) == set(right)
     assert 0 < len(changed) < len(right) or fault.name == "late"
@@ -78,10 +92,10 @@ def test_a_fault_changes_some_channels_and_keeps_to_the_contract(fault: AnswerFa
 
 def test_a_run_is_told_by_its_channels() -> None:
     assert all(getattr(answer(), output) is not None and len(getattr(answer(), output)) for output in OUTPUTS)
-    channels = channels_of(answer())
-    again = channels_of(run_of(TIMES, channels))
-    assert set(again) == set(channels)
-    assert all(np.array_equal(values, again[name]) for name, values in channels.items())
+    right = channels(answer())
+    again = channels(run_of(TIMES, right))
+    assert set(again) == set(right)
+    assert all(np.array_equal(values, again[name]) for name, values in right.items())
 
 
 CAUGHT = (
@@ -110,3 +124,37 @@ goals = {{ "marker:tip" = 1e-6, "load" = 1e-6, "energy" = 1e-6, "momentum" = 1e-
     for name in CAUGHT:
         against = [each.status for each in verdicts if (each.engine_a, each.engine_b) == ("fine", name)]
         assert "differ" in against, name
+
+
+LINEAR = {
+    "derivative_transposed": {"derivatives.by_displacement", "derivatives.by_speed"},
+    "derivative_order": {"derivatives.by_displacement", "derivatives.by_speed", "derivatives.by_force"},
+    "derivative_of_position": {"derivatives.by_displacement"},
+    "derivative_of_speed": {"derivatives.by_speed"},
+    "frequency_unit": {"frequencies"},
+}
+"""The channels in which each fault differs; the inverse of a mass matrix is its own transpose."""
+
+
+def test_wrong_derivatives_are_caught_in_an_ordinary_session() -> None:
+    case = load_case(shipped_folder() / "manipulators" / "six_axis_arm")
+    variant = msgspec.structs.replace(case.run.variant("linearised"), engines=("native", "pinocchio", *LINEAR))
+    goals = {"derivatives": 1e-6, "frequencies": 1e-4}
+    comparison = Comparison(name="all", variant="linearised", goals=goals)
+    run = msgspec.structs.replace(case.run.alone(variant), comparisons=(comparison,))
+    provider = "tests.crosscheck.biting.faulty_engine:peers"
+    record, jobs = plan(replace(case, run=run), (), provider)
+    records: list[Record] = [record]
+    for job in jobs:
+        execute(job, lambda content: records.append(content) if isinstance(content, RunRecord) else None)
+    if any("not installed" in each.message for each in records if isinstance(each, RunRecord)):
+        pytest.skip("Pinocchio is not installed")
+    verdicts = [each for each in conclude(collect(records)).all if each.engine_a == "native"]
+    assert {each.channel: each.status for each in verdicts if each.engine_b == "pinocchio"} == dict.fromkeys(
+        ("derivatives.by_displacement", "derivatives.by_speed", "derivatives.by_force", "frequencies"), "agree"
+    )
+    for name, channels in LINEAR.items():
+        found = {each.channel for each in verdicts if each.engine_b == name and each.status == "differ"}
+        assert found == channels, name
+    reasons = [each.reason for each in verdicts if each.status == "differ" and each.channel != "frequencies"]
+    assert all("farthest apart" in reason and "d udot[" in reason for reason in reasons)

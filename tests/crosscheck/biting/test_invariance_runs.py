@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from crosscheck.biting.invariance_runs import VERDICTS, InvarianceVerdict, run_invariances
-from crosscheck.library.find import load_case
+from crosscheck.library.find import load_case, shipped_folder
 from crosscheck.terminal.invariances import print_invariances
 from tests.crosscheck.sessions import CASE, PROVIDER, run_here
 
@@ -76,3 +76,15 @@ def test_an_absent_engine_is_no_agreement(tmp_path: Path) -> None:
     found = invariances(tmp_path, "missing")
     assert {each.status for each in found} == {"did not run", "not applicable"}
     assert print_invariances(Console(quiet=True), found) == 1
+
+
+def test_what_rests_says_nothing_and_nobody_asks_for_its_derivatives(tmp_path: Path) -> None:
+    """Derivatives depend on units and on the order of the coordinates: they would differ in every counterpart."""
+    case = load_case(shipped_folder() / "linearised" / "hanging_pendulum")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("crosscheck.biting.invariance_runs.run_planned", run_here)
+        found = run_invariances([case], tmp_path, engine="mujoco")
+    assert all(each.status == "not applicable" and each.ok for each in found)
+    assert {each.invariance for each in found if each.reason == "nothing moves"} >= {"turned", "rescaled", "reordered"}
+    records = (tmp_path / "invariances.jsonl").read_text(encoding="utf-8")
+    assert "derivatives" not in records.partition('"record":"run"')[2]

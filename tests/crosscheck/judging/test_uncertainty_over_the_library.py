@@ -17,6 +17,7 @@ from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engines
 from crosscheck.judging.uncertainty import RungSignal, estimate
 from crosscheck.library.case import Variant
+from crosscheck.library.channels import LINEAR_KINDS
 from crosscheck.library.find import Case, resolve
 from crosscheck.library.reference import load_reference
 from crosscheck.library.selection import held
@@ -35,7 +36,9 @@ PAIRS = [
     (case, variant)
     for case in CASES
     for variant in case.run.variants
-    if "native" in variant.engines and STEPS not in {(item.engine, item.kind) for item in variant.efforts}
+    if "native" in variant.engines
+    and variant.start != "equilibrium"  # what rests moves by the rounding of its forces alone
+    and STEPS not in {(item.engine, item.kind) for item in variant.efforts}
 ]
 
 
@@ -61,6 +64,10 @@ class Ladder:
                 yield places[-1], estimate(channel, "tolerance", rungs, size).value
 
 
+def kind_of(channel: str) -> str:
+    return family(channel).partition(".")[0]
+
+
 def climbed(case: Case, variant: Variant, engine: str, times: Real, tolerances: tuple[float, ...]) -> Ladder:
     found = engines()[engine]
     scene = case.scene(variant)
@@ -84,6 +91,8 @@ def test_u_bounds_the_error(case: Case, engine: str) -> None:
     if not (engine in variant.engines and engine in held(case.run, (engine,))):
         pytest.skip(f"{case.name} does not hold {engine} against its reference")
     reference = load_reference(case.folder)
+    if not any(kind_of(channel) not in LINEAR_KINDS for channel in reference.channels):
+        pytest.skip(f"{case.name} has a reference of the linearised motion alone, which no integration gives")
     ladder = climbed(case, variant, engine, reference.times, TOLERANCES)
     exceeded, count = [], 0
     for channel, known in reference.knowledge.channels.items():

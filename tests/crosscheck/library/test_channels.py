@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 
 import flexmb
-from crosscheck.engines.contract import ENERGIES, OUTPUTS, MarkerPath, Snapshot, Trajectory
-from crosscheck.library.channels import CONSERVED, KINDS, kind_named, part_of
-from flexmb.run.channels import channels_of, family, unit
+from crosscheck.engines.contract import ENERGIES, LINEAR, OUTPUTS, MarkerPath, Snapshot, Trajectory
+from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.signals import signals_of
+from crosscheck.library.channels import CONSERVED, KINDS, is_judged, kind_named, known_to, part_of
+from flexmb.run.channels import family, unit
 from flexmb.run.trajectory import Trajectory as OwnTrajectory
 from tests.flexmb.surrogate.beams import beam_scene
 
 SAMPLES = 5
-NAMED = {name: "a.b" for name in ("loads", "wheel_loads", "drives", "connectors", "hinge_forces")}
+NAMED = {name: ("a.b",) for name in ("loads", "wheel_loads", "drives", "connectors", "hinge_forces")}
+NAMED |= {"energy": ENERGIES, "derivatives": DERIVATIVES, "known_to": (*DERIVATIVES, FREQUENCIES)}
 
 
 def everything() -> Trajectory:
@@ -24,14 +27,14 @@ def everything() -> Trajectory:
     outputs: dict[str, object] = {}
     for name, columns in OUTPUTS.items():
         values = np.ones((SAMPLES, *(2 if n is None else n for n in columns)))
-        items = ENERGIES if name == "energy" else (NAMED[name],) if name in NAMED else ()
+        items = NAMED.get(name, ())
         outputs[name] = {item: values for item in items} if items else values
     path = MarkerPath(np.ones((SAMPLES, 3)), np.ones((SAMPLES, 4)), np.ones((SAMPLES, 6)))
     return Trajectory("finished", "", np.arange(float(SAMPLES)), {"a.b": path}, **outputs)
 
 
 def test_every_channel_is_in_the_table_with_its_width_and_every_entry_is_a_channel() -> None:
-    found = channels_of(everything())
+    found = signals_of(everything())
     parts = {name: part_of(name) for name in found}
     for name, part in parts.items():
         assert part is not None and part.width in (None, found[name].shape[1]), name
@@ -41,7 +44,7 @@ def test_every_channel_is_in_the_table_with_its_width_and_every_entry_is_a_chann
 
 def test_channels_of_one_family_have_one_title_and_one_unit() -> None:
     titles: dict[str, set[str]] = {}
-    for name in channels_of(everything()):
+    for name in signals_of(everything()):
         part = part_of(name)
         titles.setdefault(family(name), set()).add(part.title)
         if part.unit:
@@ -58,13 +61,21 @@ def test_other_names_are_no_channels(name: str) -> None:
 
 
 def test_what_is_conserved_is_a_channel() -> None:
-    assert set(CONSERVED.values()) <= channels_of(everything()).keys()
+    assert set(CONSERVED.values()) <= signals_of(everything()).keys()
 
 
 def test_the_outputs_of_the_contract_are_those_of_our_own_trajectories() -> None:
     """An output that one of the three lacks would be lost on its way to the judging."""
-    assert OUTPUTS.keys() <= {each.name for each in dataclasses.fields(OwnTrajectory)}
-    assert OUTPUTS.keys() - {"work"} <= {each.name for each in dataclasses.fields(Snapshot)}
+    of_runs = OUTPUTS.keys() - set(LINEAR)
+    assert of_runs <= {each.name for each in dataclasses.fields(OwnTrajectory)}
+    assert of_runs - {"work"} <= {each.name for each in dataclasses.fields(Snapshot)}
+
+
+def test_what_an_engine_says_of_its_own_derivatives_is_a_channel_that_nobody_judges() -> None:
+    found = signals_of(everything())
+    told = {name for name in found if not is_judged(name)}
+    assert told == {known_to(name) for name in found if name.startswith(("derivatives.", FREQUENCIES))}
+    assert len(told) == 4 and not any(known_to(name) in found for name in told)
 
 
 def test_the_columns_of_our_own_files_are_those_of_the_table(tmp_path: Path) -> None:

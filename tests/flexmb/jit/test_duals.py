@@ -9,9 +9,9 @@ import pytest
 from numba.core.errors import TypingError
 
 from flexmb.jit.bundle import bundle
-from flexmb.jit.duals import DUAL, rate, seeded
+from flexmb.jit.duals import DUAL, nonzero, rate, seeded
 from flexmb.jit.kernel import kernel
-from flexmb.jit.lanes import LANES, select
+from flexmb.jit.lanes import LANE, LANES, select, some
 from flexmb.jit.wide_arrays import as_duals, wide_zeros
 from flexmb.spatial.scalar import atan2, cos, sin, sincos, sqrt
 from tests.bounds import gamma
@@ -129,6 +129,36 @@ def test_floats_of_records_are_duals():
     np.testing.assert_array_equal(found.rows["v"][1, 2], [18.0, 12.0, *[0.0] * (LANES - 1)])
     np.testing.assert_array_equal(found.rows["v"][1, 1], [1.5, *[0.0] * LANES])
     np.testing.assert_array_equal(found.out[0, :2], [18.0, 12.0])
+
+
+@kernel
+def there(d):
+    for i in range(d.x.shape[0]):
+        d.out[i] = 1.0 if nonzero(d.x[i]) else 0.0
+
+
+@kernel
+def there_in_lanes(d):
+    return some(nonzero(d.x[0]))
+
+
+@bundle
+class Lanes:
+    numbers = LANE
+
+    x: np.ndarray
+
+
+def test_a_term_is_left_out_only_if_its_derivatives_vanish_too():
+    found = duals(0.0, -0.0, 1e-300, 0.0, np.nan)
+    found.x[3, 1 + 5] = 1e-300
+    there(found)
+    assert found.out[:5, 0].tolist() == [0.0, 0.0, 1.0, 1.0, 1.0]
+    lanes = Lanes(wide_zeros((1,)))
+    assert not there_in_lanes(lanes)
+    lanes.x[0, 6] = 1.0
+    assert there_in_lanes(lanes)
+    assert nonzero(1.0) and not nonzero(0.0)
 
 
 @kernel

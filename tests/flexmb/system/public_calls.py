@@ -111,6 +111,18 @@ def calls() -> dict[str, Call]:
         accelerations=vectors)  # fmt: skip
     add("System.evaluation_derivatives", tree.evaluation_derivatives, of_rates, state=states,
         accelerations=but_none(vectors))  # fmt: skip
+    no_names = chosen(None, 5, "arm", [], ["nobody"], ["elbow"], [None], [1])
+    for called, system, at in (("System", tree, state), ("ClosedSystem", chain, chain.initial_state)):
+        numbers_of = {"names": ["gravity_m_s2.0", "gravity_m_s2.1"]}
+        add(f"{called}.parameters", lambda names, system=system, at=at: system.parameters(names).accelerations(at),
+            numbers_of, names=no_names)  # fmt: skip
+        body = {"bodies": [system.scene.bodies[0].name]}
+        add(f"{called}.inertia_regressor", lambda bodies, system=system: system.inertia_regressor(bodies).values,
+            body, bodies=chosen(5, "arm", ["nobody"], [None], [1]))  # fmt: skip
+    by = tree.parameters(["gravity_m_s2.0"])
+    for name in ("accelerations", "loads"):
+        add(f"Parameters.{name}", getattr(by, name), {"state": state}, state=states)
+    add("Parameters.inverse_dynamics", by.inverse_dynamics, of_rates, state=states, accelerations=vectors)
     add("System.factorise", lambda state: tree.factorise(state).log_determinant, {"state": state}, state=states)
     add("System.operators", lambda state: tree.operators(state).M, {"state": state}, state=states)
     add(
@@ -337,7 +349,7 @@ def seen(run: fm.Trajectory) -> tuple[Any, ...]:
 # What takes no numbers, and why. Whatever else is public must be among the calls.
 INSIDE = {  # of the mechanics, for numbers that have been examined
     "nested_system", "precision_if_doubtful", "observe_recursion", "observe_rates", "observe_motion", "observe_row",
-    "check_status", "check_precision", "all_loads", "referred_loads",
+    "check_status", "check_precision", "all_loads", "referred_loads", "with_numbers",
 }  # fmt: skip
 EXEMPT = {
     *(f"{system}.{name}" for system in ("System", "ClosedSystem") for name in INSIDE),

@@ -1,0 +1,118 @@
+"""Eigenfrequencies of an Exudyn system about an equilibrium, in the motions that its constraints allow.
+
+With M v' = f(q, v) - C(q)' mu and C v = 0, the motion about a state of rest is
+
+    Z'M Z s'' + Z'D Z s' + Z'K Z s = 0,    K = -d(f - C'mu)/dq,    D = -df/dv,    q = Z s to first order,
+
+where Z spans the null space of C. The multipliers mu are held, so that K contains what the loads of joints do as they
+turn with the bodies: a hanging pendulum has no other stiffness. (Exudyn's own eigenvalue solver leaves that part out.)
+K and D are differences of fourth order of Exudyn's residual and of its constraints' Jacobian.
+
+In motion, or where accelerations are left, there is no such linear model in redundant coordinates: no frequencies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.linalg import null_space
+
+from crosscheck.engines.exudyn.assembly import Assembly
+from crosscheck.engines.exudyn.state import States, set_state
+from crosscheck.engines.linear.differences import differentiated
+from crosscheck.engines.linear.frequencies import eigenfrequencies
+from crosscheck.engines.linear.matrices import EPS, Errors, StateDerivatives, norm
+from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs
+from crosscheck.engines.linear.parts import FREQUENCIES
+from flexmb.typing import Real
+
+AT_REST = 1e-6
+"""Largest speed and acceleration (SI) of a state that counts as an equilibrium: the solvers leave so much."""
+RANK = 1e-9  # singular values of C, relative to the largest, that count as zero: of redundant constraints
+
+
+def frequencies(assembly: Assembly, states: States) -> LinearOutputs:
+    """The frequencies (T,n) at all samples, and how well they are known; nothing unless all are equilibria."""
+    solver = _Residual(assembly)
+    try:
+        found = [solver.at(states, sample) for sample in range(len(states.times))]
+    finally:
+        solver.close()
+    known = [each for each in found if each is not None]
+    if len(known) < len(found) or not len(known[0].by_speed):
+        return NOTHING
+    rows, doubts = map(np.array, zip(*map(eigenfrequencies, known), strict=True))
+    return LinearOutputs({}, rows, {FREQUENCIES: doubts})
+
+
+class _Residual:
+    """Exudyn's mass matrix, right-hand side f and Jacobian C of the constraints, by its implicit solver."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        self._mbs, exu = assembly.shop.mbs, assembly.shop.exu
+        self._settings = exu.SimulationSettings()
+        self._settings.solution.file.write = False
+        self._settings.timeIntegration.verboseMode = 0
+        self._solver = exu.MainSolverImplicitSecondOrder()
+        self._solver.InitializeSolver(self._mbs, self._settings)
+        self._k = self._solver.GetAEsize()
+
+    def close(self) -> None:
+        self._solver.FinalizeSolver(self._mbs, self._settings)
+
+    def at(self, states: States, sample: int) -> StateDerivatives | None:
+        """The matrices of the motions Z that are allowed; None unless the state is an equilibrium."""
+        set_state(self._mbs, states, sample)
+        if self._k:
+            self._mbs.systemData.SetAECoordinates(np.zeros(self._k))
+        q, v = states.q[sample], states.v[sample]
+        n = len(q)
+        M, f, C = self._mass(n), self._force(q, v), self._jacobian(q)
+        system = np.block([[M, C.T], [C, np.zeros((self._k, self._k))]])
+        solution = np.linalg.lstsq(system, np.concatenate([f, np.zeros(self._k)]), rcond=1e-14)[0]
+        a, multipliers = solution[:n], solution[n:]
+        left = float(np.abs(np.concatenate([a, v])).max(initial=0.0))
+        if left > AT_REST:
+            return None
+
+        def residual(change: Real) -> Real:
+            return self._force(q + change, v) - self._jacobian(q + change).T @ multipliers
+
+        return _reduced(M, C, residual, lambda change: self._force(q, v + change), f, left)
+
+    def _mass(self, n: int) -> Real:
+        self._solver.ComputeMassMatrix(self._mbs)
+        return np.array(self._solver.GetSystemMassMatrix())[:n, :n]
+
+    def _force(self, q: Real, v: Real) -> Real:
+        data = self._mbs.systemData
+        data.SetODE2Coordinates(q)
+        data.SetODE2Coordinates_t(v)
+        self._solver.ComputeODE2RHS(self._mbs)
+        return np.array(self._solver.GetSystemResidual())[: len(q)]
+
+    def _jacobian(self, q: Real) -> Real:
+        n, k = len(q), self._k
+        if not k:
+            return np.zeros((0, n))
+        self._mbs.systemData.SetODE2Coordinates(q)
+        self._solver.SetSystemJacobian(np.zeros((n + k, n + k)))
+        self._solver.ComputeJacobianAE(self._mbs, velocityLevel=False)
+        return np.array(self._solver.GetSystemJacobian())[n:, :n]
+
+
+def _reduced(
+    M: Real, C: Real, residual: Callable[[Real], Real], force: Callable[[Real], Real], f: Real, left: float
+) -> StateDerivatives:
+    """The matrices of the allowed motions s; `left` are the speeds and accelerations that an equilibrium lacks."""
+    Z = null_space(C, rcond=RANK) if len(C) else np.eye(len(M))
+    noise = len(f) * EPS * (norm(f) + norm(C))
+    by_q, apart = differentiated(lambda s: Z.T @ residual(Z @ s), Z.shape[1], noise)
+    by_v, asunder = differentiated(lambda s: Z.T @ force(Z @ s), Z.shape[1], noise)
+    inverse = np.linalg.inv(Z.T @ M @ Z)
+    inverse = (inverse + inverse.T) / 2.0
+    share = float(np.linalg.norm(inverse, 2))
+    errors = Errors(share * (apart + left * norm(M)), share * (asunder + left * norm(M)), EPS * norm(inverse))
+    none = np.zeros_like(inverse)
+    return StateDerivatives(inverse @ by_q, inverse @ by_v, inverse, none, errors)

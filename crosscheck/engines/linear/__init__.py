@@ -1,0 +1,1 @@
+"""Derivatives of accelerations and eigenfrequencies: coordinates, matrices, their errors, and differences."""

@@ -1,0 +1,107 @@
+"""Derivatives of the accelerations of a MuJoCo tree, by MuJoCo's own finite differences of a step.
+
+`mjd_transitionFD` differentiates one step by its state, with central differences. A semi-implicit Euler step of 1 s,
+without implicit damping, makes v + qacc of a speed v, so that its derivatives are those of the accelerations whatever
+the step. Those of several step sizes make differences of fourth order (`crosscheck.engines.linear.differences`). The
+inverse of the mass matrix is by MuJoCo's factors. Inertias that MuJoCo makes us raise (`mujoco.tree`) change it by
+their share, which is part of the errors.
+
+Displacements of MuJoCo's joints are those of their speeds. For free flight, three slides in inboard axes and a ball,
+ours are in outboard axes (`crosscheck.engines.linear.axes`).
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from functools import cache
+from typing import assert_never
+
+import mujoco
+import numpy as np
+
+from crosscheck.engines.conventions import rotation_matrix
+from crosscheck.engines.linear.axes import OutboardAxes, swapped_transport
+from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
+from crosscheck.engines.linear.differences import fourth_order
+from crosscheck.engines.linear.matrices import EPS, Errors, StateDerivatives, norm, rounding
+from crosscheck.engines.linear.slots import slot_names
+from crosscheck.engines.links import Ball, Floating, Scalar
+from crosscheck.engines.mujoco.forces import Forces
+from crosscheck.engines.mujoco.tree import LEAST_INERTIA, MujocoSlot, MujocoTree
+from flexmb.scene.schema import Scene
+from flexmb.typing import Real
+
+
+def linearised(tree: MujocoTree, forces: Forces, scene: Scene) -> MujocoLinear | None:
+    """None for scenes whose derivatives are not offered."""
+    return None if obstacle(scene) else MujocoLinear(tree, forces, scene)
+
+
+class MujocoLinear:
+    def __init__(self, tree: MujocoTree, forces: Forces, scene: Scene) -> None:
+        self._forces = forces
+        self._model = model = copy(tree.model)
+        model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_EULER, 1.0
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+        self._data = mujoco.MjData(model)
+        moments = (np.linalg.eigvalsh(link.inertia.inertia)[0] for link in tree.links)
+        self._raised = sum(bool(moment < LEAST_INERTIA) for moment in moments)
+        own = [""] * model.nv
+        self._turning: list[int] = []
+        self._flying: list[MujocoSlot] = []
+        for slot, names in slot_names(scene, tree.slots):
+            match slot.freedom:
+                case Scalar():
+                    own[slot.v : slot.v + len(names)] = names
+                case Ball():
+                    own[slot.v : slot.v + 3] = names
+                    self._turning.append(slot.v)
+                case Floating():
+                    own[slot.v : slot.v + 6] = [*names[3:], *names[:3]]
+                    self._flying.append(slot)
+                case _:
+                    assert_never(slot.freedom)
+        self._places = places(coordinate_names(scene), own)
+        self._square = np.ix_(self._places, self._places)
+
+    def at(self, t: float, qpos: Real, qvel: Real) -> StateDerivatives:
+        """The derivatives at a state, in the order that all engines share."""
+        model, data, nv = self._model, self._data, self._model.nv
+        data.time, data.qpos[:], data.qvel[:] = t, qpos, qvel
+        with self._forces.active():
+            mujoco.mj_forward(model, data)
+            inverse = np.empty((nv, nv))
+            mujoco.mj_solveM(model, data, inverse, np.eye(nv))
+            axes = self._axes(data.qacc)
+            by_force = axes.by_force(inverse)[self._square]
+            unit = rounding(by_force, nv)
+            noise = np.sqrt(nv) * (unit * norm(axes.udot[self._places]) + EPS * norm(axes.u))
+            step = cache(self._step)
+            by_q, apart = fourth_order(lambda eps: step(eps)[nv:, :nv], noise)
+            by_v, asunder = fourth_order(lambda eps: step(eps)[nv:, nv:] - np.eye(nv), noise)
+        share = self._raised * LEAST_INERTIA * norm(by_force)
+        errors = Errors(
+            apart + asunder * axes.kept + share * (norm(by_q) + norm(axes.udot[self._places])),
+            asunder + share * norm(by_v),
+            (unit + share) * norm(by_force),
+        )
+        transport = swapped_transport(axes.u, self._turning, [slot.v for slot in self._flying])
+        parts = (axes.by_displacement(by_q, by_v), axes.by_speed(by_v))
+        return StateDerivatives(*(part[self._square] for part in parts), by_force, transport[self._square], errors)
+
+    def _step(self, eps: float) -> Real:
+        """d [q; v] after a step by d [q; v] before it (2nv,2nv)."""
+        model = self._model
+        found = np.empty((2 * model.nv, 2 * model.nv))
+        mujoco.mjd_transitionFD(model, self._data, eps, True, found, None, None, None)
+        return found
+
+    def _axes(self, acceleration: Real) -> OutboardAxes:
+        """The change to outboard axes of the shifts of free flights."""
+        axes = OutboardAxes(self._data.qvel, acceleration)
+        for slot in self._flying:
+            quaternion = self._data.qpos[slot.q + 3 : slot.q + 7]
+            R = rotation_matrix(quaternion / np.linalg.norm(quaternion))
+            turning = slice(slot.v + 3, slot.v + 6)
+            axes.turned(R, slice(slot.v, slot.v + 3), turning, self._data.qvel[turning])
+        return axes

@@ -1,0 +1,124 @@
+"""Derivatives of the accelerations of a Pinocchio tree, by Pinocchio's own analytic ones.
+
+Where all coordinates are free they are those of `computeABADerivatives`, else those of `computeRNEADerivatives` for the
+accelerations of the whole motion, with the free rows and columns of the mass matrix. Both hold tau and the wrenches in
+joint axes constant, so that the derivatives of springs, of dampers, and of loads in World axes are added here. Scenes
+with connectors, whose laws have no derivatives here, are left out.
+
+Pinocchio's displacements of a free flyer are [linear; angular] in outboard axes, its speeds likewise, and those of a
+spherical joint the same as ours.
+"""
+
+from __future__ import annotations
+
+from typing import assert_never
+
+import numpy as np
+import pinocchio as pin
+
+from crosscheck.engines.conventions import rotation_vector, scalar_first
+from crosscheck.engines.linear.axes import swapped_transport
+from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
+from crosscheck.engines.linear.matrices import StateDerivatives, exact
+from crosscheck.engines.linear.slots import slot_names
+from crosscheck.engines.links import Ball, Floating, Scalar
+from crosscheck.engines.pinocchio.dynamics import Acting, Dynamics, PinocchioState
+from flexmb.scene.schema import Scene
+from flexmb.typing import Real
+
+
+def linearised(dynamics: Dynamics, scene: Scene) -> PinocchioLinear | None:
+    """None for scenes whose derivatives are not offered."""
+    return None if obstacle(scene) or scene.connectors else PinocchioLinear(dynamics, scene)
+
+
+class PinocchioLinear:
+    def __init__(self, dynamics: Dynamics, scene: Scene) -> None:
+        self._dynamics = dynamics
+        self._model = dynamics.tree.model
+        self._data = self._model.createData()
+        own = [""] * self._model.nv
+        self._turning: list[int] = []
+        self._moving: list[int] = []
+        for slot, names in slot_names(scene, dynamics.tree.slots):
+            match slot.freedom:
+                case Scalar():
+                    own[slot.v : slot.v + len(names)] = names
+                case Ball():
+                    own[slot.v : slot.v + 3] = names
+                    self._turning.append(slot.v)
+                case Floating():
+                    own[slot.v : slot.v + 6] = [*names[3:], *names[:3]]
+                    self._moving.append(slot.v)
+                case _:
+                    assert_never(slot.freedom)
+        self._places = places(coordinate_names(scene), own)
+        self._free = not dynamics.driven
+
+    def at(self, t: float, state: PinocchioState) -> StateDerivatives:
+        """The derivatives at a state, in the order that all engines share."""
+        acting = self._dynamics.acting(t, state)
+        a = self._dynamics.solve(t, state).acceleration
+        by_q, by_v, by_force = self._of_all(state, acting) if self._free else self._of_free(state, acting, a)
+        place = self._places
+        transport = swapped_transport(state.v, self._turning, self._moving)[np.ix_(place, place)]
+        return exact(by_q, by_v, by_force, transport, state.v, a)
+
+    def _of_all(self, state: PinocchioState, acting: Acting) -> tuple[Real, Real, Real]:
+        """By forward dynamics: derivatives by displacements, speeds and forces."""
+        extra = () if acting.wrenches is None else (acting.wrenches,)
+        pin.computeABADerivatives(self._model, self._data, state.q, state.v, acting.tau, *extra)
+        upper = np.triu(self._data.Minv)  # all that Pinocchio fills
+        inverse = upper + np.triu(upper, 1).T
+        by_q = self._data.ddq_dq + inverse @ self._pull(state, acting)
+        by_v = self._data.ddq_dv + inverse @ self._drag(state)
+        square = np.ix_(self._places, self._places)
+        return by_q[square], by_v[square], inverse[square]
+
+    def _of_free(self, state: PinocchioState, acting: Acting, a: Real) -> tuple[Real, Real, Real]:
+        """The same by inverse dynamics, of the coordinates that no function of time drives."""
+        extra = () if acting.wrenches is None else (acting.wrenches,)
+        by_q, by_v, _ = pin.computeRNEADerivatives(self._model, self._data, state.q, state.v, a, *extra)
+        by_q, by_v = by_q.copy(), by_v.copy()
+        M = pin.crba(self._model, self._data, state.q)
+        M = np.triu(M) + np.triu(M, 1).T
+        square = np.ix_(self._places, self._places)
+        inverse = np.linalg.inv(M[square])
+        pull, drag = self._pull(state, acting)[square], self._drag(state)[square]
+        return inverse @ (pull - by_q[square]), inverse @ (drag - by_v[square]), inverse
+
+    def _pull(self, state: PinocchioState, acting: Acting) -> Real:
+        """d tau/d xi (nv,nv) of springs and of loads in World axes."""
+        found = np.zeros((self._model.nv, self._model.nv))
+        for slot in self._dynamics.tree.slots:
+            match slot.freedom:
+                case Scalar(stiffness=k):
+                    found[slot.v, slot.v] -= k
+                case Ball(stiffness=k):
+                    turn = rotation_vector(scalar_first(state.q[slot.q : slot.q + 4]))
+                    found[slot.v : slot.v + 3, slot.v : slot.v + 3] -= k * pin.Jlog3(pin.exp3(turn))
+                case Floating():
+                    pass  # free flight has no spring
+                case _:
+                    assert_never(slot.freedom)
+        if acting.wrenches is not None:
+            pin.computeJointJacobians(self._model, self._data, state.q)
+            for joint, wrench in self._dynamics.loads.fixed_in_world(acting.t, self._data):
+                J = pin.getJointJacobian(self._model, self._data, joint, pin.ReferenceFrame.LOCAL)
+                found += J.T @ wrench @ J[3:]
+        return found
+
+    def _drag(self, state: PinocchioState) -> Real:
+        """d tau/d v (nv,nv) of dampers."""
+        found = np.zeros(self._model.nv)
+        for slot in self._dynamics.tree.slots:
+            match slot.freedom:
+                case Scalar(damping=c):
+                    found[slot.v] -= c
+                case Ball(damping=c):
+                    found[slot.v : slot.v + 3] -= c
+                case Floating():
+                    pass
+                case _:
+                    assert_never(slot.freedom)
+        return np.diag(found)

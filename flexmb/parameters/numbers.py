@@ -1,0 +1,83 @@
+"""The numbers of a scene by name, each of which may be a parameter: names are those of `Scene.with_values`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from flexmb.scene.schema import Scene
+from flexmb.scene.values import PathError, changed_at, with_values
+
+
+class Number:
+    """A real number of a scene, or equal ones at several places of one path with `*`."""
+
+    def __init__(self, scene: Scene, name: str) -> None:
+        """PathError where the scene has no such number, or what is there is no real number."""
+        if not isinstance(name, str):
+            raise TypeError(f"a parameter is named by a string, not by {name!r}: write a path such as rod.mass_kg")
+        found = list[float]()
+
+        def look(value: Any) -> Any:
+            found.append(_real(value, name))
+            return value
+
+        changed_at(scene, name, look)
+        if len(set(found)) > 1:
+            raise PathError(
+                f'parameter "{name}" has the values {", ".join(f"{each:g}" for each in found[:4])}: name one of its '
+                "places, or give all of them one value"
+            )
+        self.name, self.value, self._scene = name, found[0], scene
+
+    def scene_at(self, value: float) -> Scene:
+        """The scene with another value."""
+        changed: Scene = with_values(self._scene, {self.name: value})
+        return changed
+
+    @property
+    def scale(self) -> float:
+        """A size of the number: its own magnitude or that of its largest neighbour in an array; 1 if all are zero."""
+        steps = self.name.split(".")
+        neighbours = [0.0]
+        if steps[-1].isdecimal():
+
+            def look(value: Any) -> Any:
+                neighbours.extend(abs(each) for each in value if isinstance(each, float))
+                return value
+
+            changed_at(self._scene, ".".join(steps[:-1]), look)
+        return max(abs(self.value), *neighbours) or 1.0
+
+
+def _real(value: Any, name: str) -> float:
+    if isinstance(value, tuple):
+        raise PathError(f'parameter "{name}" is an array of {len(value)}: name one of its numbers, as "{name}.0"')
+    if value is None:
+        raise PathError(f'parameter "{name}" has no value: write it into the scene first')
+    if isinstance(value, bool | str) or not isinstance(value, float | int):
+        raise PathError(
+            f'parameter "{name}" is {value!r}, and nothing is differentiated by that: give the path of a real number'
+        )
+    if isinstance(value, int):
+        raise PathError(
+            f'parameter "{name}" is the whole number {value}, such as a count, and nothing can be differentiated by '
+            f"that: give the path of a real number (or write {value}.0 if one is meant)"
+        )
+    if not math.isfinite(value):
+        raise PathError(f'parameter "{name}" is {value}: give it a finite value')
+    return value
+
+
+def numbers(scene: Scene, names: Sequence[str]) -> tuple[Number, ...]:
+    """The numbers of these names; ValueError or TypeError where there is none, or one twice."""
+    if isinstance(names, str):
+        raise TypeError(f"parameters are a list of names, not the string {names!r}: write [{names!r}]")
+    found = tuple(Number(scene, name) for name in names)
+    if not found:
+        raise ValueError("no parameters are named: give at least one, such as rod.mass_kg")
+    twice = sorted({each.name for each in found if sum(other.name == each.name for other in found) > 1})
+    if twice:
+        raise ValueError(f'parameter "{twice[0]}" is named twice: name it once')
+    return found

@@ -1,0 +1,231 @@
+"""Derivatives of accelerations, loads and everything observable by the numbers of a scene.
+
+    p = system.parameters(["rod.mass_kg", "boom.stations.0.EIy_Nm2", "pivot.rotation.stiffness_Nm_rad"])
+    p.accelerations(state)          (nu,P)
+
+From a number of the scene to the constants of the kernels, derivatives are those of interpolants (`spectral`), from
+there on they are exact to rounding: the kernels are compiled once more for constants that are dual numbers (`kernels`).
+What is held fixed are the numbers q and u of the state. Modal coordinates are those of the modes as they are normalised
+and ordered in the scene; when a number changes, modes follow (`flexmb.modal.following`).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from flexmb.closure.tables import Closed
+from flexmb.jit.direct import Direct, direct
+from flexmb.jit.lanes import LANES
+from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
+from flexmb.parameters import kernels
+from flexmb.parameters.numbers import Number, numbers
+from flexmb.parameters.plant import Plant
+from flexmb.parameters.spectral import NotSmooth, derivative
+from flexmb.parameters.tables import ParameterBlock, Tables, blocks, diagonal, numbers_of, parts, structure
+from flexmb.scene.problems import SceneWarning
+from flexmb.scene.schema import Scene
+from flexmb.tables.per_thread import Own, per_thread
+from flexmb.tables.state import State, finite_result
+from flexmb.tables.status import OK
+from flexmb.typing import Real
+
+
+class ParameterError(ValueError):
+    """A number of a scene by which motions have no derivative; the message names it, the reason and the remedy."""
+
+
+class Parameters:
+    """Numbers of a scene, and derivatives by them; made by `System.parameters`. Threads may share it.
+
+    names (P,); values (P,); errors (P,): estimates of the relative errors of the derivatives of the tables; blocks: the
+    tables in dual numbers, LANES parameters each; initial_state (nq+nu+1,P): d[q, u, work]/dp of the scene's state at
+    t = 0, for closed chains of the nearest one that closes all closures.
+    """
+
+    def __init__(self, plant: Plant, names: Sequence[str]) -> None:
+        """PathError where the scene has no such number, ParameterError where there is no derivative by it."""
+        chosen = numbers(plant.scene, names)
+        if plant.closures is not None and plant.closures.at_rest:
+            raise NotImplementedError(
+                f'scene "{plant.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
+                'closures join them: for derivatives use level "linear" or a better one'
+            )
+        self.names, self.values = tuple(each.name for each in chosen), np.array([each.value for each in chosen])
+        self.values.flags.writeable = False
+        self.plant = plant.with_numbers(plant.scene)
+        """The same system, with equal functions of time kept apart: numbers of one may change without the other's."""
+        found = _Differentiation(self.plant)
+        rates = [found.by(each) for each in chosen]
+        self.errors = np.array([each.error for each in rates])
+        of_tables = np.column_stack([each.values for each in rates])
+        self.blocks: tuple[ParameterBlock, ...] = blocks(found.tables, found.diagonal, self.names, of_tables)
+        self.initial_state: Real = of_tables[-len(found.tables.start) :].copy()
+        for each in (self.errors, self.initial_state):
+            each.flags.writeable = False
+        self.own = Own()
+
+    def __repr__(self) -> str:
+        return f"Parameters({list(self.names)!r})"
+
+    def accelerations(self, state: State) -> Real:
+        """d udot/dp (nu,P) of the free motion at a fixed state; for closed chains with closures that stay closed.
+
+        Raises DynamicsError where the accelerations do not exist.
+        """
+        t, y = self.plant.layout.entering(state)
+        found = self.slopes(t, y, np.zeros((len(y), len(self.names))))
+        return finite_result(found[self.plant.nq : -1], t)
+
+    def slopes(self, t: float, y: Real, dy: Real) -> Real:
+        """d(dy/dt)/dp (n,P) at y (n,) = [q, u, work], which changes along dy (n,P), one column for each parameter."""
+        found = np.empty(dy.shape)
+        for start, bound in self._bound:
+            place = slice(start, start + bound.count)
+            out, along = np.empty((len(y), LANES)), np.zeros((len(y), LANES))
+            along[:, : bound.count] = dy[:, place]
+            bound.check(bound.slopes(t, y, along, out))
+            found[:, place] = out[:, : bound.count]
+        return found
+
+    def evaluate(self, state: State) -> dict[str, Any]:
+        """By name of the parameter, the derivatives of everything observable, in the form of `System.evaluate`.
+
+        NaN where redundant closures leave loads undetermined.
+        """
+        t, y = self.plant.layout.entering(state)
+        found = dict[str, Any]()
+        for start, bound in self._bound:
+            bound.check(bound.observe(t, y))
+            for lane in range(bound.count):
+                row = finite_result(bound.row(lane), t)
+                found[self.names[start + lane]] = self.plant.observation.evaluation(row + self._open(t, y))
+        return found
+
+    def loads(self, state: State) -> dict[str, Real]:
+        """d/dp (6,P) of the load [torque; force] across each hinge and closure on the outboard body, World axes."""
+        found = list(self.evaluate(state).values())
+        return {name: np.column_stack([each.loads[name] for each in found]) for name in found[0].loads}
+
+    def inverse_dynamics(self, state: State, accelerations: Real) -> Real:
+        """d tau/dp (nu,P) of tau = M udot + c of the tree for given accelerations (nu,)."""
+        t, y = self.plant.layout.entering(state)
+        rates = self.plant.layout.rates("accelerations", accelerations)
+        found = np.empty((self.plant.nu, len(self.names)))
+        for start, bound in self._bound:
+            bound.invert(t, y, rates)
+            found[:, start : start + bound.count] = bound.loads.tau[:, 1 : 1 + bound.count]
+        return finite_result(found, t)
+
+    def workspace(self, block: ParameterBlock) -> Any:
+        """A new workspace for kernels that take the constants of a block; one per thread."""
+        plant = self.plant
+        return kernels.parameter_workspace(block.constants, plant.constants, plant.nq, plant.nu)
+
+    def _open(self, t: float, y: Real) -> Real:
+        """(width,) NaN where loads are not determined by the motion, else zero."""
+        observation, closures = self.plant.observation, self.plant.closures
+        row = np.zeros(observation.width)
+        if closures is not None and closures.rank < len(closures.constants[1].row):
+            self.plant.observe_row(t, y, "articulated", row)
+        return np.where(np.isnan(row), np.nan, 0.0)
+
+    @per_thread
+    def _bound(self) -> list[tuple[int, _Bound]]:
+        """Number of the first parameter of each block, and the kernels bound to the block."""
+        return [(i * LANES, _Bound(self, block)) for i, block in enumerate(self.blocks)]
+
+
+class _Bound:
+    """The kernels of one block, with workspaces of one thread."""
+
+    def __init__(self, parameters: Parameters, block: ParameterBlock) -> None:
+        self._plant, self._block, self.count = parameters.plant, block, len(block.names)
+        self._w = parameters.workspace(block)
+        closures = self._plant.closures
+        self.loads = kernels.loads(self._plant.constants, 0 if closures is None else len(closures.scene))
+        self._chain: Closed | None = None
+        if closures is not None:
+            self._chain = closures.chain("articulated")
+            self._rates = kernels.chain_rates(self._w, closures.constants[1])
+        self._out = kernels.dual_outputs(self._plant.observation.outputs())
+        self.own = Own()
+
+    def check(self, status: int) -> None:
+        """DynamicsError unless a status code is OK."""
+        if status != OK:
+            self._plant.check_status(status, int(self._w.fault[0]))
+
+    def row(self, lane: int) -> Real:
+        """(width,) the derivatives of the last `observe` by the parameter of a lane."""
+        parts = self._out.every, self._out.drives, self.loads.closures
+        row: Real = np.concatenate([each[..., 1 + lane].ravel() for each in parts])
+        return row
+
+    @per_thread
+    def slopes(self) -> Direct:
+        """(t, y, dy, out)."""
+        c = self._block.constants
+        if self._chain is None:
+            return direct(kernels.slopes, STATUS, REAL, VECTOR, MATRIX, MATRIX, c, self._w)
+        tables = self._chain, c, self._block.closures, self._rates
+        return direct(kernels.closed_slopes, STATUS, REAL, VECTOR, MATRIX, MATRIX, *tables)
+
+    @per_thread
+    def observe(self) -> Direct:
+        """(t, y)."""
+        c = self._block.constants
+        if self._chain is None:
+            return direct(kernels.outputs, STATUS, REAL, VECTOR, c, self._w, self._out)
+        tables = self._chain, c, self._block.closures, self._rates, self._out, self.loads
+        return direct(kernels.closed_outputs, STATUS, REAL, VECTOR, *tables)
+
+    @per_thread
+    def invert(self) -> Direct:
+        """(t, y, rates)."""
+        tables = self._block.constants, self._w, self.loads
+        return direct(kernels.inverse, VOID, REAL, VECTOR, VECTOR, *tables)
+
+
+class _Differentiation:
+    """The tables of a scene as functions of each of its numbers."""
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+        self.tables = _tables(plant)
+        self.diagonal = diagonal(self.tables)
+        self._structure, self._parts = structure(self.tables), parts(self.tables, plant.nq)
+        self._middle = numbers_of(self.tables)
+
+    def by(self, number: Number) -> Any:
+        """Derivatives of `numbers_of` the tables by a number; ParameterError where there are none."""
+
+        def at(value: float) -> Real:
+            return self._middle if value == number.value else self._at(number.scene_at(value))
+
+        try:
+            return derivative(at, number.value, number.scale, self._parts)
+        except NotSmooth as error:
+            raise ParameterError(
+                f'parameter "{number.name}" = {number.value:g}: the motion has no derivative by it ({error}); take a '
+                "value at which nothing appears, vanishes or changes its order, or another parameter"
+            ) from None
+
+    def _at(self, scene: Scene) -> Real:
+        tables = _tables(self._plant.with_numbers(scene))
+        changed = [name for name, each in structure(tables).items() if each != self._structure.get(name)]
+        if changed:
+            raise ValueError(f"what the tables contain depends on it: {changed[0]}")
+        self.diagonal = np.minimum(self.diagonal, diagonal(tables))
+        return numbers_of(tables)
+
+
+def _tables(plant: Plant) -> Tables:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SceneWarning)  # of values that closures change, which compiling has said
+        start = plant.initial_state.y.copy()
+    closures = plant.closures
+    return Tables(plant.constants, None if closures is None else closures.constants[1], start)

@@ -1,0 +1,129 @@
+"""Derivatives of smooth functions of one number by interpolation in Chebyshev's points, with an estimate of the error.
+
+The functions lead from a number of a scene to its tables: finite elements, an eigenproblem, integrals over modes. Most
+elements are polynomials of low degree in the number, for which the derivative of the interpolant is exact to rounding;
+for all other analytic ones it converges geometrically with the number of points (Trefethen, Approximation Theory and
+Approximation Practice, ch. 8, 21). The points spread over half of the number, or over a few per cent of it where a
+singularity is near: far more than the steps of finite differences, so that rounding errors are hardly magnified.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.typing import Real
+
+INTERVALS = (2, 4, 8, 16)  # of the points cos(pi k / n), each set of which contains the one before
+WIDTHS = (2.0**-1, 2.0**-3, 2.0**-5, 2.0**-8, 2.0**-11, 2.0**-14)  # half-widths that are tried, relative to the scale
+ENOUGH = 1e-11  # relative error at which no smaller width is tried
+HOPELESS = 1e-5  # an error with half of the points that all of them will not bring down to ENOUGH
+LARGEST = 1e-9  # relative error that is accepted
+# Shares of values over scale, and of values over width, that count as rounding. That of an eigenproblem is some hundred
+# eps, and is magnified by the inverse of the width.
+ROUNDING, MAGNIFIED = 1e-11, 2e-14
+
+
+class NotSmooth(ValueError):
+    """A function has no derivative, or none that is found to LARGEST; the message says what was met."""
+
+
+class Derivative(NamedTuple):
+    """Derivatives (n,) and the estimate of their relative error."""
+
+    values: Real
+    error: float
+
+
+def derivative(function: Callable[[float], Real], x: float, scale: float, parts: Sequence[slice]) -> Derivative:
+    """df/dx (n,) at x of a function that returns (n,), or raises ValueError where it is not defined.
+
+    scale: size of changes of x that change the function by its own size. Errors are relative to the largest derivative,
+    or value over scale, in each part of the values. NotSmooth where the estimated error is too large.
+    """
+    middle = function(x)
+    best, trouble = Derivative(np.zeros_like(middle), np.inf), ""
+    for width in WIDTHS:
+        try:
+            found = _on_interval(function, x, width * scale, middle, scale, parts)
+        except ValueError as error:  # that the value is outside of its range: a smaller interval may not be
+            trouble = str(error)
+            continue
+        best = min(best, found, key=lambda each: each.error)
+        if best.error <= ENOUGH:
+            break
+    if not best.error <= LARGEST:
+        raise NotSmooth(
+            trouble
+            or f"it is known to {best.error:.1g} of its size only: there is a kink, frequencies nearly cross, or the "
+            "effect of the number drowns in rounding"
+        )
+    return best
+
+
+def _on_interval(
+    function: Callable[[float], Real], x: float, width: float, middle: Real, scale: float, parts: Sequence[slice]
+) -> Derivative:
+    """By interpolation on [x - width, x + width]: points are added until the derivative does not change."""
+    odd, even = dict[float, Real](), dict[float, Real]()  # f(x + d) -+ f(x - d) by d / width
+    size = np.abs(middle)
+    before, error = None, np.inf
+    for intervals in INTERVALS:
+        places, weights = _rule(intervals)
+        for place in places:
+            if place not in odd:
+                ahead, behind = function(x + place * width), function(x - place * width)
+                odd[place], even[place] = ahead - behind, ahead + behind - 2.0 * middle
+                size = np.maximum(size, np.maximum(np.abs(ahead), np.abs(behind)))
+        now = sum(weight * odd[place] for place, weight in zip(places, weights, strict=True)) / width
+        if before is not None:
+            # The middle is none of the points: it must lie on the interpolant of the others.
+            jump = sum(weight * even[place] for place, weight in zip(places, _rest(intervals), strict=True)) / width
+            rounding = size * (ROUNDING / scale + MAGNIFIED / width)
+            error = max(_relative(each, now, rounding, parts) for each in (now - before, jump))
+            if error <= ENOUGH or intervals == INTERVALS[-2] and error > HOPELESS:
+                break
+        before = now
+    return Derivative(now, error)
+
+
+def _relative(change: Real, derivative: Real, rounding: Real, parts: Sequence[slice]) -> float:
+    """The largest change of a part's derivatives beyond rounding, relative to the largest of these derivatives."""
+    worst = 0.0
+    for part in parts:
+        off = np.max(np.abs(change[part]), initial=0.0)
+        largest = np.max(np.abs(derivative[part]), initial=0.0)
+        if not np.isfinite(off):
+            return np.inf
+        if off > np.max(rounding[part], initial=0.0):
+            worst = max(worst, off / largest if largest > 0.0 else np.inf)
+    return worst
+
+
+@cache
+def _rule(intervals: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Positive places d in [-1, 1], and the weights of f(d) - f(-d) in f'(0): the derivative of the interpolant.
+
+    Its barycentric weights are those of Chebyshev's points of the second kind (Trefethen, ch. 5), ch. 21 for f'.
+    """
+    half = intervals // 2
+    places = np.array([np.cos(np.pi * k / intervals) for k in range(half)])
+    signs = np.array([(-1.0) ** (k - half) * (0.5 if k == 0 else 1.0) for k in range(half)])
+    # A place in two sets is the same number in both: pi k / n is, for powers of two.
+    return tuple(places.tolist()), tuple((-signs / places).tolist())
+
+
+@cache
+def _rest(intervals: int) -> tuple[float, ...]:
+    """Weights of f(d) + f(-d) - 2 f(0) in the value at 0 of the interpolant of all points but 0, less f(0).
+
+    Without the point at 0, the barycentric weights of the others are multiplied by their distances from it.
+    """
+    places, _ = _rule(intervals)
+    half = intervals // 2
+    ratios = [(-1.0) ** (k - half) * (0.5 if k == 0 else 1.0) for k in range(half)]
+    total = 2.0 * sum(ratios)
+    return tuple(ratio / total for ratio in ratios)

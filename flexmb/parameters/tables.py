@@ -1,0 +1,154 @@
+"""The tables of a scene whose numbers are duals: each lane holds the derivatives of all constants by one parameter.
+
+Kernels that are compiled for them and for the workspace of `flexmb.entry.tangent` carry derivatives along the state and
+by the parameters at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexmb.closure.tables import ClosureConstants
+from flexmb.jit.bundle import broaden, bundle
+from flexmb.jit.duals import DUAL
+from flexmb.jit.lanes import LANES
+from flexmb.jit.wide_arrays import as_duals
+from flexmb.levels.affine_integrals import moving_columns
+from flexmb.tables.arrays import Constants
+from flexmb.typing import Real
+
+# What is no function of the numbers that motions depend on: thresholds for rounding, weights that compare rows, which
+# modes move masses along an axis. Their derivatives are zero.
+_STEADY = {"moves", "doubtful", "weight", "length"}
+# Integers that say that a matrix is diagonal. Where it is not for other numbers, kernels use all of its elements.
+_DIAGONAL = {"orthogonal", "uncoupled"}
+
+
+@bundle
+class DualConstants(Constants):
+    """The constants of a tree, and their derivatives by LANES parameters."""
+
+    numbers = DUAL
+
+
+@bundle
+class DualClosureConstants(ClosureConstants):
+    """The constants of closures, and their derivatives by LANES parameters."""
+
+    numbers = DUAL
+
+
+class Tables(NamedTuple):
+    """All tables of a scene, and y (nq+nu+1,) = [q, u, work] of its initial state."""
+
+    tree: Constants
+    closures: ClosureConstants | None
+    start: Real
+
+
+class ParameterBlock(NamedTuple):
+    """Parameters `names` (k,), at most LANES of them, in the lanes of the constants, in this order."""
+
+    names: tuple[str, ...]
+    constants: DualConstants
+    closures: DualClosureConstants | None
+
+
+class TableFloats(NamedTuple):
+    """Floats of a table, or of one field of its records."""
+
+    table: str
+    field: str | None
+    values: Real
+
+
+def columns(tables: Tables) -> Iterator[TableFloats]:
+    """All floats that depend on the numbers of a scene, in a fixed order."""
+    for kind, table in (("tree", tables.tree), ("closures", tables.closures)):
+        for each in () if table is None else fields(table):
+            array = getattr(table, each.name)
+            for field in array.dtype.names or (None,):
+                values = array if field is None else array[field]
+                if values.dtype == np.float64 and (field or each.name) not in _STEADY:
+                    yield TableFloats(f"{kind}.{each.name}", field, values)
+    yield TableFloats("start", None, tables.start)
+
+
+def numbers_of(tables: Tables) -> Real:
+    """(n,) all of these floats in a row."""
+    return np.concatenate([column.values.ravel() for column in columns(tables)])
+
+
+def parts(tables: Tables, coordinates: int) -> list[slice]:
+    """The columns in that row; coordinates and speeds of the initial state apart."""
+    found, start = list[slice](), 0
+    for column in columns(tables):
+        size = column.values.size
+        sizes = [size] if column.table != "start" else [coordinates, size - coordinates]
+        for each in sizes:
+            found.append(slice(start, start + each))
+            start += each
+    return found
+
+
+def structure(tables: Tables) -> dict[str, Any]:
+    """Everything else that the kernels depend on: the shapes of the tables, and their integers."""
+    found = dict[str, Any]()
+    for kind, table in (("tree", tables.tree), ("closures", tables.closures)):
+        for each in () if table is None else fields(table):
+            array = getattr(table, each.name)
+            found[f"{kind}.{each.name}"] = array.shape
+            for field in array.dtype.names or ():
+                if array[field].dtype == np.int64 and field not in _DIAGONAL:
+                    found[f"{kind}.{each.name}.{field}"] = array[field].tobytes()
+    return found
+
+
+def diagonal(tables: Tables) -> Real:
+    """Which matrices of the bodies are diagonal, (fields, N)."""
+    return np.array([tables.tree.body[field] for field in sorted(_DIAGONAL)])
+
+
+def blocks(tables: Tables, is_diagonal: Real, names: Sequence[str], rates: Real) -> tuple[ParameterBlock, ...]:
+    """Dual tables for the derivatives (n,P) of `numbers_of` by all parameters.
+
+    is_diagonal: `diagonal`, of the scene and of those with other numbers.
+    """
+    body = tables.tree.body.copy()
+    for field, values in zip(sorted(_DIAGONAL), is_diagonal, strict=True):
+        body[field] = values
+    tree = replace(tables.tree, body=body)
+    found = [
+        _block(tables._replace(tree=tree), tuple(names[first : first + LANES]), rates[:, first : first + LANES])
+        for first in range(0, len(names), LANES)
+    ]
+    broaden([each.constants for each in found])
+    if tables.closures is not None:
+        broaden([each.closures for each in found])
+    return tuple(found)
+
+
+def _block(tables: Tables, names: tuple[str, ...], rates: Real) -> ParameterBlock:
+    """Dual tables for the derivatives (n,k) by k parameters."""
+    duals = {kind: _duals(table) for kind, table in (("tree", tables.tree), ("closures", tables.closures))}
+    start = 0
+    for column in columns(tables):
+        stop = start + column.values.size
+        kind, _, table = column.table.partition(".")
+        if kind != "start":
+            wide = duals[kind][table] if column.field is None else duals[kind][table][column.field]
+            wide[..., 1 : 1 + rates.shape[1]] = rates[start:stop].reshape(*column.values.shape, rates.shape[1])
+        start = stop
+    tree = duals["tree"]
+    moving = moving_columns(np.max(np.abs(tree["product"]), axis=-1))
+    tree["moves"][..., 0] = np.maximum(tree["moves"][..., 0], moving)
+    closures = None if tables.closures is None else DualClosureConstants(**duals["closures"])
+    return ParameterBlock(names, DualConstants(**tree), closures)
+
+
+def _duals(table: Constants | ClosureConstants | None) -> dict[str, Any]:
+    return {} if table is None else {each.name: as_duals(getattr(table, each.name)) for each in fields(table)}

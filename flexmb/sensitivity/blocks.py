@@ -1,0 +1,172 @@
+"""The equations of motion of a system in dual numbers: one block of tables for every eight directions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexmb.entry.observed_tangent import OutputsTangent, outputs_tangent
+from flexmb.entry.tangent import TangentWorkspace
+from flexmb.jit.direct import address, addresses
+from flexmb.jit.duals import DualType
+from flexmb.jit.lanes import LANES
+from flexmb.jit.pointer import REAL, STATUS, VOID
+from flexmb.jit.wide_arrays import as_duals, wide_zeros
+from flexmb.parameters.kernels import chain_rates, parameter_workspace
+from flexmb.parameters.tables import DualClosureConstants, DualConstants
+from flexmb.sensitivity import chain, tree
+from flexmb.system.tree_system import System
+from flexmb.tables.status import Status
+from flexmb.typing import Real
+
+
+class DualTables(NamedTuple):
+    """The constants of a block of directions, whose lanes carry their changes; closures: None of a tree."""
+
+    constants: DualConstants
+    closures: DualClosureConstants | None
+
+
+class Observed(NamedTuple):
+    """Everything observable, laid out as `Observation.columns`: values (m,), derivatives (m,P)."""
+
+    row: Real
+    rates: Real
+
+
+class Response(NamedTuple):
+    """Accelerations (nu,) due to loads of rows, their derivatives (nu,P), those of the drive loads (nu,P) that keep
+    prescribed speeds, and of the rows' rates (G,P)."""
+
+    gain: Real
+    gain_rates: Real
+    drive_rates: Real
+    row_rates: Real
+
+
+class Blocks:
+    """The tables of all blocks of a system, and the addresses of its kernels.
+
+    state, slope (B,nq+nu+1,9): [q, u, work] and its rate, the memory of the workspaces.
+    """
+
+    def __init__(self, system: System, tables: Sequence[DualTables], directions: int) -> None:
+        self.system, self.directions, self.duals = system, directions, list(tables)
+        n = system.nq + system.nu + 1
+        self.state, self.slope = (wide_zeros((len(tables), n), width=DualType.width) for _ in range(2))
+        self.workspaces = [
+            _workspace(system, each.constants, self.state[b], self.slope[b]) for b, each in enumerate(tables)
+        ]
+        self.outputs: list[OutputsTangent] = [outputs_tangent(system.observation.out) for _ in tables]
+        self._kind: Any = tree if system.closures is None else chain
+        if system.closures is None:
+            pairs = zip(tables, self.workspaces, strict=True)
+            self.tables: list[Any] = [tree.TreeBlock(c=each.constants, w=w) for each, w in pairs]
+        else:
+            self._loads = [chain.ClosureLoads(as_duals(np.zeros((len(system.scene.constraints), 6)))) for _ in tables]
+            self.tables = self._chains(system)
+        self.motion, _ = addresses(self._kind.motion, STATUS, REAL, self.tables[0])
+        self.manifold, _ = addresses(self._kind.manifold, VOID, REAL, self.tables[0])
+
+    def _chains(self, system: System) -> list[Any]:
+        assert system.closures is not None
+        self._chain = system.closures.chain("articulated")
+        found = []
+        for each, w in zip(self.duals, self.workspaces, strict=True):
+            assert each.closures is not None
+            found.append(
+                chain.ChainBlock(
+                    chain=self._chain,
+                    c=each.constants,
+                    cc=each.closures,
+                    y=np.zeros(len(self.state[0])),
+                    slope=np.zeros(len(self.state[0])),
+                    x=chain_rates(w, system.closures.constants[1]),
+                )  # fmt: skip
+            )
+        return found
+
+    def __len__(self) -> int:
+        return len(self.tables)
+
+    @property
+    def observing(self) -> Any:
+        """The kernel (tables, outputs) that finds everything observable, but for the loads of closures."""
+        return self._kind.observing
+
+    @property
+    def where(self) -> list[int]:
+        """Addresses of the tables of all blocks."""
+        return [address(each) for each in self.tables]
+
+    @property
+    def fault(self) -> int:
+        """Index of the item at which the last evaluation failed."""
+        if self.system.closures is not None and self._chain.fault[0]:
+            return int(self._chain.fault[0])
+        return max(int(w.fault[0]) for w in self.workspaces)
+
+    def check(self, status: int) -> None:
+        """DynamicsError unless a status is OK."""
+        self.system.check_status(status, self.fault)
+
+    def place(self, status: Status) -> str:
+        """Name of the item at which the last evaluation failed."""
+        return self.system.fault_name(status, self.fault)
+
+    def observe(self) -> Observed:
+        """Everything observable where the motion of all blocks was just evaluated."""
+        rows = []
+        for b, (block, out) in enumerate(zip(self.tables, self.outputs, strict=True)):
+            self._kind.observing(block, out)
+            parts = [out.every, out.drives]
+            if self.system.closures is not None:
+                chain.closure_loads(block, self._loads[b])
+                parts.append(self._loads[b].every.reshape(-1, DualType.width))
+            rows.append(np.concatenate(parts))
+        return Observed(rows[0][:, 0].copy(), self.joined(rows))
+
+    def inertia_forces(self, t: float, rates: Real) -> tuple[Real, Real]:
+        """M rates (nu,) for given rates (nu,) at the coordinates of the blocks' states, and its derivatives (nu,P)."""
+        found = []
+        for each, w in zip(self.duals, self.workspaces, strict=True):
+            x = tree.Inertial(as_duals(np.zeros(len(rates))))
+            tree.inertia_forces(t, each.constants, w, rates, x)
+            moved = x.tau.copy()
+            tree.inertia_forces(t, each.constants, w, np.zeros(len(rates)), x)
+            found.append(moved - x.tau)
+        return found[0][:, 0], self.joined(found)
+
+    def response(self, t: float, load: Real) -> Response:
+        """How the motion of a closed chain at the blocks' states responds to loads of rows (G,)."""
+        found = []
+        for block, w in zip(self.tables, self.workspaces, strict=True):
+            parts = []
+            for given in (load, np.zeros(len(load))):
+                self.check(chain.under_loads(t, block, given))
+                rates = w.slope[self.system.nq : self.system.nq + self.system.nu]
+                parts.append((rates.copy(), w.speed["drive"].copy(), block.x.cw.row["rate"].copy()))
+            (gained, drive, _), (own, idle, rate) = parts
+            found.append((gained - own, drive - idle, rate))
+        gains, drives, of_rows = (self.joined([each[i] for each in found]) for i in range(3))
+        return Response(found[0][0][:, 0], gains, drives, of_rows)
+
+    def joined(self, duals: Sequence[Real]) -> Real:
+        """The derivatives (...,P) of one array of duals (...,9) for each block."""
+        return np.concatenate([each[..., 1:] for each in duals], axis=-1)[..., : self.directions]
+
+
+def set_lanes(duals: Real, rates: Real, b: int) -> None:
+    """Write the derivatives (...,P) of numbers, of which those of block b go into its duals (...,9)."""
+    own = rates[..., LANES * b : LANES * (b + 1)]
+    duals[..., 1 : 1 + own.shape[-1]] = own
+
+
+def _workspace(system: System, c: DualConstants, state: Real, slope: Real) -> TangentWorkspace:
+    """A workspace in duals, whose state and slope are these arrays."""
+    w = parameter_workspace(c, system.constants, system.nq, system.nu)
+    arrays = {field.name: getattr(w, field.name) for field in fields(w)}
+    return TangentWorkspace(**(arrays | {"state": state, "slope": slope}))

@@ -1,0 +1,164 @@
+"""Derivatives of the channels of a trajectory, by the names of `Trajectory.columns`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from flexmb.control.wiring import wired
+from flexmb.run.trajectory import Trajectory
+from flexmb.scene.problems import closest
+from flexmb.scene.tree import watches_signals
+from flexmb.sensitivity.blocks import Observed
+from flexmb.system.observables import ENERGIES
+from flexmb.system.tree_system import System
+from flexmb.typing import Real
+
+
+class Seen(NamedTuple):
+    """What is known at one output time: Y (n,P) of the state [q, u, ..., work], everything observable, and signals'
+    derivatives (S,P)."""
+
+    Y: Real
+    observed: Observed | None
+    signals: Real | None
+
+
+Channel = Callable[[Seen], Real]
+"""The derivatives (P,) of one channel."""
+
+
+class Chosen(NamedTuple):
+    """The channels that are asked for: names (K,), units (K,), values (T,K)."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Real
+
+    @property
+    def observed(self) -> bool:
+        """Whether one of them is more than a part of the state or a signal."""
+        return not all(name.startswith("signal.") for name in self.names)
+
+
+def refuse_unknown_outputs(system: System, names: Sequence[str]) -> None:
+    """ValueError or TypeError, before a run, for names of channels that it will not have.
+
+    Loads of drives are looked for afterwards, since events may hold further coordinates.
+    """
+    if isinstance(names, str):
+        raise TypeError(f"outputs are a list of names, not the string {names!r}: write [{names!r}]")
+    scene = system.scene
+    has_loop = bool(scene.controllers) or watches_signals(scene)
+    known = [*channels(system, wired(system).names if has_loop else {})]
+    if not names:
+        raise ValueError(f"no outputs are named: give at least one of {', '.join(known)}")
+    for name in names:
+        if str(name).startswith("power."):
+            raise NotImplementedError(f"output {name!r}: derivatives of powers of controllers are not available")
+        if name not in known and ".drive[" not in str(name):
+            raise ValueError(f"there is no output {name!r}: {closest(str(name), known)}")
+
+
+def chosen(trajectory: Trajectory, names: Sequence[str]) -> Chosen:
+    """The channels of these names; ValueError for others."""
+    known = {name: (unit, values) for name, unit, values in trajectory.columns() if name != "t"}
+    for name in names:
+        if name not in known:
+            raise ValueError(f"there is no output {name!r}: {closest(str(name), known)}")
+    values = np.column_stack([known[name][1] for name in names])
+    return Chosen(tuple(names), tuple(known[name][0] for name in names), values)
+
+
+def channels(system: System, signals: dict[str, slice]) -> dict[str, Channel]:
+    """All channels of a system, by name."""
+    return dict(_all(system, signals))
+
+
+def _all(system: System, signals: dict[str, slice]) -> Iterator[tuple[str, Channel]]:
+    observation = system.observation
+    names, columns = observation.names, observation.columns
+    for i, (name, _) in enumerate((*system.state_names[0], *system.state_names[1])):
+        yield name, _state(i)
+    yield "work", _state(-1)
+    for i, name in enumerate(names.markers):
+        first = columns["markers"][0].start + 24 * i
+        yield from _each(f"{name}.position", "xyz", first)
+        for k, axis in enumerate("wxyz"):
+            yield f"{name}.quaternion.{axis}", _quaternion(first + 3, k)
+        for k, part in enumerate(("angular_velocity", "velocity", "angular_acceleration", "acceleration")):
+            yield from _each(f"{name}.{part}", "xyz", first + 12 + 3 * k)
+    for group, items in (
+        ("loads", names.hinges), ("closures", names.closures), ("wheel_loads", names.wheels),
+        ("connectors", names.connectors),
+    ):  # fmt: skip
+        for i, name in enumerate(items):
+            first = columns[group][0].start + 6 * i
+            yield from _each(f"{name}.torque", "xyz", first)
+            yield from _each(f"{name}.force", "xyz", first + 3)
+    for name, speeds in names.driven.items():
+        for i, speed in enumerate(speeds):
+            yield f"{name}.drive[{i}]", _row(columns["drives"][0].start + int(speed))
+    for i, name in enumerate(names.hinge_forces):
+        yield f"{name}.hinge_force", _row(columns["hinge_forces"][0].start + i)
+    energies = columns["energy"][0]
+    for i, name in enumerate(ENERGIES):
+        yield f"energy.{name}", _row(energies.start + i)
+    yield "energy.total", _sum(energies)
+    yield from _each("momentum.angular", "xyz", columns["momentum"][0].start)
+    yield from _each("momentum.linear", "xyz", columns["momentum"][0].start + 3)
+    for name, place in signals.items():
+        for i in range(place.stop - place.start):
+            yield f"signal.{name}[{i}]", _signal(place.start + i)
+
+
+def _each(name: str, axes: str, first: int) -> Iterator[tuple[str, Channel]]:
+    for i, axis in enumerate(axes):
+        yield f"{name}.{axis}", _row(first + i)
+
+
+def _state(i: int) -> Channel:
+    return lambda seen: seen.Y[i]
+
+
+def _row(i: int) -> Channel:
+    def rates(seen: Seen) -> Real:
+        assert seen.observed is not None
+        return seen.observed.rates[i]
+
+    return rates
+
+
+def _sum(place: slice) -> Channel:
+    def rates(seen: Seen) -> Real:
+        assert seen.observed is not None
+        return np.sum(seen.observed.rates[place], axis=0)
+
+    return rates
+
+
+def _signal(i: int) -> Channel:
+    def rates(seen: Seen) -> Real:
+        assert seen.signals is not None
+        return seen.signals[i]
+
+    return rates
+
+
+def _quaternion(first: int, k: int) -> Channel:
+    """Component k of the quaternion of the rotation (9,) from `first` on, whose scalar part is not negative."""
+
+    def rates(seen: Seen) -> Real:
+        assert seen.observed is not None
+        R = seen.observed.row[first : first + 9].reshape(3, 3)
+        dR = seen.observed.rates[first : first + 9].reshape(3, 3, -1)
+        turn = np.einsum("ijk,lj->ilk", dR, R)  # R' = turn R
+        w = np.stack([turn[2, 1], turn[0, 2], turn[1, 0]])
+        q = Rotation.from_matrix(R).as_quat(canonical=True, scalar_first=True)
+        whole = 0.5 * np.vstack([-q[1:] @ w, q[0] * w + np.cross(w.T, q[1:]).T])
+        return np.asarray(whole[k], float)
+
+    return rates

@@ -1,0 +1,126 @@
+"""The variational equations of a run, as a right-hand side for integrators.
+
+With y' = f(t, y; p) and the scaled derivatives s_k = scale_k dy/dp_k of P parameters, the state is
+
+    z = [y without work, s_1 .. s_P without work, work, its P derivatives],    s_k' = df/dy s_k + scale_k df/dp_k.
+
+Eight directions are evaluated at once: y is a dual number whose lanes carry s_k, and so are the constants of the
+equations of motion, whose lanes carry scale_k dc/dp_k. The kernels of the recursion are compiled once more for them;
+they reach this right-hand side by address, so that it is compiled once. `work` comes last since it is a quadrature,
+which no error test needs (`flexmb.integrate.problem.Accuracy`).
+"""
+
+from __future__ import annotations
+
+from flexmb.jit.bundle import bundle
+from flexmb.jit.direct import nothing_at, status_at
+from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.lanes import LANES
+from flexmb.tables.status import OK
+from flexmb.typing import Index, Real
+
+# Indices in `Flow.address`; 0 where there is none.
+MOTION, MANIFOLD, CONTROL, FOLLOW = range(4)
+ADDRESSES = 4
+
+
+@bundle
+class Flow:
+    """The tables of the variational equations: B blocks of LANES directions each.
+
+    The last axis of the arrays of duals holds the value, then the derivatives along LANES directions.
+    """
+
+    address: Index  # (ADDRESSES,) of kernels
+    block: Index  # (B,) addresses of the tables of each block
+    loop: Index  # (B,) of its controllers; 0 without
+    directions: Index  # (1,) P
+    state: Real  # (B,nq+nu+1,9) [q, u, work] as duals; the memory of the blocks' workspaces
+    slope: Real  # (B,nq+nu+1,9) likewise its rate
+    law: Real  # (B,states,9) likewise the states of controllers
+    law_rate: Real  # (B,states,9)
+    continuous: Index  # (X,) which of these are integrated
+
+
+@kernel
+def rhs(t, z, dz, s, same):
+    """dz/dt; returns a status code. The flow is passed for both arguments."""
+    for b in range(s.block.shape[0]):
+        take(z, b, s)
+        status = evaluate(t, b, s)
+        if status != OK:
+            return status
+        _give(s.slope, s.law_rate, b, s, dz)
+    return OK
+
+
+@kernel
+def project(t, z, s):
+    """Project z: y to its manifold, and its derivatives by the derivative of that projection."""
+    for b in range(s.block.shape[0]):
+        take(z, b, s)
+        nothing_at(s.address[MANIFOLD], (t, s.block[b]))
+        _give(s.state, s.law, b, s, z)
+
+
+@kernel
+def evaluate_at(t, z, b, s):
+    """Evaluate one block at z, for its outputs; returns a status code."""
+    take(z, b, s)
+    return evaluate(t, b, s)
+
+
+@helper
+def evaluate(t, b, s):
+    """Evaluate one block where its state is; returns a status code."""
+    if s.address[CONTROL]:
+        status = status_at(s.address[CONTROL], (t, s.loop[b]))
+        if status != OK:
+            return status
+    status = status_at(s.address[MOTION], (t, s.block[b]))
+    if status == OK and s.address[FOLLOW]:
+        status = status_at(s.address[FOLLOW], (t, s.loop[b]))
+    return status
+
+
+@helper
+def take(z, b, s):
+    """Copy y and the directions of a block from z to its state."""
+    n, x, P = s.state.shape[1] - 1, s.continuous.shape[0], s.directions[0]
+    m = n + x
+    count = min(LANES, P - LANES * b)
+    for i in range(n):
+        s.state[b, i, 0] = z[i]
+    for j in range(x):
+        s.law[b, s.continuous[j], 0] = z[n + j]
+    s.state[b, n, 0] = z[m * (1 + P)]
+    for lane in range(count):
+        k = LANES * b + lane
+        first = m * (1 + k)
+        for i in range(n):
+            s.state[b, i, 1 + lane] = z[first + i]
+        for j in range(x):
+            s.law[b, s.continuous[j], 1 + lane] = z[first + n + j]
+        s.state[b, n, 1 + lane] = z[m * (1 + P) + 1 + k]
+
+
+@helper
+def _give(of_motion, of_laws, b, s, z):
+    """Copy states, or their rates, to z."""
+    n, x, P = s.state.shape[1] - 1, s.continuous.shape[0], s.directions[0]
+    m = n + x
+    count = min(LANES, P - LANES * b)
+    if b == 0:
+        for i in range(n):
+            z[i] = of_motion[b, i, 0]
+        for j in range(x):
+            z[n + j] = of_laws[b, s.continuous[j], 0]
+        z[m * (1 + P)] = of_motion[b, n, 0]
+    for lane in range(count):
+        k = LANES * b + lane
+        first = m * (1 + k)
+        for i in range(n):
+            z[first + i] = of_motion[b, i, 1 + lane]
+        for j in range(x):
+            z[first + n + j] = of_laws[b, s.continuous[j], 1 + lane]
+        z[m * (1 + P) + 1 + k] = of_motion[b, n, 1 + lane]

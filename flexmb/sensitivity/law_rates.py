@@ -1,0 +1,107 @@
+"""Derivatives of the numbers of controllers, of what they drive and of events, all functions of a scene's numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexmb.control.wiring import law_numbers, profile_tables, wired
+from flexmb.parameters.numbers import Number
+from flexmb.parameters.spectral import derivative
+from flexmb.scene.events import Impact
+from flexmb.scene.schema import Scene
+from flexmb.system.tree_system import System
+from flexmb.typing import Real
+
+
+class LawRates(NamedTuple):
+    """Scaled derivatives of the tables of controllers: parameters (numbers,P), initial states (states,P), gains of what
+    signals drive (drives,P); of the functions that sensors read (functions,4,P) and of their pieces (pieces,8,P)."""
+
+    number: Real
+    state: Real
+    gain: Real
+    course: Real
+    piece: Real
+
+
+class EventRates(NamedTuple):
+    """Scaled derivatives (P,) of the level of an event and, by number of the action, of restitutions."""
+
+    level: Real
+    restitution: dict[int, Real]
+
+
+def law_rates(system: System, numbers: Sequence[Number | None], scales: Real) -> LawRates:
+    """Of a system's controllers by these numbers; None for one on which nothing depends."""
+    wiring = wired(system)
+    inputs = wiring.controller["inputs"].tolist()
+
+    def of_laws(scene: Scene, is_gain: bool) -> Real:
+        course, piece = profile_tables(scene)
+        laws = law_numbers(scene.controllers, inputs)
+        gains = _gains(system.with_numbers(scene) if is_gain else system)
+        return np.concatenate([*laws, gains, course["data"].ravel(), piece.ravel()])
+
+    found = np.zeros((len(of_laws(system.scene, is_gain=False)), len(numbers)))
+    for is_gain in (False, True):
+        chosen = [each if _concerns_laws(each, system.scene, is_gain) else None for each in numbers]
+        found += _by_numbers(partial(of_laws, is_gain=is_gain), system.scene, chosen, scales)
+    shapes = wiring.number.shape, wiring.initial.shape, wiring.drive.shape, (len(wiring.course), 4), wiring.piece.shape
+    stops = np.cumsum([np.prod(shape, dtype=int) for shape in shapes])
+    parts = np.split(found, stops[:-1])
+    return LawRates(*(part.reshape(*shape, len(numbers)) for part, shape in zip(parts, shapes, strict=True)))
+
+
+def event_rates(scene: Scene, numbers: Sequence[Number | None], scales: Real) -> dict[str, EventRates]:
+    """Of all events of a scene, by name."""
+    found = dict[str, EventRates]()
+    numbers = [each if _changes(each, scene, lambda of: of.events) else None for each in numbers]
+    for event in scene.events:
+        impacts = [i for i, action in enumerate(event.actions) if isinstance(action, Impact)]
+        rates = _by_numbers(partial(_of_event, name=event.name), scene, numbers, scales)
+        found[event.name] = EventRates(rates[0], dict(zip(impacts, rates[1:], strict=True)))
+    return found
+
+
+def _of_event(scene: Scene, name: str) -> Real:
+    [event] = [each for each in scene.events if each.name == name]
+    return np.array([event.level, *(each.restitution for each in event.actions if isinstance(each, Impact))])
+
+
+def _changes(number: Number | None, scene: Scene, part: Callable[[Scene], Any]) -> bool:
+    """Whether a part of a scene depends on a number."""
+    return number is not None and part(number.scene_at(number.value + 2.0**-6 * number.scale)) != part(scene)
+
+
+def _concerns_laws(number: Number | None, scene: Scene, is_gain: bool) -> bool:
+    """Whether the tables of controllers depend on a number that is the gain of what a signal drives, or none."""
+    if number is None or number.name.endswith(".gain") != is_gain:
+        return False
+    return is_gain or _changes(number, scene, lambda of: (of.controllers, of.sensors))
+
+
+def _gains(system: System) -> Real:
+    """Gains of what signals drive."""
+    return np.array([signal.gain for signal in system.signals.values()])
+
+
+def _by_numbers(
+    function: Callable[[Scene], Real], scene: Scene, numbers: Sequence[Number | None], scales: Real
+) -> Real:
+    """Scaled derivatives (n,P) of a function of a scene."""
+    now = function(scene)
+    found, finite = np.zeros((len(now), len(numbers))), np.isfinite(now)  # limits may be infinite
+
+    def at(value: float, number: Number) -> Real:
+        return np.where(finite, function(number.scene_at(value)), 0.0)
+
+    for k, number in enumerate(numbers):
+        if number is not None:
+            parts = [slice(i, i + 1) for i in range(len(now))]
+            rates = derivative(partial(at, number=number), number.value, number.scale, parts)
+            found[:, k] = scales[k] * rates.values
+    return found

@@ -1,0 +1,130 @@
+"""The variational equations of one part of a run between two events, integrated in compiled code."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.integrate.control import ACCEPTED, COUNTS, REJECTED, SAMPLES, STOP
+from flexmb.integrate.problem import Accuracy, Clock, problem
+from flexmb.integrate.settings import Settings
+from flexmb.jit.direct import undispatched
+from flexmb.run.driver import Leg
+from flexmb.run.interruption import interruptible
+from flexmb.run.outputs import ending
+from flexmb.run.propagate import Integration
+from flexmb.run.switching import clock_of
+from flexmb.sensitivity import flow
+from flexmb.sensitivity.blocks import Blocks
+from flexmb.sensitivity.loops import Loops
+from flexmb.tables.state import DynamicsError
+from flexmb.tables.status import OK, Status
+from flexmb.typing import Real
+
+# Derivatives are as smooth as the motion, but for singular positions: they take about its number of steps.
+MORE_STEPS = 30
+FEW_STEPS = 1000  # allowed in any case, where the motion itself takes hardly a step
+
+
+class Course(NamedTuple):
+    """A state y (n,) = [q, u, x, work] and its scaled derivatives (n,P)."""
+
+    y: Real
+    Y: Real
+
+
+class Variation:
+    """The flow of one part of a run: its tables, and their evaluation at one state."""
+
+    def __init__(self, leg: Leg, blocks: Blocks, loops: Loops | None) -> None:
+        self.leg, self.blocks, self.loops = leg, blocks, loops
+        system = blocks.system
+        n, B = system.nq + system.nu + 1, len(blocks)
+        where = np.zeros(flow.ADDRESSES, np.int64)
+        where[flow.MOTION], where[flow.MANIFOLD] = blocks.motion, blocks.manifold
+        law, law_rate, continuous = np.zeros((B, 0, 9)), np.zeros((B, 0, 9)), np.zeros(0, np.int64)
+        if loops is not None:
+            where[flow.CONTROL], where[flow.FOLLOW] = loops.steer, loops.follow
+            law, law_rate, continuous = loops.law, loops.law_rate, loops.continuous
+        self._width = n + len(continuous)
+        self.flow = flow.Flow(
+            address=where, block=np.array(blocks.where), loop=np.array(loops.where if loops else [0] * B),
+            directions=np.array([blocks.directions]), state=blocks.state, slope=blocks.slope, law=law,
+            law_rate=law_rate, continuous=continuous,
+        )  # fmt: skip
+
+    def joined(self, at: Course) -> Real:
+        """z of a state with its derivatives."""
+        return np.concatenate([at.y[:-1], at.Y[:-1].T.ravel(), at.y[-1:], at.Y[-1]])
+
+    def parted(self, z: Real) -> Course:
+        """The inverse of `joined`."""
+        m, P = self._width - 1, self.blocks.directions
+        y, works = np.r_[z[:m], z[m * (1 + P)]], z[m * (1 + P) + 1 :]
+        return Course(y, np.vstack([z[m : m * (1 + P)].reshape(P, m).T, works]))
+
+    def slope(self, t: float, at: Course) -> Course:
+        """The rates of a state and of its derivatives; DynamicsError where they do not exist."""
+        z = self.joined(at)
+        rates = np.zeros(len(z))
+        self.check(flow.rhs(t, z, rates, self.flow, self.flow), t)
+        return self.parted(rates)
+
+    def put(self, t: float, at: Course) -> None:
+        """Evaluate all blocks at a state, for their outputs."""
+        z = self.joined(at)
+        for b in range(len(self.blocks)):
+            self.check(flow.evaluate_at(t, z, b, self.flow), t)
+
+    def take(self, at: Course) -> None:
+        """Set the states of all blocks without evaluating them."""
+        z = self.joined(at)
+        for b in range(len(self.blocks)):
+            flow.take.py_func(z, b, self.flow)
+
+    def energy_rates(self, t: float, at: Course) -> Real:
+        """The derivatives (P,) of the energy at a state."""
+        self.put(t, at)
+        place, _ = self.blocks.system.observation.columns["energy"]
+        rates: Real = np.sum(self.blocks.observe().rates[place], axis=0)
+        return rates
+
+    def check(self, status: int, t: float) -> None:
+        """DynamicsError with the time, unless a status is OK."""
+        if status != OK:
+            error = DynamicsError(f"derivatives {ending(self.blocks.system, Status(status), self.blocks.fault, t)}")
+            error.status = Status(status)
+            raise error
+
+    def integrate(self, start: Course, times: Real, clock: Clock, settings: Settings) -> list[Course]:
+        """The state with its derivatives at these times (T,) s, from the first to the last."""
+        z, P = self.joined(start), self.blocks.directions
+        plain = settings.accuracy(self.blocks.system.nq, self.blocks.system.nu)
+        steps = self.leg.raw.counts[ACCEPTED] + self.leg.raw.counts[REJECTED]
+        most = min(settings.max_steps, MORE_STEPS * steps + FEW_STEPS)
+        accuracy: Accuracy = plain._replace(controlled=(self._width - 1) * (1 + P), max_steps=most)
+        posed = problem(flow.rhs, flow.project, self.flow, self.flow)
+        method, counts, out = settings.integrator, np.zeros(COUNTS, np.int64), np.empty((len(times), len(z)))
+        given = z, clock._replace(times=times), accuracy, out, counts, method.memory(len(z)), None
+        run = undispatched(method.run, posed, *given)
+        (status, t), interrupted = interruptible(lambda *given: run(posed, *given), given, counts[STOP : STOP + 1])
+        if interrupted:
+            raise KeyboardInterrupt
+        if status == Status.MAX_STEPS and most < settings.max_steps:
+            raise DynamicsError(
+                f"derivatives stopped at t = {t:g} s: they would take more than {MORE_STEPS} times the steps of the "
+                "run, because they grow without bound there: a closed chain has no derivative beyond a singular "
+                "position, where branches of its motion meet; start elsewhere, or end the run before"
+            )
+        self.check(status, t)
+        return [self.parted(row) for row in out[: counts[SAMPLES]]]
+
+
+def clock_of_leg(solve: Integration, leg: Leg, times: Real, settings: Settings) -> tuple[Real, Clock]:
+    """The state at the start of a part of a run, with those of controllers, and its clock; begins the controllers."""
+    begin, fixed = leg.begin, settings.integrator.fixed
+    clock = clock_of(solve.system, begin.state.t, times, fixed, breaks=True)
+    accuracy, counts = settings.accuracy(solve.system.nq, solve.system.nu), np.zeros(COUNTS, np.int64)
+    y, clock, _ = solve.begin(begin._replace(y=begin.y.copy()), clock, accuracy, counts)
+    return y, clock

@@ -1,0 +1,78 @@
+"""Measurements over time: a table of channels, from arrays or a CSV file as `Trajectory.to_csv` writes it."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexmb.tables import arguments
+from flexmb.typing import Real
+
+TIME = "t"
+
+
+class Measurements(NamedTuple):
+    """t (T,) s, increasing, from 0 on; values (T,K) of the channels (K,), NaN where nothing was measured."""
+
+    t: Real
+    channels: tuple[str, ...]
+    values: Real
+
+
+def measurements(data: str | os.PathLike[str] | Mapping[str, Any]) -> Measurements:
+    """The measurements in a file, or in arrays by name with the times as "t"; ValueError or TypeError for others."""
+    if isinstance(data, Mapping):
+        return _checked("data", {str(name): arguments.array(f'data["{name}"]', each) for name, each in data.items()})
+    return _checked(str(data), _read(Path(data)))
+
+
+def _read(path: Path) -> dict[str, Real]:
+    """Columns of a CSV file by the names in its header, without units in brackets after a space."""
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        rows = [row for row in csv.reader(file) if row]
+    if len(rows) < 2:
+        raise ValueError(f"{path}: there are no measurements: give a header and at least one row")
+    names = [cell.strip().split(" [")[0] for cell in rows[0]]
+    if len(set(names)) < len(names):
+        raise ValueError(f"{path}: two columns have one name in {', '.join(names)}")
+    values = np.full((len(rows) - 1, len(names)), np.nan)
+    for i, row in enumerate(rows[1:]):
+        if len(row) != len(names):
+            raise ValueError(f"{path}: line {i + 2} has {len(row)} cells, but the header {len(names)}")
+        for j, cell in enumerate(row):
+            if cell.strip():
+                try:
+                    values[i, j] = float(cell)
+                except ValueError:
+                    raise ValueError(f"{path}: line {i + 2} has {cell!r} in column {names[j]}: give numbers") from None
+    return dict(zip(names, values.T, strict=True))
+
+
+def _checked(where: str, columns: dict[str, Real]) -> Measurements:
+    if TIME not in columns:
+        raise ValueError(f'{where}: there is no column "{TIME}" with the times in s: there are {", ".join(columns)}')
+    t = columns.pop(TIME)
+    if not columns:
+        raise ValueError(f"{where}: there are times, but no channels")
+    if (
+        t.ndim != 1
+        or not np.isfinite(t).all()
+        or np.any(np.diff(t) <= 0.0)
+        or len(t) == 0
+        or t[0] < 0.0
+        or t[-1] <= 0.0
+    ):
+        raise ValueError(f"{where}: the times must be finite and increase, from 0 s on, where the run starts")
+    for name, each in columns.items():
+        if each.shape != t.shape:
+            raise ValueError(f'{where}: "{name}" has the shape {each.shape}, but there are {len(t)} times')
+        if np.isinf(each).any():
+            raise ValueError(f'{where}: "{name}" has infinite values: leave out what was not measured')
+        if np.isnan(each).all():
+            raise ValueError(f'{where}: "{name}" has no values')
+    return Measurements(t.astype(float), tuple(columns), np.column_stack(list(columns.values())))

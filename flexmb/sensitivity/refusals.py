@@ -1,0 +1,40 @@
+"""Refuses numbers of a scene by which the derivatives of a run do not exist, or are not found, before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flexmb.parameters.numbers import Number
+from flexmb.parameters.parameters import ParameterError
+from flexmb.scene.check.walk import values
+from flexmb.scene.convert import ROOT
+from flexmb.scene.functions import Pulse
+from flexmb.scene.schema import Scene
+
+_SCHEDULE = "period_s", "offset_s", "delay_s"
+_ENDS = "start_s", "duration_s"
+
+
+def refuse_moving_instants(scene: Scene, numbers: Sequence[Number]) -> None:
+    """ParameterError for numbers that move the instants of sampled controllers or the ends of pulses."""
+    for number in numbers:
+        other = number.scene_at(number.value + 2.0**-6 * number.scale)
+        if _schedule(other) != _schedule(scene):
+            raise ParameterError(
+                f'parameter "{number.name}" moves the instants at which a sampled controller acts: derivatives by it '
+                "are not available; compare runs with other values"
+            )
+        if number.name.rpartition(".")[2] in _ENDS and _pulses(other) != _pulses(scene):
+            raise ParameterError(
+                f'parameter "{number.name}" moves the start or the end of a pulse, at which a load jumps: derivatives '
+                'by it are not available; use a function of kind "smooth_step", or events on time with their levels as '
+                "parameters"
+            )
+
+
+def _schedule(scene: Scene) -> list[tuple[float | None, ...]]:
+    return [tuple(getattr(each, name) for name in _SCHEDULE) for each in scene.controllers]
+
+
+def _pulses(scene: Scene) -> list[tuple[float, float]]:
+    return [(each.start_s, each.duration_s) for _, _, each in values(ROOT, scene) if isinstance(each, Pulse)]

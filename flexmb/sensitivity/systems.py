@@ -1,0 +1,205 @@
+"""The systems of the parts of a run in dual numbers: what events change and what they hold keeps its derivatives.
+
+The tables of the scene are differentiated once (`System.parameters`). After a latch or a release nothing but functions
+of time and integers differ, so that the derivatives are taken over; after other changes they are found anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexmb.jit.bundle import broaden
+from flexmb.jit.lanes import LANES
+from flexmb.jit.wide_arrays import as_duals
+from flexmb.parameters.numbers import Number
+from flexmb.parameters.tables import DualClosureConstants, DualConstants
+from flexmb.scene.schema import Scene
+from flexmb.scene.tree import rate_name, scalar_paths
+from flexmb.scene.values import PathError
+from flexmb.sensitivity.blocks import Blocks, DualTables, set_lanes
+from flexmb.system.tree_system import System
+from flexmb.tables.state import State, pack
+from flexmb.typing import Real
+
+_DIAGONAL = (
+    "orthogonal",
+    "uncoupled",
+)  # integers of a body that hold for other numbers too, see flexmb.parameters.tables
+_OF_TIME = "function", "table"  # tables of functions, of which events make others
+
+
+class Known(NamedTuple):
+    """The tables of a system: with constants of floats, and in duals for each block."""
+
+    system: System
+    duals: list[DualTables]
+
+
+class Systems:
+    """Makes the blocks of one part of a run after the other.
+
+    numbers: those that the directions belong to; those that no table depends on come last. scales (P,).
+    """
+
+    def __init__(self, numbers: Sequence[Number], scales: Real, mechanical: int) -> None:
+        """mechanical: how many of the first numbers the tables of the mechanics may depend on."""
+        self._numbers, self._scales, self._mechanical = numbers, scales, mechanical
+        self._known: Known | None = None
+
+    def first(self, system: System) -> tuple[Blocks, Real]:
+        """The blocks of a run's own scene, and the scaled derivatives (nq+nu+1,P) of its initial state."""
+        start = np.zeros((system.nq + system.nu + 1, len(self._numbers)))
+        self._known = self._differentiated(system, list(range(self._mechanical)), start)
+        return self._blocks(self._known, {}), start
+
+    def then(self, system: System, state: State, alive: Sequence[bool], held: Mapping[str, Real]) -> Blocks:
+        """The blocks after events, from a state on. alive (P,): which numbers the scene still depends on; held: the
+        scaled derivatives (P,) of the values at which coordinates are held, by name."""
+        assert self._known is not None  # a run begins with `first`
+        plant = system.with_numbers(system.scene)
+        taken = [_taken_over(self._known.system, plant, each) if all(alive) else None for each in self._known.duals]
+        if all(each is not None for each in taken):
+            found = Known(plant, [each for each in taken if each is not None])
+            _alike(found.duals)
+        else:
+            start = np.zeros((system.nq + system.nu + 1, len(self._numbers)))
+            names = [k for k in range(self._mechanical) if alive[k] and _exists(system.scene, self._numbers[k].name)]
+            found = self._differentiated(system, names, start)
+        self._known = found
+        if found.system.closures is not None:  # the rows that are independent here
+            found.system.closures.begin_at(state.t, pack(state))
+        return self._blocks(found, held)
+
+    def _differentiated(self, system: System, chosen: Sequence[int], start: Real) -> Known:
+        """The tables of a system by those of the numbers that are chosen; the part of its initial state to `start`."""
+        P = len(self._numbers)
+        if not chosen:
+            plant = system.with_numbers(system.scene)
+            plant.initial_state  # noqa: B018  (counts the rows of closures)
+            sources = list[tuple[Any, Any]]()
+        else:
+            parameters = system.parameters([self._numbers[k].name for k in chosen])
+            sources = [(each.constants, each.closures) for each in parameters.blocks]
+            assert isinstance(parameters.plant, System)  # it is the same one with its functions of time kept apart
+            plant = parameters.plant
+            start[:, list(chosen)] = parameters.initial_state * self._scales[list(chosen)]
+        tree = [
+            _arranged(plant.constants, [each[0] for each in sources], chosen, self._scales, b) for b in range(_count(P))
+        ]
+        closed: list[DualClosureConstants | None] = [None] * _count(P)
+        if plant.closures is not None:
+            own = plant.closures.constants[1]
+            of_closures = [
+                _arranged(own, [each[1] for each in sources], chosen, self._scales, b) for b in range(_count(P))
+            ]
+            closed = [DualClosureConstants(**each) for each in of_closures]
+        found = [DualTables(DualConstants(**each), other) for each, other in zip(tree, closed, strict=True)]
+        _alike(found)
+        return Known(plant, found)
+
+    def _blocks(self, known: Known, held: Mapping[str, Real]) -> Blocks:
+        """The blocks with derivatives of what is held, which those that are taken over do not have."""
+        found = []
+        for b, each in enumerate(known.duals):
+            functions = each.constants.function.copy()
+            for name, rates in held.items():
+                set_lanes(functions["data"][_function_of(known.system, name), :1], rates[None], b)
+            found.append(each._replace(constants=replace(each.constants, function=functions)))
+        _alike(found)
+        return Blocks(known.system, found, len(self._numbers))
+
+
+def _alike(duals: Sequence[DualTables]) -> None:
+    """Give the tables of all blocks the features of any, so that they share kernels."""
+    broaden([each.constants for each in duals])
+    closures = [each.closures for each in duals if each.closures is not None]
+    if closures:
+        broaden(closures)
+
+
+def _count(directions: int) -> int:
+    return -(-directions // LANES)
+
+
+def _arranged(table: Any, sources: Sequence[Any], chosen: Sequence[int], scales: Real, b: int) -> dict[str, Any]:
+    """The arrays of block b in duals: its lanes are those of the directions, found in `sources` in the order in which
+    they were chosen, times their scales."""
+    first = sources[0] if sources else table
+    found = {}
+    for each in fields(table):
+        own = getattr(table, each.name)
+        wide = as_duals(own)
+        for part, name in _floats(wide, own):
+            for place, k in enumerate(chosen):
+                if k // LANES == b:
+                    source = getattr(sources[place // LANES], each.name)
+                    lanes = source if name is None else source[name]
+                    part[..., 1 + k % LANES] = scales[k] * lanes[..., 1 + place % LANES]
+        if sources and each.name == "moves":
+            for source in sources:
+                wide[..., 0] = np.maximum(wide[..., 0], source.moves[..., 0])
+        if sources and each.name == "body":
+            for name in _DIAGONAL:
+                wide[name] = first.body[name]
+        found[each.name] = wide
+    return found
+
+
+def _floats(wide: Any, own: Any) -> list[tuple[Any, str | None]]:
+    """The floats of an array in duals, or of each field of its records, with the name of the field."""
+    if own.dtype == np.float64:
+        return [(wide, None)]
+    names = own.dtype.names or ()
+    return [(wide[name], name) for name in names if (own.dtype[name].subdtype or (own.dtype[name],))[0] == np.float64]
+
+
+def _taken_over(before: System, now: System, duals: DualTables) -> DualTables | None:
+    """The tables of a system in duals, with the derivatives of the system before; None if these do not suffice."""
+    tree = _with_derivatives(before.constants, now.constants, duals.constants)
+    if tree is None or now.closures is None or before.closures is None:
+        return None if tree is None else DualTables(DualConstants(**tree), None)
+    closed = _with_derivatives(before.closures.constants[1], now.closures.constants[1], duals.closures)
+    return None if closed is None else DualTables(DualConstants(**tree), DualClosureConstants(**closed))
+
+
+def _with_derivatives(before: Any, now: Any, duals: Any) -> dict[str, Any] | None:
+    """The arrays of a table in duals, with the derivatives of a table before that has the same numbers; None if it does
+    not. Functions of time may differ where they have no derivatives."""
+    found = {}
+    for each in fields(now):
+        old, new, known = (getattr(of, each.name) for of in (before, now, duals))
+        wide = as_duals(new)
+        for part, name in _floats(wide, new):
+            source, one, other = (array if name is None else array[name] for array in (known, old, new))
+            if each.name in _OF_TIME:
+                if np.any(source[..., 1:]):
+                    return None
+            elif not np.array_equal(one, other):
+                return None
+            else:
+                part[...] = source
+        if each.name == "body":
+            for name in _DIAGONAL:
+                wide[name] = known[name]
+        found[each.name] = wide
+    return found
+
+
+def _exists(scene: Scene, name: str) -> bool:
+    """Whether a scene has a number of this name."""
+    try:
+        Number(scene, name)
+    except PathError:
+        return False
+    return True
+
+
+def _function_of(system: System, coordinate: str) -> int:
+    """The number of the function that holds a coordinate."""
+    rate = rate_name(coordinate, scalar_paths(system.scene)[coordinate])
+    speed = [name for name, _ in system.state_names[1]].index(rate)
+    return int(system.constants.speed["prescribed"][speed])
