@@ -101,7 +101,7 @@ def wheel_rows(c, w, d, k, masses):
         put_force(d, BY_RATES, place, (l2, zero))
         for n in range(c.body[k].modes):
             _with_mode(c, d, k, place, port, n, l2, l1)
-        inboard_columns(c, d, place, d.places[k].run, d.places[k].end, (l2, zero), l1, zero, masses)
+        inboard_columns(c, d, place, (d.places[k].run, d.places[k].end), ((l2, zero), l1, zero), masses)
         d.matrix[place, 2 * nu + place] = axial
 
 

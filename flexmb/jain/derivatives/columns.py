@@ -11,8 +11,13 @@ from flexmb.tables.features import CONNECTORS, LOADS, MODES
 
 
 @helper
-def inboard_columns(c, d, place, run, end, l2, l1, l0, masses):
-    """Row `place` for all sources of a path: l2 . s2 + l1 . s1 + l0 . s0, and l2 . J for the mass matrix."""
+def inboard_columns(c, d, place, path, answer, masses):
+    """Row `place` for all sources of a path: l2 . s2 + l1 . s1 + l0 . s0, and l2 . J for the mass matrix.
+
+    `path`: the last run and the end of its slots; `answer`: l2, l1 and l0.
+    """
+    run, end = path
+    l2, l1, l0 = answer
     nu = d.speed.shape[0]
     row = d.matrix[place]
     while run >= 0:

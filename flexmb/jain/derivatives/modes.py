@@ -51,7 +51,7 @@ def mode_rows(c, d, k, masses):
     for n in range(nm):
         l1, l0 = column3(mode, MODE_BY_RATE, n), column3(mode, MODE_BY_TURN, n)
         run, end = d.places[k].run, d.places[k].end
-        inboard_columns(c, d, first + n, run, end, six_of(mode, MODE_ROW, n), l1, l0, masses)
+        inboard_columns(c, d, first + n, (run, end), (six_of(mode, MODE_ROW, n), l1, l0), masses)
 
 
 @helper

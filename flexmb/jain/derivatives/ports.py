@@ -62,14 +62,16 @@ def move_ports(c, w, d, k):
                 V, A = sum6(V_body, V_r), sum6(sum6(A_body, motion_cross(V_body, V_r)), A_r)
                 _change(c, w, d, k, i)
                 for n in range(0, c.body[k].modes, width(w)):
-                    _seed(c, w, d, k, i, n, R, r, V, A)
+                    _seed(c, w, d, k, i, n, (R, r), (V, A))
             store6(d.port[i].velocity, 0, V)
             store6(d.port[i].accel, 0, A)
 
 
 @helper
-def _seed(c, w, d, k, i, n, R, r, V, A):
-    """What a strip of modes does to port i, which moves with V and A."""
+def _seed(c, w, d, k, i, n, frame, motion):
+    """What a strip of modes does to port i; `frame`: the body's rotation and place, `motion`: V and A of the port."""
+    R, r = frame
+    V, A = motion
     J, V_body, moved = to_world(R, r, strips6(w, w.port_mode[i], n)), vec6(d.body[k].velocity, 0), d.port_mode[i]
     put_strips(d, moved, MOTION, n, J)
     if is_at_rest(c.body[k].level):
@@ -95,13 +97,19 @@ def move_frame(c, w, d, k, R, r, V, A):
         J = scale6(-1.0, to_world(R, r, strips6(w, w.port_mode[i], n)))
         put_strips(d, d.frame_mode[k], MOTION, n, J)
         if not is_at_rest(c.body[k].level):
-            _seed_frame(d, k, n, R, r, J, V_r, A_r, V_body, A_body)
+            _seed_frame(d, k, n, (R, r), J, (V_r, A_r), (V_body, A_body))
     return V_body, A_body
 
 
 @helper
-def _seed_frame(d, k, n, R, r, J, V_r, A_r, V_body, A_body):
-    """What a strip of modes does to the body frame; the axes of O stay, which turn against those of the body."""
+def _seed_frame(d, k, n, frame, J, relative, motion):
+    """What a strip of modes does to the body frame; the axes of O stay, which turn against those of the body.
+
+    `relative`: velocity and acceleration of O against the body, `motion`: those of the body frame.
+    """
+    R, r = frame
+    V_r, A_r = relative
+    V_body, A_body = motion
     moved = d.frame_mode[k]
     change = sum6(to_world(R, r, strips_of(d, d.change, 0, n)), motion_cross(J, V_r))
     dV = scale6(-1.0, change)

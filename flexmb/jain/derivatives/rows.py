@@ -85,7 +85,7 @@ def _row(c, d, k, place, slot, masses):
         l0 = row_by_angle(d.body[k].by_turn, J)
     if d.places[k].leaves_point:
         l2 = at_inboard_point(l2, vec3(d.body[k].step, 0))
-    inboard_columns(c, d, place, d.places[k].inboard_run, d.places[k].inboard_end, l2, l1, l0, masses)
+    inboard_columns(c, d, place, (d.places[k].inboard_run, d.places[k].inboard_end), (l2, l1, l0), masses)
     own_columns(d, J, place, d.places[k].hinge, d.places[k].stop, masses)
 
 
