@@ -41,7 +41,7 @@ _HOME = {
     "flexmb.sensitivity.fit": "Fit fit",
     "flexmb.sensitivity.jump": "EventError",
     "flexmb.sensitivity.sensitivities": "EventSensitivity Sensitivities sensitivities",
-    "flexmb.sensitivity.uncertainty": "Uncertainty uncertainty",
+    "flexmb.sensitivity.uncertainty": "Uncertainties uncertainty",
     "flexmb.system.batch": "Batch",
     "flexmb.system.compile": "compile compile_batch",
     "flexmb.system.derivative_records": "AccelerationDerivatives EvaluationDerivatives InverseDynamicsDerivatives",
@@ -96,7 +96,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.sensitivity.sensitivities import EventSensitivity as EventSensitivity
     from flexmb.sensitivity.sensitivities import Sensitivities as Sensitivities
     from flexmb.sensitivity.sensitivities import sensitivities as sensitivities
-    from flexmb.sensitivity.uncertainty import Uncertainty as Uncertainty
+    from flexmb.sensitivity.uncertainty import Uncertainties as Uncertainties
     from flexmb.sensitivity.uncertainty import uncertainty as uncertainty
     from flexmb.system.batch import Batch as Batch
     from flexmb.system.compile import compile as compile

@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
 from crosscheck.engines.linear.differences import differentiated
-from crosscheck.engines.linear.matrices import Errors, StateDerivatives, exact, norm, rounding
+from crosscheck.engines.linear.matrices import Errors, LinearMatrices, exact, norm, rounding
 from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs, outputs
 from crosscheck.engines.linear.parts import DERIVATIVES, LinearPart
 from flexmb.linear.equations import equations_of
@@ -56,23 +56,23 @@ def _offered(algorithm: Algorithm) -> Sequence[str]:
     return DERIVATIVES[:2] if ALGORITHMS[algorithm].is_first_order else DERIVATIVES
 
 
-def _exactly(equations: Equations, states: Iterable[State]) -> Iterator[StateDerivatives]:
+def _exactly(equations: Equations, states: Iterable[State]) -> Iterator[LinearMatrices]:
     return (_exact(equations, state) for state in states)
 
 
-def _exact(equations: Equations, state: State) -> StateDerivatives:
+def _exact(equations: Equations, state: State) -> LinearMatrices:
     at = equations.variations(state)
     return exact(at.by_displacement, at.by_speed, np.linalg.inv(at.mass), at.transport, state.u, at.rates)
 
 
-def _by_differences(equations: Equations, algorithm: Algorithm, states: Iterable[State]) -> Iterator[StateDerivatives]:
+def _by_differences(equations: Equations, algorithm: Algorithm, states: Iterable[State]) -> Iterator[LinearMatrices]:
     """By differences of the accelerations; the mass matrix is that of composite bodies."""
     accelerations = equations.system.evaluator(algorithm)
     for state in states:
         yield _differenced(equations, equations.variations(state), accelerations)
 
 
-def _differenced(equations: Equations, at: Variations, accelerations: Evaluator) -> StateDerivatives:
+def _differenced(equations: Equations, at: Variations, accelerations: Evaluator) -> LinearMatrices:
     state, free, n = at.state, equations.free, len(at.rates)
 
     def displaced(xi: Real) -> Real:
@@ -90,6 +90,6 @@ def _differenced(equations: Equations, at: Variations, accelerations: Evaluator)
     by_displacement, apart = differentiated(displaced, n, noise)
     by_speed, asunder = differentiated(hurried, n, noise)
     errors = Errors(apart, asunder, unit * norm(by_force))
-    return StateDerivatives(by_displacement, by_speed, by_force, at.transport, errors)
+    return LinearMatrices(by_displacement, by_speed, by_force, at.transport, errors)
 
 

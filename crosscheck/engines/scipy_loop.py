@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
-from crosscheck.engines.linear.matrices import StateDerivatives
+from crosscheck.engines.linear.matrices import LinearMatrices
 from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs, outputs
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.functions import Function
@@ -42,7 +42,7 @@ class Observer(Protocol):
 
 
 class Linearised(Protocol):
-    def at(self, t: float, state: Any) -> StateDerivatives: ...
+    def at(self, t: float, state: Any) -> LinearMatrices: ...
 
 
 class ScipyModel:

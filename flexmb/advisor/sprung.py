@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from scipy.spatial.transform import Rotation
 
 from flexmb.frisch.equivalence.appendage import appendage_of
-from flexmb.frisch.equivalence.relations import Fit, best_hinge
+from flexmb.frisch.equivalence.relations import HingeFit, best_hinge
 from flexmb.modal import flexible_model
 from flexmb.scene.bodies import BeamBody, ModalBody, Node, RigidBody
 from flexmb.scene.schema import AngularCoordinate, Hinge, Revolute, Scene, Universal
@@ -48,7 +48,7 @@ def spring_hinged(scene: Scene, name: str) -> Scene:
     return replace(scene, bodies=tuple(bodies), hinges=tuple(hinges), loads=loads, markers=markers)
 
 
-def fitted_hinge(scene: Scene, name: str) -> Fit:
+def fitted_hinge(scene: Scene, name: str) -> HingeFit:
     """The best hinge for the lowest mode, or for the lowest two that turn the body about orthogonal axes."""
     body = appendage_of(scene, name)
     one = best_hinge(body)
@@ -62,7 +62,7 @@ def fitted_hinge(scene: Scene, name: str) -> Fit:
     return one
 
 
-def _spring(body: BeamBody | ModalBody, fit: Fit) -> Hinge:
+def _spring(body: BeamBody | ModalBody, fit: HingeFit) -> Hinge:
     """The hinge between clamp and body, with its frames at the fitted point, x (and y) along its axes at rest."""
     first = fit.hinge.axes[0]
     second = fit.hinge.axes[1] if len(fit.hinge.axes) == 2 else _across(first)

@@ -24,7 +24,7 @@ from scipy.linalg import solve_triangular
 from flexmb.closure.closures import Closures
 from flexmb.closure.tangent import ClosureTangentWorkspace, closed_jacobian
 from flexmb.entry.tangent import TangentWorkspace
-from flexmb.entry.variation import StateDerivatives, Variation
+from flexmb.entry.variation import ByAllDirections, FreeVariation
 from flexmb.typing import Index, Real
 
 
@@ -39,7 +39,7 @@ class _Tangent(NamedTuple):
 
 def variation(
     closures: Closures, t: float, y: Real, mass: Real, tables: tuple[TangentWorkspace, ClosureTangentWorkspace]
-) -> Variation:
+) -> FreeVariation:
     """At y = [q, u, work], which must fulfil the closures, with the mass matrix (nu,nu) of the tree.
 
     DynamicsError where the closures are singular.
@@ -67,10 +67,10 @@ def variation(
     inertia[np.ix_(chosen, chosen)] = R_inverse @ R_inverse.T
     by_force[np.ix_(chosen, free)] = -solve_triangular(R, solve_triangular(root, Q, lower=True, trans=1).T)
 
-    def along_speeds(change: Real, by_force: Real) -> StateDerivatives:
-        return StateDerivatives(change[:, :nq] @ motion, change[:, nq:-1], by_force, change[:, -1])
+    def along_speeds(change: Real, by_force: Real) -> ByAllDirections:
+        return ByAllDirections(change[:, :nq] @ motion, change[:, nq:-1], by_force, change[:, -1])
 
-    return Variation(
+    return FreeVariation(
         accelerations, along_speeds(of_rates, _by_force(root, Q, free, nu)), motion, loads,
         along_speeds(of_loads, by_force), lever, inertia,
     )  # fmt: skip

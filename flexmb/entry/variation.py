@@ -13,7 +13,7 @@ from flexmb.typing import Real
 MOST_SPEEDS = 6  # of a hinge
 
 
-class StateDerivatives(NamedTuple):
+class ByAllDirections(NamedTuple):
     """Derivatives of m numbers: by displacements along the speeds (m,nu), speeds (m,nu), generalised forces along the
     speeds (m,nu), and time (m,)."""
 
@@ -28,7 +28,7 @@ class StateDerivatives(NamedTuple):
         return np.column_stack(self)
 
 
-class Variation(NamedTuple):
+class FreeVariation(NamedTuple):
     """The accelerations (nu,) of a free motion and the loads (G,) of the rows of closures, with their derivatives.
 
     motion (nq,nu): N = d(qdot)/du, the change of the coordinates by displacements along the speeds. Columns of
@@ -38,10 +38,10 @@ class Variation(NamedTuple):
     """
 
     accelerations: Real
-    of_accelerations: StateDerivatives
+    of_accelerations: ByAllDirections
     motion: Real
     loads: Real
-    of_loads: StateDerivatives
+    of_loads: ByAllDirections
     lever: Real
     inertia: Real
 

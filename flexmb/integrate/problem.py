@@ -39,7 +39,7 @@ class StiffProblem(NamedTuple):
     jacobian(t, y, J, exact, tangent) puts df/dy (n,n) into J and returns a status code.
     move(y, increment, result, constants) puts y = [q, u, ...] with q o exp(increment) into result, for methods on Lie
     groups; increment (nu,). settles: whether `project` displaces stiff components: see `flexmb.integrate.settling`.
-    separates: whether the functions of `StiffPart` exist, with its tables in `stiff`: Newton's method may then do
+    separates: whether the functions of `StiffKernels` exist, with its tables in `stiff`: Newton's method may then do
     without the Jacobian, see `flexmb.integrate.stiff_place`.
     """
 
@@ -115,7 +115,7 @@ class Leaping(NamedTuple):
     noticed: Callable[[Any], tuple[float, int] | None]
 
 
-class StiffPart(NamedTuple):
+class StiffKernels(NamedTuple):
     """Kernels for equations M udot = f of which the stiff part of f, -K (q - q0) - D (u - u0), is known; their tables.
 
     settle_at(t, y, tables) takes K, D, M and N = dqdot/du there; returns a status code. shift(a, b, second, tables)
@@ -139,7 +139,7 @@ class Linear(NamedTuple):
     exact: Any
     tangent: Any
     settles: bool = False
-    stiff: StiffPart | None = None
+    stiff: StiffKernels | None = None
 
 
 @kernel
@@ -192,7 +192,7 @@ def stiff_problem(
 ) -> StiffProblem:
     """A `StiffProblem` from kernels and bundles, see `problem`."""
     jacobian, move, exact, tangent, settles, stiff = linear
-    nothing = StiffPart(_no_settling, _no_shift, _no_motion, _no_answer, exact)
+    nothing = StiffKernels(_no_settling, _no_shift, _no_motion, _no_answer, exact)
     settle_at, shift, along, restore, tables = stiff or nothing
     known = tables if stiff else AnyBundle._numba_type_
     return StiffProblem(

@@ -1,4 +1,4 @@
-"""Newton's method with the stiff part of the equations in place of their Jacobian: see `StiffPart` in `problem`.
+"""Newton's method with the stiff part of the equations in place of their Jacobian: see `StiffKernels` in `problem`.
 
 With sigma = 1/a and b = a^2, the equations (sigma - J) x = f of a method of Runge-Kutta are, for the coordinates and
 speeds of J = [0 N; -M^-1 K N^-1  -M^-1 D],

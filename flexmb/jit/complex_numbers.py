@@ -1,7 +1,7 @@
 """Complex numbers as the numbers of kernels: elementary functions that numba has for them under other names only.
 
 A kernel whose workspace holds complex numbers is compiled from the same source as for floats. It solves the equations
-of implicit methods, whose matrices are complex (`flexmb.entry.implicit`). Comparisons use the real part, `.real`.
+of implicit methods, whose matrices are complex (`flexmb.entry.stiff_part`). Comparisons use the real part, `.real`.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ class _OfOne(AbstractTemplate):
 
 
 @infer_global(math.sqrt)
-class _SquareRoot(_OfOne):
+class _ComplexSquareRoot(_OfOne):
     pass
 
 
 @infer_global(sincos)
-class _SineCosine(AbstractTemplate):
+class _ComplexSineCosine(AbstractTemplate):
     def generic(self, args, kws):
         return signature(types.UniTuple(COMPLEX, 2), COMPLEX) if args == (COMPLEX,) else None
 
@@ -56,7 +56,7 @@ def _sincos(context, builder, sig, args):
 
 
 @infer_global(nonzero)
-class _Nonzero(AbstractTemplate):
+class _ComplexNonzero(AbstractTemplate):
     def generic(self, args, kws):
         return signature(types.boolean, COMPLEX) if args == (COMPLEX,) else None
 

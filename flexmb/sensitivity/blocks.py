@@ -30,14 +30,14 @@ class DualTables(NamedTuple):
     closures: DualClosureConstants | None
 
 
-class Observed(NamedTuple):
+class ObservedRates(NamedTuple):
     """Everything observable, laid out as `Observation.columns`: values (m,), derivatives (m,P)."""
 
     row: Real
     rates: Real
 
 
-class Response(NamedTuple):
+class RowResponse(NamedTuple):
     """Accelerations (nu,) due to loads of rows, their derivatives (nu,P), those of the drive loads (nu,P) that keep
     prescribed speeds, and of the rows' rates (G,P)."""
 
@@ -117,7 +117,7 @@ class Blocks:
         """Name of the item at which the last evaluation failed."""
         return self.system.fault_name(status, self.fault)
 
-    def observe(self) -> Observed:
+    def observe(self) -> ObservedRates:
         """Everything observable where the motion of all blocks was just evaluated."""
         rows = []
         for b, (block, out) in enumerate(zip(self.tables, self.outputs, strict=True)):
@@ -127,7 +127,7 @@ class Blocks:
                 chain.closure_loads(block, self._loads[b])
                 parts.append(self._loads[b].every.reshape(-1, DualType.width))
             rows.append(np.concatenate(parts))
-        return Observed(rows[0][:, 0].copy(), self.joined(rows))
+        return ObservedRates(rows[0][:, 0].copy(), self.joined(rows))
 
     def inertia_forces(self, t: float, rates: Real) -> tuple[Real, Real]:
         """M rates (nu,) for given rates (nu,) at the coordinates of the blocks' states, and its derivatives (nu,P)."""
@@ -140,7 +140,7 @@ class Blocks:
             found.append(moved - x.tau)
         return found[0][:, 0], self.joined(found)
 
-    def response(self, t: float, load: Real) -> Response:
+    def response(self, t: float, load: Real) -> RowResponse:
         """How the motion of a closed chain at the blocks' states responds to loads of rows (G,)."""
         found = []
         for block, w in zip(self.tables, self.workspaces, strict=True):
@@ -152,7 +152,7 @@ class Blocks:
             (gained, drive, _), (own, idle, rate) = parts
             found.append((gained - own, drive - idle, rate))
         gains, drives, of_rows = (self.joined([each[i] for each in found]) for i in range(3))
-        return Response(found[0][0][:, 0], gains, drives, of_rows)
+        return RowResponse(found[0][0][:, 0], gains, drives, of_rows)
 
     def joined(self, duals: Sequence[Real]) -> Real:
         """The derivatives (...,P) of one array of duals (...,9) for each block."""

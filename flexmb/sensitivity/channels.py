@@ -12,7 +12,7 @@ from flexmb.control.wiring import wired
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.problems import closest
 from flexmb.scene.tree import watches_signals
-from flexmb.sensitivity.blocks import Observed
+from flexmb.sensitivity.blocks import ObservedRates
 from flexmb.system.observables import ENERGIES
 from flexmb.system.tree_system import System
 from flexmb.typing import Real
@@ -23,7 +23,7 @@ class Seen(NamedTuple):
     derivatives (S,P)."""
 
     Y: Real
-    observed: Observed | None
+    observed: ObservedRates | None
     signals: Real | None
 
 

@@ -19,13 +19,13 @@ from flexmb.jit.lanes import LANES
 from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
-# Indices in `Flow.address`; 0 where there is none.
+# Indices in `VariationalFlow.address`; 0 where there is none.
 MOTION, MANIFOLD, CONTROL, FOLLOW = range(4)
 ADDRESSES = 4
 
 
 @bundle
-class Flow:
+class VariationalFlow:
     """The tables of the variational equations: B blocks of LANES directions each.
 
     The last axis of the arrays of duals holds the value, then the derivatives along LANES directions.

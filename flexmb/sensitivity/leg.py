@@ -48,7 +48,7 @@ class Variation:
             where[flow.CONTROL], where[flow.FOLLOW] = loops.steer, loops.follow
             law, law_rate, continuous = loops.law, loops.law_rate, loops.continuous
         self._width = n + len(continuous)
-        self.flow = flow.Flow(
+        self.flow = flow.VariationalFlow(
             address=where, block=np.array(blocks.where), loop=np.array(loops.where if loops else [0] * B),
             directions=np.array([blocks.directions]), state=blocks.state, slope=blocks.slope, law=law,
             law_rate=law_rate, continuous=continuous,

@@ -32,7 +32,7 @@ _DIAGONAL = (
 _OF_TIME = "function", "table"  # tables of functions, of which events make others
 
 
-class Known(NamedTuple):
+class KnownTables(NamedTuple):
     """The tables of a system: with constants of floats, and in duals for each block."""
 
     system: System
@@ -48,7 +48,7 @@ class Systems:
     def __init__(self, numbers: Sequence[Number], scales: Real, mechanical: int) -> None:
         """mechanical: how many of the first numbers the tables of the mechanics may depend on."""
         self._numbers, self._scales, self._mechanical = numbers, scales, mechanical
-        self._known: Known | None = None
+        self._known: KnownTables | None = None
 
     def first(self, system: System) -> tuple[Blocks, Real]:
         """The blocks of a run's own scene, and the scaled derivatives (nq+nu+1,P) of its initial state."""
@@ -63,7 +63,7 @@ class Systems:
         plant = system.with_numbers(system.scene)
         taken = [_taken_over(self._known.system, plant, each) if all(alive) else None for each in self._known.duals]
         if all(each is not None for each in taken):
-            found = Known(plant, [each for each in taken if each is not None])
+            found = KnownTables(plant, [each for each in taken if each is not None])
             _alike(found.duals)
         else:
             start = np.zeros((system.nq + system.nu + 1, len(self._numbers)))
@@ -74,7 +74,7 @@ class Systems:
             found.system.closures.begin_at(state.t, pack(state))
         return self._blocks(found, held)
 
-    def _differentiated(self, system: System, chosen: Sequence[int], start: Real) -> Known:
+    def _differentiated(self, system: System, chosen: Sequence[int], start: Real) -> KnownTables:
         """The tables of a system by those of the numbers that are chosen; the part of its initial state to `start`."""
         P = len(self._numbers)
         if not chosen:
@@ -99,9 +99,9 @@ class Systems:
             closed = [DualClosureConstants(**each) for each in of_closures]
         found = [DualTables(DualConstants(**each), other) for each, other in zip(tree, closed, strict=True)]
         _alike(found)
-        return Known(plant, found)
+        return KnownTables(plant, found)
 
-    def _blocks(self, known: Known, held: Mapping[str, Real]) -> Blocks:
+    def _blocks(self, known: KnownTables, held: Mapping[str, Real]) -> Blocks:
         """The blocks with derivatives of what is held, which those that are taken over do not have."""
         found = []
         for b, each in enumerate(known.duals):

@@ -26,7 +26,7 @@ SYMMETRIC = 1e-9  # relative difference of opposite entries of a correlation, an
 
 
 @dataclass(frozen=True)
-class Uncertainty:
+class Uncertainties:
     """Standard deviations of the outputs of a run, by `uncertainty`.
 
     t (T,) s; outputs (K,) with their values (T,K) and standard deviations sigma (T,K); parameters (P,) with their
@@ -74,7 +74,7 @@ def uncertainty(
     correlation: Any = None,
     samples: int | Sequence[float] | Real = 201,
     **settings: Unpack[RunSettings],
-) -> Uncertainty:
+) -> Uncertainties:
     """Standard deviations of outputs over time, to first order, and what each parameter contributes to them.
 
     given: standard deviations by parameter, in the units of the scene, or a `Fit` with its covariance. correlation
@@ -88,7 +88,7 @@ def uncertainty(
     S = found.derivatives
     contributions = S * (S @ covariance)
     sigma = np.sqrt(np.maximum(np.sum(contributions, axis=-1), 0.0))
-    return Uncertainty(
+    return Uncertainties(
         found.t, found.outputs, found.units, found.values, sigma, found.parameters, covariance, contributions, found
     )
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from flexmb.entry import articulated, derivatives, stiff_part
 from flexmb.entry.observation import observe
-from flexmb.integrate.problem import Linear, StiffPart
+from flexmb.integrate.problem import Linear, StiffKernels
 from flexmb.motion import coordinates, retraction
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.mechanics import Mechanics
@@ -26,13 +26,13 @@ def _linear(system: Mechanics) -> Linear:
     return Linear(derivatives.jacobian, retraction.move, exact, written, stiff=_stiff(system))
 
 
-def _stiff(system: Mechanics) -> StiffPart | None:
+def _stiff(system: Mechanics) -> StiffKernels | None:
     """The stiff part of a scene for which it pays; None where stiff forces may act that it does not contain."""
     c = system.constants
     if system.nu < MANY_SPEEDS or not stiff_part.is_complete(c):
         return None
     tables = stiff_part.stiff_part(c, system.nq, system.nu)
-    return StiffPart(stiff_part.settle_at, stiff_part.shift, stiff_part.along, stiff_part.restore, tables)
+    return StiffKernels(stiff_part.settle_at, stiff_part.shift, stiff_part.along, stiff_part.restore, tables)
 
 
 def _route(system: Mechanics) -> Route:

@@ -9,7 +9,7 @@ from flexmb.closure.given_motion import observe_given, rows_tangent
 from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace
 from flexmb.entry.given_motion import motion_tangent
 from flexmb.entry.observed_tangent import outputs_tangent
-from flexmb.entry.variation import Variation
+from flexmb.entry.variation import FreeVariation
 from flexmb.jit.direct import direct
 from flexmb.jit.pointer import STATUS
 from flexmb.system.derivative_evaluator import DerivativeEvaluator
@@ -37,7 +37,7 @@ class ChainDerivatives(DifferentiableMotion):
             "use acceleration_derivatives(state)"
         )
 
-    def _variation(self, t: float, y: Real) -> Variation:
+    def _variation(self, t: float, y: Real) -> FreeVariation:
         from flexmb.closure.variation import variation  # imported here, because it imports SciPy, which is slow
 
         self.accelerations(self.layout.known(t, y))  # with its errors and warnings

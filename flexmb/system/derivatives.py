@@ -21,7 +21,7 @@ from flexmb.entry.derivatives import (
 from flexmb.entry.given_motion import motion_tangent, observe_given
 from flexmb.entry.observed_tangent import outputs_tangent
 from flexmb.entry.tangent import TangentWorkspace, tangent_workspace, time_derivative
-from flexmb.entry.variation import StateDerivatives, Variation, coordinate_motion
+from flexmb.entry.variation import ByAllDirections, FreeVariation, coordinate_motion
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.scene.open_loop import refuse_feedback
@@ -151,7 +151,7 @@ class DifferentiableMotion(FreeMotion):
 
     # What closed chains do otherwise
 
-    def _variation(self, t: float, y: Real) -> Variation:
+    def _variation(self, t: float, y: Real) -> FreeVariation:
         """How the free motion changes."""
         w, nu = self._derivative_workspace, self.nu
         by_displacement, by_speed, by_force = (np.empty((nu, nu)) for _ in range(3))
@@ -160,14 +160,14 @@ class DifferentiableMotion(FreeMotion):
         self.check_precision(t, y, w)
         for part in (by_displacement, by_speed, by_force):
             finite_result(part, t)
-        of_rates = StateDerivatives(by_displacement, by_speed, by_force, self._by_time(t, y))
-        return Variation(accelerations, of_rates, self._coordinate_motion(t, y), *self._no_rows)
+        of_rates = ByAllDirections(by_displacement, by_speed, by_force, self._by_time(t, y))
+        return FreeVariation(accelerations, of_rates, self._coordinate_motion(t, y), *self._no_rows)
 
     @cached_property
-    def _no_rows(self) -> tuple[Real, StateDerivatives, Real, Real]:
-        """What a `Variation` has of the rows of closures, in a tree."""
+    def _no_rows(self) -> tuple[Real, ByAllDirections, Real, Real]:
+        """What a `FreeVariation` has of the rows of closures, in a tree."""
         none = np.zeros((0, self.nu))
-        return np.zeros(0), StateDerivatives(none, none, none, np.zeros(0)), none.T, np.zeros((0, 0))
+        return np.zeros(0), ByAllDirections(none, none, none, np.zeros(0)), none.T, np.zeros((0, 0))
 
     def _by_time(self, t: float, y: Real) -> Real:
         """Explicit derivatives (nu,) of the accelerations by time."""
@@ -282,7 +282,7 @@ class DifferentiableMotion(FreeMotion):
         motion = GivenMotion(t, y, at.accelerations, at.loads)
         return motion, Directions(state, at.of_accelerations.by_all, at.of_loads.by_all, time)
 
-    def _under_forces(self, at: Variation, t: float, y: Real, forces: Real) -> Variation:
+    def _under_forces(self, at: FreeVariation, t: float, y: Real, forces: Real) -> FreeVariation:
         """The motion under further generalised forces (nu,), which the scene's motion `at` is without.
 
         They add accelerations x and row loads f with M x - J'f = forces and J x = 0. In a direction these change by
@@ -298,10 +298,10 @@ class DifferentiableMotion(FreeMotion):
 
         drift, opening = np.vsplit(finite_result(left(x, f) - left(np.zeros(nu), np.zeros(rows)), t), [nu])
 
-        def turned(of: StateDerivatives, by_row: Real) -> StateDerivatives:
+        def turned(of: ByAllDirections, by_row: Real) -> ByAllDirections:
             less = of.by_force @ drift + by_row @ opening
             by_displacement, by_speed, by_time = np.hsplit(less, [nu, 2 * nu])
-            return StateDerivatives(
+            return ByAllDirections(
                 of.by_displacement - by_displacement, of.by_speed - by_speed, of.by_force, of.by_time - by_time[:, 0]
             )
 

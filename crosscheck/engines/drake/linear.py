@@ -26,7 +26,7 @@ from crosscheck.engines.drake.actions import Drives, JointActions
 from crosscheck.engines.drake.tree import DrakeSlot, DrakeState, DrakeTree, ball_rotation, place
 from crosscheck.engines.linear.axes import OutboardAxes
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
-from crosscheck.engines.linear.matrices import StateDerivatives, exact, quaternion_transport
+from crosscheck.engines.linear.matrices import LinearMatrices, exact, quaternion_transport
 from crosscheck.engines.linear.slots import slot_names
 from crosscheck.engines.links import Ball, Floating, Scalar, attachment
 from crosscheck.engines.rigid_tree import PointLoad
@@ -79,7 +79,7 @@ class DrakeLinear:
                     assert_never(slot.freedom)
         self._places = places(coordinate_names(scene), own)
 
-    def at(self, t: float, state: DrakeState) -> StateDerivatives:
+    def at(self, t: float, state: DrakeState) -> LinearMatrices:
         """The derivatives at a state, in the order that all engines share."""
         n = len(state.v)
         acceleration = self._accelerations(t, state)

@@ -22,7 +22,7 @@ from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.state import States, set_state
 from crosscheck.engines.linear.differences import differentiated
 from crosscheck.engines.linear.frequencies import eigenfrequencies
-from crosscheck.engines.linear.matrices import EPS, Errors, StateDerivatives, norm
+from crosscheck.engines.linear.matrices import EPS, Errors, LinearMatrices, norm
 from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs
 from crosscheck.engines.linear.parts import FREQUENCIES
 from flexmb.typing import Real
@@ -61,7 +61,7 @@ class _Residual:
     def close(self) -> None:
         self._solver.FinalizeSolver(self._mbs, self._settings)
 
-    def at(self, states: States, sample: int) -> StateDerivatives | None:
+    def at(self, states: States, sample: int) -> LinearMatrices | None:
         """The matrices of the motions Z that are allowed; None unless the state is an equilibrium."""
         set_state(self._mbs, states, sample)
         if self._k:
@@ -104,7 +104,7 @@ class _Residual:
 
 def _reduced(
     M: Real, C: Real, residual: Callable[[Real], Real], force: Callable[[Real], Real], f: Real, left: float
-) -> StateDerivatives:
+) -> LinearMatrices:
     """The matrices of the allowed motions s; `left` are the speeds and accelerations that an equilibrium lacks."""
     Z = null_space(C, rcond=RANK) if len(C) else np.eye(len(M))
     noise = len(f) * EPS * (norm(f) + norm(C))
@@ -115,4 +115,4 @@ def _reduced(
     share = float(np.linalg.norm(inverse, 2))
     errors = Errors(share * (apart + left * norm(M)), share * (asunder + left * norm(M)), EPS * norm(inverse))
     none = np.zeros_like(inverse)
-    return StateDerivatives(inverse @ by_q, inverse @ by_v, inverse, none, errors)
+    return LinearMatrices(inverse @ by_q, inverse @ by_v, inverse, none, errors)

@@ -20,11 +20,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cholesky, eig, solve_triangular
 
-from crosscheck.engines.linear.matrices import EPS, StateDerivatives, norm
+from crosscheck.engines.linear.matrices import EPS, LinearMatrices, norm
 from flexmb.typing import Real
 
 
-def eigenfrequencies(at: StateDerivatives) -> tuple[Real, float]:
+def eigenfrequencies(at: LinearMatrices) -> tuple[Real, float]:
     """The frequencies (n,) and the Euclidean norm of their errors (rad/s), infinite where the masses are singular."""
     if not np.isfinite((at.errors.by_displacement, at.errors.by_speed)).all():
         return np.zeros(len(at.by_speed)), float("inf")
@@ -35,7 +35,7 @@ def eigenfrequencies(at: StateDerivatives) -> tuple[Real, float]:
     return frequencies[order], norm(errors)
 
 
-def _undamped(at: StateDerivatives) -> tuple[Real, Real] | None:
+def _undamped(at: LinearMatrices) -> tuple[Real, Real] | None:
     """Frequencies and errors where speeds have no part and S is symmetric, within what is known; None elsewhere."""
     if norm(at.by_speed) > at.errors.by_speed or norm(at.transport) > 0.0:
         return None
@@ -53,7 +53,7 @@ def _of_squares(S: Real, doubt: float) -> tuple[Real, Real]:
     return frequencies, doubt / (reach + frequencies) if doubt > 0.0 else np.zeros_like(frequencies)
 
 
-def _damped(at: StateDerivatives) -> tuple[Real, Real]:
+def _damped(at: LinearMatrices) -> tuple[Real, Real]:
     """Frequencies and errors by the eigenvalues of A in the coordinates a, b of xi = L a, u = s L b, which have no
     units: their inertia is 1, and s is the size of the frequencies."""
     n = len(at.by_speed)

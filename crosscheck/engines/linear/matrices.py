@@ -41,7 +41,7 @@ class Errors:
 
 
 @dataclass(frozen=True)
-class StateDerivatives:
+class LinearMatrices:
     """The derivatives of one state in the order of `coordinate_names`, their errors, and the transport."""
 
     by_displacement: Real
@@ -50,22 +50,22 @@ class StateDerivatives:
     transport: Real
     errors: Errors
 
-    def ordered(self, places: Any) -> StateDerivatives:
+    def ordered(self, places: Any) -> LinearMatrices:
         """The same with rows and columns in another order: `places` (n,) are their numbers in this one."""
         square = np.ix_(places, places)
         parts = (self.by_displacement, self.by_speed, self.by_force, self.transport)
-        return StateDerivatives(*(part[square] for part in parts), self.errors)
+        return LinearMatrices(*(part[square] for part in parts), self.errors)
 
 
 def exact(
     by_displacement: Real, by_speed: Real, by_force: Real, transport: Real, u: Real, udot: Real
-) -> StateDerivatives:
+) -> LinearMatrices:
     """Derivatives that are exact up to rounding, of a state with all speeds u and accelerations udot, also prescribed
     ones."""
     unit = rounding(by_force, len(u))
     sizes = (norm(by_displacement) + norm(by_speed) * norm(u) + norm(udot), norm(by_speed) + norm(u), norm(by_force))
     errors = Errors(*(unit * size if np.isfinite(unit) else float("inf") for size in sizes))
-    return StateDerivatives(by_displacement, by_speed, by_force, transport, errors)
+    return LinearMatrices(by_displacement, by_speed, by_force, transport, errors)
 
 
 def rounding(by_force: Real, speeds: int) -> float:

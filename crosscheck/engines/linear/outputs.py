@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.engines.linear.matrices import StateDerivatives
+from crosscheck.engines.linear.matrices import LinearMatrices
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES, LinearPart
 from flexmb.typing import Real
 
@@ -29,7 +29,7 @@ NOTHING = LinearOutputs({}, None, {})
 
 
 def outputs(
-    asked: Collection[LinearPart], samples: Iterable[StateDerivatives], offered: Sequence[str] = DERIVATIVES
+    asked: Collection[LinearPart], samples: Iterable[LinearMatrices], offered: Sequence[str] = DERIVATIVES
 ) -> LinearOutputs:
     """The outputs that were `asked` from the matrices of every sample; of the derivatives those `offered`.
 

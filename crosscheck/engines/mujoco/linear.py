@@ -23,7 +23,7 @@ from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.linear.axes import OutboardAxes, swapped_transport
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
 from crosscheck.engines.linear.differences import fourth_order
-from crosscheck.engines.linear.matrices import EPS, Errors, StateDerivatives, norm, rounding
+from crosscheck.engines.linear.matrices import EPS, Errors, LinearMatrices, norm, rounding
 from crosscheck.engines.linear.slots import slot_names
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.mujoco.forces import Forces
@@ -64,7 +64,7 @@ class MujocoLinear:
         self._places = places(coordinate_names(scene), own)
         self._square = np.ix_(self._places, self._places)
 
-    def at(self, t: float, qpos: Real, qvel: Real) -> StateDerivatives:
+    def at(self, t: float, qpos: Real, qvel: Real) -> LinearMatrices:
         """The derivatives at a state, in the order that all engines share."""
         model, data, nv = self._model, self._data, self._model.nv
         data.time, data.qpos[:], data.qvel[:] = t, qpos, qvel
@@ -87,7 +87,7 @@ class MujocoLinear:
         )
         transport = swapped_transport(axes.u, self._turning, [slot.v for slot in self._flying])
         parts = (axes.by_displacement(by_q, by_v), axes.by_speed(by_v))
-        return StateDerivatives(*(part[self._square] for part in parts), by_force, transport[self._square], errors)
+        return LinearMatrices(*(part[self._square] for part in parts), by_force, transport[self._square], errors)
 
     def _step(self, eps: float) -> Real:
         """d [q; v] after a step by d [q; v] before it (2nv,2nv)."""

@@ -19,7 +19,7 @@ import pinocchio as pin
 from crosscheck.engines.conventions import rotation_vector, scalar_first
 from crosscheck.engines.linear.axes import swapped_transport
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
-from crosscheck.engines.linear.matrices import StateDerivatives, exact
+from crosscheck.engines.linear.matrices import LinearMatrices, exact
 from crosscheck.engines.linear.slots import slot_names
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.dynamics import Acting, Dynamics, PinocchioState
@@ -55,7 +55,7 @@ class PinocchioLinear:
         self._places = places(coordinate_names(scene), own)
         self._free = not dynamics.driven
 
-    def at(self, t: float, state: PinocchioState) -> StateDerivatives:
+    def at(self, t: float, state: PinocchioState) -> LinearMatrices:
         """The derivatives at a state, in the order that all engines share."""
         acting = self._dynamics.acting(t, state)
         a = self._dynamics.solve(t, state).acceleration

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from flexmb.frisch.equivalence.appendage import Appendage, inertia_about_origin
 from flexmb.frisch.equivalence.mode_count import Direction, directions
-from flexmb.frisch.equivalence.relations import Fit, best_hinge, fit_at, modal_effective_inertia
+from flexmb.frisch.equivalence.relations import HingeFit, best_hinge, fit_at, modal_effective_inertia
 
 AT_CLAMP, BEST, GIVEN = "hinge at the clamp", "best hinge", "given hinge"
 
@@ -40,7 +40,7 @@ class Equivalence:
 
     appendage: Appendage
     accuracy: float
-    fits: dict[str, Fit]
+    fits: dict[str, HingeFit]
     directions: tuple[Direction, ...]
     verdicts: tuple[Preference, ...]
 
@@ -70,7 +70,7 @@ def equivalence(
     return Equivalence(body, accuracy, fits, found, _verdicts(body, accuracy, fits.get(GIVEN, best)))
 
 
-def coupling_error(body: Appendage, fit: Fit) -> float:
+def coupling_error(body: Appendage, fit: HingeFit) -> float:
     """Largest relative difference of effective mass and effective inertia between a hinge and its modes, along the
     modes.
 
@@ -87,7 +87,7 @@ def coupling_error(body: Appendage, fit: Fit) -> float:
     return float(max(errors, default=0.0))
 
 
-def _verdicts(body: Appendage, accuracy: float, fit: Fit) -> tuple[Preference, ...]:
+def _verdicts(body: Appendage, accuracy: float, fit: HingeFit) -> tuple[Preference, ...]:
     f = body.frequencies / (2.0 * np.pi)
     first = min(fit.modes)
     mismatch = max(relation.mismatch for group in fit.relations for relation in group)
@@ -129,7 +129,7 @@ def _verdicts(body: Appendage, accuracy: float, fit: Fit) -> tuple[Preference, .
     return tuple(verdicts)
 
 
-def _beyond(body: Appendage, fit: Fit) -> tuple[float, float]:
+def _beyond(body: Appendage, fit: HingeFit) -> tuple[float, float]:
     """Fractions of the inertia about the hinge axes, and of the mass along the modes' velocity, of all other modes."""
     modal, rigid = modal_effective_inertia(body, fit.modes), inertia_about_origin(body.moving)
     turning = [(q @ modal[:3, :3] @ q) / (q @ rigid[:3, :3] @ q) for q in fit.hinge.axes]

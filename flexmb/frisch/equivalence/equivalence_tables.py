@@ -8,7 +8,7 @@ from rich.text import Text
 
 from flexmb.frisch.equivalence.comparison import BEST, Equivalence, percent
 from flexmb.frisch.equivalence.mode_count import Direction
-from flexmb.frisch.equivalence.relations import Fit, Relation, displacement_relations, modal_effective_inertia
+from flexmb.frisch.equivalence.relations import HingeFit, Relation, displacement_relations, modal_effective_inertia
 from flexmb.output.listing import Listing, figures, names, prose
 from flexmb.typing import Real
 
@@ -25,7 +25,7 @@ def equivalence_tables(result: Equivalence, angle: float = 0.1) -> RenderableTyp
     )  # fmt: skip
 
 
-def _lead(result: Equivalence) -> Fit:
+def _lead(result: Equivalence) -> HingeFit:
     return next(iter(result.fits.values()))
 
 

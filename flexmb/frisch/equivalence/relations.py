@@ -63,7 +63,7 @@ class Relation:
 
 
 @dataclass(frozen=True)
-class Fit:
+class HingeFit:
     """A spring-hinged rigid model of an appendage.
 
     `hinge`; `modes` (k), those that its axes replace, counted from 0; `rates` (k,k), row i: hinge rates thetadot that
@@ -158,7 +158,7 @@ def turning_axis(body: Appendage, mode: int) -> Real:
     return axis / np.linalg.norm(axis)
 
 
-def best_hinge(body: Appendage, axes: ArrayLike | None = None, modes: tuple[int, ...] | None = None) -> Fit:
+def best_hinge(body: Appendage, axes: ArrayLike | None = None, modes: tuple[int, ...] | None = None) -> HingeFit:
     """The spring hinge that approximates the appendage best: its point minimises the norm of (149)-(151).
 
     `axes` (k,3): default one, about which the first of `modes` turns the appendage. `modes`, one for each axis, counted
@@ -181,7 +181,7 @@ def best_hinge(body: Appendage, axes: ArrayLike | None = None, modes: tuple[int,
 
 def fit_at(
     body: Appendage, point: ArrayLike, axes: ArrayLike | None = None, modes: tuple[int, ...] | None = None
-) -> Fit:
+) -> HingeFit:
     """The spring hinge at a given point (3,), m from the clamp; axes, modes and springs as in `best_hinge`."""
     axes, modes = _choice(body, axes, modes)
     p, at = body.parameters, np.asarray(point, dtype=float)
@@ -194,7 +194,7 @@ def fit_at(
     relations = tuple(rate_relations(body, hinge, unit[mode]) for mode in modes)
     squares = [relation.mismatch**2 for group in relations for relation in group]
     momenta = np.hstack([axes @ (p.Phi + _carried(p, arm)).T, p.mass * np.cross(axes, arm)])
-    return Fit(
+    return HingeFit(
         hinge=hinge,
         modes=modes,
         rates=np.array([best_rates(body, at, axes, unit[mode]) for mode in modes]),

@@ -7,7 +7,13 @@ from functools import partial
 import numpy as np
 
 import flexmb as fm
-from flexmb.entry import articulated, derivatives, tangent
+from flexmb.entry import articulated, tangent
+from flexmb.entry.derivatives import (
+    acceleration_derivatives,
+    derivative_workspace,
+    inverse_dynamics_derivatives,
+    jacobian,
+)
 from flexmb.jit.kernel import kernel
 from tests.benchmarks import peers
 from tests.benchmarks.compiled import pinocchio
@@ -75,7 +81,7 @@ def _from_python(bodies: int) -> Measured:
 def _forward(scene: fm.Scene, times: int = 100) -> Call:
     system, y = _started(scene)
     out = np.zeros((3, system.nu, system.nu))
-    w = derivatives.derivative_workspace(system.constants, system.nq, system.nu)
+    w = derivative_workspace(system.constants, system.nq, system.nu)
     return Call(lambda: _accelerations(times, y, *out, system.constants, w), times, lambda: out.ravel())
 
 
@@ -83,7 +89,7 @@ def _inverse(scene: fm.Scene, times: int = 100) -> Call:
     system, y = _started(scene)
     rates = np.linspace(-1.0, 1.0, system.nu)
     out = np.zeros((3, system.nu, system.nu))
-    w = derivatives.derivative_workspace(system.constants, system.nq, system.nu)
+    w = derivative_workspace(system.constants, system.nq, system.nu)
     return Call(lambda: _inverse_dynamics(times, y, rates, *out, system.constants, w), times, lambda: out.ravel())
 
 
@@ -92,9 +98,9 @@ def _flexible(modes: int) -> Measured:
     system, y = _started(flexible_chain(10, modes, "full"))
     c, nq, nu = system.constants, system.nq, system.nu
     J, expected = np.zeros((2, len(y), len(y)))
-    w, by_duals = derivatives.derivative_workspace(c, nq, nu), tangent.tangent_workspace(c, nq, nu)
+    w, by_duals = derivative_workspace(c, nq, nu), tangent.tangent_workspace(c, nq, nu)
     evaluation = system.recursion_constants, system.recursion_workspace()
-    derivatives.jacobian(0.0, y, J, c, w)
+    jacobian(0.0, y, J, c, w)
     tangent.jacobian(0.0, y, expected, c, by_duals)
     difference = float(np.max(np.abs(J - expected)) / np.max(np.abs(expected)))
     seconds = turns(lambda: _evaluations(100, y, *evaluation), lambda: _jacobians(10, y, J, c, w)) / [100, 10]
@@ -113,14 +119,14 @@ def _started(scene: fm.Scene) -> tuple[fm.System, np.ndarray]:
 def _accelerations(times, y, by_displacement, by_speed, by_force, c, w):
     status = 0
     for _ in range(times):
-        status = max(status, derivatives.acceleration_derivatives(0.0, y, by_displacement, by_speed, by_force, c, w))
+        status = max(status, acceleration_derivatives(0.0, y, by_displacement, by_speed, by_force, c, w))
     return status
 
 
 @kernel
 def _inverse_dynamics(times, y, rates, by_displacement, by_speed, by_acceleration, c, w):
     for _ in range(times):
-        derivatives.inverse_dynamics_derivatives(0.0, y, rates, by_displacement, by_speed, by_acceleration, c, w)
+        inverse_dynamics_derivatives(0.0, y, rates, by_displacement, by_speed, by_acceleration, c, w)
 
 
 @kernel
@@ -135,5 +141,5 @@ def _evaluations(times, y, c, w):
 def _jacobians(times, y, J, c, w):
     status = 0
     for _ in range(times):
-        status = max(status, derivatives.jacobian(0.0, y, J, c, w))
+        status = max(status, jacobian(0.0, y, J, c, w))
     return status

@@ -7,7 +7,7 @@ import pytest
 
 from crosscheck.engines.linear.differences import differentiated
 from crosscheck.engines.linear.frequencies import eigenfrequencies
-from crosscheck.engines.linear.matrices import Errors, StateDerivatives, exact, scaled_condition
+from crosscheck.engines.linear.matrices import Errors, LinearMatrices, exact, scaled_condition
 from flexmb.typing import Real
 
 SMALL = 1e-13
@@ -20,13 +20,13 @@ def spd(rng: np.random.Generator, n: int) -> Real:
 
 def problem(
     M: Real, K: Real, C: Real | None = None, error: float = SMALL, transport: Real | None = None
-) -> StateDerivatives:
+) -> LinearMatrices:
     """M q'' + C q' + K q = 0, known to `error`."""
     n, inverse = len(M), np.linalg.inv(M)
     inverse = (inverse + inverse.T) / 2.0
     damping = np.zeros((n, n)) if C is None else C
     turning = np.zeros((n, n)) if transport is None else transport
-    return StateDerivatives(-inverse @ K, -inverse @ damping, inverse, turning, Errors(error, error, error))
+    return LinearMatrices(-inverse @ K, -inverse @ damping, inverse, turning, Errors(error, error, error))
 
 
 def test_repeated_frequencies_are_as_good_as_others() -> None:
@@ -94,7 +94,7 @@ def test_matrices_within_their_errors_have_frequencies_within_theirs(seed: int, 
         change, other = rng.normal(size=(2, n, n))
         if not damped:  # as symmetric as a stiffness is
             change = true.by_force @ (change + change.T)
-        moved = StateDerivatives(
+        moved = LinearMatrices(
             true.by_displacement + error * change / np.linalg.norm(change),
             true.by_speed + (error * other / np.linalg.norm(other) if damped else 0.0),
             true.by_force, true.transport, true.errors,
