@@ -69,11 +69,11 @@ class Driver:
 
     def __init__(
         self, system: System, times: Real, settings: Settings, algorithm: Algorithm, stabilise: float,
-        taken_up: EventMemory | None = None, made_by: Making | None = None, course: list[Leg] | None = None,
+        taken_up: EventMemory | None = None, made_by: Making | None = None,
     ) -> None:  # fmt: skip
-        """times (T,) s: output times; taken_up: the events' state at the end of the run that is resumed, if any;
-        course: a list to which the parts of the run are appended."""
-        self._course = course
+        """times (T,) s: output times; taken_up: the events' state at the end of the run that is resumed, if any."""
+        self.course: list[Leg] | None = None
+        """A list to which the parts of the run are appended."""
         self._times, self._settings, self._taken_up, self._made_by = times, settings, taken_up, made_by
         given = None if taken_up is None else taken_up.given
         self._situation = Situation(system, settings, algorithm, stabilise, given)
@@ -127,8 +127,8 @@ class Driver:
 
     def _keep_leg(self, begin: Beginning, end: Raw, early: float = 0.0) -> None:
         """Append a part of the run to its course, before the events at its end change the system."""
-        if self._course is not None:
-            self._course.append(Leg(self._situation.system, begin, end._replace(y=end.y.copy()), [], [], early))
+        if self.course is not None:
+            self.course.append(Leg(self._situation.system, begin, end._replace(y=end.y.copy()), [], [], early))
 
     def _next(self, begin: Beginning) -> Segment:
         """Integrate the next segment, append its outputs and update the sides to those at its end."""
@@ -173,9 +173,9 @@ class Driver:
         self._agenda.take()  # coming to rest on a stop adds an event
         self._sides.make_known()
         ends = any(isinstance(action, EndRun) for event in (*arrived, *struck) for action in event.actions)
-        if self._course:
-            self._course[-1].events.extend((*arrived, *struck))
-            self._course[-1].records.extend(self._happened[before:])
+        if self.course:
+            self.course[-1].events.extend((*arrived, *struck))
+            self.course[-1].records.extend(self._happened[before:])
         return AfterEvents(raw, ends)
 
     def _stand(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> list[SceneEvent]:

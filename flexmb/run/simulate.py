@@ -165,7 +165,8 @@ def _run(
             return observed(system, times, raw, algorithm, solve), [], False
     again = partial(_again, stage, state, algorithm, stabilise)
     made_by = None if system.scene.events else Making(system, times, settings, again)
-    driver = Driver(system, times, settings, algorithm, stabilise, begin.events, made_by, course)
+    driver = Driver(system, times, settings, algorithm, stabilise, begin.events, made_by)
+    driver.course = course
     trajectory = driver(begin)
     warned: list[Warning] = [SceneWarning(doubt) for doubt in driver.doubts]
     if start is not None and start.is_low:
