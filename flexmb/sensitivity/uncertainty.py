@@ -101,6 +101,8 @@ def _covariance(given: Mapping[str, float] | Fit, correlation: Any) -> tuple[tup
         if given.unidentifiable:
             raise ValueError(f"the fit did not identify {', '.join(given.unidentifiable)}: fit fewer parameters")
         return given.parameters, given.covariance
+    if not isinstance(given, Mapping):
+        raise TypeError(f"given is {type(given).__name__}: give standard deviations by name, or what `fit` found")
     sigma = np.array([arguments.number(f'given["{name}"]', each) for name, each in given.items()])
     if not len(sigma):
         raise ValueError("no parameters are given: give standard deviations by name")

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexmb.closure.closures import Closures
 from flexmb.entry import articulated
 from flexmb.jain.elimination import ELIMINATIONS, Elimination
 from flexmb.motion import coordinates
@@ -35,6 +34,7 @@ from flexmb.tables.state import State, finite_result
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
+    from flexmb.closure.closures import Closures
     from flexmb.frisch.nested_system import NestedSystem, Partitions
     from flexmb.jain.operators import Operators, SpatialOperators
     from flexmb.parameters.parameters import Parameters

@@ -118,8 +118,9 @@ def check_lemmas(o: Operators) -> None:
     assert residual(left, right, o.Phi, o.R, o.Phi) <= nbar
     H_Phi = o.H @ o.Phi
     assert residual(o.M, o.H @ right @ o.H.T, H_Phi, o.R, H_Phi) <= nbar
-    # tau_bar P tau_bar' = tau_bar P, behind Lemma 2
-    assert residual(o.tau_bar @ o.P @ o.tau_bar.T, o.tau_bar @ o.P, o.tau_bar, o.P, o.tau_bar) <= nbar
+    # tau_bar P tau_bar' = tau_bar P, behind Lemma 2; tau_bar = 1 - G H, whose terms may cancel to a part of their size
+    terms = np.array([[1.0 + norm(o.G) * norm(o.H)]])
+    assert residual(o.tau_bar @ o.P @ o.tau_bar.T, o.tau_bar @ o.P, terms, o.P, o.tau_bar) <= nbar
     # Lemma 2 (54)
     assert residual(o.innovations @ o.D @ o.innovations.T, o.M, o.innovations, o.D, o.innovations) <= n
     # Lemma 3 (55), (A4)

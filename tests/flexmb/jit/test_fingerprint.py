@@ -239,7 +239,7 @@ def dispatchers() -> tuple[set[FunctionType], set[FunctionType]]:
     modules = [
         importlib.import_module(each.name)
         for each in pkgutil.walk_packages(flexmb.__path__, "flexmb.")
-        if not each.name.endswith("__main__")
+        if not each.name.endswith("__main__") and not each.name.startswith("flexmb.bridges.")  # other libraries'
     ]
     found = {value for each in modules for value in vars(each).values() if isinstance(value, Dispatcher | FunctionType)}
     found = {value for value in found if hasattr(value, "py_func")}

@@ -318,6 +318,19 @@ def calls() -> dict[str, Call]:
         step=steps,
         spectral_radius=radius,
     )
+    outputs = chosen(5, ["nobody"], [None], [])
+    by = {"t_end": 0.01, "by": ["gravity_m_s2.0"], "of": ["elbow.rotation"], "samples": 3}
+    add("sensitivities", lambda **given: fm.sensitivities(W.scene, **given).derivatives, by,
+        by=chosen(None, 5, "elbow", [], ["nobody"], [None]), of=outputs, samples=SAMPLES, **RUN)  # fmt: skip
+    doubt = {"given": {"gravity_m_s2.0": 0.1}, "of": ["elbow.rotation"]}
+    add("uncertainty", lambda given, of: fm.uncertainty(W.scene, 0.01, given, of, samples=3).sigma, doubt,
+        given=chosen(None, 5, {}, {"nobody": 0.1}, {"gravity_m_s2.0": -1.0}, {"gravity_m_s2.0": np.nan}),
+        of=outputs)  # fmt: skip
+    measured = {"t": [0.0, 0.005, 0.01], "elbow.rotation": [0.3, 0.3, 0.3]}
+    measured = {"data": measured, "parameters": ["gravity_m_s2.0"], "sigma": 0.1}
+    add("fit", lambda **given: fm.fit(W.scene, max_runs=3, **given).covariance, measured,
+        data=chosen(None, 5, {}, {"t": [0.0, 0.01]}, {"t": [0.0, np.nan], "elbow.rotation": [0.3, 0.3]}),
+        parameters=chosen(None, 5, [], ["nobody"]), sigma=chosen("1", -1.0, 0.0, np.nan, {"nobody": 1.0}))  # fmt: skip
     asked = {"tolerance": 1e-2, "quantity": "marker:centre.position@1", "t_end": 0.01}
     refused = chosen(*NO_NUMBER, 0.0, -1.0)
     found["advise"] = Call(lambda **given: fm.advise(W.scene, **given), asked, {
@@ -373,11 +386,12 @@ EXEMPT = {
     "ClosedSystem.workspace", "ClosedSystem.recursion_workspace", "ClosedSystem.composite_workspace",
     "load_scene", "save_scene", "SceneBuilder",  # files and data, checked where they are compiled
     "AccelerationDerivatives", "EvaluationDerivatives", "InverseDynamicsDerivatives",  # results
+    "EventSensitivity", "Fit", "Sensitivities", "Uncertainties",  # results
     "Advice", "Campbell", "Evaluation", "LinearModel", "SteadySpin", "System", "Trajectory", "Status",  # results
     "Batch.initial_states", "Batch.tables", "Batch.constants",  # nothing; of those who fill lanes
     "BatchTrajectory",  # a result
-    "ClosureError", "DynamicsError", "EquilibriumError", "Interrupted", "NotDifferentiableError", "PrecisionWarning",
-    "SceneError", "SceneWarning",
+    "ClosureError", "DynamicsError", "EquilibriumError", "EventError", "Interrupted",
+    "NotDifferentiableError", "PrecisionWarning", "SceneError", "SceneWarning",
 }  # fmt: skip
 CLASSES = (
     fm.System,

@@ -71,6 +71,8 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
         for name in ("mass_matrix", "bias", "energy", "momentum", "digits_left", "precision", "mass_properties",
                      "applied", "hinge_loads", "admissible")
     }  # fmt: skip
+    found["parameters"] = lambda s, x: s.parameters(["gravity_m_s2.0"]).accelerations(x)
+    found["inertia_regressor"] = lambda s, x: s.inertia_regressor([scene.bodies[0].name]).values
     algorithms = ("articulated", "unsplit", "composite", "frisch") if is_tree else ("articulated", "composite")
     for each in algorithms:
         found[f"accelerations, {each}"] = lambda s, x, each=each: s.accelerations(x, each)
