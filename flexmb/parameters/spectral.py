@@ -3,8 +3,8 @@
 The functions lead from a number of a scene to its tables: finite elements, an eigenproblem, integrals over modes. Most
 elements are polynomials of low degree in the number, for which the derivative of the interpolant is exact to rounding;
 for all other analytic ones it converges geometrically with the number of points (Trefethen, Approximation Theory and
-Approximation Practice, ch. 8, 21). The points spread over half of the number, or over a few per cent of it where a
-singularity is near: far more than the steps of finite differences, so that rounding errors are hardly magnified.
+Approximation Practice, ch. 8, 21). The points spread over an eighth of the number, or over less of it where a singularity
+is near: far more than the steps of finite differences, so that rounding errors are hardly magnified.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from flexmb.typing import Real
 
 INTERVALS = (2, 4, 8, 16)  # of the points cos(pi k / n), each set of which contains the one before
-WIDTHS = (2.0**-1, 2.0**-3, 2.0**-5, 2.0**-8, 2.0**-11, 2.0**-14)  # half-widths that are tried, relative to the scale
+WIDTHS = (2.0**-3, 2.0**-5, 2.0**-8, 2.0**-11, 2.0**-14)  # half-widths that are tried, relative to the scale
 ENOUGH = 1e-11  # relative error at which no smaller width is tried
 HOPELESS = 1e-5  # an error with half of the points that all of them will not bring down to ENOUGH
 LARGEST = 1e-9  # relative error that is accepted

@@ -183,6 +183,7 @@ def test_controllers_agree_with_differences(sampling):
     agrees(scene, 1.0, by, of, tolerance=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")  # of the runs with other numbers
 def test_a_four_bar_agrees_with_differences():
     """By masses and by lengths, on which the closure depends, through an impulse that its rows carry on."""
     scene = fm.load_scene(ROOT / "cases" / "closed_chains" / "four_bar" / "scene.toml")
