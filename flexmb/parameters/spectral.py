@@ -3,8 +3,8 @@
 The functions lead from a number of a scene to its tables: finite elements, an eigenproblem, integrals over modes. Most
 elements are polynomials of low degree in the number, for which the derivative of the interpolant is exact to rounding;
 for all other analytic ones it converges geometrically with the number of points (Trefethen, Approximation Theory and
-Approximation Practice, ch. 8, 21). The points spread over an eighth of the number, or over less of it where a singularity
-is near: far more than the steps of finite differences, so that rounding errors are hardly magnified.
+Approximation Practice, ch. 8, 21). The points spread over an eighth of the number, or over less of it where a
+singularity is near: far more than the steps of finite differences, so that rounding errors are hardly magnified.
 """
 
 from __future__ import annotations

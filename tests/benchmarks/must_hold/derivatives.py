@@ -39,17 +39,17 @@ def rows() -> list[Row]:
         ),
         *(
             Row(
-                f"derivatives_python_{n}", PYTHON, f"pin.computeABADerivatives, {n} bodies", 2.0,
-                partial(_from_python, n),
-            )
-            for n in (10, 35, 100)
-        ),
-        *(
-            Row(
                 f"inverse_derivatives_{n}", COMPILED, f"pin.computeRNEADerivatives in C++, {n} bodies", 2.0,
                 partial(_rigid, n, inverse=True),
             )
             for n in (10, 35)
+        ),
+        *(
+            Row(
+                f"derivatives_python_{n}", PYTHON, f"pin.computeABADerivatives, {n} bodies", 2.0,
+                partial(_from_python, n),
+            )
+            for n in (10, 35, 100)
         ),
         *(
             Row(
