@@ -28,6 +28,7 @@ from flexmb.scene.schema import Scene
 from flexmb.sensitivity.sensitivities import sensitivities
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS, ON_CHAINS, RUNNING, WITH_JACOBIAN
+from flexmb.system.by_recursion import MANY_SPEEDS
 from flexmb.system.compile import compile, compile_batch
 
 Use = Callable[[], object]
@@ -61,6 +62,8 @@ def uses() -> Iterator[tuple[str, Use]]:
                 yield f"{method}, tree, {algorithm}", partial(_run, scenes.pendulum().scene(), method, algorithm)
                 if algorithm in ON_CHAINS:
                     yield f"{method}, loop, {algorithm}", partial(_run, scenes.looped().scene(), method, algorithm)
+        if INTEGRATORS[method].keeps_jacobian:
+            yield f"{method}, many speeds", partial(_run, scenes.panelled(MANY_SPEEDS, "full").scene(), method)
         yield f"{method}, condensed", partial(_run, scenes.panelled(18, "ruthless").scene(), method, "articulated")
     yield "advice", _advice
 

@@ -104,5 +104,5 @@ def test_events_at_one_instant_whose_times_change_differently_are_refused():
 
 def test_a_singular_position_is_refused_with_the_closure():
     scene = scenes.looped().scene()
-    with pytest.raises(fm.DynamicsError, match="derivatives stopped at t = 0.5.*singular position"):
+    with pytest.raises(fm.DynamicsError, match="derivatives stopped at t = 0.5.*singular"):
         ask(scene, t_end=1.5)
