@@ -127,7 +127,8 @@ class Feedback:
         leaps = of_motion and of_motion._replace(back=leaping.back, leap=leaping.leap)
         if linear is not None:
             if made.continuous[0]:
-                linear = linear._replace(jacobian=jacobian, exact=made, tangent=self._tangent(linear, len(y)))
+                tangent = self._tangent(linear, len(y))  # and no stiff part: it knows no states of controllers
+                linear = linear._replace(jacobian=jacobian, exact=made, tangent=tangent, stiff=None)
             posed: Any = stiff_problem(*kernels, linear._replace(move=loop.move), leaps)
         else:
             posed = problem(*kernels, leaps)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.ready import scenes
 from flexmb.scene.build import SceneBuilder
 from flexmb.system import by_recursion
 from tests import trees
@@ -86,3 +87,17 @@ def test_without_it_they_use_the_jacobian(always):
     run = fm.simulate(tied.scene(), 0.1, "radau5", samples=2)
     assert run.finished
     assert run.statistics.jacobians > 0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_controllers(method, monkeypatch):
+    """States of continuous controllers are not in the stiff part; sampled ones only hold their outputs."""
+    for sampling, exact in ({}, True), ({"period": 0.01}, False):
+        scene = scenes.with_feedback(scenes.pendulum(), **sampling)
+        found = {}
+        for many in (0, 10**9):
+            monkeypatch.setattr(by_recursion, "MANY_SPEEDS", many)
+            run = fm.simulate(scene, 0.1, method, samples=3, **METHODS[method])
+            found[many] = end(run)
+            assert (run.statistics.jacobians > 0) == (exact or many > 0)
+        np.testing.assert_allclose(found[0], found[10**9], rtol=1e-6)
