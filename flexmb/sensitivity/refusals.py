@@ -1,4 +1,4 @@
-"""Refuses numbers of a scene by which the derivatives of a run do not exist, or are not found, before anything runs."""
+"""Refuses scenes and numbers by which the derivatives of a run do not exist, or are not found, before anything runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from flexmb.parameters.parameters import ParameterError
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import DriveSensor, LoadSensor, Scene
 
 _SCHEDULE = "period_s", "offset_s", "delay_s"
 _ENDS = "start_s", "duration_s"
@@ -29,6 +29,16 @@ def refuse_moving_instants(scene: Scene, numbers: Sequence[Number]) -> None:
                 f'parameter "{number.name}" moves the start or the end of a pulse, at which a load jumps: derivatives '
                 'by it are not available; use a function of kind "smooth_step", or events on time with their levels as '
                 "parameters"
+            )
+
+
+def refuse_measured_loads(scene: Scene) -> None:
+    """NotImplementedError where sensors measure loads in a closed chain: no test holds the derivatives of such runs."""
+    for sensor in scene.sensors:
+        if scene.constraints and isinstance(sensor, LoadSensor | DriveSensor):
+            raise NotImplementedError(
+                f'sensor "{sensor.name}" measures a load in a scene with closures or couplings: derivatives of its '
+                "runs are not available; compare runs with other values, or leave the sensor out"
             )
 
 

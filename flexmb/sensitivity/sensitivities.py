@@ -19,7 +19,7 @@ from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 from flexmb.sensitivity.channels import chosen, refuse_unknown_outputs
 from flexmb.sensitivity.following import Following
-from flexmb.sensitivity.refusals import refuse_moving_instants
+from flexmb.sensitivity.refusals import refuse_measured_loads, refuse_moving_instants
 from flexmb.system.compile import assembled
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError
@@ -97,6 +97,7 @@ def sensitivities(
         raise ValueError(f'method "{method}" does not integrate derivatives: use {names}')
     t_end = arguments.number("t_end", t_end)
     check_and_warn(scene, t_end, 0.0)
+    refuse_measured_loads(scene)
     found = numbers(scene, by)
     refuse_moving_instants(scene, found)
     given = Settings(method, **settings).checked(abs(t_end))

@@ -22,13 +22,13 @@ REASONS = (
     ),
     Reason(
         ("jacobian_5_modes",),
-        "short samples take 7.4 to 7.7 evaluations, long ones 8.7: the tables of the derivatives (100 to 400 kB) do "
-        "not stay in the first cache, those of an evaluation do.",
+        "short samples take 7.4 to 7.7 evaluations, long ones 8.7: probably because the tables of the derivatives "
+        "(100 to 400 kB) do not stay in the first cache, as those of an evaluation do.",
     ),
     Reason(
         ("sensitivity",),
-        "of 1.23 s, 0.84 are evaluations for dual numbers in two blocks of eight directions, for twelve numbers, and "
-        "the tables of the numbers take about 0.2: beams are meshed and reduced anew at four to eight values of each.",
+        "most of it are evaluations for dual numbers in two blocks of eight directions, for twelve numbers; a fifth "
+        "or less are the tables of the numbers: beams are meshed and reduced anew at four to eight values of each.",
     ),
     Reason(
         ("dop853_1e-06", "equal_error_cpp_1e-06"),

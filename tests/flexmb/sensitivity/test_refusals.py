@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 
 import flexmb as fm
@@ -106,3 +107,9 @@ def test_a_singular_position_is_refused_with_the_closure():
     scene = scenes.looped().scene()
     with pytest.raises(fm.DynamicsError, match="derivatives stopped at t = 0.5.*singular"):
         ask(scene, t_end=1.5)
+
+
+def test_loads_that_are_measured_in_closed_chains_are_refused():
+    scene = msgspec.structs.replace(scenes.looped().scene(), sensors=(fm.LoadSensor(name="felt", hinge="pivot"),))
+    with pytest.raises(NotImplementedError, match='sensor "felt" measures a load'):
+        fm.sensitivities(scene, 0.1, ["bob.mass_kg"], ["pivot.rotation"])
