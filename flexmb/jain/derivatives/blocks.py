@@ -94,6 +94,11 @@ def plus6(J, x, V):
 
 
 @helper
+def clear_block6(d, a):
+    put_block6(d, a, no_block6(d, a[0]))
+
+
+@helper
 def no_block6(d, row):
     """Six blocks of zeros, of the type of those in a row."""
     x = scaled(0.0, block(d, row, 0))

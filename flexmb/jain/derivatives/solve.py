@@ -1,13 +1,15 @@
 """M x = -T for many columns T at once, by the factors that `flexmb.jain.sweeps.inward` has left: (55), (56).
 
 The columns are solved in blocks of `BLOCK` strips. What passes from body to body is six numbers for each column, as in
-`flexmb.jain.innovations`; in World axes they are added without a rotation.
+`flexmb.jain.innovations`; in World axes they are added without a rotation. Bodies are visited depth first, so that
+along a chain these numbers stay in registers; only where the tree branches they are stored.
 """
 
 from flexmb.jain.derivatives.blocks import (
     along,
     block,
     block6,
+    clear_block6,
     less,
     minus_sum,
     no_block6,
@@ -43,17 +45,46 @@ from flexmb.tables.features import MODES, SEVERAL, WHEELS
 @helper
 def solve(c, w, d, columns):
     """Replace the first `columns` columns of `matrix` by -M^-1 times them; rows of prescribed speeds vanish."""
+    _all_gains(c, w, d)
+    for at in range(0, columns, BLOCK * width(d)):
+        _block(c, w, d, at, c.body.shape[0])
+
+
+@helper
+def solve_with_inverse(c, w, d):
+    """The same of all columns, of which the last third are those of -1; of the symmetric M^-1 the upper triangle.
+
+    A force on a speed acts on no innovation but its own and those inboard, whose places are before its own.
+    """
+    _all_gains(c, w, d)
+    nu, bodies = w.u.shape[0], c.body.shape[0]
+    for at in range((3 * nu - 1) // (BLOCK * width(d)) * BLOCK * width(d), -1, -BLOCK * width(d)):
+        while at >= 2 * nu and bodies > 0 and d.places[d.order[bodies - 1]].hinge >= at + BLOCK * width(d) - 2 * nu:
+            bodies -= 1
+        _block(c, w, d, at, bodies if at >= 2 * nu else c.body.shape[0])
+
+
+@helper
+def _block(c, w, d, at, bodies):
+    """The columns from `at` on, in the rows of the first bodies of the order."""
+    for i in range(d.fork.shape[0]):
+        clear_block6(d, d.passed[d.fork[i]])
+    z = no_block6(d, d.passed[0, 0])
+    for i in range(bodies - 1, -1, -1):
+        z = _inward(c, w, d, d.order[i], at, z)
+    A = no_block6(d, d.passed[0, 0])
+    for i in range(bodies):
+        A = _outward(c, w, d, d.order[i], at, A)
+
+
+@helper
+def _all_gains(c, w, d):
     for k in range(c.body.shape[0]):
         _gains(c, w, d, k)
         if has(c, MODES):
             for n in range(c.body[k].modes):
                 R, r = mat3(d.body[k].rotation, 0), vec3(d.body[k].position, 0)
                 store6(d.gain[d.places[k].modes + n], 0, force_to_world(R, r, vec6(w.pfr[k, n], 0)))
-    for at in range(0, columns, BLOCK * width(d)):
-        for k in range(c.body.shape[0] - 1, -1, -1):
-            _inward(c, w, d, k, at)
-        for k in range(c.body.shape[0]):
-            _outward(c, w, d, k, at)
 
 
 @helper
@@ -78,9 +109,15 @@ def _gains(c, w, d, k):
 
 
 @helper
-def _inward(c, w, d, k, at):
-    """y = -T - J . z of the block of columns from `at` on, and z + G y to the parent, as `hinge_solve.innovate`."""
-    z = block6(d, d.passed[k]) if not d.places[k].tip else no_block6(d, d.passed[k, 0])
+def _inward(c, w, d, k, at, z):
+    """y = -T - J . z of a block of columns, and z + G y to the parent, as `hinge_solve.innovate`.
+
+    z comes from the body before, unless body k does not carry it; that of other bodies that it carries is in `passed`.
+    """
+    if d.places[k].ends:
+        z = no_block6(d, d.passed[0, 0])
+    if d.places[k].forks:
+        z = sum_block6(z, block6(d, d.passed[k]))
     if has(c, WHEELS):
         z = release_wheels(c, w, d, k, at, z)
     if has(c, MODES):
@@ -99,9 +136,9 @@ def _inward(c, w, d, k, at):
             load_modes(c, d, k, at, z)
         if d.places[k].new_point:
             z = shift_forces(z, vec3(d.body[k].step, 0))
-        if not d.places[k].first:
-            z = sum_block6(z, block6(d, d.passed[p]))
-        put_block6(d, d.passed[p], z)
+        if d.places[k].branches:
+            put_block6(d, d.passed[p], sum_block6(z, block6(d, d.passed[p])))
+    return z
 
 
 @helper
@@ -121,14 +158,18 @@ def _innovate(c, w, d, k, at, z):
 
 
 @helper
-def _outward(c, w, d, k, at):
-    """x = y / D - G . A of the same columns, and A + J x of the body, as `hinge_solve.solve`."""
+def _outward(c, w, d, k, at, A):
+    """x = y / D - G . A of the same columns, and A + J x of the body, as `hinge_solve.solve`; A is the parent's."""
     p = c.body[k].parent
-    A = block6(d, d.passed[p]) if p >= 0 else no_block6(d, d.passed[k, 0])
-    if p >= 0 and d.places[k].new_point:
-        A = shift_motions(A, vec3(d.body[k].step, 0))
-    if has(c, MODES):
-        A = moved_by_modes(c, d, k, at, A)
+    if p < 0:
+        A = no_block6(d, d.passed[0, 0])
+    else:
+        if d.places[k].branches:
+            A = block6(d, d.passed[p])
+        if d.places[k].new_point:
+            A = shift_motions(A, vec3(d.body[k].step, 0))
+        if has(c, MODES):
+            A = moved_by_modes(c, d, k, at, A)
     first, slot = d.places[k].hinge, d.places[k].slot
     if is_single(c, w, k):
         x = along(vec6(d.gain[first], 0), A)
@@ -141,8 +182,9 @@ def _outward(c, w, d, k, at):
         answer_modes(c, w, d, k, at, A)
     if has(c, WHEELS):
         answer_wheels(c, w, d, k, at, A)
-    if not d.places[k].tip:
+    if d.places[k].forks:
         put_block6(d, d.passed[k], A)
+    return A
 
 
 @helper
