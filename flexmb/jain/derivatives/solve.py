@@ -11,10 +11,12 @@ from flexmb.jain.derivatives.blocks import (
     block6,
     clear_block6,
     less,
+    minus6,
     minus_sum,
     no_block6,
     plus,
     plus6,
+    plus_along,
     put_block,
     put_block6,
     scaled,
@@ -70,11 +72,56 @@ def _block(c, w, d, at, bodies):
     for i in range(d.fork.shape[0]):
         clear_block6(d, d.passed[d.fork[i]])
     z = no_block6(d, d.passed[0, 0])
-    for i in range(bodies - 1, -1, -1):
-        z = _inward(c, w, d, d.order[i], at, z)
-    A = no_block6(d, d.passed[0, 0])
-    for i in range(bodies):
-        A = _outward(c, w, d, d.order[i], at, A)
+    for i in range(d.stretch.shape[0] - 1, -1, -1):
+        start, stop = d.stretch[i].start, min(d.stretch[i].stop, bodies)
+        z = _force_beyond(d, i, stop, z)
+        for j in range(stop - 1, start - 1, -1):
+            z = _inward(c, w, d, d.order[j], at, z)
+        if start < stop:
+            z = _force_inboard(c, d, d.order[start], z)
+    A = z
+    for i in range(d.stretch.shape[0]):
+        start, stop = d.stretch[i].start, min(d.stretch[i].stop, bodies)
+        if start < stop:
+            A = _acceleration_inboard(c, d, d.order[start], A)
+        for j in range(start, stop):
+            A = _outward(c, w, d, d.order[j], at, A)
+        if stop == d.stretch[i].stop and d.stretch[i].forks:
+            put_block6(d, d.passed[d.order[stop - 1]], A)
+
+
+@helper
+def _force_beyond(d, i, stop, z):
+    """The force z of all that the last body of stretch i carries, where z is that of the stretch after it."""
+    if d.stretch[i].ends or stop < d.stretch[i].stop:
+        z = no_block6(d, d.passed[0, 0])
+    if d.stretch[i].forks and stop == d.stretch[i].stop:
+        z = sum_block6(z, block6(d, d.passed[d.order[stop - 1]]))
+    return z
+
+
+@helper
+def _force_inboard(c, d, k, z):
+    """z about the base point of the body on which body k sits, the first of its stretch."""
+    p = c.body[k].parent
+    if d.places[k].new_point and p >= 0:
+        z = shift_forces(z, vec3(d.body[k].step, 0))
+    if d.places[k].branches:
+        put_block6(d, d.passed[p], sum_block6(z, block6(d, d.passed[p])))
+    return z
+
+
+@helper
+def _acceleration_inboard(c, d, k, A):
+    """A of the body on which body k sits, about its own base point; A comes from the stretch before."""
+    p = c.body[k].parent
+    if p < 0:
+        return no_block6(d, d.passed[0, 0])
+    if d.places[k].branches:
+        A = block6(d, d.passed[p])
+    if d.places[k].new_point:
+        A = shift_motions(A, vec3(d.body[k].step, 0))
+    return A
 
 
 @helper
@@ -114,30 +161,19 @@ def _inward(c, w, d, k, at, z):
 
     z comes from the body before, unless body k does not carry it; that of other bodies that it carries is in `passed`.
     """
-    if d.places[k].ends:
-        z = no_block6(d, d.passed[0, 0])
-    if d.places[k].forks:
-        z = sum_block6(z, block6(d, d.passed[k]))
     if has(c, WHEELS):
         z = release_wheels(c, w, d, k, at, z)
     if has(c, MODES):
         z = release_modes(c, w, d, k, at, z)
     first, slot = d.places[k].hinge, d.places[k].slot
     if is_single(c, w, k):
-        y = along(column6(d.seed, slot), z)
-        y = minus_sum(block(d, d.matrix[first], at), y)
+        y = plus_along(column6(d.seed, slot), z, block(d, d.matrix[first], at))
         put_block(d, d.matrix[first], at, y)
-        z = plus6(vec6(d.gain[first], 0), y, z)
+        z = minus6(vec6(d.gain[first], 0), y, z)
     else:
         z = _innovate(c, w, d, k, at, z)
-    p = c.body[k].parent
-    if p >= 0:
-        if has(c, MODES):
-            load_modes(c, d, k, at, z)
-        if d.places[k].new_point:
-            z = shift_forces(z, vec3(d.body[k].step, 0))
-        if d.places[k].branches:
-            put_block6(d, d.passed[p], sum_block6(z, block6(d, d.passed[p])))
+    if has(c, MODES) and c.body[k].parent >= 0:
+        load_modes(c, d, k, at, z)
     return z
 
 
@@ -160,30 +196,19 @@ def _innovate(c, w, d, k, at, z):
 @helper
 def _outward(c, w, d, k, at, A):
     """x = y / D - G . A of the same columns, and A + J x of the body, as `hinge_solve.solve`; A is the parent's."""
-    p = c.body[k].parent
-    if p < 0:
-        A = no_block6(d, d.passed[0, 0])
-    else:
-        if d.places[k].branches:
-            A = block6(d, d.passed[p])
-        if d.places[k].new_point:
-            A = shift_motions(A, vec3(d.body[k].step, 0))
-        if has(c, MODES):
-            A = moved_by_modes(c, d, k, at, A)
+    if has(c, MODES) and c.body[k].parent >= 0:
+        A = moved_by_modes(c, d, k, at, A)
     first, slot = d.places[k].hinge, d.places[k].slot
     if is_single(c, w, k):
-        x = along(vec6(d.gain[first], 0), A)
-        x = less(scaled(d.factor[first], block(d, d.matrix[first], at)), x)
-        put_block(d, d.matrix[first], at, x)
-        A = plus6(column6(d.seed, slot), x, A)
+        x = plus_along(vec6(d.gain[first], 0), A, scaled(d.factor[first], block(d, d.matrix[first], at)))
+        put_block(d, d.matrix[first], at, scaled(-1.0, x))
+        A = minus6(column6(d.seed, slot), x, A)
     else:
         A = _solve(c, w, d, k, at, A)
     if has(c, MODES):
         answer_modes(c, w, d, k, at, A)
     if has(c, WHEELS):
         answer_wheels(c, w, d, k, at, A)
-    if d.places[k].forks:
-        put_block6(d, d.passed[k], A)
     return A
 
 

@@ -29,7 +29,7 @@ from flexmb.typing import Index, Real, Record
 BODIES_A_POINT = 8
 """Moments about a point eight bodies away lose two digits at most."""
 
-BLOCK = 4
+BLOCK = 3
 """Strips of columns that are solved together: as many independent sums hide the time that one product takes."""
 
 _F, _I = np.float64, np.int64
@@ -49,9 +49,16 @@ PLACES = np.dtype(
         ("end", _I),
         ("new_point", _I),  # whether its hinge point is a base point
         ("leaves_point", _I),  # whether no source inboard of its hinge is about its base point
-        ("ends", _I),  # whether the next body in `order` does not sit on it
-        ("forks", _I),  # whether any body that is not the next one sits on it
         ("branches", _I),  # whether it sits on a body that is not the one before it
+    ],
+    align=True,
+)
+STRETCH = np.dtype(
+    [
+        ("start", _I),  # first place in `order`
+        ("stop", _I),
+        ("ends", _I),  # whether the next body in `order` does not sit on its last one
+        ("forks", _I),  # whether any body that is not the next one sits on its last one
     ],
     align=True,
 )
@@ -135,7 +142,8 @@ class Derivatives:
     gain: Real  # (nu,6) of the factors of M
     factor: Real  # (nu,)
     order: Index  # (N,) bodies by their places
-    fork: Index  # those that fork
+    stretch: Record  # STRETCH: bodies in `order` about one base point, each of which carries the next and no other
+    fork: Index  # bodies at the ends of stretches that fork
     passed: Real  # (N,6,block) their forces, then accelerations, of one block of columns
     moved: Real  # (N,6,6,6) of hinges that are no single axis: derivatives of H in outboard axes by displacement
     turned: Real  # (3,6,6) of one such hinge: of V_r and A_r by displacement, of A_r by speed, in columns
@@ -165,7 +173,7 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
     """Arrays of the right sizes."""
     order = matrices(c)
     places, runs, slots = _places_and_runs(c, order)
-    visited = _visited(c, places)
+    visited, stretch = _stretches(c, places)
     place = np.empty(nu, np.int64)
     place[order.speed] = np.arange(nu)
     columns = whole(3 * nu + BLOCK * LANES)  # room for the last block
@@ -183,7 +191,8 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
         gain=np.zeros((nu, 6)),
         factor=np.zeros(nu),
         order=visited,
-        fork=np.flatnonzero(places["forks"]),
+        stretch=stretch,
+        fork=visited[stretch["stop"][stretch["forks"] != 0] - 1],
         passed=strip_zeros((len(c.body), 6, BLOCK * LANES)),
         moved=np.zeros((len(c.body) if np.any(c.body["axis"] < 0) else 1, 6, 6, 6)),
         turned=np.zeros((3, 6, 6)),
@@ -252,15 +261,22 @@ def _places_and_runs(c: Constants, order: Matrices) -> tuple[Record, Record, int
     return places, np.array(paths.runs or [(0, 0, -1, 0, 0, 0)], RUN), paths.slots
 
 
-def _visited(c: Constants, places: Record) -> Index:
-    """Bodies in the order of the solution; writes to `places` which of them do not follow each other in the tree."""
+def _stretches(c: Constants, places: Record) -> tuple[Index, Record]:
+    """Bodies in the order of the solution, and its stretches; writes to `places` which bodies branch off."""
     order = np.argsort(places["hinge"], kind="stable")  # a weld has the place of what it carries
     parent = c.body["parent"][order]
     follows = parent == np.concatenate([[-1], order[:-1]])
-    places["ends"][order] = ~np.append(follows[1:], False)
-    places["branches"][order] = ~follows & (parent >= 0)
-    places["forks"][parent[~follows & (parent >= 0)]] = 1
-    return order
+    branches = ~follows & (parent >= 0)
+    places["branches"][order] = branches
+    forks = np.isin(order, parent[branches])
+    begins = ~follows | (places["new_point"][order] != 0) | np.append(False, forks[:-1])
+    begins[:1] = True
+    start = np.flatnonzero(begins)
+    stretch = np.zeros(len(start), STRETCH)
+    stretch["start"], stretch["stop"] = start, np.append(start[1:], len(order))
+    stretch["ends"] = ~np.append(follows[1:], False)[stretch["stop"] - 1]
+    stretch["forks"] = forks[stretch["stop"] - 1]
+    return order, stretch
 
 
 class _Paths:
