@@ -1,14 +1,15 @@
-"""Blocks of columns: three strips as one value, and six of them as the spatial vectors of all these columns."""
+"""Blocks of columns: four strips as one value, and six of them as the spatial vectors of all these columns."""
 
+from flexmb.jain.derivatives.columns import zero
 from flexmb.jit.kernel import helper
 from flexmb.jit.strips import put, strip, width
 
 
 @helper
 def block(d, row, n):
-    """Three strips from element n of a row on."""
+    """Four strips from element n of a row on."""
     s = width(d)
-    return strip(d, row, n), strip(d, row, n + s), strip(d, row, n + 2 * s)
+    return strip(d, row, n), strip(d, row, n + s), strip(d, row, n + 2 * s), strip(d, row, n + 3 * s)
 
 
 @helper
@@ -17,6 +18,7 @@ def put_block(d, row, n, x):
     put(d, row, n, x[0])
     put(d, row, n + s, x[1])
     put(d, row, n + 2 * s, x[2])
+    put(d, row, n + 3 * s, x[3])
 
 
 @helper
@@ -40,30 +42,30 @@ def put_block6(d, a, V):
 
 @helper
 def scaled(s, x):
-    return s * x[0], s * x[1], s * x[2]
+    return s * x[0], s * x[1], s * x[2], s * x[3]
 
 
 @helper
 def plus(s, x, y):
     """s x + y."""
-    return s * x[0] + y[0], s * x[1] + y[1], s * x[2] + y[2]
+    return s * x[0] + y[0], s * x[1] + y[1], s * x[2] + y[2], s * x[3] + y[3]
 
 
 @helper
 def less(x, y):
     """x - y."""
-    return x[0] - y[0], x[1] - y[1], x[2] - y[2]
+    return x[0] - y[0], x[1] - y[1], x[2] - y[2], x[3] - y[3]
 
 
 @helper
 def minus_sum(x, y):
     """-x - y."""
-    return -x[0] - y[0], -x[1] - y[1], -x[2] - y[2]
+    return -x[0] - y[0], -x[1] - y[1], -x[2] - y[2], -x[3] - y[3]
 
 
 @helper
 def sum_block(x, y):
-    return x[0] + y[0], x[1] + y[1], x[2] + y[2]
+    return x[0] + y[0], x[1] + y[1], x[2] + y[2], x[3] + y[3]
 
 
 @helper
@@ -83,30 +85,6 @@ def along(J, V):
 
 
 @helper
-def plus_along(J, V, x):
-    """x + J . V."""
-    a, b = J
-    x = plus(a[2], V[2], plus(a[1], V[1], plus(a[0], V[0], x)))
-    return sum_block(x, plus(b[2], V[5], plus(b[1], V[4], scaled(b[0], V[3]))))
-
-
-@helper
-def minus(s, x, y):
-    """y - s x."""
-    return y[0] - s * x[0], y[1] - s * x[1], y[2] - s * x[2]
-
-
-@helper
-def minus6(J, x, V):
-    """V - J x."""
-    a, b = J
-    return (
-        minus(a[0], x, V[0]), minus(a[1], x, V[1]), minus(a[2], x, V[2]),
-        minus(b[0], x, V[3]), minus(b[1], x, V[4]), minus(b[2], x, V[5]),
-    )  # fmt: skip
-
-
-@helper
 def plus6(J, x, V):
     """J x + V."""
     a, b = J
@@ -117,14 +95,10 @@ def plus6(J, x, V):
 
 
 @helper
-def clear_block6(d, a):
-    put_block6(d, a, no_block6(d, a[0]))
-
-
-@helper
 def no_block6(d, row):
     """Six blocks of zeros, of the type of those in a row."""
-    x = scaled(0.0, block(d, row, 0))
+    nothing = zero(d, row)
+    x = nothing, nothing, nothing, nothing
     return x, x, x, x, x, x
 
 

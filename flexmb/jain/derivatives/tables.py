@@ -29,7 +29,7 @@ from flexmb.typing import Index, Real, Record
 BODIES_A_POINT = 8
 """Moments about a point eight bodies away lose two digits at most."""
 
-BLOCK = 3
+BLOCK = 4
 """Strips of columns that are solved together: as many independent sums hide the time that one product takes."""
 
 _F, _I = np.float64, np.int64
