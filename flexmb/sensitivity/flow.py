@@ -88,24 +88,23 @@ def take(z, b, s):
     """Copy y and the directions of a block from z to its state."""
     n, x, row = s.state.shape[1] - 1, s.continuous.shape[0], 1 + s.directions[0]
     for i in range(n):
-        _take(z, i * row, b, s, s.state[b, i])
+        _take(z[i * row : (i + 1) * row], b, s.state[b, i])
     for j in range(x):
-        _take(z, (n + j) * row, b, s, s.law[b, s.continuous[j]])
-    _take(z, (n + x) * row, b, s, s.state[b, n])
+        _take(z[(n + j) * row : (n + j + 1) * row], b, s.law[b, s.continuous[j]])
+    _take(z[(n + x) * row :], b, s.state[b, n])
 
 
 @helper
-def _take(z, first, b, s, number):
-    """A number with the derivatives of block b from those that start at `first`."""
-    number[0] = z[first]
-    first += 1 + LANES * b
-    count = s.directions[0] - LANES * b
-    if count >= LANES:  # a constant number of them is one vector
+def _take(row, b, number):
+    """A number with the derivatives of block b from those of all."""
+    number[0] = row[0]
+    part = row[1 + LANES * b :]
+    if part.shape[0] >= LANES:  # this number of them is known when the kernel is compiled: they are one vector
         for lane in range(LANES):
-            number[1 + lane] = z[first + lane]
+            number[1 + lane] = part[lane]
     else:
-        for lane in range(count):
-            number[1 + lane] = z[first + lane]
+        for lane in range(part.shape[0]):
+            number[1 + lane] = part[lane]
 
 
 @helper
@@ -113,22 +112,21 @@ def _give(of_motion, of_laws, b, s, z):
     """Copy states, or their rates, to z."""
     n, x, row = s.state.shape[1] - 1, s.continuous.shape[0], 1 + s.directions[0]
     for i in range(n):
-        _put(of_motion[b, i], b, s, z, i * row)
+        _put(of_motion[b, i], b, z[i * row : (i + 1) * row])
     for j in range(x):
-        _put(of_laws[b, s.continuous[j]], b, s, z, (n + j) * row)
-    _put(of_motion[b, n], b, s, z, (n + x) * row)
+        _put(of_laws[b, s.continuous[j]], b, z[(n + j) * row : (n + j + 1) * row])
+    _put(of_motion[b, n], b, z[(n + x) * row :])
 
 
 @helper
-def _put(number, b, s, z, first):
+def _put(number, b, row):
     """The inverse of `_take`."""
     if b == 0:
-        z[first] = number[0]
-    first += 1 + LANES * b
-    count = s.directions[0] - LANES * b
-    if count >= LANES:
+        row[0] = number[0]
+    part = row[1 + LANES * b :]
+    if part.shape[0] >= LANES:
         for lane in range(LANES):
-            z[first + lane] = number[1 + lane]
+            part[lane] = number[1 + lane]
     else:
-        for lane in range(count):
-            z[first + lane] = number[1 + lane]
+        for lane in range(part.shape[0]):
+            part[lane] = number[1 + lane]
