@@ -9,6 +9,8 @@ import numpy as np
 from flexmb.scene.bodies import BeamBody
 from flexmb.typing import Real
 
+SHEAR = ("GAy_N", "GAz_N")
+
 
 @dataclass(frozen=True)
 class SectionTable:
@@ -44,14 +46,16 @@ def section_table(body: BeamBody) -> SectionTable:
         return np.array([getattr(station, key) for station in stations], dtype=float)
 
     shear: list[Real | None] = [None, None]
-    if body.theory == "timoshenko":
+    if body.level == "exact":  # whose strains may include shear in any theory
+        shear = [column(key) if all(getattr(s, key) is not None for s in stations) else None for key in SHEAR]
+    elif body.theory == "timoshenko":
         missing = [s.x_m for s in stations if s.GAy_N is None or s.GAz_N is None]
         if missing:
             raise ValueError(
                 f"beam '{body.name}': theory 'timoshenko' needs GAy_N and GAz_N at every station (missing at x = "
                 f"{missing[0]:g} m)"
             )
-        shear = [column("GAy_N"), column("GAz_N")]
+        shear = [column(key) for key in SHEAR]
     return SectionTable(
         x=column("x_m"),
         EA=column("EA_N"),

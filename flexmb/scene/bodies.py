@@ -9,7 +9,7 @@ import msgspec
 Vector = tuple[float, float, float]
 Matrix3 = tuple[Vector, Vector, Vector]
 Quaternion = tuple[float, float, float, float]
-Level = Literal["rigid", "ruthless", "linear", "full", "stiffened"]
+Level = Literal["rigid", "ruthless", "linear", "full", "stiffened", "exact"]
 Square = tuple[tuple[float, ...], ...]
 VectorSquare = tuple[tuple[Vector, ...], ...]
 
@@ -49,7 +49,8 @@ class BeamStation(SceneStruct, frozen=True, kw_only=True):
 
     x is the beam axis, y and z the principal section axes: `EIz` resists bending in the x-y plane.
     Shear stiffnesses are used by Timoshenko beams only; rotary inertias per length are rho*Iy, rho*Iz, and the
-    torsional one is their sum.
+    torsional one is their sum. `curvature_1_m`: twist and curvatures of the unloaded axis about the section's x, y and
+    z, for beams of level "exact"; the beam leaves the body's origin along +x.
     """
 
     x_m: float
@@ -62,6 +63,7 @@ class BeamStation(SceneStruct, frozen=True, kw_only=True):
     rotary_z_kg_m: float = 0.0
     GAy_N: float | None = None
     GAz_N: float | None = None
+    curvature_1_m: Vector = ZERO
 
 
 class TipMass(SceneStruct, frozen=True, kw_only=True):
@@ -81,11 +83,35 @@ class BeamNode(SceneStruct, frozen=True, kw_only=True):
     quaternion: Quaternion = IDENTITY
 
 
+class StrainPolynomials(SceneStruct, frozen=True, kw_only=True):
+    """How many polynomials the strains of a beam of level "exact" have along each of its pieces: with 1 a strain is
+    constant there, with 2 linear.
+
+    `bending_y` is curvature about the section's z, `bending_z` about y, `axial` the stretch.
+    """
+
+    axial: int = 0
+    shear_y: int = 0
+    shear_z: int = 0
+    torsion: int = 0
+    bending_z: int = 0
+    bending_y: int = 0
+
+
 class Modes(SceneStruct, frozen=True, kw_only=True):
     """The modes of a beam: the `count` lowest of the chosen families, clamped at the root or free-free.
 
     `static` adds attachment modes (unit tip force and moment in the chosen families) to the eigenmodes; with `count` 0
     they are the only modes.
+
+    At level "exact" the strains are polynomials along each of `pieces` equal parts of the beam: `count` of them for
+    each curvature of the chosen families and for torsion, and in theory "timoshenko" two fewer, but one at least, for
+    the shear of each; or as many as `polynomials` says, which alone allows stretch. Attachment modes are contained in
+    them. `points`: Gauss points of a piece, three more than the largest number of its polynomials if not given, and six
+    at least.
+
+    Damping is that of `damping_ratio` and, if `viscosity_s` is not zero, of a material (Kelvin and Voigt) whose stress
+    is that of the strain plus `viscosity_s` times the strain rate.
     """
 
     count: int
@@ -94,11 +120,15 @@ class Modes(SceneStruct, frozen=True, kw_only=True):
         "axial", "torsion", "bending_y", "bending_z",
     )  # fmt: skip
     static: bool = False
+    polynomials: StrainPolynomials | None = None
+    pieces: int = 1
+    points: int | None = None
+    viscosity_s: float = 0.0
     damping_ratio: float | tuple[float, ...] = 0.0
 
 
 class BeamBody(SceneStruct, frozen=True, kw_only=True, tag="beam", tag_field="kind"):
-    """A straight beam along +x of the body frame, root at the origin.
+    """A beam along +x of the body frame, root at the origin; straight but for the curvature of its stations.
 
     `bending_y` is deflection along y (resisted by EIz), `bending_z` along z. `points` is the model of the section's
     inertia: "line" omits the rotary inertia of bending and of torsion, "rotary" gives each inertia point a tensor that

@@ -1,0 +1,182 @@
+"""The model of a beam of level "exact": its strain modes, inertia points and nodes, and how its sections move.
+
+The space of the strains is that of the polynomials; the modes are those of the linear beam in it, clamped at the root,
+so that they have frequencies. Inertia sits at the Gauss points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from flexmb.modal.cross import cross_matrix
+from flexmb.modal.eigenproblem import eigenpairs
+from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming_node
+from flexmb.modal.following import followed
+from flexmb.modal.reduce import BeamModes, damping_matrix
+from flexmb.modal.section import SectionTable, section_table
+from flexmb.modal.stations import lumps
+from flexmb.modal.strain_field import StrainField, gauss_weights, strain_field, strain_stiffness
+from flexmb.scene.bodies import IDENTITY, BeamBody, Quaternion
+from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.rest_curve import rest_sections
+from flexmb.scene.strains import STRAINS, points_of_piece, polynomials
+from flexmb.typing import Index, Real
+
+# Relative to the largest: below it an eigenvalue of the modal masses is zero but for rounding.
+_MASSLESS = 1e-13
+
+
+def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
+    """The model in the frame of the root; unit modal masses at rest, stiffness diag(omega^2).
+
+    `like`: see `flexmb.modal.flexible.flexible_model`. Raises ValueError for modes without inertia.
+    """
+    try:
+        field, points, M = _polynomial_beam(body)
+        modes = _modes(field, _stiffness(body), M)
+        if like is not None:
+            modes = followed(modes, M, _reference(like))
+        damping = damping_matrix(modes.roots, body.modes.damping_ratio) + body.modes.viscosity_s * modes.stiffness
+    except ValueError as error:
+        raise ValueError(f"beam '{body.name}': {error}") from error
+    field = field.with_modes(modes.columns)
+    turn, shift = field.shapes()
+    at = points.section
+    return FlexibleModel(
+        mass=points.mass,
+        position=field.position[at],
+        com_offset=points.com_offset,
+        inertia=points.inertia,
+        translation=shift[at],
+        rotation=turn[at],
+        stiffness=modes.stiffness,
+        damping=damping,
+        nodes=_nodes(body, field, turn, shift),
+        clamped=True,
+        field=field,
+        section=at,
+    )
+
+
+class _Points:
+    """Inertia points: mass (n,), com_offset (n,3) and inertia (n,3,3) about it in the axes of the root, at rest; the
+    number of the section that each is fixed to (n,)."""
+
+    def __init__(self, mass: Real, com_offset: Real, inertia: Real, section: Index) -> None:
+        self.mass, self.com_offset, self.inertia, self.section = mass, com_offset, inertia, section
+
+
+@lru_cache(maxsize=8)
+def _reference(body: BeamBody) -> BeamModes:
+    field, _, M = _polynomial_beam(body)
+    return _modes(field, _stiffness(body), M)
+
+
+def _polynomial_beam(body: BeamBody) -> tuple[StrainField, _Points, Real]:
+    """Sections at Gauss points, lumps, then nodes; inertia points; modal masses (m,m) of the polynomials at rest."""
+    rigid_lumps = lumps(body)
+    most, points = max(polynomials(body).values(), default=0), points_of_piece(body)
+    if points <= most:
+        raise ValueError(
+            f"{points} points for {most} polynomials of one strain along a piece leave motions without inertia: use "
+            f"{most + 1} points at least, or fewer polynomials"
+        )
+    places = np.array([*(lump.x for lump in rigid_lumps), *(x for _, x, _ in _listed(body))])
+    field = strain_field(body, places)
+    x, weight = gauss_weights(body)
+    table = section_table(body)
+    _, rotation = rest_sections(body, x)
+    local = np.zeros((len(x), 3, 3))
+    if body.points != "line":
+        about_y, about_z = (table.at(values, x) for values in (table.rotary_y, table.rotary_z))
+        for i, values in enumerate((about_y + about_z, about_y, about_z)):
+            local[:, i, i] = weight * values
+    at_lumps = len(field.x) - len(places) + np.arange(len(rigid_lumps))
+    _, turned = rest_sections(body, np.array([lump.x for lump in rigid_lumps]))
+    found = _Points(
+        np.concatenate([weight * table.at(table.mass, x), [lump.mass for lump in rigid_lumps]]),
+        np.concatenate(
+            [np.zeros((len(x), 3)), *((R @ lump.com)[None] for R, lump in zip(turned, rigid_lumps, strict=True))]
+        ),
+        np.concatenate(
+            [
+                rotation @ local @ np.swapaxes(rotation, 1, 2),
+                *((R @ lump.inertia @ R.T)[None] for R, lump in zip(turned, rigid_lumps, strict=True)),
+            ]
+        ),
+        np.concatenate([field.gauss, at_lumps]),
+    )
+    return field, found, _modal_masses(field, found)
+
+
+def _modal_masses(field: StrainField, points: _Points) -> Real:
+    """(m,m) at rest: the sum of m U'U + W' J W, with U of the mass centres and W of the points."""
+    turn, shift = field.shapes()
+    W = turn[points.section]
+    U = shift[points.section] - cross_matrix(points.com_offset) @ W
+    masses = np.einsum("p,pam,pan->mn", points.mass, U, U)
+    return np.asarray(masses + np.einsum("pam,pab,pbn->mn", W, points.inertia, W))
+
+
+def _stiffness(body: BeamBody) -> Real:
+    """K (m,m) of the polynomials, by Gauss points that are exact for sections that vary linearly."""
+    table = section_table(body)
+    edges = np.unique(np.concatenate([np.linspace(0.0, body.length_m, body.modes.pieces + 1), table.x]))
+    xi, w = np.polynomial.legendre.leggauss(max(polynomials(body).values()) + 1)
+    half = np.diff(edges) / 2.0
+    x = (edges[:-1, None] + half[:, None] * (1.0 + xi)).ravel()
+    return strain_stiffness(body, _section_stiffness(body, table, x), x, (half[:, None] * w).ravel())
+
+
+def _section_stiffness(body: BeamBody, table: SectionTable, x: Real) -> Real:
+    """(n,6,6) of [stretch, shears; twist, curvatures]."""
+    zero = np.zeros_like(x)
+    shears = [zero if each is None else table.at(each, x) for each in (table.GAy, table.GAz)]
+    found = np.zeros((len(x), 6, 6))
+    rows = (table.at(table.EA, x), *shears, *(table.at(each, x) for each in (table.GJ, table.EIy, table.EIz)))
+    for i, values in enumerate(rows):
+        found[:, i, i] = values
+    return found
+
+
+def _modes(field: StrainField, K: Real, M: Real) -> BeamModes:
+    """The modes of K and M, ascending, with unit modal masses; the largest motion of the tip is positive."""
+    compliance, columns = eigenpairs(M, K)
+    if not compliance[0] > _MASSLESS * compliance[-1]:
+        raise ValueError(
+            "some of its strains move no inertia while the beam is straight: use fewer polynomials, or give the "
+            'sections their rotary inertia and points = "section"'
+        )
+    columns = columns[:, ::-1] / np.sqrt(compliance[::-1])
+    turn, shift = (shape @ columns for shape in (each[field.gauss[-1]] for each in field.shapes()))
+    rows = np.concatenate([shift, field.x[field.gauss[-1]] * turn])
+    largest = np.argmax(np.abs(rows) > 0.5 * np.max(np.abs(rows), axis=0), axis=0)
+    signs = np.where(rows[largest, np.arange(columns.shape[1])] < 0.0, -1.0, 1.0)
+    return BeamModes(columns * signs, 1.0 / np.sqrt(compliance[::-1]))
+
+
+def _listed(body: BeamBody) -> list[tuple[str, float, Quaternion]]:
+    """Tip and listed nodes, which the modes move: name, place, quaternion in the section."""
+    nodes = [("tip", body.length_m, IDENTITY), *((node.name, node.x_m, node.quaternion) for node in body.nodes)]
+    for name, x, _ in nodes:
+        if not 0.0 <= x <= body.length_m:
+            raise ValueError(f"node '{name}' at x = {x:g} m is not on [0, {body.length_m:g}] m")
+    return nodes
+
+
+def _nodes(body: BeamBody, field: StrainField, turn: Real, shift: Real) -> dict[str, FlexibleNode]:
+    """Nodes by name: origin and root, which do not deform, tip and the listed ones, which are the last sections."""
+    rigid = undeforming_node(field.mode_count)
+    found = {"origin": rigid, "root": replace(rigid)}
+    listed = _listed(body)
+    first = len(field.x) - len(listed)
+    _, rotation = rest_sections(body, field.x[first:])
+    for i, (name, _, quaternion) in enumerate(listed):
+        j = first + i
+        found[name] = FlexibleNode(
+            field.position[j], rotation[i] @ rotation_matrix(quaternion), shift[j], turn[j], section=j
+        )
+    return found
