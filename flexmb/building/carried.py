@@ -33,7 +33,8 @@ def moved_inertia(body: Record, port: Record, mff: Real, wheel: Record, speeds: 
             inertia[parent[k]] += _about(about_hinge, mass[k], arm[k])
     for k in np.flatnonzero(body["modes"]):
         first, n = body["etad_index"][k], body["modes"][k]
-        moved[first : first + n] = np.diagonal(mff[k])[:n]
+        of_sections = body["section_stop"][k] > body["section_start"][k]  # whose modal masses are unity at rest
+        moved[first : first + n] = 1.0 if of_sections else np.diagonal(mff[k])[:n]
     moved[wheel["u_index"]] = wheel["axial"]
     return moved
 

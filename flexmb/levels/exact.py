@@ -6,6 +6,8 @@ the sections (`flexmb.levels.section_motion`), which must have been moved. Nothi
 
 from dataclasses import replace
 
+import numpy as np
+
 from flexmb.jit.kernel import helper
 from flexmb.levels import full
 from flexmb.levels.level import FidelityLevel, InertiaTables
@@ -23,7 +25,7 @@ def inertia_and_bias(c, w, k):
 
 
 def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
-    """Every point is summed; the tables have the inertia at rest."""
+    """Every point is summed, to modal masses of zero; the other tables have the inertia at rest."""
     i = modal_integrals(model)
     m = i.mode_count
     at_rest = full.polynomial(i, model)
@@ -36,7 +38,7 @@ def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
         rotation=model.rotation,
         section=model.section,
     )
-    return replace(at_rest, mff=i.spatial_mass[:m, :m], mfr=i.spatial_mass[m:, :m], product=None, summed=summed)
+    return replace(at_rest, mff=np.zeros((m, m)), mfr=i.spatial_mass[m:, :m], product=None, summed=summed)
 
 
 LEVEL = FidelityLevel(
