@@ -24,7 +24,8 @@ def polynomials(body: BeamBody) -> dict[Strain, int]:
         if not twists(body):
             wanted["torsion"] = 0
         if body.theory == "timoshenko":
-            for shear, bending in (("shear_y", "bending_y"), ("shear_z", "bending_z")):
+            pairs: tuple[tuple[Strain, Strain], ...] = (("shear_y", "bending_y"), ("shear_z", "bending_z"))
+            for shear, bending in pairs:
                 wanted[shear] = max(1, wanted[bending] - 2) if wanted[bending] else 0
     return {strain: wanted[strain] for strain in STRAINS if wanted.get(strain, 0) > 0}
 
