@@ -66,7 +66,7 @@ def _arms(stations: Stations) -> tuple[Real, Real]:
         a[:, 1], b[:, 2] = np.sqrt(yy / stations.mass), np.sqrt(zz / stations.mass)
         return a, b
     root = np.sqrt(np.maximum(yy * zz - yz**2, 0.0))  # a thin strip has none, up to rounding
-    size = np.sqrt(stations.mass * (yy + zz + 2.0 * root))
+    size = np.sqrt(stations.mass * np.maximum(yy + zz + 2.0 * root, 0.0))
     size[size == 0.0] = 1.0  # a section without inertia, beside others
     a[:, 1], a[:, 2], b[:, 1], b[:, 2] = ((yy + root) / size, yz / size, yz / size, (zz + root) / size)
     return a, b

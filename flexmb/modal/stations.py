@@ -12,11 +12,10 @@ from typing import assert_never
 
 import numpy as np
 
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.interpolation import ElementMesh
 from flexmb.modal.section import SectionTable
 from flexmb.scene.bodies import BeamBody
-from flexmb.scene.sections import mass_centres
+from flexmb.scene.sections import inertia_matrices, mass_centres
 from flexmb.typing import Real
 
 GAUSS_POINTS = 6
@@ -43,9 +42,7 @@ class Stations:
 
     def matrices(self) -> Real:
         """Mass matrices (n,6,6) for [displacement; rotation] of the axis points."""
-        c = self.mass[:, None, None] * cross_matrix(self.com)
-        about_axis = self.inertia - c @ cross_matrix(self.com)
-        return np.block([[self.mass[:, None, None] * np.eye(3), -c], [c, about_axis]])
+        return inertia_matrices(self.mass, self.com, self.inertia)
 
 
 @dataclass(frozen=True)

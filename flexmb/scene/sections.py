@@ -26,6 +26,7 @@ WITHOUT_SHEAR = [EXTENSION, TWIST, ABOUT_Y, ABOUT_Z]
 STRAINS = ("extension", "shear along y", "shear along z", "twist", "curvature about y", "curvature about z")
 STIFFNESS_KEYS = ("EA_N", "EIy_Nm2", "EIz_Nm2", "GJ_Nm2")
 SHEAR_KEYS = ("GAy_N", "GAz_N")
+ROUNDING = 64 * np.finfo(float).eps  # of sums of at most nine products of three factors, there and back
 INERTIA_KEYS = ("mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
 
 
@@ -76,12 +77,19 @@ def mass_per_length(station: BeamStation) -> float:
 
 
 def mass_centres(inertia: Real) -> tuple[Real, Real, Real]:
-    """Masses (n,), mass centres (n,3) and inertias (n,3,3) about these of inertias (n,6,6)."""
+    """Masses (n,), mass centres (n,3; without mass zero) and inertias (n,3,3) about these of inertias (n,6,6)."""
     m = inertia[:, 0, 0]
     com = np.zeros((len(m), 3))
-    com[:, 1], com[:, 2] = -inertia[:, 0, 5] / m, inertia[:, 0, 4] / m
-    square = np.einsum("na,na->n", com, com)[:, None, None] * np.eye(3) - np.einsum("na,nb->nab", com, com)
-    return m, com, inertia[:, 3:, 3:] - m[:, None, None] * square
+    np.divide(-inertia[:, 0, 5], m, out=com[:, 1], where=m != 0.0)
+    np.divide(inertia[:, 0, 4], m, out=com[:, 2], where=m != 0.0)
+    about_axis, of_mass = inertia[:, 3:, 3:], -m[:, None, None] * _skew(com) @ _skew(com)
+    return m, com, _above_rounding(about_axis - of_mass, np.abs(about_axis) + np.abs(of_mass))
+
+
+def inertia_matrices(mass: Real, com: Real, inertia: Real) -> Real:
+    """Inertias (n,6,6) of masses (n,), mass centres (n,3) and inertias (n,3,3) about these."""
+    c = mass[:, None, None] * _skew(com)
+    return np.block([[mass[:, None, None] * np.eye(3), -c], [c, inertia - c @ _skew(com)]])
 
 
 def restated(station: BeamStation, point: tuple[float, float]) -> BeamStation:
@@ -125,7 +133,17 @@ def _on_axis(stated: Real, point: tuple[float, float]) -> Real:
     if not any(point):
         return stated
     T = transport(point)
-    return T.T @ stated @ T
+    return _above_rounding(T.T @ stated @ T, np.abs(T.T) @ np.abs(stated) @ np.abs(T))
+
+
+def _above_rounding(found: Real, terms: Real) -> Real:
+    """Sums, with zeros where nothing is left of terms of these sizes but rounding: what they cancel couples nothing."""
+    return np.where(np.abs(found) > ROUNDING * terms, found, 0.0)
+
+
+def _skew(c: Real) -> Real:
+    """Matrices (n,3,3) of c x, c (n,3)."""
+    return np.swapaxes(np.cross(c[:, None], np.eye(3)), 1, 2)
 
 
 def _given(station: BeamStation, key: str) -> float:
