@@ -26,7 +26,8 @@ class BeamSections:
 
     points: inertia points of the whole beam, with no cut inside the interval of any; `beyond` (n,): the number of cuts
     that each is at or beyond; `second`: their second-order field at level stiffened. motion (X,6,m): mode shapes
-    [displacement; rotation] of the sections, `second_motion` their field. Stiffnesses (X,): EA N, EIy, EIz, GJ N m².
+    [displacement; rotation] of the sections, `second_motion` their field. stiffness (X,6,6) about the axis, infinite
+    where there is no shear; `plain` if it couples nothing.
     """
 
     x: Real
@@ -35,10 +36,8 @@ class BeamSections:
     second: SecondOrder | None
     motion: Real
     second_motion: SecondOrder | None
-    EA: Real
-    EIy: Real
-    EIz: Real
-    GJ: Real
+    stiffness: Real
+    plain: bool
 
 
 def beam_sections(body: BeamBody, x: Real) -> BeamSections:
@@ -60,8 +59,6 @@ def beam_sections(body: BeamBody, x: Real) -> BeamSections:
         second=second_order_of(body, elements, columns, points.x, points.position - on_axis(points.x)),
         motion=elements.motion(x, columns),
         second_motion=second_order_of(body, elements, columns, x, np.zeros((len(x), 3))),
-        EA=table.at(table.EA, x),
-        EIy=table.at(table.EIy, x),
-        EIz=table.at(table.EIz, x),
-        GJ=table.at(table.GJ, x),
+        stiffness=table.at(table.stiffness, x),
+        plain=table.plain,
     )

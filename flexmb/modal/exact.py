@@ -16,8 +16,8 @@ from flexmb.modal.eigenproblem import eigenpairs
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming_node
 from flexmb.modal.following import followed
 from flexmb.modal.reduce import BeamModes, damping_matrix
-from flexmb.modal.section import SectionTable, section_table
-from flexmb.modal.stations import lumps
+from flexmb.modal.section import section_table
+from flexmb.modal.stations import lumps, section_masses
 from flexmb.modal.strain_field import StrainField, gauss_weights, strain_field, strain_stiffness
 from flexmb.scene.bodies import IDENTITY, BeamBody, Quaternion
 from flexmb.scene.quaternions import rotation_matrix
@@ -88,22 +88,21 @@ def _polynomial_beam(body: BeamBody) -> tuple[StrainField, _Points, Real]:
     field = strain_field(body, places)
     x, weight = gauss_weights(body)
     table = section_table(body)
+    own = section_masses(x, weight[:, None, None] * table.at(table.inertia, x), body, table.plain)
     _, rotation = rest_sections(body, x)
-    local = np.zeros((len(x), 3, 3))
-    if body.points != "line":
-        about_y, about_z = (table.at(values, x) for values in (table.rotary_y, table.rotary_z))
-        for i, values in enumerate((about_y + about_z, about_y, about_z)):
-            local[:, i, i] = weight * values
     at_lumps = len(field.x) - len(places) + np.arange(len(rigid_lumps))
     _, turned = rest_sections(body, np.array([lump.x for lump in rigid_lumps]))
     found = _Points(
-        np.concatenate([weight * table.at(table.mass, x), [lump.mass for lump in rigid_lumps]]),
+        np.concatenate([own.mass, [lump.mass for lump in rigid_lumps]]),
         np.concatenate(
-            [np.zeros((len(x), 3)), *((R @ lump.com)[None] for R, lump in zip(turned, rigid_lumps, strict=True))]
+            [
+                np.einsum("pab,pb->pa", rotation, own.com),
+                *((R @ lump.com)[None] for R, lump in zip(turned, rigid_lumps, strict=True)),
+            ]
         ),
         np.concatenate(
             [
-                rotation @ local @ np.swapaxes(rotation, 1, 2),
+                rotation @ own.inertia @ np.swapaxes(rotation, 1, 2),
                 *((R @ lump.inertia @ R.T)[None] for R, lump in zip(turned, rigid_lumps, strict=True)),
             ]
         ),
@@ -128,18 +127,7 @@ def _stiffness(body: BeamBody) -> Real:
     xi, w = np.polynomial.legendre.leggauss(max(polynomials(body).values()) + 1)
     half = np.diff(edges) / 2.0
     x = (edges[:-1, None] + half[:, None] * (1.0 + xi)).ravel()
-    return strain_stiffness(body, _section_stiffness(body, table, x), x, (half[:, None] * w).ravel())
-
-
-def _section_stiffness(body: BeamBody, table: SectionTable, x: Real) -> Real:
-    """(n,6,6) of [stretch, shears; twist, curvatures]."""
-    zero = np.zeros_like(x)
-    shears = [zero if each is None else table.at(each, x) for each in (table.GAy, table.GAz)]
-    found = np.zeros((len(x), 6, 6))
-    rows = (table.at(table.EA, x), *shears, *(table.at(each, x) for each in (table.GJ, table.EIy, table.EIz)))
-    for i, values in enumerate(rows):
-        found[:, i, i] = values
-    return found
+    return strain_stiffness(body, table.at(table.stiffness, x), x, (half[:, None] * w).ravel())
 
 
 def _modes(field: StrainField, K: Real, M: Real) -> BeamModes:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from flexmb.scene import schema as s
+from flexmb.scene.sections import has_plain_sections
 from flexmb.scene.tree import rest_frames
 from flexmb.surrogate.chain import (
     NodePlace,
@@ -60,6 +61,12 @@ def finite_segments(scene: s.Scene, body: str | None, n: int) -> s.Scene:
 def _segmented(scene: s.Scene, beam: s.BeamBody, n: int) -> s.Scene:
     if beam.theory == "timoshenko":
         raise ValueError(f'beam "{beam.name}": finite segments have no shear; use theory "euler-bernoulli"')
+    if not has_plain_sections(beam):
+        raise ValueError(
+            f'beam "{beam.name}": the hinges between finite segments have springs that nothing couples, and its '
+            "sections are matrices or stated off its axis; divide it into flexible pieces (substructures), or keep "
+            "its modes"
+        )
     cuts = _cuts(beam, n)
     ends = [0.0, *(cut.x for cut in cuts), beam.length_m]
     places = {}

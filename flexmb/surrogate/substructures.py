@@ -15,6 +15,15 @@ from msgspec.structs import replace
 from flexmb.modal import flexible_model
 from flexmb.scene.check.beams import twisting_points
 from flexmb.scene.schema import BeamBody, BeamStation, Hinge, Level, Modes, Scene, Weld
+from flexmb.scene.sections import (
+    INERTIA_KEYS,
+    SHEAR_KEYS,
+    STIFFNESS_KEYS,
+    inertia_on_axis,
+    is_plain,
+    matrix,
+    stiffness_on_axis,
+)
 from flexmb.scene.tree import rest_frames
 from flexmb.surrogate.chain import (
     NodePlace,
@@ -26,7 +35,7 @@ from flexmb.surrogate.chain import (
     stiffness_damping,
 )
 
-_SECTION_KEYS = tuple(key for key in BeamStation.__struct_fields__ if key != "x_m")
+_NUMBERS = (*STIFFNESS_KEYS, *SHEAR_KEYS, *INERTIA_KEYS)
 
 
 def substructured(
@@ -120,11 +129,20 @@ def _between(stations: list[BeamStation], right: int, x: float) -> BeamStation:
     """The section at x between the stations `right` - 1 and `right`, constant beyond the outer ones."""
     a, b = stations[max(right - 1, 0)], stations[min(right, len(stations) - 1)]
     share = (x - a.x_m) / (b.x_m - a.x_m) if b.x_m > a.x_m else 0.0
+    if not (is_plain(a) and is_plain(b)):
+        return replace(a, x_m=x) if share == 0.0 else _mixed(a, b, share, x)
     values = {}
-    for key in _SECTION_KEYS:
+    for key in _NUMBERS:
         at_a, at_b = getattr(a, key), getattr(b, key)
         values[key] = at_a if share == 0.0 or None in (at_a, at_b) else at_a + share * (at_b - at_a)
     return replace(a, x_m=x, **values)
+
+
+def _mixed(a: BeamStation, b: BeamStation, share: float, x: float) -> BeamStation:
+    """The section at x between two, one of which at least is a matrix or off the axis: matrices about the axis."""
+    stiffness = (1.0 - share) * stiffness_on_axis(a) + share * stiffness_on_axis(b)
+    inertia = (1.0 - share) * inertia_on_axis(a) + share * inertia_on_axis(b)
+    return BeamStation(x_m=x, stiffness=matrix(stiffness), inertia=matrix(inertia))
 
 
 def _welds(beam: BeamBody, count: int, root: int) -> list[Hinge]:

@@ -17,6 +17,7 @@ from crosscheck.engines.pace import pace
 from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Planar, Revolute, Weld
 from flexmb.scene.schema import BeamBody, Marker, Scene
+from flexmb.scene.sections import has_plain_sections
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
@@ -90,6 +91,12 @@ def _refusals(scene: Scene) -> Iterator[str]:
         yield 'it is planar: the beam may want the families "bending_y" and "axial" only'
     if np.any(beam.modes.damping_ratio):
         yield "it has no modal damping"
+    if not has_plain_sections(beam):
+        yield (
+            "its elements have EA, EI and GA on the axis alone: a section that is a matrix, or stated off the axis, "
+            'couples them; compare with engine "exudyn" after the beam is made points and modes'
+        )
+        return
     if beam.theory == "timoshenko" and any(station.GAy_N is None for station in beam.stations):
         yield "a shear-flexible beam needs GAy_N at every station"
     if beam.level == "rigid":
