@@ -13,23 +13,41 @@ RANGE = 10.0  # in sizes of the body: a larger deflection means that the motion 
 def is_out_of_range(c, eta, k):
     """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size.
 
+    A beam of level exact deflects by its own size at most. There eta'eta / m is the deflection of the linear beam with
+    the same strains, whose modes have unit masses at rest; a uniform beam with constant curvature ends at some
+    25 radians.
+
     eta (m,) is zero at level ruthless, whose bodies are never out of range. In lanes the answer is True if all copies
-    are; the copies in which the body is so alone get NaN and end by that. At level exact, whose modal masses are unity
-    at rest, the deflection is that of the linear beam: ten sizes are three to four full turns of bending.
+    are; the copies in which the body is so alone get NaN and end by that.
     """
     if c.body[k].modes == 0 or is_at_rest(c.body[k].level):
         return False
     body = c.body[k].rigid
     limit = RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])
-    diagonal, own = 0.0, 1.0 if has(c, SECTIONS) and c.body[k].section_stop > c.body[k].section_start else 0.0
+    if has(c, SECTIONS) and c.body[k].section_stop > c.body[k].section_start:
+        return _is_beyond(_squares(c, eta, k), limit, eta)
+    diagonal = 0.0
     for n in range(c.body[k].modes):
-        diagonal += eta[n] * (c.mff[k, n, n] + own) * eta[n]
+        diagonal += eta[n] * c.mff[k, n, n] * eta[n]
     if every(c.body[k].modes * diagonal.real <= limit.real):  # an upper bound of the sum below, by Cauchy-Schwarz
         return False
     squares = 0.0
     for n in range(c.body[k].modes):
-        squares += own * eta[n] * eta[n]
         for i in range(c.body[k].modes):
             squares += eta[n] * c.mff[k, n, i] * eta[i]
+    return _is_beyond(squares, limit, eta)
+
+
+@helper
+def _squares(c, eta, k):
+    """eta'eta."""
+    squares = 0.0
+    for n in range(c.body[k].modes):
+        squares += eta[n] * eta[n]
+    return squares
+
+
+@helper
+def _is_beyond(squares, limit, eta):
     eta[0] = kept(squares.real <= limit.real, eta[0])
     return every(squares.real > limit.real)

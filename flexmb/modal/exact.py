@@ -35,7 +35,7 @@ def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
     `like`: see `flexmb.modal.flexible.flexible_model`. Raises ValueError for modes without inertia.
     """
     try:
-        field, points, M = _polynomial_beam(body)
+        field, points, M = _polynomial_beam(body, _nodes_at(body))
         modes = _modes(field, _stiffness(body), M)
         if like is not None:
             modes = followed(modes, M, _reference(like))
@@ -61,9 +61,16 @@ def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
     )
 
 
-class _Points:
+def cut_beam(body: BeamBody, x: Real) -> tuple[StrainField, BeamPoints]:
+    """The sections of the beam, of which those at x (n,) m are the last, with the strain modes of `exact_model`; its
+    inertia points."""
+    field, points, M = _polynomial_beam(body, x)
+    return field.with_modes(_modes(field, _stiffness(body), M).columns), points
+
+
+class BeamPoints:
     """Inertia points: mass (n,), com_offset (n,3) and inertia (n,3,3) about it in the axes of the root, at rest; the
-    number of the section that each is fixed to (n,)."""
+    number of the section that each is fixed to (n,). The first are those at the Gauss points."""
 
     def __init__(self, mass: Real, com_offset: Real, inertia: Real, section: Index) -> None:
         self.mass, self.com_offset, self.inertia, self.section = mass, com_offset, inertia, section
@@ -71,12 +78,13 @@ class _Points:
 
 @lru_cache(maxsize=8)
 def _reference(body: BeamBody) -> BeamModes:
-    field, _, M = _polynomial_beam(body)
+    field, _, M = _polynomial_beam(body, np.zeros(0))
     return _modes(field, _stiffness(body), M)
 
 
-def _polynomial_beam(body: BeamBody) -> tuple[StrainField, _Points, Real]:
-    """Sections at Gauss points, lumps, then nodes; inertia points; modal masses (m,m) of the polynomials at rest."""
+def _polynomial_beam(body: BeamBody, others: Real) -> tuple[StrainField, BeamPoints, Real]:
+    """Sections at Gauss points, lumps, then at `others` (n,) m; inertia points; modal masses (m,m) of the polynomials
+    at rest."""
     rigid_lumps = lumps(body)
     most, points = max(polynomials(body).values(), default=0), points_of_piece(body)
     if points <= most:
@@ -84,7 +92,7 @@ def _polynomial_beam(body: BeamBody) -> tuple[StrainField, _Points, Real]:
             f"{points} points for {most} polynomials of one strain along a piece leave motions without inertia: use "
             f"{most + 1} points at least, or fewer polynomials"
         )
-    places = np.array([*(lump.x for lump in rigid_lumps), *(x for _, x, _ in _listed(body))])
+    places = np.concatenate([[lump.x for lump in rigid_lumps], others])
     field = strain_field(body, places)
     x, weight = gauss_weights(body)
     table = section_table(body)
@@ -92,7 +100,7 @@ def _polynomial_beam(body: BeamBody) -> tuple[StrainField, _Points, Real]:
     _, rotation = rest_sections(body, x)
     at_lumps = len(field.x) - len(places) + np.arange(len(rigid_lumps))
     _, turned = rest_sections(body, np.array([lump.x for lump in rigid_lumps]))
-    found = _Points(
+    found = BeamPoints(
         np.concatenate([own.mass, [lump.mass for lump in rigid_lumps]]),
         np.concatenate(
             [
@@ -111,7 +119,7 @@ def _polynomial_beam(body: BeamBody) -> tuple[StrainField, _Points, Real]:
     return field, found, _modal_masses(field, found)
 
 
-def _modal_masses(field: StrainField, points: _Points) -> Real:
+def _modal_masses(field: StrainField, points: BeamPoints) -> Real:
     """(m,m) at rest: the sum of m U'U + W' J W, with U of the mass centres and W of the points."""
     turn, shift = field.shapes()
     W = turn[points.section]
@@ -144,6 +152,11 @@ def _modes(field: StrainField, K: Real, M: Real) -> BeamModes:
     largest = np.argmax(np.abs(rows) > 0.5 * np.max(np.abs(rows), axis=0), axis=0)
     signs = np.where(rows[largest, np.arange(columns.shape[1])] < 0.0, -1.0, 1.0)
     return BeamModes(columns * signs, 1.0 / np.sqrt(compliance[::-1]))
+
+
+def _nodes_at(body: BeamBody) -> Real:
+    """The places (n,) m of `_listed`."""
+    return np.array([x for _, x, _ in _listed(body)])
 
 
 def _listed(body: BeamBody) -> list[tuple[str, float, Quaternion]]:
