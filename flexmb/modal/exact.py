@@ -15,7 +15,7 @@ from flexmb.modal.cross import cross_matrix
 from flexmb.modal.eigenproblem import eigenpairs
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming_node
 from flexmb.modal.following import followed
-from flexmb.modal.reduce import BeamModes, damping_matrix
+from flexmb.modal.reduce import BeamModes, damping_matrix, groups
 from flexmb.modal.section import section_table
 from flexmb.modal.stations import lumps, section_masses
 from flexmb.modal.strain_field import StrainField, gauss_weights, strain_field, strain_stiffness
@@ -27,6 +27,8 @@ from flexmb.typing import Index, Real
 
 # Relative to the largest: below it an eigenvalue of the modal masses is zero but for rounding.
 _MASSLESS = 1e-13
+# Elements of stiffness and masses that are scaled to a unit diagonal: below it they are rounding errors of their sums.
+_UNCOUPLED = 1e-12
 
 
 def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
@@ -36,7 +38,7 @@ def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
     """
     try:
         field, points, M = _polynomial_beam(body, _nodes_at(body))
-        modes = _modes(field, _stiffness(body), M)
+        modes = _modes(body, field, _stiffness(body), M)
         if like is not None:
             modes = followed(modes, M, _reference(like))
         damping = damping_matrix(modes.roots, body.modes.damping_ratio) + body.modes.viscosity_s * modes.stiffness
@@ -65,7 +67,7 @@ def cut_beam(body: BeamBody, x: Real) -> tuple[StrainField, BeamPoints]:
     """The sections of the beam, of which those at x (n,) m are the last, with the strain modes of `exact_model`; its
     inertia points."""
     field, points, M = _polynomial_beam(body, x)
-    return field.with_modes(_modes(field, _stiffness(body), M).columns), points
+    return field.with_modes(_modes(body, field, _stiffness(body), M).columns), points
 
 
 class BeamPoints:
@@ -79,7 +81,7 @@ class BeamPoints:
 @lru_cache(maxsize=8)
 def _reference(body: BeamBody) -> BeamModes:
     field, _, M = _polynomial_beam(body, np.zeros(0))
-    return _modes(field, _stiffness(body), M)
+    return _modes(body, field, _stiffness(body), M)
 
 
 def _polynomial_beam(body: BeamBody, others: Real) -> tuple[StrainField, BeamPoints, Real]:
@@ -138,20 +140,37 @@ def _stiffness(body: BeamBody) -> Real:
     return strain_stiffness(body, table.at(table.stiffness, x), x, (half[:, None] * w).ravel())
 
 
-def _modes(field: StrainField, K: Real, M: Real) -> BeamModes:
-    """The modes of K and M, ascending, with unit modal masses; the largest motion of the tip is positive."""
-    compliance, columns = eigenpairs(M, K)
-    if not compliance[0] > _MASSLESS * compliance[-1]:
+def _modes(body: BeamBody, field: StrainField, K: Real, M: Real) -> BeamModes:
+    """The modes of K and M, ascending, with unit modal masses; the largest motion of the tip is positive.
+
+    Strains that neither matrix couples are solved separately, so that modes of one frequency each have their own.
+    """
+    strain = np.repeat(*np.array([(i, n * body.modes.pieces) for i, n in enumerate(polynomials(body).values())]).T)
+    columns, compliance = np.zeros_like(K), np.zeros(len(K))
+    for own in _uncoupled(strain, K, M):
+        compliance[own], columns[np.ix_(own, own)] = eigenpairs(M[np.ix_(own, own)], K[np.ix_(own, own)])
+    if not compliance.min() > _MASSLESS * compliance.max():
         raise ValueError(
             "some of its strains move no inertia while the beam is straight: use fewer polynomials, or give the "
             'sections their rotary inertia and points = "section"'
         )
-    columns = columns[:, ::-1] / np.sqrt(compliance[::-1])
+    # Frequencies that agree to nine digits count as equal, so that the order of the strains decides.
+    order = np.lexsort((strain, [float(f"{-each:.8e}") for each in compliance]))
+    columns, frequencies = columns[:, order] / np.sqrt(compliance[order]), 1.0 / np.sqrt(compliance[order])
     turn, shift = (shape @ columns for shape in (each[field.gauss[-1]] for each in field.shapes()))
     rows = np.concatenate([shift, field.x[field.gauss[-1]] * turn])
     largest = np.argmax(np.abs(rows) > 0.5 * np.max(np.abs(rows), axis=0), axis=0)
     signs = np.where(rows[largest, np.arange(columns.shape[1])] < 0.0, -1.0, 1.0)
-    return BeamModes(columns * signs, 1.0 / np.sqrt(compliance[::-1]))
+    return BeamModes(columns * signs, frequencies)
+
+
+def _uncoupled(strain: Index, K: Real, M: Real) -> list[Index]:
+    """The coordinates of each set of strains that K and M couple by more than rounding; `strain` (m,): that of each."""
+    scaled = [np.abs(each) / np.sqrt(np.outer(np.diag(each), np.diag(each))) for each in (K, M)]
+    names = np.unique(strain)
+    coupled = [[max(np.max(each[np.ix_(strain == a, strain == b)]) for each in scaled) for b in names] for a in names]
+    label = groups(np.array(coupled) > _UNCOUPLED)
+    return [np.flatnonzero(np.isin(strain, names[np.array(label) == each])) for each in dict.fromkeys(label)]
 
 
 def _nodes_at(body: BeamBody) -> Real:

@@ -116,7 +116,7 @@ def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Cou
     coupled = np.array(
         [[any(_coupled(A[a, b], A[a, a], A[b, b]) for A in (M, K)) for b in blocks] for a in blocks]
     )
-    label = _groups(coupled)
+    label = groups(coupled)
     free = np.ones(elements.size, dtype=bool)
     if clamped:
         free[elements.clamped_coordinates()] = False
@@ -134,7 +134,7 @@ def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Cou
     return parts
 
 
-def _groups(coupled: NDArray[np.bool_]) -> list[int]:
+def groups(coupled: NDArray[np.bool_]) -> list[int]:
     """For each family the first one that it is coupled with, directly or through others."""
     label = list(range(len(coupled)))
     for a, b in np.argwhere(coupled):
