@@ -15,7 +15,7 @@ from flexmb.modal.cross import cross_matrix
 from flexmb.modal.eigenproblem import eigenpairs
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming_node
 from flexmb.modal.following import followed
-from flexmb.modal.reduce import BeamModes, damping_matrix, groups
+from flexmb.modal.reduce import BeamModes, damping_matrix, groups, tip_signs
 from flexmb.modal.section import section_table
 from flexmb.modal.stations import lumps, section_masses
 from flexmb.modal.strain_field import StrainField, gauss_weights, strain_field, strain_stiffness
@@ -141,7 +141,7 @@ def _stiffness(body: BeamBody) -> Real:
 
 
 def _modes(body: BeamBody, field: StrainField, K: Real, M: Real) -> BeamModes:
-    """The modes of K and M, ascending, with unit modal masses; the largest motion of the tip is positive.
+    """The modes of K and M, ascending, with unit modal masses; signs by the last Gauss point (`tip_signs`).
 
     Strains that neither matrix couples are solved separately, so that modes of one frequency each have their own.
     """
@@ -158,10 +158,7 @@ def _modes(body: BeamBody, field: StrainField, K: Real, M: Real) -> BeamModes:
     order = np.lexsort((strain, [float(f"{-each:.8e}") for each in compliance]))
     columns, frequencies = columns[:, order] / np.sqrt(compliance[order]), 1.0 / np.sqrt(compliance[order])
     turn, shift = (shape @ columns for shape in (each[field.gauss[-1]] for each in field.shapes()))
-    rows = np.concatenate([shift, field.x[field.gauss[-1]] * turn])
-    largest = np.argmax(np.abs(rows) > 0.5 * np.max(np.abs(rows), axis=0), axis=0)
-    signs = np.where(rows[largest, np.arange(columns.shape[1])] < 0.0, -1.0, 1.0)
-    return BeamModes(columns * signs, frequencies)
+    return BeamModes(columns * tip_signs(shift, body.length_m * turn), frequencies)
 
 
 def _uncoupled(strain: Index, K: Real, M: Real) -> list[Index]:
