@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple
 
@@ -92,6 +92,11 @@ class Blocks:
     def __len__(self) -> int:
         return len(self.tables)
 
+    def acts(self, b: int) -> bool:
+        """Whether the constants of the equations depend on any of the directions of block b."""
+        found = [self.duals[b].constants, self.duals[b].closures]
+        return any(np.any(part[..., 1:]) for table in found if table is not None for part in dual_parts(table))
+
     @property
     def observing(self) -> Any:
         """The kernel (tables, outputs) that finds everything observable, but for the loads of closures."""
@@ -157,6 +162,17 @@ class Blocks:
     def joined(self, duals: Sequence[Real]) -> Real:
         """The derivatives (...,P) of one array of duals (...,9) for each block."""
         return np.concatenate([each[..., 1:] for each in duals], axis=-1)[..., : self.directions]
+
+
+def dual_parts(table: Any) -> Iterator[Any]:
+    """The duals (...,9) of a table in dual numbers, of all arrays and all fields of its records."""
+    for each in fields(table):
+        array = getattr(table, each.name)
+        if array.dtype == np.float64:
+            yield array
+        for name in array.dtype.names or ():
+            if (array.dtype[name].subdtype or (array.dtype[name],))[0] == np.float64:
+                yield array[name]
 
 
 def set_lanes(duals: Real, rates: Real, b: int) -> None:
