@@ -92,11 +92,6 @@ class Blocks:
     def __len__(self) -> int:
         return len(self.tables)
 
-    def acts(self, b: int) -> bool:
-        """Whether the constants of the equations depend on any of the directions of block b."""
-        found = [self.duals[b].constants, self.duals[b].closures]
-        return any(np.any(part[..., 1:]) for table in found if table is not None for part in dual_parts(table))
-
     @property
     def observing(self) -> Any:
         """The kernel (tables, outputs) that finds everything observable, but for the loads of closures."""
@@ -164,15 +159,20 @@ class Blocks:
         return np.concatenate([each[..., 1:] for each in duals], axis=-1)[..., : self.directions]
 
 
-def dual_parts(table: Any) -> Iterator[Any]:
-    """The duals (...,9) of a table in dual numbers, of all arrays and all fields of its records."""
+def dual_parts(table: Any) -> Iterator[tuple[str, str | None, Any]]:
+    """Name, name of the field of its records, and the duals (...,9) of every array of a table in dual numbers."""
     for each in fields(table):
-        array = getattr(table, each.name)
-        if array.dtype == np.float64:
-            yield array
-        for name in array.dtype.names or ():
-            if (array.dtype[name].subdtype or (array.dtype[name],))[0] == np.float64:
-                yield array[name]
+        for field, part in array_parts(getattr(table, each.name)):
+            yield each.name, field, part
+
+
+def array_parts(array: Any) -> Iterator[tuple[str | None, Any]]:
+    """The duals (...,9) of an array, or of each field of its records, with the name of the field."""
+    if array.dtype == np.float64:
+        yield None, array
+    for name in array.dtype.names or ():
+        if (array.dtype[name].subdtype or (array.dtype[name],))[0] == np.float64:
+            yield name, array[name]
 
 
 def set_lanes(duals: Real, rates: Real, b: int) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID
 from flexmb.run.interruption import interruptible
 from flexmb.run.outputs import ending
 from flexmb.sensitivity.adjoint import recorded, stages
+from flexmb.sensitivity.adjoint.transposes import Transposes
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import OK, Status
@@ -40,16 +41,6 @@ SCHEMES = {
         np.array([0.0, 0.5, 0.5, 1.0, 1.0]),
     ),
 }  # fmt: skip
-
-
-class Transposes(NamedTuple):
-    """Kernels `transpose` and `unproject`, as `flexmb.sensitivity.adjoint.transposed` has them, with their tables, and
-    what these refer to."""
-
-    transpose: Any
-    unproject: Any
-    tables: Any
-    refers_to: Any
 
 
 class Cost(NamedTuple):

@@ -1,43 +1,71 @@
-"""Transposes of the derivatives of a right-hand side and of a projection, by the Jacobian and by dual numbers.
+"""Transposes of the derivatives of a right-hand side and of a projection: by recursion, or by the Jacobian.
 
-m = F'l for a row l, with F = df/dy from the kernel that implicit methods use; l . df/dp for parameters p whose lanes
-the constants of the equations of motion have, eight in a block (`flexmb.sensitivity.blocks`).
+m = F'l for a row l, with F = df/dy, and l . df/dp. Most trees are pulled in O(N) without a matrix, by
+`flexmb.entry.pulled`, which also adds up the derivatives by many constants of the tree; else F is the matrix that
+implicit methods use. What is left are parameters on which other constants depend: their lanes are those of the constants
+of the equations of motion in dual numbers, eight in a block (`flexmb.sensitivity.blocks`).
 """
 
 from __future__ import annotations
 
+from flexmb.entry.pulled import PullWorkspace, pull
 from flexmb.jit.bundle import bundle
 from flexmb.jit.direct import nothing_at, status_at
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.lanes import LANES
 from flexmb.spatial.scalar import sqrt
+from flexmb.tables.arrays import Constants
 from flexmb.tables.features import PRESCRIBED, QUATERNIONS
 from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
-# Indices in `ByJacobian.address`: the Jacobian and its tables; the motion and the projection in dual numbers; the
-# transposed projection and its constants.
-JACOBIAN, EXACT, TANGENT, MOTION, MANIFOLD, UNPROJECT, CONSTANTS = range(7)
-ADDRESSES = 7
+# Indices in `Lanes.address`: the motion and the projection in dual numbers.
+MOTION, MANIFOLD = range(2)
+# Indices in `ByJacobian.address`: the kernel of the Jacobian, and its tables.
+JACOBIAN, EXACT, TANGENT = range(3)
 
 
 @bundle
-class ByJacobian:
-    """Tables of the transposes: n entries of the state, B blocks of parameters."""
+class Lanes:
+    """Parameters in the lanes of B blocks of constants in dual numbers; none where B is 0."""
 
-    address: Index  # (ADDRESSES,)
-    J: Real  # (n,n)
-    which: Index  # the blocks on whose directions the motion depends
+    address: Index  # (2,)
     block: Index  # (B,) addresses of the tables of each block
     state: Real  # (B,n,9) the state as duals; the memory of the blocks' workspaces
     slope: Real  # (B,n,9) likewise its rate
     gradient: Real  # (LANES B,) by the parameters, added up
 
 
+@bundle
+class ByRecursion:
+    """Tables of `pull_back`."""
+
+    c: Constants
+    x: PullWorkspace
+    lanes: Lanes
+
+
+@bundle
+class ByJacobian:
+    """Tables of `transpose`: n entries of the state."""
+
+    address: Index  # (3,)
+    J: Real  # (n,n)
+    c: Constants
+    lanes: Lanes
+
+
 @kernel
-def transpose(t, y, pull, moved, s):
-    """moved = F'pull at (t, y), and pull . df/dp to the gradient; returns a status code."""
+def pull_back(t, y, row, moved, s):
+    """moved = F'row at (t, y), and row . df/dp to the gradients; returns a status code."""
+    status = pull(t, y, row, moved, s.c, s.x)
+    return _pull_lanes(t, y, row, s.lanes) if status == OK else status
+
+
+@kernel
+def transpose(t, y, row, moved, s):
+    """The same by the Jacobian."""
     status = status_at(s.address[JACOBIAN], (t, y, s.J, s.address[EXACT], s.address[TANGENT]))
     if status != OK:
         return status
@@ -45,43 +73,29 @@ def transpose(t, y, pull, moved, s):
     for j in range(n):
         moved[j] = 0.0
     for i in range(n):
-        if pull[i] != 0.0:
+        if row[i] != 0.0:
             for j in range(n):
-                moved[j] += pull[i] * s.J[i, j]
-    for i in range(s.which.shape[0]):
-        b = s.which[i]
-        _hold(y, b, s)
-        status = status_at(s.address[MOTION], (t, s.block[b]))
-        if status != OK:
-            return status
-        _add(pull, s.slope, b, s)
-    return OK
+                moved[j] += row[i] * s.J[i, j]
+    return _pull_lanes(t, y, row, s.lanes)
 
 
 @kernel
 def unproject(t, y, gradient, s):
     """The gradient by the state y before its projection, from that by the projected one; the rest is the parameters'."""
-    for i in range(s.which.shape[0]):
-        b = s.which[i]
-        _hold(y, b, s)
-        nothing_at(s.address[MANIFOLD], (t, s.block[b]))
-        _add(gradient, s.state, b, s)
-    nothing_at(s.address[UNPROJECT], (y, gradient, s.address[CONSTANTS]))
-
-
-@kernel
-def off_manifold(y, gradient, c):
-    """`unproject` for unit quaternions and prescribed coordinates of a tree or closed chain."""
-    if has(c, QUATERNIONS):
-        for k in range(c.body.shape[0]):
-            if c.body[k].quaternion >= 0:
-                _off_sphere(y, gradient, c.body[k].quaternion)
-    if has(c, PRESCRIBED):
-        nu = c.speed.shape[0]
+    for b in range(s.lanes.block.shape[0]):
+        _hold(y, b, s.lanes)
+        nothing_at(s.lanes.address[MANIFOLD], (t, s.lanes.block[b]))
+        _add(gradient, s.lanes.state, b, s.lanes)
+    if has(s.c, QUATERNIONS):
+        for k in range(s.c.body.shape[0]):
+            if s.c.body[k].quaternion >= 0:
+                _off_sphere(y, gradient, s.c.body[k].quaternion)
+    if has(s.c, PRESCRIBED):
+        nu = s.c.speed.shape[0]
         nq = y.shape[0] - nu - 1
         for j in range(nu):
-            if c.speed[j].prescribed >= 0:
-                gradient[c.speed[j].coordinate] = gradient[nq + j] = 0.0
+            if s.c.speed[j].prescribed >= 0:
+                gradient[s.c.speed[j].coordinate] = gradient[nq + j] = 0.0
 
 
 @helper
@@ -93,6 +107,17 @@ def _off_sphere(y, gradient, i):
         along += y[i + n] * gradient[i + n]
     for n in range(4):
         gradient[i + n] = (gradient[i + n] - y[i + n] * along / (length * length)) / length
+
+
+@helper
+def _pull_lanes(t, y, row, s):
+    for b in range(s.block.shape[0]):
+        _hold(y, b, s)
+        status = status_at(s.address[MOTION], (t, s.block[b]))
+        if status != OK:
+            return status
+        _add(row, s.slope, b, s)
+    return OK
 
 
 @helper

@@ -25,7 +25,7 @@ from flexmb.scene.events import Latch
 from flexmb.scene.schema import Scene
 from flexmb.sensitivity.adjoint.arc import Arc, Cost
 from flexmb.sensitivity.adjoint.seeing import Seeing
-from flexmb.sensitivity.adjoint.transposes import ByLanes, transposes
+from flexmb.sensitivity.adjoint.transposes import Transposes
 from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
 from flexmb.sensitivity.passage import Passage, is_mechanical
 from flexmb.sensitivity.scalars import Probe, ScalarTerm, TimeIntegral
@@ -113,15 +113,16 @@ class Adjoint:
         gradient = np.zeros(D)
         for part in reversed(parts):
             if part.arc is not None:
-                lanes = ByLanes(part.variation, self._lanes)
-                own = transposes(part.variation.leg.system, lanes)
+                variation, added = part.variation, [gradient, *part.added.values()]
+                of_power = any(each[-1] != 0.0 for each in added)
+                own = Transposes(variation.leg.system, variation.blocks, self._lanes, of_power)
 
                 def at(t: float, part: Part = part) -> Real | None:
                     return part.added.get(t)
 
                 state, rest = part.arc.backwards(gradient[self._lanes :], own, at)
                 self.cost = self.cost.plus(part.arc.cost)
-                gradient[: self._lanes] += rest[: self._lanes] + lanes.gradient[: self._lanes]
+                gradient[: self._lanes] += rest[: self._lanes] + own.by_parameters()
                 gradient[self._lanes :] = state
             gradient += part.added.get(part.begin, 0.0)
             gradient = self._through(part, gradient)
