@@ -59,15 +59,22 @@ def stiffness_on_axis(station: BeamStation) -> Real:
 
 
 def inertia_on_axis(station: BeamStation) -> Real:
-    """Inertia per length (6,6) about the axis, kg/m, kg, kg m. Of a matrix only the symmetric part counts.
+    """Inertia per length (6,6) about the axis, kg/m, kg, kg m; ValueError for a station without mass.
 
-    ValueError for a station without mass.
+    The mass of a matrix is its element [0][0], the first moment is in its first row and column, and of J the symmetric
+    part counts: the other elements repeat these.
     """
     if station.inertia is None:
         m, y, z = _given(station, "mass_per_length_kg_m"), station.rotary_y_kg_m, station.rotary_z_kg_m
         stated = np.diag([m, m, m, y + z, y, z])
     else:
-        stated = symmetric(station.inertia)
+        given = symmetric(station.inertia)
+        m, moment = given[0, 0], np.array([[0.0, -given[0, 5], given[0, 4]]])
+        stated = np.zeros((6, 6))
+        stated[:3, :3] = m * np.eye(3)
+        stated[3:, :3] = _skew(moment)[0]
+        stated[:3, 3:] = stated[3:, :3].T
+        stated[3:, 3:] = given[3:, 3:]
     return _on_axis(stated, station.reference_point_m)
 
 
