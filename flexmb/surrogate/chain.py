@@ -75,6 +75,11 @@ def in_pieces(
     )
 
 
+def nodes_along(beam: BeamBody) -> dict[str, float]:
+    """Places (m) along the beam of all its nodes by name, implicit ones included."""
+    return {"origin": 0.0, "root": 0.0, "tip": beam.length_m, **{node.name: node.x_m for node in beam.nodes}}
+
+
 def piece_at(ends: Sequence[float], x: float) -> int:
     """The number of the piece between two of the `ends` (m, ascending) that contains x; at a cut the outer one."""
     return min(int(np.searchsorted(ends, x, side="right")) - 1, len(ends) - 2)
@@ -86,9 +91,10 @@ def outward(joints: Sequence[Hinge], root: int) -> list[Hinge]:
 
 
 def stiffness_damping(beam: BeamBody) -> float:
-    """Ratio (s) of damping and stiffness of all parts: 2 zeta/omega of the first mode, whose damping is thus exact."""
+    """Ratio (s) of damping and stiffness of all parts: the viscosity and 2 zeta/omega of the first mode, whose damping
+    is thus exact."""
     if not np.any(beam.modes.damping_ratio):
-        return 0.0
+        return beam.modes.viscosity_s
     model = flexible_model(beam)
     return float(model.damping[0, 0] / model.stiffness[0, 0])
 

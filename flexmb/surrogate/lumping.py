@@ -12,12 +12,13 @@ from typing import assert_never
 import numpy as np
 
 from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.rest_curve import is_curved, rest_sections
 from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, SidBody, TipMass, Vector
 from flexmb.scene.tree import rest_frames
 from flexmb.typing import Real
 
-_GAUSS_POINTS = 3
-"""Exact to degree 5: the second moment of a linearly varying section has degree 3."""
+_GAUSS_POINTS, _ALONG_CURVES = 3, 16
+"""Exact to degree 5: the second moment of a linearly varying section has degree 3. Along curved beams more are used."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ def quadrature(body: BeamBody, cuts: Sequence[float]) -> tuple[Real, Real]:
     """Gauss points and weights (n,) between the cuts (ascending) and stations, where the sections have kinks."""
     inside = [station.x_m for station in body.stations if cuts[0] < station.x_m < cuts[-1]]
     ends = np.unique([*cuts, *inside])
-    s, w = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
+    s, w = np.polynomial.legendre.leggauss(_ALONG_CURVES if is_curved(body) else _GAUSS_POINTS)
     half = np.diff(ends)[:, None] / 2.0
     return (ends[:-1, None] + half * (1.0 + s)).ravel(), (half * w).ravel()
 
@@ -67,17 +68,18 @@ def beam_piece(body: BeamBody, start: float, end: float) -> Inertia:
     mass, rotary_y, rotary_z = section_properties(body, x, "mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
     turning = 0.0 if body.points == "line" else 1.0
     parts = [
-        Inertia(length * m, np.array([at, 0.0, 0.0]), turning * length * np.diag([iy + iz, iy, iz]))
-        for at, length, m, iy, iz in zip(x, weight, mass, rotary_y, rotary_z, strict=True)
+        Inertia(length * m, at, turn @ (turning * length * np.diag([iy + iz, iy, iz])) @ turn.T)
+        for at, turn, length, m, iy, iz in zip(*rest_sections(body, x), weight, mass, rotary_y, rotary_z, strict=True)
     ]
     here = [lump for lump in body.tip_masses if start <= lump.x_m < end or lump.x_m == end == body.length_m]
-    return combine([*parts, *_lumps(here)])
+    return combine([*parts, *_lumps(body, here)])
 
 
-def _lumps(lumps: Sequence[TipMass]) -> list[Inertia]:
+def _lumps(body: BeamBody, lumps: Sequence[TipMass]) -> list[Inertia]:
+    frames = zip(*rest_sections(body, np.array([lump.x_m for lump in lumps])), strict=True)
     return [
-        Inertia(lump.mass_kg, np.array([lump.x_m, 0.0, 0.0]) + lump.com_m, np.array(lump.inertia_kg_m2))
-        for lump in lumps
+        Inertia(lump.mass_kg, at + turn @ lump.com_m, turn @ np.array(lump.inertia_kg_m2) @ turn.T)
+        for lump, (at, turn) in zip(lumps, frames, strict=True)
     ]
 
 
@@ -88,7 +90,7 @@ def _lumped_beam(body: BeamBody) -> Inertia:
     hats = np.maximum(0.0, 1.0 - np.abs(x[:, None] - nodes) * body.elements / body.length_m)
     mass, rotary_y, rotary_z = section_properties(body, x, "mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
     turning = 0.0 if body.points == "line" else 1.0
-    parts = [*_lumps(body.tip_masses)]
+    parts = [*_lumps(body, body.tip_masses)]
     for node, hat in zip(nodes, (weight[:, None] * hats).T, strict=True):
         iy, iz = turning * hat @ rotary_y, turning * hat @ rotary_z
         parts.append(Inertia(hat @ mass, np.array([node, 0.0, 0.0]), np.diag([iy + iz, iy, iz])))

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from flexmb.scene import schema as s
+from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.tree import rest_frames
 from flexmb.surrogate.chain import (
     NodePlace,
@@ -60,6 +61,8 @@ def finite_segments(scene: s.Scene, body: str | None, n: int) -> s.Scene:
 def _segmented(scene: s.Scene, beam: s.BeamBody, n: int) -> s.Scene:
     if beam.theory == "timoshenko":
         raise ValueError(f'beam "{beam.name}": finite segments have no shear; use theory "euler-bernoulli"')
+    if is_curved(beam):
+        raise ValueError(f'beam "{beam.name}" is curved at rest: use flexible pieces of level "exact"')
     cuts = _cuts(beam, n)
     ends = [0.0, *(cut.x for cut in cuts), beam.length_m]
     places = {}
