@@ -181,7 +181,7 @@ class Confirmation:
             apart = error(done.signals, last.signals, scale)
             history.append(f"{last.name} and {name} differ by {apart:.2g}")
             falls = max(apart / steps[-1], SECOND_ORDER) if steps and steps[-1] > 0.0 else 1.0
-            steps += [apart] if last.name.endswith("pieces") else []
+            steps += [apart] if " pieces" in last.name else []
             left = apart * falls / (1.0 - falls) if falls < 0.5 else apart
             last = Reference(name, model, done.signals, scale, left + hidden + self.drift, tuple(history))
             if last.uncertainty <= AGREED * self.tolerance:

@@ -86,6 +86,7 @@ def rungs(
     if some and set(some) != set(body.modes.families):
         sets.append(some)
     carries = body.modes.static or any(hinge.parent == body.name for hinge in scene.hinges)
+    sets_of_strains = (False, True) if _stretches(body) else (False,)
     found = [BodyModel("rigid"), BodyModel("sprung")]
     for families in sets:
         for level in LEVELS:
@@ -93,10 +94,15 @@ def rungs(
             if carries:
                 found += [BodyModel("modes", n, level, True, families) for n in (0, 1, 2, 4)]
         if bends_far:
-            found += [_strains(n, pieces, more, families) for pieces, n in STRAINS for more in (False, True)]
+            found += [_strains(n, pieces, more, families) for pieces, n in STRAINS for more in sets_of_strains]
     found += [BodyModel("segments", pieces=n) for n in SEGMENTS]
     found += [BodyModel("pieces", pieces=n, level=level) for n in PIECES for level in LEVELS[-2:]]
     return tuple(found)
+
+
+def _stretches(body: BeamBody) -> bool:
+    """Whether the beam has stretch or shear."""
+    return "axial" in body.modes.families or body.theory == "timoshenko"
 
 
 def _strains(polynomials: int, pieces: int, stretching: bool, families: tuple[str, ...] = ()) -> BodyModel:
@@ -127,7 +133,7 @@ def references(scene: Scene, bends_far: bool = False) -> tuple[tuple[str, Model]
         return BodyModel("modes", body.modes.count + more, LEVELS[-1], body.modes.static)
 
     def strains(body: BeamBody, count: int, pieces: int) -> BodyModel:
-        return _strains(count, pieces, "axial" in body.modes.families or body.theory == "timoshenko")
+        return _strains(count, pieces, _stretches(body))
 
     def exact(body: BeamBody | ModalBody, count: int, pieces: int) -> BodyModel:
         return strains(body, count, pieces) if isinstance(body, BeamBody) and body.name in splits else rung(body, 4, 0)

@@ -75,11 +75,6 @@ def in_pieces(
     )
 
 
-def nodes_along(beam: BeamBody) -> dict[str, float]:
-    """Places (m) along the beam of all its nodes by name, implicit ones included."""
-    return {"origin": 0.0, "root": 0.0, "tip": beam.length_m, **{node.name: node.x_m for node in beam.nodes}}
-
-
 def piece_at(ends: Sequence[float], x: float) -> int:
     """The number of the piece between two of the `ends` (m, ascending) that contains x; at a cut the outer one."""
     return min(int(np.searchsorted(ends, x, side="right")) - 1, len(ends) - 2)

@@ -20,12 +20,12 @@ from flexmb.modal import flexible_model
 from flexmb.scene.check.beams import twisting_points
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import BeamBody, BeamStation, Hinge, Level, Modes, Scene, StrainPolynomials, Weld
+from flexmb.scene.tree import nodes_along
 from flexmb.surrogate.chain import (
     NodePlace,
     beams_named,
     in_pieces,
     inboard_hinge,
-    nodes_along,
     outward,
     piece_at,
     stiffness_damping,

@@ -16,6 +16,7 @@ from crosscheck.engines.exudyn.state import States
 from crosscheck.engines.pace import pace
 from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Planar, Revolute, Weld
+from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import BeamBody, Marker, Scene
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
@@ -88,8 +89,10 @@ def _refusals(scene: Scene) -> Iterator[str]:
         yield "it takes no gravity"
     if set(beam.modes.families) - {"bending_y", "axial"}:
         yield 'it is planar: the beam may want the families "bending_y" and "axial" only'
-    if np.any(beam.modes.damping_ratio):
+    if np.any(beam.modes.damping_ratio) or beam.modes.viscosity_s:
         yield "it has no modal damping"
+    if is_curved(beam):
+        yield "it takes straight beams"
     if beam.theory == "timoshenko" and any(station.GAy_N is None for station in beam.stations):
         yield "a shear-flexible beam needs GAy_N at every station"
     if beam.level == "rigid":
