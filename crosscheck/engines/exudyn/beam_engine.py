@@ -110,12 +110,10 @@ def _mode_refusals(beam: BeamBody) -> Iterator[str]:
             yield f"it is planar, and the beam has polynomials of {', '.join(sorted(beyond))}"
         if is_curved(beam):
             yield f'its elements are straight, and beam "{beam.name}" is curved where it is not loaded'
-        if beam.modes.viscosity_s:
-            yield "it has no damping by the rate of strain"
     elif set(beam.modes.families) - {"bending_y", "axial"}:
         yield 'it is planar: the beam may want the families "bending_y" and "axial" only'
-    if np.any(beam.modes.damping_ratio):
-        yield "it has no modal damping"
+    if np.any(beam.modes.damping_ratio) or beam.modes.viscosity_s:
+        yield "it has no modal damping, and none by the rate of strain"
 
 
 def _hinge_refusals(beam: BeamBody, hinge: Hinge) -> Iterator[str]:

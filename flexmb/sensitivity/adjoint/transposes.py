@@ -16,8 +16,7 @@ from flexmb.jit.direct import addresses
 from flexmb.jit.duals import DualType
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
-
-from flexmb.parameters.tables import DualClosureConstants, DualConstants
+from flexmb.parameters.tables import DualConstants
 from flexmb.sensitivity.adjoint import transposed
 from flexmb.sensitivity.blocks import Blocks, DualTables, array_parts, dual_parts
 from flexmb.system.tree_system import System
