@@ -24,14 +24,17 @@ from flexmb.jain.derivatives.tables import (
 )
 from flexmb.jain.ports import mode_motion, move_port
 from flexmb.jit.duals import rate, seeded
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
 from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import width
 from flexmb.levels.body import is_at_rest
+from flexmb.levels.section_motion import move_sections
 from flexmb.spatial.cross6 import motion_cross
 from flexmb.spatial.rows import column6, strips6
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, scale6, shift_motion, store6, sub6, sum6, vec6
 from flexmb.spatial.vector import add, cross, mat3, scale, store3, sub, times, vec3
+from flexmb.tables.features import SECTIONS
 
 
 @helper
@@ -169,6 +172,8 @@ def _change(c, w, d, k, i):
         count = min(LANES, 2 * nm - first)
         for lane in range(count):
             seed_mode(e, k, nm, first + lane, lane)
+        if has(c, SECTIONS):
+            move_sections(c, e, k)
         move_port(c, e, k, i)
         _store_relative(c, w, d, k, i)
         for lane in range(count):

@@ -24,7 +24,7 @@ from flexmb.jit.strips import strip_zeros, whole
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.tables.arrays import ON_GROUND, Constants, Workspace
 from flexmb.tables.workspaces import workspace
-from flexmb.typing import Index, Real, Record
+from flexmb.typing import Flags, Index, Real, Record
 
 BODIES_A_POINT = 8
 """Moments about a point eight bodies away lose two digits at most."""
@@ -228,12 +228,19 @@ def _shape(c: Constants, place: Index, nq: int) -> Index:
     return np.array([len(set(body["parent"].tolist())) < len(body), in_order, alike], np.int64)
 
 
+def ports_in_use(c: Constants) -> Flags:
+    """(P,) which ports a body, wheel, load or connector is attached to."""
+    found = np.zeros(len(c.port), bool)
+    ends = c.end["port"][c.end["body"] != ON_GROUND]
+    for attached in (c.body["inboard_port"], c.wheel["port"], c.load["port"], ends):
+        found[attached[attached >= 0]] = True
+    return found
+
+
 def _ports(c: Constants) -> Record:
     """(P,) PORT with what is attached where."""
     port = np.zeros(len(c.port), PORT)
-    ends = c.end["port"][c.end["body"] != ON_GROUND]
-    for attached in (c.body["inboard_port"], c.wheel["port"], c.load["port"], ends):
-        port["used"][attached[attached >= 0]] = 1
+    port["used"] = ports_in_use(c)
     return port
 
 
