@@ -42,7 +42,7 @@ class Transposes:
         c = plant.constants
         by_recursion = not of_power and not np.any(c.body["outboard_port"] >= 0)
         self._x = pull_workspace(c, plant.nq, plant.nu) if by_recursion else None
-        acts = [_acting(each, c if by_recursion else None) for each in blocks.duals[: -(-count // LANES)]]
+        acts = [_acting(each, c, by_recursion, functions) for each in blocks.duals[: -(-count // LANES)]]
         self._chosen = np.flatnonzero(np.concatenate(acts)[:count])
         self._driven = len(functions)
         lanes = len(self._chosen) + self._driven
@@ -108,14 +108,17 @@ def _by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
     return np.asarray(found + p.gravity @ duals.gravity[..., 1:])
 
 
-def _acting(duals: DualTables, c: Constants | None) -> Flags:
-    """(LANES,) which parameters of a block the motion depends on; but for those constants that `Pulled` has, if c is
-    given."""
+def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequence[int]) -> Flags:
+    """(LANES,) which parameters of a block the motion depends on; by recursion, but for the constants that `Pulled` has.
+
+    What controllers drive has directions of its own.
+    """
     known = dict[tuple[str, str | None], Flags | bool]()
-    if c is not None:
+    known["function", "data"] = ~np.isin(np.arange(len(c.function)), driven)
+    if by_recursion:
         modes, on_ports = c.body["modes"] > 0, c.body["inboard_port"] >= 0
         simple = not (np.any(c.body["ball_spring"]) or len(c.hinge_spring) or len(c.coordinate_law))
-        known = {("body", "rigid"): modes, ("gravity", None): False}
+        known |= {("body", "rigid"): modes, ("gravity", None): False}
         known |= {("body", f"placement_{name}"): on_ports for name in ("position", "rotation")}
         known |= {("speed", "armature"): False, ("port", None): ports_in_use(c)}
         known |= {("speed", name): False for name in ("stiffness", "damping", "rest")} if simple else {}
@@ -138,6 +141,7 @@ def _gathered(blocks: Blocks, chosen: Index, functions: Sequence[int]) -> list[D
     count = len(chosen) + len(functions)
     for first in range(0, count, LANES):
         arrays = _lanes_of(sources, chosen[first : first + LANES])
+        arrays["function"]["data"][functions, 0, 1:] = 0.0
         for lane in range(min(LANES, count - first)):
             if first + lane >= len(chosen):
                 arrays["function"]["data"][functions[first + lane - len(chosen)], 0, 1 + lane] = 1.0
