@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 INTERVALS = (2, 4, 8, 16)  # of the points cos(pi k / n), each set of which contains the one before
 WIDTHS = (2.0**-3, 2.0**-5, 2.0**-8, 2.0**-11, 2.0**-14)  # half-widths that are tried, relative to the scale
@@ -37,7 +37,9 @@ class Derivative(NamedTuple):
     error: float
 
 
-def derivative(function: Callable[[float], Real], x: float, scale: float, parts: Sequence[slice]) -> Derivative:
+def derivative(
+    function: Callable[[float], Real], x: float, scale: float, parts: Sequence[slice | Index]
+) -> Derivative:
     """df/dx (n,) at x of a function that returns (n,), or raises ValueError where it is not defined.
 
     scale: size of changes of x that change the function by its own size. Errors are relative to the largest derivative,
@@ -64,7 +66,7 @@ def derivative(function: Callable[[float], Real], x: float, scale: float, parts:
 
 
 def _on_interval(
-    function: Callable[[float], Real], x: float, width: float, middle: Real, scale: float, parts: Sequence[slice],
+    function: Callable[[float], Real], x: float, width: float, middle: Real, scale: float, parts: Sequence[slice | Index],
     is_last: bool,
 ) -> Derivative:  # fmt: skip
     """By interpolation on [x - width, x + width]: points are added until the derivative does not change.
@@ -95,7 +97,7 @@ def _on_interval(
     return Derivative(now, error)
 
 
-def _relative(change: Real, derivative: Real, rounding: Real, parts: Sequence[slice]) -> float:
+def _relative(change: Real, derivative: Real, rounding: Real, parts: Sequence[slice | Index]) -> float:
     """The largest change of a part's derivatives beyond rounding, relative to the largest of these derivatives."""
     worst = 0.0
     for part in parts:
