@@ -53,7 +53,7 @@ def blades() -> Scene:
 def test_nothing_changes_at_another_reference_point() -> None:
     counterpart = RESTATED.of(blades())
     stations = [station for body in counterpart.scene.bodies for station in getattr(body, "stations", ())]
-    assert len({each.reference_point_m for each in stations}) == 6  # a root and a tip of all blades, and two sections by numbers
+    assert len({each.reference_point_m for each in stations}) == 6  # root and tip of the blades and of two other beams
     assert all(each.stiffness is not None and each.inertia is not None for each in stations)
     assert strangers(blades(), counterpart) == []
 
