@@ -22,7 +22,7 @@ from flexmb.modal.strain_field import StrainField, gauss_weights, strain_field, 
 from flexmb.scene.bodies import IDENTITY, BeamBody, Quaternion
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.rest_curve import rest_sections
-from flexmb.scene.strains import STRAINS, points_of_piece, polynomials
+from flexmb.scene.strains import points_of_piece, polynomials
 from flexmb.typing import Index, Real
 
 # Relative to the largest: below it an eigenvalue of the modal masses is zero but for rounding.
