@@ -30,6 +30,7 @@ from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import BeamBody, Body, ModalBody
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import Scene
+from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, mass_per_length, stiffness_on_axis
 from flexmb.scene.strains import polynomials
 
 EXACT_REFERENCES = ((1, 4), (1, 6), (1, 8), (2, 6), (4, 6), (8, 6))
@@ -208,6 +209,6 @@ def _squares_of(body: BeamBody | ModalBody) -> tuple[float, ...]:
 
 def _beam_rate(beam: BeamBody) -> float:
     """sqrt(EI / (m L^4)) (rad/s) of the stiffest section."""
-    station = max(beam.stations, key=lambda s: max(s.EIy_Nm2, s.EIz_Nm2) / s.mass_per_length_kg_m)
-    stiff = max(station.EIy_Nm2, station.EIz_Nm2)
-    return float(np.sqrt(stiff / (station.mass_per_length_kg_m * beam.length_m**4)))
+    sections = ((stiffness_on_axis(each), mass_per_length(each)) for each in beam.stations)
+    stiffest = max(max(K[ABOUT_Y, ABOUT_Y], K[ABOUT_Z, ABOUT_Z]) / mass for K, mass in sections)
+    return float(np.sqrt(stiffest / beam.length_m**4))

@@ -6,9 +6,12 @@ the sections (`flexmb.levels.section_motion`), which must have been moved. Nothi
 
 from dataclasses import replace
 
+import numpy as np
+
 from flexmb.jit.kernel import helper
 from flexmb.levels import full
 from flexmb.levels.level import FidelityLevel, InertiaTables
+from flexmb.levels.masses import modal_masses
 from flexmb.levels.summed_point import add_point, clear_inertia
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import TurningPoints, modal_integrals
@@ -16,14 +19,15 @@ from flexmb.modal.integrals import TurningPoints, modal_integrals
 
 @helper
 def inertia_and_bias(c, w, k):
-    """The sum over all points of body k."""
+    """The sum over all points of body k, after modal masses that are zero unless a matrix was added to them."""
+    modal_masses(c, w, k)
     clear_inertia(c, w, k)
     for j in range(c.body[k].point_start, c.body[k].point_stop):
         add_point(c, w, k, j)
 
 
 def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
-    """Every point is summed; the tables have the inertia at rest."""
+    """Every point is summed, and there are no other modal masses; the tables have the rigid inertia at rest."""
     i = modal_integrals(model)
     m = i.mode_count
     at_rest = full.polynomial(i, model)
@@ -36,7 +40,7 @@ def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
         rotation=model.rotation,
         section=model.section,
     )
-    return replace(at_rest, mff=i.spatial_mass[:m, :m], mfr=i.spatial_mass[m:, :m], product=None, summed=summed)
+    return replace(at_rest, mff=np.zeros((m, m)), mfr=i.spatial_mass[m:, :m], product=None, summed=summed)
 
 
 LEVEL = FidelityLevel(

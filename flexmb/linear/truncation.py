@@ -20,10 +20,10 @@ from scipy.optimize import linear_sum_assignment
 from flexmb.linear.linear_model import Complex, LinearModel, modal_assurance
 from flexmb.linear.linearize import linearize
 from flexmb.modal.flexible import flexible_model
-from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
+from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody, StrainPolynomials
 from flexmb.scene.check.beams import available_modes, mode_count
 from flexmb.scene.check.exact_beams import MOST_POLYNOMIALS
-from flexmb.scene.schema import ModalState, Scene, StrainPolynomials
+from flexmb.scene.schema import ModalState, Scene
 from flexmb.scene.strains import polynomials
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
@@ -76,7 +76,8 @@ def truncation(
 
 
 def finer_scene(scene: Scene) -> Scene:
-    """The scene with twice the eigenmodes of every flexible beam, and the elements for them."""
+    """The scene with twice the eigenmodes of every flexible beam, and the elements for them; twice the polynomials of
+    beams of level exact."""
     finer = {body.name: _finer(body) for body in scene.bodies if _bends(body)}
     bodies = tuple(finer.get(body.name, body) for body in scene.bodies)
     states = tuple(_moved(state, scene, finer) for state in scene.modal_states)

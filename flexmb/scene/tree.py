@@ -107,6 +107,14 @@ def _on_beam(body: BeamBody, x: float, quaternion: Quaternion) -> NodeFrame:
     return NodeFrame((at[0], at[1], at[2]), (turn[0], turn[1], turn[2], turn[3]))
 
 
+def place_along(body: BeamBody, node: str) -> float:
+    """Where a node of a beam is, in m along its axis from the root; ValueError if there is no such node."""
+    places = {"origin": 0.0, "root": 0.0, "tip": body.length_m} | {n.name: n.x_m for n in body.nodes}
+    if node not in places:
+        raise ValueError(f'body "{body.name}" has no node "{node}"; its nodes are {", ".join(places)}')
+    return places[node]
+
+
 def node_frame(body: Body, node: str) -> NodeFrame:
     """Rest frame of `node` on `body`; ValueError, which lists the body's nodes, if there is no such node."""
     frames = rest_frames(body)

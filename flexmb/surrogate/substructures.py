@@ -20,6 +20,15 @@ from flexmb.modal import flexible_model
 from flexmb.scene.check.beams import twisting_points
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import BeamBody, BeamStation, Hinge, Level, Modes, Scene, StrainPolynomials, Weld
+from flexmb.scene.sections import (
+    INERTIA_KEYS,
+    SHEAR_KEYS,
+    STIFFNESS_KEYS,
+    inertia_on_axis,
+    is_plain,
+    matrix,
+    stiffness_on_axis,
+)
 from flexmb.scene.tree import nodes_along
 from flexmb.surrogate.chain import (
     NodePlace,
@@ -34,7 +43,7 @@ from flexmb.surrogate.chain import (
 CURVATURES = 3
 """Polynomials of each curvature of a piece of level "exact": as costly as the two under loads at the tip and one
 eigenmode, with errors of the sixth power of the length."""
-_SECTION_KEYS = tuple(key for key in BeamStation.__struct_fields__ if key != "x_m")
+_NUMBERS = (*STIFFNESS_KEYS, *SHEAR_KEYS, *INERTIA_KEYS, "curvature_1_m")
 
 
 def substructured(
@@ -168,10 +177,20 @@ def _between(stations: list[BeamStation], right: int, x: float) -> BeamStation:
     """The section at x between the stations `right` - 1 and `right`, constant beyond the outer ones."""
     a, b = stations[max(right - 1, 0)], stations[min(right, len(stations) - 1)]
     share = (x - a.x_m) / (b.x_m - a.x_m) if b.x_m > a.x_m else 0.0
+    if not (is_plain(a) and is_plain(b)):
+        return replace(a, x_m=x) if share == 0.0 else _mixed_matrices(a, b, share, x)
     values = {}
-    for key in _SECTION_KEYS:
+    for key in _NUMBERS:
         values[key] = _mixed(getattr(a, key), getattr(b, key), share)
     return replace(a, x_m=x, **values)
+
+
+def _mixed_matrices(a: BeamStation, b: BeamStation, share: float, x: float) -> BeamStation:
+    """The section at x between two, one of which at least is a matrix or off the axis: matrices about the axis."""
+    stiffness = (1.0 - share) * stiffness_on_axis(a) + share * stiffness_on_axis(b)
+    inertia = (1.0 - share) * inertia_on_axis(a) + share * inertia_on_axis(b)
+    curvature = _mixed(a.curvature_1_m, b.curvature_1_m, share)
+    return BeamStation(x_m=x, stiffness=matrix(stiffness), inertia=matrix(inertia), curvature_1_m=curvature)
 
 
 def _mixed(a: Any, b: Any, share: float) -> Any:

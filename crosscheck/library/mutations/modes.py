@@ -12,8 +12,9 @@ from crosscheck.library.mutations.edits import bodies, of_body, whole
 from crosscheck.library.mutations.mirror import along, mirrors, within
 from crosscheck.library.mutations.mutation import Mutation, SceneChange
 from crosscheck.library.mutations.resting import rests, twists_only
-from flexmb.scene.bodies import BeamBody, Body, ModalBody, ModalNode
+from flexmb.scene.bodies import BeamBody, BeamStation, Body, ModalBody, ModalNode
 from flexmb.scene.schema import Scene
+from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, matrix
 from flexmb.surrogate import modal_points
 
 ROUNDING = 1e-9  # of an eigenproblem and of sums over its modes
@@ -126,10 +127,16 @@ def _no_rotation(body: ModalBody) -> ModalBody:
 def _section(body: Body) -> Body:
     if not isinstance(body, BeamBody):
         raise CaseError(f'control "section_axes" changes beams, not "{body.name}"')
-    stations = tuple(
-        replace(each, EIy_Nm2=each.EIz_Nm2, EIz_Nm2=each.EIy_Nm2) for each in body.stations
-    )
-    return replace(body, stations=stations)
+    return replace(body, stations=tuple(map(_bent_across, body.stations)))
+
+
+def _bent_across(station: BeamStation) -> BeamStation:
+    """The station with EIy and EIz exchanged."""
+    if station.stiffness is None:
+        return replace(station, EIy_Nm2=station.EIz_Nm2, EIz_Nm2=station.EIy_Nm2)
+    exchanged = np.array(station.stiffness)
+    exchanged[ABOUT_Y, ABOUT_Y], exchanged[ABOUT_Z, ABOUT_Z] = exchanged[ABOUT_Z, ABOUT_Z], exchanged[ABOUT_Y, ABOUT_Y]
+    return replace(station, stiffness=matrix(exchanged))
 
 
 MUTATIONS = (

@@ -8,7 +8,7 @@ from flexmb.jain.derivatives.modes import mode_rows
 from flexmb.jain.derivatives.motion import move
 from flexmb.jain.derivatives.ports import clear_ports, move_ports
 from flexmb.jain.derivatives.rows import add_answer, inward
-from flexmb.jain.derivatives.solve import solve
+from flexmb.jain.derivatives.solve import solve, solve_with_inverse
 from flexmb.jain.derivatives.tables import BRANCHES
 from flexmb.jain.derivatives.work import differentiate_power
 from flexmb.jit.features import has
@@ -74,7 +74,10 @@ def accelerations(c, w, d):
     for place in range(nu):
         _clear(d.matrix[place], 2 * nu, 3 * nu)
         d.matrix[place, 2 * nu + place] = -1.0
-    solve(c, w, d, 3 * nu)
+    solve_with_inverse(c, w, d)
+    for i in range(nu):
+        for j in range(i):
+            d.matrix[i, 2 * nu + j] = d.matrix[j, 2 * nu + i]
 
 
 @kernel

@@ -1,0 +1,147 @@
+"""Makes the transposed equations of one part of a run, and reads the gradient by parameters from their tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from flexmb.entry.pulled import pull_workspace
+from flexmb.jain.derivatives.pull_tables import ARMATURE, DAMPING, REST, STIFFNESS
+from flexmb.jain.derivatives.tables import ports_in_use
+from flexmb.jit.bundle import broaden
+from flexmb.jit.direct import addresses
+from flexmb.jit.duals import DualType
+from flexmb.jit.lanes import LANES
+from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
+from flexmb.parameters.tables import DualConstants
+from flexmb.sensitivity.adjoint import transposed
+from flexmb.sensitivity.blocks import Blocks, DualTables, array_parts, dual_parts
+from flexmb.system.tree_system import System
+from flexmb.tables.arrays import Constants
+from flexmb.typing import Flags, Real
+
+_SPRING = {"stiffness": STIFFNESS, "damping": DAMPING, "rest": REST, "armature": ARMATURE}
+
+
+class Transposes:
+    """The transposed equations of one part of a run.
+
+    kernels: `transpose` and `unproject`; tables: theirs. blocks: the constants in dual numbers, whose first `count`
+    directions are those of parameters and of values at which coordinates are held.
+    """
+
+    def __init__(self, system: System, blocks: Blocks, count: int, of_power: bool) -> None:
+        """of_power: whether the scalar depends on the work at the end of the part."""
+        self._blocks, self._count, plant = blocks, count, blocks.system
+        c = plant.constants
+        by_recursion = not of_power and not np.any(c.body["outboard_port"] >= 0)
+        self._x = pull_workspace(c, plant.nq, plant.nu) if by_recursion else None
+        acts = [_acting(each, c if by_recursion else None) for each in blocks.duals[: -(-count // LANES)]]
+        self._chosen = np.flatnonzero(np.concatenate(acts)[:count]) if acts else np.zeros(0, int)
+        self._lanes = Blocks(plant, _gathered(blocks, self._chosen), len(self._chosen)) if len(self._chosen) else None
+        lanes = self._lanes_table(plant)
+        self.gradient = lanes.gradient
+        n = plant.nq + plant.nu + 1
+        self.unproject = transposed.unproject
+        self.tables: Any
+        if self._x is not None:
+            self.transpose: Any = transposed.pull_back
+            self.tables = transposed.ByRecursion(c, self._x, lanes)
+            return
+        route = system.route("articulated", 0.0)
+        assert route.linear is not None  # of every tree
+        self._linear = route.linear(*route.tables())
+        where = addresses(
+            self._linear.jacobian, STATUS, REAL, VECTOR, MATRIX, self._linear.exact, self._linear.tangent
+        )  # fmt: skip
+        self.transpose = transposed.transpose
+        self.tables = transposed.ByJacobian(np.array(where), np.zeros((n, n)), system.constants, lanes)
+
+    def _lanes_table(self, plant: System) -> transposed.Lanes:
+        if self._lanes is None:
+            nothing = np.zeros((0, plant.nq + plant.nu + 1, DualType.width))
+            return transposed.Lanes(np.zeros(2, np.int64), np.zeros(0, np.int64), nothing, nothing, np.zeros(0))
+        return transposed.Lanes(
+            np.array([self._lanes.motion, self._lanes.manifold]), np.array(self._lanes.where, np.int64),
+            self._lanes.state, self._lanes.slope, np.zeros(LANES * len(self._lanes)),
+        )  # fmt: skip
+
+    def by_parameters(self) -> Real:
+        """The gradient (count,) by the first directions that the steps passed so far have left."""
+        found = np.zeros(self._count)
+        found[self._chosen] = self.gradient[: len(self._chosen)]
+        if self._x is not None:
+            p, c = self._x.p, self._blocks.system.constants
+            for b, each in enumerate(self._blocks.duals[: -(-self._count // LANES)]):
+                own = _by_constants(p, c, each.constants)
+                count = min(LANES, self._count - LANES * b)
+                chosen = np.isin(np.arange(LANES * b, LANES * b + count), self._chosen)
+                found[LANES * b : LANES * b + count] += np.where(chosen, 0.0, own[:count])
+        return found
+
+
+def _by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
+    """(LANES,) by the parameters of a block, from the derivatives by the constants that `Pulled` has."""
+    found = np.einsum("ki,kil->l", p.rigid, duals.body["rigid"][..., 1:])
+    found = found + np.einsum("ki,kil->l", p.placement[:, :3], duals.body["placement_position"][..., 1:])
+    R = c.body["placement_rotation"].reshape(-1, 3, 3)
+    dR = duals.body["placement_rotation"][..., 1:].reshape(len(R), 3, 3, LANES)
+    turn = np.einsum("kijl,kmj->kiml", dR, R)  # of the axes against themselves: a skew matrix
+    turn = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
+    found = found + np.einsum("ki,kil->l", p.placement[:, 3:], turn)
+    for name, column in _SPRING.items():
+        found = found + p.spring[:, column] @ duals.speed[name][..., 1:]
+    return np.asarray(found + p.gravity @ duals.gravity[..., 1:])
+
+
+def _acting(duals: DualTables, c: Constants | None) -> Flags:
+    """(LANES,) which parameters of a block the motion depends on; but for those constants that `Pulled` has, if c is
+    given."""
+    known = dict[tuple[str, str | None], Flags | bool]()
+    if c is not None:
+        modes, on_ports = c.body["modes"] > 0, c.body["inboard_port"] >= 0
+        simple = not (np.any(c.body["ball_spring"]) or len(c.hinge_spring) or len(c.coordinate_law))
+        known = {("body", "rigid"): modes, ("gravity", None): False}
+        known |= {("body", f"placement_{name}"): on_ports for name in ("position", "rotation")}
+        known |= {("speed", "armature"): False, ("port", None): ports_in_use(c)}
+        known |= {("speed", name): False for name in ("stiffness", "damping", "rest")} if simple else {}
+    found = np.zeros(LANES, bool)
+    for table in (duals.constants, duals.closures):
+        for name, field, part in dual_parts(table) if table is not None else ():
+            rates = part[..., 1:] != 0.0
+            kept = known.get((name, field), known.get((name, None), True))
+            if kept is False:
+                continue
+            if kept is not True:
+                rates = rates[kept]
+            found |= np.any(rates.reshape(-1, LANES), axis=0)
+    return found
+
+
+def _gathered(blocks: Blocks, chosen: Sequence[int] | Any) -> list[DualTables]:
+    """Blocks of the chosen directions alone."""
+    found = []
+    for first in range(0, len(chosen), LANES):
+        own = chosen[first : first + LANES]
+        of_tree = DualConstants(**_lanes_of([each.constants for each in blocks.duals], own))
+        found.append(DualTables(of_tree, None))
+    broaden([each.constants for each in found])
+    return found
+
+
+def _lanes_of(tables: Sequence[Any], chosen: Sequence[int]) -> dict[str, Any]:
+    """The arrays of a table in duals with the lanes of the chosen directions."""
+    found = {}
+    for each in fields(tables[0]):
+        arrays = [getattr(table, each.name) for table in tables]
+        wide = arrays[0].copy()
+        sources = [[part for _, part in array_parts(array)] for array in arrays]
+        for i, (_, part) in enumerate(array_parts(wide)):
+            part[..., 1:] = 0.0
+            for lane, k in enumerate(chosen):
+                part[..., 1 + lane] = sources[k // LANES][i][..., 1 + k % LANES]
+        found[each.name] = wide
+    return found
