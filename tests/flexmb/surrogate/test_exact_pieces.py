@@ -105,7 +105,7 @@ def test_refusals() -> None:
         substructured(scene, None, 2, level="stiffened", polynomials=2)
     with pytest.raises(ValueError, match=r"curved at rest: its pieces need level \"exact\""):
         substructured(arc, None, 2, level="stiffened")
-    with pytest.raises(ValueError, match="curved at rest: use flexible pieces"):
+    with pytest.raises(ValueError, match="is curved: finite segments are for straight ones"):
         finite_segments(arc, None, 4)
-    with pytest.raises(ValueError, match="do not move as sums of modes"):
+    with pytest.raises(ValueError, match="do not move by modes"):
         modal_points(scene)
