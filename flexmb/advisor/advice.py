@@ -10,7 +10,7 @@ import numpy as np
 from flexmb.advisor.bench import Bench
 from flexmb.advisor.confirm import Confirmation, NoReference, Reference
 from flexmb.advisor.indicators import Indicators, indicators, of_level, predicted
-from flexmb.advisor.ladder import Cost, Step, cost, model_cost, references, rungs, step
+from flexmb.advisor.ladder import Cost, Step, cost, model_cost, references, rungs, softest, step
 from flexmb.advisor.methods import RunMethod
 from flexmb.advisor.modal_response import RigidRun, modal_response, rigid_run
 from flexmb.advisor.models import EXACT, LEVELS, BodyModel, Model, built, flexible_bodies, levels
@@ -24,7 +24,7 @@ from flexmb.tables import arguments
 
 BUDGET = 4e10
 """The search for cheaper models ends when its runs have taken this many operations (about 20 s)."""
-REFERENCE = 1e10
+REFERENCE = 4e10
 """A reference whose predicted cost exceeds this number of operations is not run."""
 FAR = 0.2
 """Deflection over length, predicted by linear modes, beyond which references are of level exact."""
@@ -155,8 +155,8 @@ class Prepared:
 
     def confirmation(self) -> Confirmation:
         """Run the references; returns what measures candidates against them. Raises NoReference."""
-        far = not self.known or any(each.deflection > FAR for each in self.known.values())
-        known = references(self.bench.scene, far)
+        far = frozenset(name for name, each in self.known.items() if each.deflection > FAR)
+        known = references(self.bench.scene, far if self.known else softest(self.bench.scene))
         return Confirmation(self.bench, self.tolerance, self.hidden, self.cost, REFERENCE, known)
 
 

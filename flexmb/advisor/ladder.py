@@ -35,6 +35,7 @@ from flexmb.scene.strains import polynomials
 
 EXACT_REFERENCES = ((1, 4), (1, 6), (1, 8), (2, 6), (4, 6), (8, 6))
 """Pieces, and polynomials of each curvature along one, of references for beams that bend far."""
+SOFT = 0.05  # of the largest compliance
 STEP_AT_HIGHEST = 3.4
 """Step of DOP853 times the highest frequency when that frequency limits the step (measured)."""
 STAGES = 12
@@ -112,17 +113,19 @@ def _strains(polynomials: int, pieces: int, stretching: bool, families: tuple[st
     )
 
 
-def references(scene: Scene, bends_far: bool = False) -> tuple[tuple[str, Model], ...]:
+def references(scene: Scene, bend_far: frozenset[str] = frozenset()) -> tuple[tuple[str, Model], ...]:
     """Models against which candidates are measured, from coarse to fine; successive ones show their uncertainty.
 
     First all bodies with the modes that the scene gives them, and four more if it has no attachment modes; then beams
-    in pieces, which converge to the geometrically exact beam. If one `bends_far`, beams are of level exact instead,
-    with more and more polynomials, then in pieces of six. A raw body has no other modes than its own. A beam that
-    starts bent cannot be divided; it gets four more modes, or two more polynomials, then as many again.
+    in pieces, which converge to the geometrically exact beam. If some of them `bend_far` (names), these are of level
+    exact instead, with more and more polynomials, then in pieces of six, and the others get more modes. A raw body has
+    no other modes than its own. A beam that starts bent cannot be divided; it gets four more modes, or two more
+    polynomials, then as many again.
     """
     bodies = flexible_bodies(scene)
     bent = {state.body for state in scene.modal_states}
-    splits = [b.name for b in bodies if isinstance(b, BeamBody) and b.name not in bent]
+    splits = {b.name for b in bodies if isinstance(b, BeamBody) and b.name not in bent}
+    far = splits & (bend_far | {b.name for b in bodies if isinstance(b, BeamBody) and is_curved(b)})
 
     def rung(body: BeamBody | ModalBody, more: int, pieces: int) -> BodyModel:
         if isinstance(body, ModalBody):
@@ -137,17 +140,30 @@ def references(scene: Scene, bends_far: bool = False) -> tuple[tuple[str, Model]
         return _strains(count, pieces, _stretches(body))
 
     def exact(body: BeamBody | ModalBody, count: int, pieces: int) -> BodyModel:
-        return strains(body, count, pieces) if isinstance(body, BeamBody) and body.name in splits else rung(body, 4, 0)
+        if isinstance(body, BeamBody) and body.name in far:
+            return strains(body, count, pieces)
+        return rung(body, count - 4 if pieces == 1 else count, 0)
 
-    if splits and (bends_far or any(isinstance(b, BeamBody) and is_curved(b) for b in bodies)):
+    if far:
         sizes = [(f"{p} pieces of {n}" if p > 1 else f"{n}", n, p) for p, n in EXACT_REFERENCES]
         return tuple((f"{size} polynomials", tuple((b.name, exact(b, n, p)) for b in bodies)) for size, n, p in sizes)
-
     first = tuple((b.name, rung(b, 0 if isinstance(b, BeamBody) and b.modes.static else 4, 0)) for b in bodies)
     finer = [(f"{n} pieces", tuple((b.name, rung(b, 4, n)) for b in bodies)) for n in (2, 4, 8, 16)]
     if not splits:
         finer = [("still more modes", tuple((b.name, rung(b, 8, 0)) for b in bodies))]
     return (("modes" if bodies else "the scene", first), *((name, model) for name, model in finer if model != first))
+
+
+def softest(scene: Scene) -> frozenset[str]:
+    """The beam that bends most under a force at its tip, and those that bend nearly as much: at least `SOFT` of it."""
+    bends = {b.name: _compliance(b) for b in flexible_bodies(scene) if isinstance(b, BeamBody)}
+    return frozenset(name for name, value in bends.items() if value >= SOFT * max(bends.values()))
+
+
+def _compliance(beam: BeamBody) -> float:
+    """L^3 / (3 EI) (m/N) in its weak plane, of the stiffest section."""
+    sections = [stiffness_on_axis(each) for each in beam.stations]
+    return beam.length_m**3 / (3.0 * float(max(min(K[ABOUT_Y, ABOUT_Y], K[ABOUT_Z, ABOUT_Z]) for K in sections)))
 
 
 def step(scene: Scene, name: str, rung: BodyModel, error: float) -> Step | None:
