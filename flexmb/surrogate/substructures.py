@@ -26,7 +26,7 @@ from flexmb.surrogate.chain import (
     stiffness_damping,
 )
 
-_SECTION_KEYS = tuple(key for key in BeamStation.__struct_fields__ if key != "x_m")
+_SECTION_KEYS = tuple(key for key in BeamStation.__struct_fields__ if key not in ("x_m", "curvature_1_m"))
 
 
 def substructured(
@@ -124,7 +124,9 @@ def _between(stations: list[BeamStation], right: int, x: float) -> BeamStation:
     for key in _SECTION_KEYS:
         at_a, at_b = getattr(a, key), getattr(b, key)
         values[key] = at_a if share == 0.0 or None in (at_a, at_b) else at_a + share * (at_b - at_a)
-    return replace(a, x_m=x, **values)
+    ends = zip(a.curvature_1_m, b.curvature_1_m, strict=True)
+    curvature = tuple((1.0 - share) * at_a + share * at_b for at_a, at_b in ends)
+    return replace(a, x_m=x, curvature_1_m=curvature, **values)
 
 
 def _welds(beam: BeamBody, count: int, root: int) -> list[Hinge]:
