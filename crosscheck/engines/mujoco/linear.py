@@ -75,10 +75,12 @@ class MujocoLinear:
             axes = self._axes(data.qacc)
             by_force = axes.by_force(inverse)[self._square]
             unit = rounding(by_force, nv)
-            noise = np.sqrt(nv) * (unit * norm(axes.udot[self._places]) + EPS * norm(axes.u))
+            parts = norm(axes.u) + norm(np.abs(by_force) @ self._weights()[self._places])
+            noise = np.sqrt(nv) * (unit * norm(axes.udot[self._places]) + EPS * parts)
             step = cache(self._step)
             by_q, apart = fourth_order(lambda eps: step(eps)[nv:, :nv], noise)
             by_v, asunder = fourth_order(lambda eps: step(eps)[nv:, nv:] - np.eye(nv), noise)
+        asunder += np.sqrt(nv) * EPS  # of the ones, which the derivatives by speeds are beside
         share = self._raised * LEAST_INERTIA * norm(by_force)
         errors = Errors(
             apart + asunder * axes.kept + share * (norm(by_q) + norm(axes.udot[self._places])),
@@ -88,6 +90,14 @@ class MujocoLinear:
         transport = swapped_transport(axes.u, self._turning, [slot.v for slot in self._flying])
         parts = (axes.by_displacement(by_q, by_v), axes.by_speed(by_v))
         return LinearMatrices(*(part[self._square] for part in parts), by_force, transport[self._square], errors)
+
+    def _weights(self) -> Real:
+        """(nv,) sums of the sizes of all bodies' weights along the speeds, which may cancel at rest."""
+        model, found, J = self._model, np.zeros(self._model.nv), np.empty((3, self._model.nv))
+        for body in range(1, model.nbody):
+            mujoco.mj_jacBodyCom(model, self._data, J, None, body)
+            found += model.body_mass[body] * norm(model.opt.gravity) * np.linalg.norm(J, axis=0)
+        return found
 
     def _step(self, eps: float) -> Real:
         """d [q; v] after a step by d [q; v] before it (2nv,2nv)."""
