@@ -10,13 +10,14 @@ from flexmb.integrate.control import ACCEPTED, COUNTS, REJECTED, SAMPLES, STOP
 from flexmb.integrate.problem import Accuracy, Clock, problem
 from flexmb.integrate.settings import Settings
 from flexmb.jit.direct import undispatched
+from flexmb.jit.lanes import LANES
 from flexmb.run.driver import Leg
 from flexmb.run.interruption import interruptible
 from flexmb.run.outputs import ending
 from flexmb.run.propagate import Integration
 from flexmb.run.switching import clock_of
 from flexmb.sensitivity import flow
-from flexmb.sensitivity.blocks import Blocks
+from flexmb.sensitivity.blocks import Blocks, set_lanes
 from flexmb.sensitivity.loops import Loops
 from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import OK, Status
@@ -79,9 +80,13 @@ class Variation:
 
     def take(self, at: Course) -> None:
         """Set the states of all blocks without evaluating them."""
-        z = self.joined(at)
-        for b in range(len(self.blocks)):
-            flow.take.py_func(z, b, self.flow)
+        n, own = self.flow.state.shape[1] - 1, self.flow.continuous
+        for b, (state, law) in enumerate(zip(self.flow.state, self.flow.law, strict=True)):
+            state[:n, 0], law[own, 0], state[n, 0] = at.y[:n], at.y[n:-1], at.y[-1]
+            set_lanes(state[:n], at.Y[:n], b)
+            set_lanes(state[n:], at.Y[-1:], b)
+            lanes = at.Y[n:-1, LANES * b : LANES * (b + 1)]
+            law[own, 1 : 1 + lanes.shape[1]] = lanes
 
     def energy_rates(self, t: float, at: Course) -> Real:
         """The derivatives (P,) of the energy at a state."""

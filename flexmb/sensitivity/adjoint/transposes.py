@@ -16,7 +16,6 @@ from flexmb.jit.direct import addresses
 from flexmb.jit.duals import DualType
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
-
 from flexmb.parameters.tables import DualConstants
 from flexmb.sensitivity.adjoint import transposed
 from flexmb.sensitivity.adjoint.sampling import Held
@@ -40,9 +39,8 @@ class Transposes:
         on the work at the end of the part."""
         self._blocks, self._count, plant = blocks, count, blocks.system
         c = plant.constants
-        by_recursion = not of_power and not np.any(c.body["outboard_port"] >= 0)
-        self._x = pull_workspace(c, plant.nq, plant.nu) if by_recursion else None
-        acts = [_acting(each, c, by_recursion, functions) for each in blocks.duals[: -(-count // LANES)]]
+        self._x = None if of_power else pull_workspace(c, plant.nq, plant.nu)
+        acts = [_acting(each, c, not of_power, functions) for each in blocks.duals[: -(-count // LANES)]]
         self._chosen = np.flatnonzero(np.concatenate(acts)[:count])
         self._driven = len(functions)
         lanes = len(self._chosen) + self._driven
@@ -87,14 +85,14 @@ class Transposes:
         if self._x is not None:
             p, c = self._x.p, self._blocks.system.constants
             for b, each in enumerate(self._blocks.duals[: -(-self._count // LANES)]):
-                own = _by_constants(p, c, each.constants)
+                own = by_constants(p, c, each.constants)
                 count = min(LANES, self._count - LANES * b)
                 chosen = np.isin(np.arange(LANES * b, LANES * b + count), self._chosen)
                 found[LANES * b : LANES * b + count] += np.where(chosen, 0.0, own[:count])
         return found
 
 
-def _by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
+def by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
     """(LANES,) by the parameters of a block, from the derivatives by the constants that `Pulled` has."""
     found = np.einsum("ki,kil->l", p.rigid, duals.body["rigid"][..., 1:])
     found = found + np.einsum("ki,kil->l", p.placement[:, :3], duals.body["placement_position"][..., 1:])

@@ -28,7 +28,6 @@ from flexmb.sensitivity.adjoint.part import Part, Places
 from flexmb.sensitivity.adjoint.sampling import Sampling
 from flexmb.sensitivity.adjoint.seeing import Seeing
 from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
-from flexmb.sensitivity.loops import Loops
 from flexmb.sensitivity.passage import Passage, is_mechanical
 from flexmb.sensitivity.scalars import Probe, ScalarTerm, TimeIntegral
 from flexmb.typing import Index, Real
