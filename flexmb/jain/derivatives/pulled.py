@@ -6,9 +6,9 @@ changes by
 
     s2 . G2 + s1 . G1 + s0 . G0 + W . (s0 x* F),    G2 = sum I W,  G1 = sum D'W,  G0 = sum E'W,  F = sum F
 
-over all bodies beyond, with W in the last term that of the source's hinge or port itself. The sums are those of one sweep
-inward, so that each source takes some fifty products; the rows and columns of `flexmb.jain.derivatives.rows` are the
-terms of these sums one by one.
+over all bodies beyond, with W in the last term that of the source's hinge or port itself. The sums are those of one
+sweep inward, so that each source takes some fifty products; the rows and columns of `flexmb.jain.derivatives.rows` are
+the terms of these sums one by one.
 """
 
 from flexmb.jain.derivatives.attached import attach, wheel_axis
@@ -238,7 +238,7 @@ def _ports(c, w, d, p, k):
 
 @helper
 def _frame(c, d, p, k):
-    """Columns of the modes of body k, which move its frame against the hinge point O, and with it all that it carries."""
+    """Columns of the modes of body k, which move its frame against the hinge point O, and all that it carries."""
     first, nu, nm, a, moved = d.places[k].modes, d.speed.shape[0], c.body[k].modes, p.body[k], d.frame_mode[k]
     F = vec6(d.body[k].force, 0)
     F_body = in_body_axes(mat3(d.body[k].rotation, 0), vec3(d.body[k].position, 0), F)

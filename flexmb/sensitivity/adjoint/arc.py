@@ -63,8 +63,8 @@ class Cost(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What is integrated. begin: prepares its tables for a run from their start, and returns the addresses of kernels and
-    tables as in `Recorded`. is_plain: whether it is the motion of the mechanics alone."""
+    """What is integrated. begin: prepares its tables for a run from their start, and returns the addresses of kernels
+    and tables as in `Recorded`. is_plain: whether it is the motion of the mechanics alone."""
 
     begin: Callable[[], Index]
     is_plain: bool

@@ -35,8 +35,8 @@ class Transposes:
 
     def __init__(self, blocks: Blocks, count: int, functions: Sequence[int], of_power: bool) -> None:
         """blocks: the constants in dual numbers, whose first `count` directions are those of parameters and of values
-        at which coordinates are held. functions (F,): those that controllers drive. of_power: whether the scalar depends
-        on the work at the end of the part."""
+        at which coordinates are held. functions (F,): those that controllers drive. of_power: whether the scalar
+        depends on the work done."""
         self._blocks, self._count, plant = blocks, count, blocks.system
         c = plant.constants
         self._x = None if of_power else pull_workspace(c, plant.nq, plant.nu)
@@ -107,7 +107,7 @@ def by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
 
 
 def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequence[int]) -> Flags:
-    """(LANES,) which parameters of a block the motion depends on; by recursion, but for the constants that `Pulled` has.
+    """(LANES,) which parameters of a block the motion depends on; by recursion, but for constants that `Pulled` has.
 
     What controllers drive has directions of its own.
     """
