@@ -27,8 +27,8 @@ def nested_constants(
     The partitions phiR_H, phiT_H, phiR_W vanish for hinges and wheels at nodes that do not deform. They have no entries
     in S, unless `null_partitions` keeps those for which the constants have ports.
 
-    Raises ValueError if a body is of level stiffened or exact, or if any defect is kept and the modes of a body are not clamped
-    at its origin.
+    Raises ValueError if a body is of level stiffened or exact, or if any defect is kept and the modes of a body are not
+    clamped at its origin.
     """
     parameters = [_parameters(link, errata) for link in chain]
     element, mode, pair, slopes = _elements(parameters, constants.mff.shape[2])

@@ -1,7 +1,7 @@
 """Level exact: a beam whose strains are sums of modes; its kinematics are exact at any rotation.
 
-The strain energy is 1/2 eta' K eta with constant K, and the kinetic energy the sum over inertia points that are fixed to
-the sections (`flexmb.levels.section_motion`), which must have been moved. Nothing is truncated.
+The strain energy is 1/2 eta' K eta with constant K, and the kinetic energy the sum over inertia points that are fixed
+to the sections (`flexmb.levels.section_motion`), which must have been moved. Nothing is truncated.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""A beam cut at some sections: the share of each inertia point beyond each cut, and the motion of the sections themselves.
+"""A beam cut at some sections: the share of each inertia point beyond each cut, and how the sections move.
 
 The quadrature of a beam of modes is split at the cuts, so that the interval of each inertia point lies on one side of
 every cut. A beam of level exact keeps its Gauss points, of which an inertia force per length is the polynomial through

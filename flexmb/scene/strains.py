@@ -12,7 +12,8 @@ STRAINS: tuple[Strain, ...] = ("axial", "shear_y", "shear_z", "torsion", "bendin
 """In the order of the rows [stretch, shears; twist, curvatures about y and z]."""
 CURVATURES: tuple[Strain, ...] = ("torsion", "bending_z", "bending_y")
 
-MORE_POINTS, FEWEST_POINTS = 3, 6  # Gauss points of a piece beyond its polynomials, and at least (docs/exact.md)
+# Gauss points of a piece beyond its polynomials, and at least (docs/notation.md, section 5)
+MORE_POINTS, FEWEST_POINTS = 3, 6
 
 
 def polynomials(body: BeamBody) -> dict[Strain, int]:

@@ -154,6 +154,13 @@ def _bent_across(station: BeamStation) -> BeamStation:
     return replace(station, stiffness=matrix(exchanged))
 
 
+@of_body
+def _on_the_axis(body: Body) -> Body:
+    if not isinstance(body, BeamBody) or not any(any(each.reference_point_m) for each in body.stations):
+        raise CaseError(f'control "section_point" changes beams with a reference point off the axis, not "{body.name}"')
+    return replace(body, stations=tuple(replace(each, reference_point_m=(0.0, 0.0)) for each in body.stations))
+
+
 MUTATIONS = (
     Mutation(
         "dropped_stiffening",
@@ -192,6 +199,13 @@ MUTATIONS = (
         "slopes left out: what is mounted on the body does not turn with its bending",
         bodies,
         _of_modes("mode_rotation", _no_rotation),
+    ),
+    Mutation(
+        "section_point",
+        "sections stated on the axis, not at their reference point",
+        "neutral axis and mass centre taken for the axis",
+        bodies,
+        _on_the_axis,
     ),
     Mutation("section_axes", "EIy and EIz exchanged", "bending about y taken for bending along y", bodies, _section),
 )

@@ -144,6 +144,7 @@ class Derivatives:
     order: Index  # (N,) bodies by their places
     stretch: Record  # STRETCH: bodies in `order` about one base point, each of which carries the next and no other
     fork: Index  # bodies at the ends of stretches that fork
+    carried: Real  # (N,28) in trees of rigid bodies on single axes: what branches answer where they meet
     passed: Real  # (N,6,block) their forces, then accelerations, of one block of columns
     moved: Real  # (N,6,6,6) of hinges that are no single axis: derivatives of H in outboard axes by displacement
     turned: Real  # (3,6,6) of one such hinge: of V_r and A_r by displacement, of A_r by speed, in columns
@@ -193,6 +194,7 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
         order=visited,
         stretch=stretch,
         fork=visited[stretch["stop"][stretch["forks"] != 0] - 1],
+        carried=np.zeros((len(c.body), 28)),
         passed=strip_zeros((len(c.body), 6, BLOCK * LANES)),
         moved=np.zeros((len(c.body) if np.any(c.body["axis"] < 0) else 1, 6, 6, 6)),
         turned=np.zeros((3, 6, 6)),

@@ -18,10 +18,11 @@ from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
 from flexmb.parameters.tables import DualConstants
 from flexmb.sensitivity.adjoint import transposed
+from flexmb.sensitivity.adjoint.sampling import Held
 from flexmb.sensitivity.blocks import Blocks, DualTables, array_parts, dual_parts
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
-from flexmb.typing import Flags, Real
+from flexmb.typing import Flags, Index, Real
 
 _SPRING = {"stiffness": STIFFNESS, "damping": DAMPING, "rest": REST, "armature": ARMATURE}
 
@@ -29,36 +30,38 @@ _SPRING = {"stiffness": STIFFNESS, "damping": DAMPING, "rest": REST, "armature":
 class Transposes:
     """The transposed equations of one part of a run.
 
-    kernels: `transpose` and `unproject`; tables: theirs. blocks: the constants in dual numbers, whose first `count`
-    directions are those of parameters and of values at which coordinates are held.
+    transpose, unproject: kernels; tables: theirs; held: what controllers drive.
     """
 
-    def __init__(self, system: System, blocks: Blocks, count: int, of_power: bool) -> None:
-        """of_power: whether the scalar depends on the work at the end of the part."""
+    def __init__(self, blocks: Blocks, count: int, functions: Sequence[int], of_power: bool) -> None:
+        """blocks: the constants in dual numbers, whose first `count` directions are those of parameters and of values
+        at which coordinates are held. functions (F,): those that controllers drive. of_power: whether the scalar depends
+        on the work at the end of the part."""
         self._blocks, self._count, plant = blocks, count, blocks.system
         c = plant.constants
         by_recursion = not of_power and not np.any(c.body["outboard_port"] >= 0)
         self._x = pull_workspace(c, plant.nq, plant.nu) if by_recursion else None
-        acts = [_acting(each, c if by_recursion else None) for each in blocks.duals[: -(-count // LANES)]]
-        self._chosen = np.flatnonzero(np.concatenate(acts)[:count]) if acts else np.zeros(0, int)
-        self._lanes = Blocks(plant, _gathered(blocks, self._chosen), len(self._chosen)) if len(self._chosen) else None
-        lanes = self._lanes_table(plant)
-        self.gradient = lanes.gradient
-        n = plant.nq + plant.nu + 1
-        self.unproject = transposed.unproject
-        self.tables: Any
+        acts = [_acting(each, c, by_recursion, functions) for each in blocks.duals[: -(-count // LANES)]]
+        self._chosen = np.flatnonzero(np.concatenate(acts)[:count])
+        self._driven = len(functions)
+        lanes = len(self._chosen) + self._driven
+        self._lanes = Blocks(plant, _gathered(blocks, self._chosen, functions), lanes) if lanes else None
+        table = self._lanes_table(plant)
+        self._gradient = table.gradient
+        self.unproject, self.transpose = transposed.unproject, transposed.pull_back
+        of_lanes = [] if self._lanes is None else [each.constants for each in self._lanes.duals]
         if self._x is not None:
-            self.transpose: Any = transposed.pull_back
-            self.tables = transposed.ByRecursion(c, self._x, lanes)
+            self.tables: Any = transposed.ByRecursion(c, self._x, table)
+            self.held = Held(np.array(functions, np.int64), [c, *of_lanes])
             return
-        route = system.route("articulated", 0.0)
+        route = plant.route("articulated", 0.0)
         assert route.linear is not None  # of every tree
         self._linear = route.linear(*route.tables())
-        where = addresses(
-            self._linear.jacobian, STATUS, REAL, VECTOR, MATRIX, self._linear.exact, self._linear.tangent
-        )  # fmt: skip
+        exact, n = self._linear.exact, plant.nq + plant.nu + 1
+        where = addresses(self._linear.jacobian, STATUS, REAL, VECTOR, MATRIX, exact, self._linear.tangent)
         self.transpose = transposed.transpose
-        self.tables = transposed.ByJacobian(np.array(where), np.zeros((n, n)), system.constants, lanes)
+        self.tables = transposed.ByJacobian(np.array(where), np.zeros((n, n)), c, table)
+        self.held = Held(np.array(functions, np.int64), [exact, *of_lanes])
 
     def _lanes_table(self, plant: System) -> transposed.Lanes:
         if self._lanes is None:
@@ -69,10 +72,17 @@ class Transposes:
             self._lanes.state, self._lanes.slope, np.zeros(LANES * len(self._lanes)),
         )  # fmt: skip
 
+    def by_driven(self) -> Real:
+        """(F,) by what controllers drive, since the last call."""
+        place = slice(len(self._chosen), len(self._chosen) + self._driven)
+        found = self._gradient[place].copy()
+        self._gradient[place] = 0.0
+        return found
+
     def by_parameters(self) -> Real:
         """The gradient (count,) by the first directions that the steps passed so far have left."""
         found = np.zeros(self._count)
-        found[self._chosen] = self.gradient[: len(self._chosen)]
+        found[self._chosen] = self._gradient[: len(self._chosen)]
         if self._x is not None:
             p, c = self._x.p, self._blocks.system.constants
             for b, each in enumerate(self._blocks.duals[: -(-self._count // LANES)]):
@@ -97,14 +107,17 @@ def _by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
     return np.asarray(found + p.gravity @ duals.gravity[..., 1:])
 
 
-def _acting(duals: DualTables, c: Constants | None) -> Flags:
-    """(LANES,) which parameters of a block the motion depends on; but for those constants that `Pulled` has, if c is
-    given."""
+def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequence[int]) -> Flags:
+    """(LANES,) which parameters of a block the motion depends on; by recursion, but for the constants that `Pulled` has.
+
+    What controllers drive has directions of its own.
+    """
     known = dict[tuple[str, str | None], Flags | bool]()
-    if c is not None:
+    known["function", "data"] = ~np.isin(np.arange(len(c.function)), driven)
+    if by_recursion:
         modes, on_ports = c.body["modes"] > 0, c.body["inboard_port"] >= 0
         simple = not (np.any(c.body["ball_spring"]) or len(c.hinge_spring) or len(c.coordinate_law))
-        known = {("body", "rigid"): modes, ("gravity", None): False}
+        known |= {("body", "rigid"): modes, ("gravity", None): False}
         known |= {("body", f"placement_{name}"): on_ports for name in ("position", "rotation")}
         known |= {("speed", "armature"): False, ("port", None): ports_in_use(c)}
         known |= {("speed", name): False for name in ("stiffness", "damping", "rest")} if simple else {}
@@ -121,18 +134,22 @@ def _acting(duals: DualTables, c: Constants | None) -> Flags:
     return found
 
 
-def _gathered(blocks: Blocks, chosen: Sequence[int] | Any) -> list[DualTables]:
-    """Blocks of the chosen directions alone."""
-    found = []
-    for first in range(0, len(chosen), LANES):
-        own = chosen[first : first + LANES]
-        of_tree = DualConstants(**_lanes_of([each.constants for each in blocks.duals], own))
-        found.append(DualTables(of_tree, None))
+def _gathered(blocks: Blocks, chosen: Index, functions: Sequence[int]) -> list[DualTables]:
+    """Blocks of the chosen directions, then of the values of functions of time."""
+    found, sources = list[DualTables](), [each.constants for each in blocks.duals]
+    count = len(chosen) + len(functions)
+    for first in range(0, count, LANES):
+        arrays = _lanes_of(sources, chosen[first : first + LANES])
+        arrays["function"]["data"][functions, 0, 1:] = 0.0
+        for lane in range(min(LANES, count - first)):
+            if first + lane >= len(chosen):
+                arrays["function"]["data"][functions[first + lane - len(chosen)], 0, 1 + lane] = 1.0
+        found.append(DualTables(DualConstants(**arrays), None))
     broaden([each.constants for each in found])
     return found
 
 
-def _lanes_of(tables: Sequence[Any], chosen: Sequence[int]) -> dict[str, Any]:
+def _lanes_of(tables: Sequence[Any], chosen: Index) -> dict[str, Any]:
     """The arrays of a table in duals with the lanes of the chosen directions."""
     found = {}
     for each in fields(tables[0]):

@@ -1,12 +1,9 @@
-"""A whole run backwards: its smooth parts, and between them what events do, transposed.
+"""A whole run backwards: its smooth parts, and between them what events and sampled controllers do, transposed.
 
-The gradient that is carried backwards belongs to an extended state: [y; the values at which events hold coordinates],
-and what it leaves at each part belongs to the parameters. Directions are in the order
-
-    parameters, first those on which the tables of the mechanics may depend    held coordinates    entries of y
-
-Events, and channels at the instants of the scalar, are differentiated along all of these by the dual numbers of
-`flexmb.sensitivity.passage`: they are few, beside the steps.
+The gradient that is carried backwards belongs to an extended state: the values at which events hold coordinates, y, and
+the signals and states of sampled controllers. What is left on the way belongs to the parameters. Directions are in the
+order of `Places`. Events, instants of controllers, and channels at the instants of the scalar are differentiated along
+all of them by the dual numbers of `flexmb.sensitivity.passage`: they are few, beside the stages of steps.
 """
 
 from __future__ import annotations
@@ -16,43 +13,30 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.problem import Clock
+from flexmb.control import loop
+from flexmb.integrate.control import ACCEPTED
 from flexmb.integrate.settings import Settings
+from flexmb.jit.direct import addresses
+from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID
 from flexmb.parameters.numbers import Number
 from flexmb.run.driver import Leg
-from flexmb.run.propagate import integration
+from flexmb.run.propagate import Integration, integration
 from flexmb.scene.events import Latch
 from flexmb.scene.schema import Scene
-from flexmb.sensitivity.adjoint.arc import Arc, Cost
+from flexmb.sensitivity.adjoint.arc import Arc, Cost, Motion, Plain
+from flexmb.sensitivity.adjoint.part import Part, Places
+from flexmb.sensitivity.adjoint.sampling import Sampling
 from flexmb.sensitivity.adjoint.seeing import Seeing
-from flexmb.sensitivity.adjoint.transposes import Transposes
 from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
+from flexmb.sensitivity.loops import Loops
 from flexmb.sensitivity.passage import Passage, is_mechanical
 from flexmb.sensitivity.scalars import Probe, ScalarTerm, TimeIntegral
-from flexmb.typing import Real
-
-
-class Part(NamedTuple):
-    """One part of a run, passed forwards.
-
-    arc: its steps, None where it has no duration. added: gradients (D,) of the scalar by all directions, by instant (s).
-    start (n,D): how the state at its start (s) changes along the directions of the part before; held: likewise values
-    at which coordinates are held; moved (D,): how the scalar changes with the instant between both.
-    """
-
-    variation: Variation
-    arc: Arc | None
-    added: dict[float, Real]
-    begin: float
-    start: Real
-    held: dict[str, Real]
-    moved: Real
+from flexmb.typing import Index, Real
 
 
 class Left(NamedTuple):
-    """What is known at the end of a part: its view of the channels, how its end moves (D,), and the integrands there."""
+    """What is known at the end of a part: how its end moves (D,), and the integrands there."""
 
-    seeing: Seeing
     dt: Real
     integrands: list[float]
 
@@ -67,89 +51,99 @@ class Adjoint:
         self._order = np.argsort([not is_mechanical(scene, each) for each in found], kind="stable")
         self._numbers, self._terms = [found[k] for k in self._order], terms
         self._scene, self._settings = scene, settings
-        latches = [action for event in scene.events for action in event.actions if isinstance(action, Latch)]
-        self._slots = list(dict.fromkeys(each.coordinate for each in latches))
-        self._parameters = len(found)
-        self._lanes = len(found) + len(self._slots)
         self.value = 0.0
         self.cost = Cost(0, 0, 0, 0)
 
     def __call__(self, course: Sequence[Leg]) -> Real:
         """The gradient (P,)."""
-        return self._backwards(self._forwards(course))[np.argsort(self._order)]
+        latches = [action for event in self._scene.events for action in event.actions if isinstance(action, Latch)]
+        with integration(course[0].system, "articulated", 0.0, self._settings.integrator) as solve:
+            y, _ = self._begun(solve, course[0])
+            made = None if solve.feedback is None else solve.feedback.running
+            memory = 0 if made is None else len(made.signal) + len(made.state)
+        self._places = Places(
+            len(self._numbers), tuple(dict.fromkeys(each.coordinate for each in latches)), len(y), memory
+        )
+        gradient, rows = np.zeros(self._places.size), dict[int, Real]()
+        for part in reversed(self._forwards(course)):
+            gradient = part.passed(gradient, rows)
+            if part.arc is not None:
+                self.cost = self.cost.plus(part.arc.cost)
+        return gradient[: len(self._numbers)][np.argsort(self._order)]
 
     def _forwards(self, course: Sequence[Leg]) -> list[Part]:
-        """Record all parts, with what the scalar adds in them and what events do."""
-        n, begin, t_end = len(course[0].begin.y), course[0].begin.state.t, course[-1].raw.t
-        along = np.zeros((n, self._lanes + n))
-        along[:, self._lanes :] = np.eye(n)
-        numbers = [*self._numbers, *[None] * (along.shape[1] - self._parameters)]
-        passage = Passage(self._scene, numbers, np.ones(along.shape[1]), self._settings, t_end - begin)
-        probes, names = self._probes(course, t_end), [name for term in self._terms for name in term.channels]
-        found, left = list[Part](), None
+        """Record all parts, with what the scalar adds in them, and what events and controllers do."""
+        places, t_end = self._places, course[-1].raw.t
+        numbers = [*self._numbers, *[None] * (places.size - len(self._numbers))]
+        length = t_end - course[0].begin.state.t
+        passage = Passage(self._scene, numbers, np.ones(places.size), self._settings, length)
+        probes = self._probes(course, t_end)
+        found, left, loops = list[Part](), None, None
         for i, leg in enumerate(course):
             held = {} if passage.after is None else passage.after.held
             if passage.after is not None:
-                passage.after = passage.after._replace(held={name: self._unit(name, along.shape[1]) for name in held})
-            variation = Variation(leg, passage.blocks(leg), None)
-            start, stop, is_last = leg.begin.state.t, leg.raw.t, i + 1 == len(course)
-            y, clock = self._begun(leg)
-            at = passage.begun(variation, y)
-            own = {t: each for t, each in probes.items() if start <= t and (t < stop or is_last)}
-            arc = self._recorded(leg, y, clock, sorted({start, *own, stop}))
-            seeing = Seeing(variation, along, names)
-            moved = np.zeros(along.shape[1]) if left is None else self._across(left, seeing, start, y)
-            times = sorted(own)
-            states = [y] * len(times) if arc is None else arc.states_at(times)
-            added = {t: self._added(seeing, t, state, own[t]) for t, state in zip(times, states, strict=True)}
-            found.append(Part(variation, arc, added, start, at.Y, held, moved))
-            after = passage.ended(variation, Course(leg.raw.y, along))
-            left = Left(seeing, after.dt, self._integrands(seeing, stop, leg.raw.y)) if np.any(after.dt) else None
+                passage.after = passage.after._replace(held={name: places.held(name) for name in held})
+            blocks, start, stop, is_last = passage.blocks(leg), leg.begin.state.t, leg.raw.t, i + 1 == len(course)
+            with integration(leg.system, "articulated", 0.0, self._settings.integrator) as solve:
+                y, clock = self._begun(solve, leg)
+                loops = passage.loops(solve, loops, is_last and bool(i) and start == stop)
+                variation = Variation(leg, blocks, loops)
+                sampling = None if loops is None else Sampling(variation, loops, places.memory, places.size)
+                at = passage.begun(variation, y)
+                own = {t: each for t, each in probes.items() if start <= t and (t < stop or is_last)}
+                due = [] if sampling is None else sampling.times(start, stop, is_last)
+                ends = sorted({start, *own, *due, stop})
+                plain = Plain(blocks.system)
+                arc = None
+                if stop > start:
+                    motion = Motion(plain.addresses, True) if loops is None else self._controlled(solve, leg)
+                    steps = int(leg.raw.counts[ACCEPTED])
+                    arc = Arc(plain, motion, (y, clock), ends, self._settings, steps)
+                part = Part(places, blocks, arc, start, at.Y, held)
+                states = [y] * len(ends) if arc is None else arc.states_at(ends)
+                seeing = Seeing(variation, places.along, self._names, solve.feedback)
+                self._see(part, seeing, sampling, own, due, dict(zip(ends, states, strict=True)))
+                if left is not None:
+                    jumps = np.subtract(left.integrands, self._integrands(seeing, start, y))
+                    part.moved = np.asarray(np.sum(jumps) * left.dt)
+                found.append(part)
+                after = passage.ended(variation, Course(leg.raw.y, places.along))
+                moves = bool(np.any(after.dt))
+                left = Left(after.dt, self._integrands(seeing, stop, leg.raw.y)) if moves else None
         return found
 
-    def _backwards(self, parts: Sequence[Part]) -> Real:
-        """The gradient (P,), from the last part to the first."""
-        D = parts[0].start.shape[1]
-        gradient = np.zeros(D)
-        for part in reversed(parts):
-            if part.arc is not None:
-                variation, added = part.variation, [gradient, *part.added.values()]
-                of_power = any(each[-1] != 0.0 for each in added)
-                own = Transposes(variation.leg.system, variation.blocks, self._lanes, of_power)
+    def _see(
+        self, part: Part, seeing: Seeing, sampling: Sampling | None, probes: dict[float, list[Probe]],
+        due: Sequence[float], states: dict[float, Real],
+    ) -> None:  # fmt: skip
+        """The instants of controllers and of the scalar in a part of the run, in order of time."""
+        if sampling is not None and part.begin not in due:
+            part.instants[part.begin] = sampling.held(part.begin)
+        for t in sorted({*probes, *due}):
+            if sampling is not None and t in due:
+                part.instants[t] = sampling.acted(t, Course(states[t], self._places.along))
+            if t in probes:
+                part.added[t] = self._added(seeing, t, states[t], probes[t])
 
-                def at(t: float, part: Part = part) -> Real | None:
-                    return part.added.get(t)
-
-                state, rest = part.arc.backwards(gradient[self._lanes :], own, at)
-                self.cost = self.cost.plus(part.arc.cost)
-                gradient[: self._lanes] += rest[: self._lanes] + own.by_parameters()
-                gradient[self._lanes :] = state
-            gradient += part.added.get(part.begin, 0.0)
-            gradient = self._through(part, gradient)
-        return gradient[: self._parameters]
-
-    def _through(self, part: Part, gradient: Real) -> Real:
-        """The gradient (D,) before the events at the start of a part, from that after them."""
-        before = part.start.T @ gradient[self._lanes :] + part.moved
-        before[: self._parameters] += gradient[: self._parameters]
-        for name, rates in part.held.items():
-            before += gradient[self._parameters + self._slots.index(name)] * rates
-        return np.asarray(before)
-
-    def _unit(self, name: str, directions: int) -> Real:
-        found = np.zeros(directions)
-        found[self._parameters + self._slots.index(name)] = 1.0
-        return found
-
-    def _begun(self, leg: Leg) -> tuple[Real, Clock]:
+    def _begun(self, solve: Integration, leg: Leg) -> tuple[Real, object]:
         start = leg.begin.state.t
-        with integration(leg.system, "articulated", 0.0, self._settings.integrator) as solve:
-            return clock_of_leg(solve, leg, np.array([start, max(leg.raw.t, start)]), self._settings)
+        return clock_of_leg(solve, leg, np.array([start, max(leg.raw.t, start)]), self._settings)
 
-    def _recorded(self, leg: Leg, y: Real, clock: Clock, ends: Sequence[float]) -> Arc | None:
-        if not leg.raw.t > leg.begin.state.t:
-            return None
-        return Arc(leg.system, y, clock, ends, self._settings)
+    def _controlled(self, solve: Integration, leg: Leg) -> Motion:
+        """The motion with its controllers."""
+
+        def begin() -> Index:
+            self._begun(solve, leg)
+            assert solve.feedback is not None
+            rhs, made, _ = solve.feedback.motion
+            moving = addresses(rhs, STATUS, REAL, VECTOR, VECTOR, made, made)
+            return np.array([moving[0], addresses(loop.project, VOID, REAL, VECTOR, made)[0], *moving[1:]])
+
+        return Motion(begin, False)
+
+    @property
+    def _names(self) -> list[str]:
+        return [name for term in self._terms for name in term.channels]
 
     def _probes(self, course: Sequence[Leg], t_end: float) -> dict[float, list[Probe]]:
         """The instants of all terms, by time."""
@@ -162,7 +156,7 @@ class Adjoint:
     def _added(self, seeing: Seeing, t: float, y: Real, probes: Sequence[Probe]) -> Real:
         """The gradient (D,) that the scalar adds at one instant; its value there is added to `value`."""
         values, rates = seeing.at(t, y)
-        total = np.zeros(rates[probes[0].channel].shape)
+        total = np.zeros(self._places.size)
         for each in probes:
             self.value += each.value(values[each.channel])
             total += each.slope(values[each.channel]) * rates[each.channel]
@@ -173,8 +167,3 @@ class Adjoint:
         integrals = [term for term in self._terms if isinstance(term, TimeIntegral)]
         values = seeing.at(t, y)[0] if integrals else {}
         return [term.at(t).value(values[term.channel]) for term in integrals]
-
-    def _across(self, left: Left, seeing: Seeing, t: float, y: Real) -> Real:
-        """How integrals change with the instant at which one part ends and the next begins, (D,)."""
-        jumps = np.subtract(left.integrands, self._integrands(seeing, t, y))
-        return np.asarray(np.sum(jumps) * left.dt)
