@@ -87,8 +87,8 @@ def _refusals(scene: Scene) -> Iterator[str]:
             yield f'load "{load.name}" acts out of the plane'
     if scene.modal_states:
         yield "initial modal coordinates have no meaning here"
-    if any(scene.gravity_m_s2):
-        yield "it takes no gravity"
+    if scene.gravity_m_s2[2]:
+        yield "gravity pulls out of the plane"
     yield from _mode_refusals(beam)
     if beam.theory == "timoshenko" and any(station.GAy_N is None for station in beam.stations):
         yield "a shear-flexible beam needs GAy_N at every station"
