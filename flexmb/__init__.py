@@ -19,6 +19,7 @@ _HOME = {
     "flexmb.closure.closures": "ClosureError",
     "flexmb.control.user": "user_function",
     "flexmb.linear.campbell": "Campbell campbell",
+    "flexmb.linear.controlled_motion": "ControlledDerivatives ControlledMotion",
     "flexmb.linear.equilibrium": "equilibrium",
     "flexmb.linear.linear_model": "LinearModel",
     "flexmb.linear.linearize": "linearize",
@@ -65,6 +66,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.control.user import user_function as user_function
     from flexmb.linear.campbell import Campbell as Campbell
     from flexmb.linear.campbell import campbell as campbell
+    from flexmb.linear.controlled_motion import ControlledDerivatives as ControlledDerivatives
+    from flexmb.linear.controlled_motion import ControlledMotion as ControlledMotion
     from flexmb.linear.equilibrium import equilibrium as equilibrium
     from flexmb.linear.linear_model import LinearModel as LinearModel
     from flexmb.linear.linearize import linearize as linearize

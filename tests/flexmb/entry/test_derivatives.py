@@ -23,7 +23,7 @@ T = 0.3  # s: no function of the trees is at rest there
 RECIPES = {
     "armed rigid": trees.ARMED_RIGID, "full": trees.FULL, "ruthless": trees.RUTHLESS, "linear": trees.LINEAR,
     "stiffened": trees.STIFFENED, "armed": trees.ARMED, "mixed": trees.MIXED, "flying": trees.FREE_FLYING,
-    "later kinds": trees.LATER, "every level": trees.EVERY_LEVEL,
+    "later kinds": trees.LATER, "every level": trees.EVERY_LEVEL, "exact": trees.EXACT,
 }  # fmt: skip
 
 
