@@ -35,6 +35,8 @@ _FEW_EVALUATIONS = 1000
 
 
 EXPLICIT, IMPLICIT = "dop853", "radau5"
+CHEAP = 1e9
+"""Explicit runs that are predicted to take fewer operations are not compared with implicit ones."""
 OVERCOUNTED = 4.0
 """Runs of Radau 5 may have so many times the budget, because their Jacobians are counted column by column, as they are
 not computed."""
@@ -88,8 +90,10 @@ class Confirmation:
         """DOP853, or Radau 5 for strains if it takes fewer operations than the highest frequency demands of DOP853."""
         if model not in self._integrators:
             chosen = EXPLICIT
-            if any(rung.kind == "strains" for _, rung in model) and not isinstance(self.bench.system(model), str):
-                most = min(model_cost(self.bench.scene, model, self.cost), OVERCOUNTED * self.budget)
+            expected = model_cost(self.bench.scene, model, self.cost)
+            strains = any(rung.kind == "strains" for _, rung in model)
+            if strains and expected > CHEAP and not isinstance(self.bench.system(model), str):
+                most = min(expected, OVERCOUNTED * self.budget)
                 done = self.bench.run(model, self._method(model, IMPLICIT, LOOSEST), most)
                 chosen = IMPLICIT if done.finished and done.operations < most else EXPLICIT
             self._integrators[model] = chosen
