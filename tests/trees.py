@@ -14,6 +14,7 @@ import numpy as np
 from numpy.random import Generator
 from scipy.spatial.transform import Rotation
 
+from flexmb.modal.flexible import flexible_model
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, angular, linear
 from flexmb.scene.check import check_scene
@@ -65,10 +66,15 @@ class Recipe:
 
 
 RIGID = Recipe(carriers=("rigid",))
+SINGLE = Recipe(bodies=60, carriers=("rigid",), hinges=("revolute", "prismatic", "revolute"), conservative=True,
+                prescribed=False, wheels=0, point_masses=0, armatures=True)  # fmt: skip
+"""Rigid bodies on single axes alone, in branches longer than a base point serves."""
 FULL = Recipe()
 RUTHLESS = Recipe(levels=("ruthless",))
 LINEAR = Recipe(levels=("linear",))
 STIFFENED = Recipe(levels=("stiffened", "full", "stiffened"))
+EXACT = Recipe(carriers=("beam", "modal", "beam", "rigid", "beam"), levels=("exact",))
+"""Beams whose strains are polynomials, each kind of `_strains` in turn; modal bodies are of level full."""
 MIXED = Recipe(levels=("full", "ruthless", "rigid"))
 EVERY_LEVEL = Recipe(levels=("linear", "full", "linear", "ruthless", "rigid"))
 ARMED = replace(EVERY_LEVEL, armatures=True, hinges=(*KINDS, *LATER_KINDS))
@@ -90,6 +96,8 @@ def random_scene(seed: int, recipe: Recipe = FULL) -> s.Scene:
     for k in range(recipe.bodies):
         carrier = carriers[k % len(carriers)]
         level = recipe.levels[k % len(recipe.levels)]
+        if level == "exact" and carrier != "beam":  # strains belong to beams
+            level = "full"
         nodes.append(_body(scene, rng, f"b{k}", carrier, level, recipe))
         parent = int(rng.integers(-1 if recipe.grounded else 0, k)) if k > 1 and recipe.branching else k - 1
         kind = "free" if k == 0 and not recipe.grounded else kinds[k % len(kinds)]
@@ -156,6 +164,9 @@ def _body(
         corner = s.Node(name="corner", position_m=tuple(vector(rng, 0.5)), quaternion=tuple(quaternion(rng)))
         scene.rigid_body(name, mass=mass, com=vector(rng, 0.2), inertia=inertia(rng, mass, 0.6), nodes=[corner])
         return ["origin", "corner"]
+    if carrier == "beam" and level == "exact":
+        _exact_beam(scene, rng, name, recipe)
+        return ["root", "tip", "middle"]
     if carrier in ("beam", "blade"):
         modes = _beam(scene, rng, name, level, recipe, coupled=carrier == "blade")
         nodes = ["root", "tip", "middle"]
@@ -191,6 +202,52 @@ def _beam(
         points=str(rng.choice(recipe.beam_points)), theory=theory,
     )  # fmt: skip
     return 4
+
+
+def _exact_beam(scene: SceneBuilder, rng: Generator, name: str, recipe: Recipe) -> None:
+    """A beam of level exact, with a tip mass and a lump along it, bent by some 4 recipe.deformation radians."""
+    length, (modes, curvature, theory) = rng.uniform(0.8, 1.5), _strains(int(name.removeprefix("b")))
+    shear = {"GAy_N": 4e4, "GAz_N": 3e4}
+    root, tip = (
+        msgspec.structs.replace(
+            beam_section(E=2e9, G=8e8, A=A, Iy=Iy, Iz=Iz, rho=1500.0, x=x), EA_N=5e4, rotary_y_kg_m=rotary,
+            rotary_z_kg_m=0.8 * rotary, curvature_1_m=tuple(share * np.array(curvature)), **shear,
+        )
+        for A, Iy, Iz, x, rotary, share in (
+            (9e-4, 8e-8, 5e-8, 0.0, 2e-3, 1.0), (6e-4, 5e-8, 3e-8, length, 1e-3, 0.6),
+        )
+    )  # fmt: skip
+    lumps = [
+        s.TipMass(x_m=x, mass_kg=0.2, com_m=tuple(vector(rng, 0.05)), inertia_kg_m2=matrix(inertia(rng, 0.2, 0.1)))
+        for x in (length, 0.4 * length)
+    ]
+    middle = s.BeamNode(name="middle", x_m=0.55 * length, quaternion=tuple(quaternion(rng)))
+    damping = {} if recipe.conservative else {"damping_ratio": 0.01, "viscosity_s": 1e-3}
+    beam: dict[str, Any] = {
+        "length": length, "elements": 3, "section": [root, tip], "level": "exact", "tip_masses": lumps,
+        "nodes": [middle], "modes": msgspec.structs.replace(modes, **damping), "points": "section", "theory": theory,
+    }  # fmt: skip
+    scene.beam(name, **beam)
+    alone = SceneBuilder("alone").beam(name, **beam).weld("clamp", "ground", name).scene()
+    frequency = np.sqrt(np.diag(flexible_model(alone.bodies[0]).stiffness))
+    size = 40.0 * recipe.deformation / frequency
+    coordinates, rates = (rng.uniform(-size, size) for _ in range(2))
+    scene.modal_state(name, coordinates=coordinates, rates=rates)
+
+
+def _strains(kind: int) -> tuple[s.Modes, tuple[float, float, float], str]:
+    """Strains, curvature at rest (1/m) and theory of one of six kinds of beams of level exact."""
+    euler, timoshenko = "euler-bernoulli", "timoshenko"
+    one_plane, planes = ("bending_z",), ("bending_z", "bending_y")
+    six = s.StrainPolynomials(axial=1, shear_y=1, shear_z=2, torsion=2, bending_y=3, bending_z=3)
+    return (
+        (s.Modes(count=3, families=one_plane), (0.0, 0.0, 0.0), euler),
+        (s.Modes(count=2, families=("torsion", *planes)), (0.0, 0.0, 0.0), euler),
+        (s.Modes(count=3, polynomials=six), (0.4, 0.3, -0.5), timoshenko),
+        (s.Modes(count=2, pieces=2, families=("torsion", *planes)), (0.0, 0.6, 0.4), euler),
+        (s.Modes(count=3, families=("bending_y",)), (0.0, 0.0, 0.7), timoshenko),
+        (s.Modes(count=2, families=planes, points=5), (1.0, 0.0, 0.0), euler),
+    )[kind % 6]
 
 
 def _coupled(section: s.BeamStation, rng: Generator) -> s.BeamStation:

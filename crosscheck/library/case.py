@@ -90,11 +90,11 @@ All keys, with defaults in brackets; the structs below explain them:
 - ``variant``: ``name``; ``scene`` ["scene.toml"]; ``transform`` ["none"], or "rigidify", "modal_points", "segments"
   with their number ``segments``, "substructures" with ``pieces`` and ``eigenmodes`` [0], the last two for
   ``split_body`` [every beam] alone; ``level`` [the scene's] of all flexible bodies; ``refined`` [none] with
-  ``segments``, ``pieces`` or ``elements`` and ``order`` [2.0]; ``engines``; ``also`` [none]; ``efforts`` [the
-  engine's own], each with ``engine``, ``kind`` ("tolerance" or "step"), ``method`` and falling ``values``;
-  ``duration_s`` and ``samples`` [the case's]; ``start`` [the scene's], "equilibrium" near it; ``linear`` [none],
-  what its engines are asked of the linearised motion at every sample: "derivatives", "frequencies" or both; ``note``
-  [none], shown in the report;
+  ``segments``, ``pieces``, ``elements`` or ``polynomials`` and ``order`` [2.0]; ``engines``; ``also`` [none];
+  ``efforts`` [the engine's own], each with ``engine``, ``kind`` ("tolerance" or "step"), ``method`` and falling
+  ``values``; ``duration_s`` and ``samples`` [the case's]; ``start`` [the scene's], "equilibrium" near it; ``linear``
+  [none], what its engines are asked of the linearised motion at every sample: "derivatives", "frequencies" or both;
+  ``note`` [none], shown in the report;
 - ``comparison``: ``name``; ``variant`` with ``engines`` [all of the variant's], or ``a`` and ``b``, each with a
   ``variant`` and an ``engine``; ``goals``; ``scales`` [the ranges] (SI); ``expect`` ["agree"]; ``band``, ``diverged_s``
   or ``because``, as ``expect`` needs; ``reason``;
@@ -171,14 +171,20 @@ class ComparisonSide(_CasePart, frozen=True, kw_only=True):
 class Refined(_CasePart, frozen=True, kw_only=True):
     """A finer spatial discretisation of the same variant: more segments, pieces or elements per beam.
 
-    `order` is the convergence order of the discretisation's error (2 for finite segments with springs at mid-segment
-    and for pieces of level "full").
+    `polynomials` of a beam of level "exact" are so many more of each of its strains. `order` is the convergence order
+    of the discretisation's error (2 for finite segments with springs at mid-segment and for pieces of level "full");
+    that of polynomials is higher than any, and 2 is then on the safe side.
     """
 
     segments: int | None = None
     pieces: int | None = None
     elements: int | None = None
     order: float = 2.0
+    polynomials: int | None = None
+
+    def __str__(self) -> str:
+        """As figures of variants were accepted by it, which had no polynomials at first."""
+        return repr(self).replace(", polynomials=None", "")
 
 
 class Variant(_CasePart, frozen=True, kw_only=True):

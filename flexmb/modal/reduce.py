@@ -116,7 +116,7 @@ def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Cou
     coupled = np.array(
         [[any(_coupled(A[a, b], A[a, a], A[b, b]) for A in (M, K)) for b in blocks] for a in blocks]
     )
-    label = _groups(coupled)
+    label = groups(coupled)
     free = np.ones(elements.size, dtype=bool)
     if clamped:
         free[elements.clamped_coordinates()] = False
@@ -134,7 +134,7 @@ def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Cou
     return parts
 
 
-def _groups(coupled: NDArray[np.bool_]) -> list[int]:
+def groups(coupled: NDArray[np.bool_]) -> list[int]:
     """For each family the first one that it is coupled with, directly or through others."""
     label = list(range(len(coupled)))
     for a, b in np.argwhere(coupled):
@@ -206,11 +206,16 @@ def _mass_normalised(compliance: Real, columns: Real, M: Real) -> list[tuple[flo
 
 
 def _tip_signs(elements: BeamElements, columns: Real) -> Real:
-    """Signs (m,) that make the tip's largest displacement positive, or its largest rotation if it is not displaced."""
+    """`tip_signs` of coordinate columns (size,m)."""
     length = elements.mesh.nodes[-1]
     tip = elements.motion(np.array([length]), columns)[0]
-    displacement, turn = tip[:3], length * tip[3:]
+    return tip_signs(tip[:3], length * tip[3:])
+
+
+def tip_signs(displacement: Real, turn: Real) -> Real:
+    """Signs (m,) that make the tip's largest displacement (3,m) positive, or its largest turn (3,m), times the length,
+    if it is not displaced."""
     moves = np.abs(displacement).max(axis=0) > 1e-6 * np.abs(turn).max(axis=0)
     rows = np.where(moves, displacement, turn)
     largest = np.argmax(np.abs(rows), axis=0)
-    return np.where(rows[largest, np.arange(columns.shape[1])] < 0.0, -1.0, 1.0)
+    return np.where(rows[largest, np.arange(rows.shape[1])] < 0.0, -1.0, 1.0)

@@ -114,7 +114,7 @@ def section_table(body: BeamBody) -> SectionTable:
         inertia = np.array([inertia_on_axis(station) for station in stations])
     except ValueError as error:
         raise ValueError(f"beam '{body.name}': {error}") from None
-    if not sheared:
+    if not sheared and body.level != "exact":  # whose strains may include shear in any theory
         stiffness = np.array([_rigid_in_shear(each) for each in stiffness])
     plain = has_plain_sections(body)
     return SectionTable(np.array([station.x_m for station in stations], dtype=float), stiffness, inertia, plain)

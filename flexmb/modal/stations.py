@@ -83,10 +83,10 @@ def inertia_stations(
         np.add.at(far, element + 1, inertia * xi[:, None, None])
         inertia = near + far
     kept = inertia[:, 0, 0] > 0.0  # a point without mass would divide by zero in `section_points`
-    return _stations(x[kept], inertia[kept], body, table.plain)
+    return section_masses(x[kept], inertia[kept], body, table.plain)
 
 
-def _stations(x: Real, inertia: Real, body: BeamBody, plain: bool) -> Stations:
+def section_masses(x: Real, inertia: Real, body: BeamBody, plain: bool) -> Stations:
     """Mass centres and inertias about them from mass matrices (n,6,6) about the axis."""
     if plain:
         mass, com, about_com = inertia[:, 0, 0], np.zeros((len(x), 3)), inertia[:, 3:, 3:]

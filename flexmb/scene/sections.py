@@ -136,6 +136,23 @@ def has_plain_sections(body: BeamBody) -> bool:
     return all(map(is_plain, body.stations))
 
 
+def twists_with_inertia(body: BeamBody) -> bool:
+    """Whether the sections of a beam have inertia about its axis, which those without mass or inertia have not."""
+    return any(
+        _about_axis(station, body) > 0.0
+        for station in body.stations
+        if station.inertia is not None or station.mass_per_length_kg_m is not None
+    )
+
+
+def _about_axis(station: BeamStation, body: BeamBody) -> float:
+    """Inertia per length (kg m) about the axis, as `body.points` has it."""
+    M = inertia_on_axis(station)
+    if body.points != "line":
+        return float(M[TWIST, TWIST])
+    return float(M[0, 4] ** 2 + M[0, 5] ** 2)  # of the mass at its centre, times the mass
+
+
 def _on_axis(stated: Real, point: tuple[float, float]) -> Real:
     if not any(point):
         return stated

@@ -65,5 +65,5 @@ def modes_memory(level: Level, points: float, modes: int) -> float:
             return _PER_PAIR * points * float(modes) ** 2
         case "linear":
             return _PER_TRIPLE * float(modes) ** 3
-        case "rigid" | "ruthless" | "full":
+        case "rigid" | "ruthless" | "full" | "exact":
             return 8.0 * 12.0 * points * modes

@@ -12,6 +12,7 @@ from typing import assert_never
 import numpy as np
 
 from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.rest_curve import is_curved, rest_sections
 from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, SidBody, TipMass, Vector
 from flexmb.scene.sections import inertia_on_axis, mass_centres
 from flexmb.scene.tree import rest_frames
@@ -19,6 +20,8 @@ from flexmb.typing import Real
 
 _GAUSS_POINTS = 3
 """Exact to degree 5: the second moment of a linearly varying section has degree 3."""
+_CURVED_PARTS = 64
+"""Of a curved beam: over five turns its mass centre is then known to rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ def _sections(body: BeamBody, x: Real) -> tuple[Real, Real, Real]:
     return mass, com, np.zeros_like(inertia) if body.points == "line" else inertia
 
 
-def quadrature(body: BeamBody, cuts: Sequence[float]) -> tuple[Real, Real]:
+def quadrature(body: BeamBody, cuts: Sequence[float] | Real) -> tuple[Real, Real]:
     """Gauss points and weights (n,) between the cuts (ascending) and stations, where the sections have kinks."""
     inside = [station.x_m for station in body.stations if cuts[0] < station.x_m < cuts[-1]]
     ends = np.unique([*cuts, *inside])
@@ -75,19 +78,21 @@ def beam_piece(body: BeamBody, start: float, end: float) -> Inertia:
 
     A tip mass exactly at `end` belongs to the next piece, except at the end of the beam.
     """
-    x, weight = quadrature(body, (start, end))
+    x, weight = quadrature(body, np.linspace(start, end, 1 + _CURVED_PARTS) if is_curved(body) else (start, end))
+    position, rotation = rest_sections(body, x)
     parts = [
-        Inertia(length * m, com + [at, 0.0, 0.0], length * J)
-        for at, length, m, com, J in zip(x, weight, *_sections(body, x), strict=True)
+        Inertia(length * m, at + R @ com, length * R @ J @ R.T)
+        for at, R, length, m, com, J in zip(position, rotation, weight, *_sections(body, x), strict=True)
     ]
     here = [lump for lump in body.tip_masses if start <= lump.x_m < end or lump.x_m == end == body.length_m]
-    return combine([*parts, *_lumps(here)])
+    return combine([*parts, *_lumps(body, here)])
 
 
-def _lumps(lumps: Sequence[TipMass]) -> list[Inertia]:
+def _lumps(body: BeamBody, lumps: Sequence[TipMass]) -> list[Inertia]:
+    position, rotation = rest_sections(body, np.array([lump.x_m for lump in lumps]))
     return [
-        Inertia(lump.mass_kg, np.array([lump.x_m, 0.0, 0.0]) + lump.com_m, np.array(lump.inertia_kg_m2))
-        for lump in lumps
+        Inertia(lump.mass_kg, at + R @ lump.com_m, R @ np.array(lump.inertia_kg_m2) @ R.T)
+        for lump, at, R in zip(lumps, position, rotation, strict=True)
     ]
 
 
@@ -97,7 +102,7 @@ def _lumped_beam(body: BeamBody) -> Inertia:
     x, weight = quadrature(body, tuple(nodes))
     hats = np.maximum(0.0, 1.0 - np.abs(x[:, None] - nodes) * body.elements / body.length_m)
     sections = list(zip(*_sections(body, x), strict=True))
-    parts = [*_lumps(body.tip_masses)]
+    parts = [*_lumps(body, body.tip_masses)]
     for node, hat in zip(nodes, (weight[:, None] * hats).T, strict=True):
         here = zip(hat, sections, strict=True)
         parts.append(combine([Inertia(each * m, com + [node, 0.0, 0.0], each * J) for each, (m, com, J) in here]))

@@ -11,19 +11,20 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, assert_never
 
 import numpy as np
 
 from flexmb.building.connector_arrays import between_nodes
 from flexmb.building.links import closure_sides
-from flexmb.modal.beam_sections import beam_sections
+from flexmb.modal.beam_sections import BeamSections, ByShapes, ByStrains, beam_sections
 from flexmb.modal.flexible_model import SecondOrder
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, EXTENSION, TWIST
-from flexmb.scene.tree import node_frame
+from flexmb.scene.tree import place_along
 from flexmb.system.frames import MotionTables, Pose, body_pose, closure_frames_of, hinge_frames_of, link_pose
+from flexmb.system.moved_sections import moved_sections
 from flexmb.system.observables import Evaluation
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.system.turning_points import rotation_along, turning
@@ -189,10 +190,11 @@ class SectionBalance:
         pose = body_pose(arrays, w, k)
         m = arrays.links[k].mode_count
         eta, etad, etadd = w.eta[k, :m], w.etad[k, :m], w.etadd[k, :m]
-        needed = self._inertial(_motion_in(pose, link_pose(w, k), w, k), eta, etad, etadd)
+        moved, cuts = _moved(self.sections, eta, etad, etadd)
+        needed = self._inertial(_motion_in(pose, link_pose(w, k), w, k), moved)
         for outer in self._outer(w, pose, exerted):
             needed[: outer.beyond] -= outer.wrench
-        return self._in_sections(needed, eta)[self._places]
+        return _in_sections(needed, *cuts)[self._places]
 
     def loads(self, values: Real) -> SectionLoads:
         """`SectionLoads` with these loads (...,X,6)."""
@@ -201,27 +203,22 @@ class SectionBalance:
         EA, EIy, EIz, GJ = (K[:, i, i] for i in (EXTENSION, ABOUT_Y, ABOUT_Z, TWIST))
         return SectionLoads(self.body, self.x, values, EA, EIy, EIz, GJ, None if s.plain else K)
 
-    def _inertial(self, motion: _Motion, eta: Real, etad: Real, etadd: Real) -> Real:
+    def _inertial(self, motion: _Motion, moved: _Moved) -> Real:
         """Rate of momentum (X,6), less gravity, of the parts beyond each cut, about the body's origin, body axes."""
-        s, points = self.sections, self.sections.points
+        points = self.sections.points
         w, alpha, a = motion
-        r, v, bend = _field(points.translation, s.second, "translation", eta, etad, etadd)
-        r = points.position + r
-        acceleration = a + np.cross(alpha, r) + np.cross(w, np.cross(w, r)) + 2.0 * np.cross(w, v) + bend
+        r = moved.r
+        acceleration = a + np.cross(alpha, r) + np.cross(w, np.cross(w, r)) + 2.0 * np.cross(w, moved.v) + moved.a
         torque = np.zeros_like(r)
         if np.any(points.com_offset) or np.any(points.inertia):
-            R, spin, spin_rate = turning(*_field(points.rotation, s.second, "rotation", eta, etad, etadd))
-            omega, turn = w + spin, alpha + spin_rate + np.cross(w, spin)
+            R, omega, turn = moved.R, w + moved.omega, alpha + moved.alpha + np.cross(w, moved.omega)
             arm = np.einsum("nab,nb->na", R, points.com_offset)
             J = R @ points.inertia @ np.swapaxes(R, 1, 2)
             r = r + arm
-            acceleration += np.cross(turn, arm) + np.cross(omega, np.cross(omega, arm))
+            acceleration = acceleration + np.cross(turn, arm) + np.cross(omega, np.cross(omega, arm))
             torque = np.einsum("nab,nb->na", J, turn) + np.cross(omega, np.einsum("nab,nb->na", J, omega))
         force = points.mass[:, None] * acceleration
-        each = np.hstack([np.cross(r, force) + torque, force])
-        between = np.zeros((len(s.x) + 1, 6), each.dtype)
-        np.add.at(between, s.beyond, each)
-        return np.cumsum(between[::-1], axis=0)[::-1][1:]
+        return np.asarray(self.sections.share @ np.hstack([np.cross(r, force) + torque, force]))
 
     def _outer(self, w: MotionTables, pose: Pose, exerted: Evaluation) -> list[_Outer]:
         """All loads on the beam, with their places along it."""
@@ -231,7 +228,7 @@ class SectionBalance:
         found: list[_Outer] = []
 
         def add(node: str, torque: Real, force: Real, point: Real, *, at: bool = True) -> None:
-            x = node_frame(self._beam, node).position[0]
+            x = place_along(self._beam, node)
             beyond = int(np.searchsorted(self._cuts, x, side="right" if at else "left"))
             about = torque + np.cross(point - pose.position, force)
             found.append(_Outer(beyond, np.concatenate([pose.rotation.T @ about, pose.rotation.T @ force])))
@@ -272,16 +269,6 @@ class SectionBalance:
                     add(side.node, load[:3], load[3:], closure_frames_of(arrays, w, i).point)
         return found
 
-    def _in_sections(self, wrench: Real, eta: Real) -> Real:
-        """Wrenches (X,6) about the body's origin in body axes, referred to the deformed sections and their axes."""
-        s, none = self.sections, np.zeros_like(eta)
-        axis = _field(s.motion[:, :3], s.second_motion, "translation", eta, none, none)[0]
-        theta = _field(s.motion[:, 3:], s.second_motion, "rotation", eta, none, none)[0]
-        axis[:, 0] += s.x
-        torque = wrench[:, :3] - np.cross(axis, wrench[:, 3:])
-        R = rotation_along(theta)
-        return np.hstack([np.einsum("nba,nb->na", R, each) for each in (torque, wrench[:, 3:])])
-
 
 class _Motion(NamedTuple):
     """Angular velocity, angular acceleration, acceleration of the origin less gravity (3,) of a body, its own axes."""
@@ -298,6 +285,41 @@ def _motion_in(pose: Pose, link: Pose, w: MotionTables, k: int) -> _Motion:
     omega, (alpha, a) = w.body["velocity"][k, :3], w.body["accel"][k].reshape(2, 3)
     at_origin = a + np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
     return _Motion(turn @ omega, turn @ alpha, turn @ at_origin)
+
+
+class _Moved(NamedTuple):
+    """As `flexmb.system.moved_sections.MovedSections`, of inertia points."""
+
+    r: Real
+    v: Real
+    a: Real
+    R: Real
+    omega: Real
+    alpha: Real
+
+
+def _moved(s: BeamSections, eta: Real, etad: Real, etadd: Real) -> tuple[_Moved, tuple[Real, Real]]:
+    """The inertia points relative to the body; positions (X,3) and axes (X,3,3), section to body, of the cuts."""
+    match s.motion:
+        case ByShapes(points=points, second=second, sections=shapes, second_sections=second_sections):
+            r, v, a = _field(points.translation, second, "translation", eta, etad, etadd)
+            turns = turning(*_field(points.rotation, second, "rotation", eta, etad, etadd))
+            none = np.zeros_like(eta)
+            axis = _field(shapes[:, :3], second_sections, "translation", eta, none, none)[0]
+            theta = _field(shapes[:, 3:], second_sections, "rotation", eta, none, none)[0]
+            axis[:, 0] += s.x
+            return _Moved(points.position + r, v, a, *turns), (axis, rotation_along(theta))
+        case ByStrains(field=field, points=at, cuts=cuts, rotation=rotation):
+            found = moved_sections(field, eta, etad, etadd)
+            return _Moved(*(each[at] for each in found)), (found.r[cuts], found.R[cuts] @ rotation)
+        case _:
+            assert_never(s.motion)
+
+
+def _in_sections(wrench: Real, axis: Real, R: Real) -> Real:
+    """Wrenches (X,6) about the body's origin in body axes, referred to sections at `axis` (X,3) with axes R (X,3,3)."""
+    torque = wrench[:, :3] - np.cross(axis, wrench[:, 3:])
+    return np.hstack([np.einsum("nba,nb->na", R, each) for each in (torque, wrench[:, 3:])])
 
 
 def _field(

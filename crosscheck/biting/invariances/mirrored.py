@@ -20,6 +20,7 @@ from crosscheck.biting.invariances.counterpart import (
     without_events,
     without_feedback,
 )
+from crosscheck.biting.invariances.linearised import Item, by_freedom, relation
 from crosscheck.library.time_functions import scaled
 from flexmb.scene.bodies import BeamStation, ModalBody, ModalNode, SidBody
 from flexmb.scene.connectors import BetweenNodes, Bushing
@@ -70,7 +71,14 @@ def _mirrored(scene: Scene) -> Counterpart:
             for name, rows in found.items()
         }
 
-    return Counterpart(msgspec.structs.replace(_reflected(scene), couplings=_couplings(scene)), back)
+    other = msgspec.structs.replace(_reflected(scene), couplings=_couplings(scene))
+    return Counterpart(other, back, linear=relation(scene, other, _ratios))
+
+
+def _ratios(item: Item) -> list[float]:
+    """1 for each displacement of an item that counts on in the mirror, -1 for one that counts back."""
+    signs = _signs(item)
+    return by_freedom(item, lambda _, place: signs[place], AXIAL_SIGNS, POLAR_SIGNS)
 
 
 def _couplings(scene: Scene) -> tuple[Coupling, ...]:

@@ -14,6 +14,7 @@ from crosscheck.biting.invariances.counterpart import (
     without_events,
     without_feedback,
 )
+from crosscheck.biting.invariances.linearised import Item, by_freedom, has_beam_modes, relation
 from crosscheck.library.time_functions import scaled, slowed
 from flexmb.scene.bodies import BeamStation, ModalBody, SidBody
 from flexmb.scene.connectors import (
@@ -111,7 +112,16 @@ def _rescaled(scene: Scene) -> Counterpart:
         return {name: rows / _factor(name, drives) for name, rows in channels.items() if name not in left_out}
 
     other = msgspec.structs.replace(_in_units(scene), couplings=_couplings(scene), allow=UNUSUAL)
-    return Counterpart(other, back, clock=TIME)
+    # modes that are made anew in other units round otherwise, and no engine tells by how much
+    linear = None if has_beam_modes(other) else relation(scene, other, _ratios, ENERGY.factor, TIME)
+    return Counterpart(other, back, clock=TIME, linear=linear)
+
+
+def _ratios(item: Item) -> list[float]:
+    """Of the displacements of an item in the other units to those in SI."""
+    return by_freedom(
+        item, lambda freedom, _: OF_COORDINATE[freedom.coordinate.ANGULAR].factor, (1.0,) * 3, (LENGTH,) * 3
+    )
 
 
 def _couplings(scene: Scene) -> tuple[Coupling, ...]:

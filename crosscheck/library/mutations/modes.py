@@ -12,29 +12,42 @@ from crosscheck.library.mutations.edits import bodies, of_body, whole
 from crosscheck.library.mutations.mirror import along, mirrors, within
 from crosscheck.library.mutations.mutation import Mutation, SceneChange
 from crosscheck.library.mutations.resting import rests, twists_only
-from flexmb.scene.bodies import BeamBody, BeamStation, Body, ModalBody, ModalNode
+from flexmb.scene.bodies import BeamBody, BeamStation, Body, Level, ModalBody, ModalNode
+from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import Scene
 from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, matrix
+from flexmb.scene.strains import polynomials
 from flexmb.surrogate import modal_points
 
 ROUNDING = 1e-9  # of an eigenproblem and of sums over its modes
 
 
 def _unstiffened(scene: Scene, target: str) -> Scene:
-    """Level stiffened becomes full (of body `target`, or of all)."""
+    """Levels stiffened and exact become full (of body `target`, or of all)."""
 
     def changed(body: Body) -> Body:
-        wanted = target in ("", body.name) and body.level == "stiffened"
-        return replace(body, level="full") if wanted else body
+        wanted = target in ("", body.name) and body.level in ("stiffened", "exact")
+        return _of_small_deflection(body, "full") if wanted else body
 
     return replace(scene, bodies=tuple(map(changed, scene.bodies)))
 
 
 @of_body
 def _undeformed(body: Body) -> Body:
-    """Level full or stiffened becomes ruthless: inertia of the undeformed body."""
-    wanted = body.level in ("full", "stiffened", "linear")
-    return replace(body, level="ruthless") if wanted else body
+    """Any level above ruthless becomes ruthless: inertia of the undeformed body."""
+    wanted = body.level in ("full", "stiffened", "linear", "exact")
+    return _of_small_deflection(body, "ruthless") if wanted else body
+
+
+def _of_small_deflection(body: Body, level: Level) -> Body:
+    """The body at a level of modes; a beam of level exact gets as many of them as it has polynomials of a strain."""
+    if not isinstance(body, BeamBody) or body.level != "exact":
+        return replace(body, level=level)
+    if is_curved(body):
+        raise CaseError(f'beam "{body.name}" is curved at rest, which only level "exact" can express')
+    count = max(polynomials(body).values())
+    modes = replace(body.modes, count=count, polynomials=None, pieces=1, points=None)
+    return replace(body, level=level, modes=modes, elements=max(body.elements, 2 * count))
 
 
 def _twists_in_place(scene: Scene, target: str) -> str:
@@ -61,6 +74,8 @@ def _of_modes(name: str, change: Callable[[ModalBody], ModalBody]) -> SceneChang
 def _in_modes(scene: Scene, target: str) -> Body | None:
     """The body called `target`, a beam as the points and modes that it stands for."""
     alone = next((body for body in scene.bodies if body.name == target), None)
+    if isinstance(alone, BeamBody) and alone.level == "exact":
+        raise CaseError(f'beam "{alone.name}" is of level "exact": it has strains, and its points have no modes')
     if isinstance(alone, BeamBody):
         return modal_points(replace(scene, bodies=(alone,))).bodies[0]
     return alone
@@ -149,14 +164,14 @@ def _on_the_axis(body: Body) -> Body:
 MUTATIONS = (
     Mutation(
         "dropped_stiffening",
-        "level stiffened becomes full",
+        "level stiffened or exact becomes full",
         "geometric stiffening left out",
         whole,
         _unstiffened,
     ),
     Mutation(
         "dropped_deformation",
-        "level full or stiffened becomes ruthless",
+        "level full, stiffened or exact becomes ruthless",
         "Coriolis, centrifugal and inertia terms of the deformation left out",
         bodies,
         _undeformed,

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from flexmb.scene.bodies import BeamBody, Modes
+from flexmb.scene.bodies import BeamBody
 from flexmb.scene.check import inertia
-from flexmb.scene.check.sections import stations, twists_with_inertia
+from flexmb.scene.check.exact_beams import damping, exact_beam, without_strains
+from flexmb.scene.check.sections import stations
 from flexmb.scene.check.walk import sound
 from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.schema import Scene
+from flexmb.scene.sections import twists_with_inertia
 from flexmb.scene.sizes import MOST_BYTES, PER_MODE, PLENTY, beam_estimate
+from flexmb.scene.strains import strain_count
 
 
 def beams(scene: Scene) -> Iterator[Defect]:
@@ -21,11 +24,18 @@ def beams(scene: Scene) -> Iterator[Defect]:
         yield from _size(place.key("elements"), body)
         yield from _stations(place, body)
         yield from _along(place, body)
-        yield from _modes(place.key("modes"), body)
+        if body.level == "exact":
+            yield from exact_beam(place, body)
+        else:
+            yield from _modes(place.key("modes"), body)
+            yield from without_strains(place, body)
 
 
 def mode_count(body: BeamBody) -> int:
-    """Modal coordinates of a beam: eigenmodes, and the attachment modes of the families that have inertia."""
+    """Modal coordinates of a beam: eigenmodes, and the attachment modes of the families that have inertia; at level
+    exact the polynomials of all strains."""
+    if body.level == "exact":
+        return strain_count(body)
     return body.modes.count + (_attachments(body) if body.modes.static else 0)
 
 
@@ -81,17 +91,7 @@ def _modes(place: Place, body: BeamBody) -> Iterator[Defect]:
     elif body.elements >= 1 and mode_count(body) > (available := available_modes(body)):
         what = f"{mode_count(body)} modes, but {body.elements} elements give {available} of these families"
         yield Defect(str(place.key("count")), what, "use more elements, more families, or fewer modes")
-    yield from _damping(place.key("damping_ratio"), modes, mode_count(body))
-
-
-def _damping(place: Place, modes: Modes, count: int) -> Iterator[Defect]:
-    ratios = modes.damping_ratio
-    if isinstance(ratios, tuple) and len(ratios) != count:
-        what = f"{len(ratios)} damping ratios for {count} modes"
-        yield Defect(str(place), what, "give one ratio for all modes, or one for each")
-    if any(ratio < 0.0 for ratio in (ratios if isinstance(ratios, tuple) else (ratios,))):
-        what, remedy = "a negative damping ratio feeds energy into the mode", "give ratios of at least zero"
-        yield Doubt(str(place), what, remedy, "negative_damping")
+    yield from damping(place, modes, mode_count(body))
 
 
 def _attachments(body: BeamBody) -> int:

@@ -18,14 +18,16 @@ from flexmb.scene.sections import (
     TWIST,
     WITHOUT_SHEAR,
     free_shear,
-    inertia_on_axis,
     is_plain,
     mass_centres,
     mass_per_length,
     stiffness_on_axis,
     symmetric,
+    twists_with_inertia,
     without_shear,
 )
+from flexmb.scene.strains import STRAINS as POLYNOMIALS
+from flexmb.scene.strains import polynomials
 from flexmb.typing import Real
 
 # Axial wave speed sqrt(EA / mass per length): soft rubber has some 50 m/s, diamond 18 km/s. The limits are wider than
@@ -47,25 +49,10 @@ def stations(place: Place, body: BeamBody) -> Iterator[Defect]:
         yield from found
         if not found:
             yield from _plausible(spot, station, body.length_m)
-            if not is_plain(station):
+            if body.level == "exact":
+                yield from _strained(place, station, body)
+            elif not is_plain(station):
                 yield from _shown(place, spot, station, body)
-
-
-def twists_with_inertia(body: BeamBody) -> bool:
-    """Whether the sections of a beam have inertia about its axis, which those without mass or inertia have not."""
-    return any(
-        _about_axis(station, body) > 0.0
-        for station in body.stations
-        if station.inertia is not None or station.mass_per_length_kg_m is not None
-    )
-
-
-def _about_axis(station: BeamStation, body: BeamBody) -> float:
-    """Inertia per length (kg m) about the axis, as `body.points` has it."""
-    M = inertia_on_axis(station)
-    if body.points != "line":
-        return float(M[TWIST, TWIST])
-    return float(M[0, 4] ** 2 + M[0, 5] ** 2)  # of the mass at its centre, times the mass
 
 
 def _complete(spot: Place, station: BeamStation, sheared: bool) -> Iterator[Defect]:
@@ -210,6 +197,19 @@ def _plausible_numbers(spot: Place, given: dict[str, float | None], length: floa
             what = f"{key} is {value / limit:.3g} times {counterpart}"
             isotropic = f"{check}: G is smaller than E in every isotropic material"
             yield Doubt(str(spot.key(key)), what, isotropic, "shear_stiffness")
+
+
+def _strained(place: Place, station: BeamStation, body: BeamBody) -> Iterator[Defect]:
+    """Strains that a beam of level exact leaves out are coupled with none that it has: their forces would act on it."""
+    K, own = stiffness_on_axis(station), polynomials(body)
+    chosen = np.array([strain in own for strain in POLYNOMIALS])
+    size = np.sqrt(np.diag(K))
+    coupling = np.abs(K / np.outer(size, size)) * np.outer(chosen, ~chosen)
+    if np.max(coupling, initial=0.0) > PRINTED:
+        a, b = np.unravel_index(int(np.argmax(coupling)), coupling.shape)
+        what = f"the section couples {STRAINS[a]} with {STRAINS[b]}, for which the beam has no polynomials"
+        remedy = f"give {POLYNOMIALS[b]} some in modes.polynomials, or lay the axis where nothing couples them"
+        yield Defect(str(place.key("modes", "polynomials")), what, remedy)
 
 
 def _shown(place: Place, spot: Place, station: BeamStation, body: BeamBody) -> Iterator[Defect]:
