@@ -45,8 +45,8 @@ def beam_estimate(body: BeamBody, modes: int) -> Estimate:
     elements, modes = float(min(body.elements, ENDLESS)), min(modes, ENDLESS)
     points = elements * _POINTS[body.points]
     if not has_plain_sections(body):  # one eigenproblem of all families
-        own = {name: 4 if name in ("axial", "torsion") else 4 + 5 * (shear - 1) for name in body.modes.families}
-        coupled = elements * sum(own.values())
+        bending = 9 if body.theory == "timoshenko" else 4
+        coupled = elements * sum(bending if name.startswith("bending") else 4 for name in body.modes.families)
         memory = _PER_COUPLED * coupled**2 + modes_memory(body.level, points, modes)
         return Estimate(memory, 1e-3 * coupled**3 / _SPEED_COUPLED)
     size = elements * sum(
