@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from flexmb.modal.cross import cross_matrix
-from flexmb.modal.eigenproblem import eigenpairs
+from flexmb.modal.eigenproblem import eigenpairs, refined
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming_node
 from flexmb.modal.following import followed
 from flexmb.modal.reduce import BeamModes, damping_matrix
@@ -25,7 +25,7 @@ from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.strains import points_of_piece, polynomials
 from flexmb.typing import Index, Real
 
-# Relative to the largest: below it an eigenvalue of the modal masses is zero but for rounding.
+# Relative to the largest: below it an eigenvalue of the modal masses, or an element, is zero but for rounding.
 _MASSLESS = 1e-13
 
 
@@ -152,18 +152,38 @@ def _section_stiffness(body: BeamBody, table: SectionTable, x: Real) -> Real:
 
 def _modes(field: StrainField, K: Real, M: Real) -> BeamModes:
     """The modes of K and M, ascending, with unit modal masses; the largest motion of the tip is positive."""
-    compliance, columns = eigenpairs(M, K)
-    if not compliance[0] > _MASSLESS * compliance[-1]:
+    compliance, columns = np.zeros(len(K)), np.zeros_like(K)
+    for own in _uncoupled(K, M):
+        block = np.ix_(own, own)
+        compliance[own], columns[block] = eigenpairs(M[block], K[block])
+    if not np.min(compliance) > _MASSLESS * np.max(compliance):
         raise ValueError(
             "some of its strains move no inertia while the beam is straight: use fewer polynomials, or give the "
             'sections their rotary inertia and points = "section"'
         )
-    columns = columns[:, ::-1] / np.sqrt(compliance[::-1])
+    squares, columns = refined(K, M, columns / np.sqrt(compliance))
+    # Equal frequencies, as of a round beam in both planes, stay in the order of the strains.
+    ascending = np.argsort(np.round(np.log(squares), 9), kind="stable")
+    squares, columns = squares[ascending], columns[:, ascending]
     turn, shift = (shape @ columns for shape in (each[field.gauss[-1]] for each in field.shapes()))
     rows = np.concatenate([shift, field.x[field.gauss[-1]] * turn])
     largest = np.argmax(np.abs(rows) > 0.5 * np.max(np.abs(rows), axis=0), axis=0)
     signs = np.where(rows[largest, np.arange(columns.shape[1])] < 0.0, -1.0, 1.0)
-    return BeamModes(columns * signs, 1.0 / np.sqrt(compliance[::-1]))
+    return BeamModes(columns * signs, np.sqrt(squares))
+
+
+def _uncoupled(K: Real, M: Real) -> list[Index]:
+    """The strains in sets that neither stiffness nor mass couples, each with the numbers of its own.
+
+    Solved together, strains of two planes of equal frequencies would be mixed as rounding has it.
+    """
+    linked = np.eye(len(K), dtype=bool)
+    for A in (K, M):
+        size = np.sqrt(np.abs(np.diag(A)))
+        linked |= np.abs(A) > _MASSLESS * np.outer(size, size)
+    for _ in range(len(K).bit_length()):
+        linked = linked @ linked  # of truth values: over twice as many links
+    return [np.flatnonzero(row) for row in np.unique(linked, axis=0)[::-1]]
 
 
 def _nodes_at(body: BeamBody) -> Real:
