@@ -21,6 +21,8 @@ from flexmb.scene.check import check_scene
 from flexmb.scene.convert import plain
 from flexmb.scene.hinges import WITH_AXIS
 from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.sections import inertia_on_axis, restated, stiffness_on_axis, transport
+from flexmb.scene.sections import matrix as section_matrix
 from flexmb.scene.shapes import beam_section
 from flexmb.scene.tree import coordinates, with_coordinates
 
@@ -40,8 +42,9 @@ class Recipe:
     """What a random scene contains.
 
     `carriers`: kinds of bodies, drawn in turn: "rigid", "modal" (raw, clamped), "floating" (raw, free-free), "beam",
-    "masses" (raw, clamped, points without inertia). `at_clamps`: hinges sit where the modes of the outboard body are
-    clamped, unless it floats. `conservative` leaves out dampers, motors, loads and prescribed motion.
+    "blade" (a beam whose sections couple everything), "masses" (raw, clamped, points without inertia). `at_clamps`:
+    hinges sit where the modes of the outboard body are clamped, unless it floats. `conservative` leaves out dampers,
+    motors, loads and prescribed motion.
     `hinges`: kinds drawn in turn. `armatures`: two of three coordinates of hinges and point masses have one, of the
     size of the bodies' inertia; they are drawn apart, so that all else of a scene is the same without them.
     """
@@ -63,6 +66,9 @@ class Recipe:
 
 
 RIGID = Recipe(carriers=("rigid",))
+SINGLE = Recipe(bodies=60, carriers=("rigid",), hinges=("revolute", "prismatic", "revolute"), conservative=True,
+                prescribed=False, wheels=0, point_masses=0, armatures=True)  # fmt: skip
+"""Rigid bodies on single axes alone, in branches longer than a base point serves."""
 FULL = Recipe()
 RUTHLESS = Recipe(levels=("ruthless",))
 LINEAR = Recipe(levels=("linear",))
@@ -73,6 +79,7 @@ MIXED = Recipe(levels=("full", "ruthless", "rigid"))
 EVERY_LEVEL = Recipe(levels=("linear", "full", "linear", "ruthless", "rigid"))
 ARMED = replace(EVERY_LEVEL, armatures=True, hinges=(*KINDS, *LATER_KINDS))
 ARMED_RIGID = replace(RIGID, armatures=True, hinges=(*KINDS, *LATER_KINDS))
+BLADES = Recipe(bodies=6, carriers=("blade", "rigid"), levels=("linear", "full", "stiffened", "ruthless", "rigid"))
 LATER = Recipe(hinges=(*LATER_KINDS, "spherical", *LATER_KINDS, "prismatic"))
 CONSERVATIVE = Recipe(conservative=True, prescribed=False)
 FREE_FLYING = replace(CONSERVATIVE, grounded=False)
@@ -160,8 +167,8 @@ def _body(
     if carrier == "beam" and level == "exact":
         _exact_beam(scene, rng, name, recipe)
         return ["root", "tip", "middle"]
-    if carrier == "beam":
-        modes = _beam(scene, rng, name, level, recipe)
+    if carrier in ("beam", "blade"):
+        modes = _beam(scene, rng, name, level, recipe, coupled=carrier == "blade")
         nodes = ["root", "tip", "middle"]
     else:
         modes = 3
@@ -171,15 +178,20 @@ def _body(
         )  # fmt: skip
         nodes = ["a", "b"] if carrier == "floating" else ["origin", "a", "b"]
     if level != "rigid":
-        size = recipe.deformation if carrier != "beam" else 0.3 * recipe.deformation
+        size = recipe.deformation if carrier not in ("beam", "blade") else 0.3 * recipe.deformation
         scene.modal_state(name, coordinates=rng.uniform(-size, size, modes), rates=rng.uniform(-size, size, modes))
     return nodes
 
 
-def _beam(scene: SceneBuilder, rng: Generator, name: str, level: s.Level, recipe: Recipe) -> int:
+def _beam(
+    scene: SceneBuilder, rng: Generator, name: str, level: s.Level, recipe: Recipe, *, coupled: bool
+) -> int:  # fmt: skip
     length = rng.uniform(0.8, 1.5)
     root = beam_section(E=2e9, G=8e8, A=9e-4, Iy=8e-8, Iz=5e-8, rho=1500.0)
     tip = beam_section(E=2e9, G=8e8, A=6e-4, Iy=5e-8, Iz=3e-8, rho=1500.0, x=length)
+    theory = "euler-bernoulli"
+    if coupled:
+        theory, root, tip = "timoshenko", _coupled(root, rng), _coupled(tip, rng)
     lump = s.TipMass(
         x_m=length, mass_kg=0.2, com_m=tuple(vector(rng, 0.05)), inertia_kg_m2=matrix(inertia(rng, 0.2, 0.1))
     )
@@ -187,7 +199,7 @@ def _beam(scene: SceneBuilder, rng: Generator, name: str, level: s.Level, recipe
     scene.beam(
         name, length=length, elements=3, section=[root, tip], level=level, tip_masses=[lump], nodes=[middle],
         modes=s.Modes(count=4, damping_ratio=0.0 if recipe.conservative else 0.02),
-        points=str(rng.choice(recipe.beam_points)),
+        points=str(rng.choice(recipe.beam_points)), theory=theory,
     )  # fmt: skip
     return 4
 
@@ -236,6 +248,18 @@ def _strains(kind: int) -> tuple[s.Modes, tuple[float, float, float], str]:
         (s.Modes(count=3, families=("bending_y",)), (0.0, 0.0, 0.7), timoshenko),
         (s.Modes(count=2, families=planes, points=5), (1.0, 0.0, 0.0), euler),
     )[kind % 6]
+
+
+def _coupled(section: s.BeamStation, rng: Generator) -> s.BeamStation:
+    """The section with correlations of all strains and its mass centre off the axis, stated at a random point."""
+    stiffness, inertia = stiffness_on_axis(section), inertia_on_axis(section)
+    size, random = np.sqrt(np.diag(stiffness)), np.triu(rng.uniform(-0.15, 0.15, (6, 6)), 1)
+    stiffness += (random + random.T) * np.outer(size, size)
+    T = transport(rng.uniform(-0.02, 0.02, 2))
+    on_axis = s.BeamStation(
+        x_m=section.x_m, stiffness=section_matrix(stiffness), inertia=section_matrix(T.T @ inertia @ T)
+    )
+    return restated(on_axis, tuple(rng.uniform(-0.02, 0.02, 2)))
 
 
 def _modal(

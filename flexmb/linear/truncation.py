@@ -1,5 +1,7 @@
 """Effect of modal truncation of beams on the eigenvalues of a linear model, by a model with twice as many modes.
 
+Beams of level exact get twice as many polynomials of each strain instead.
+
 By the Rayleigh-Ritz principle, truncation makes an undamped structure stiffer: its frequencies decrease towards their
 limit when modes are added. So the change by the next modes estimates the truncation error. The effect of still higher
 modes is not included: for eigenmodes of a beam with a heavy body at its tip it is of about the same size.
@@ -20,8 +22,9 @@ from flexmb.linear.linearize import linearize
 from flexmb.modal.flexible import flexible_model
 from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody, StrainPolynomials
 from flexmb.scene.check.beams import available_modes, mode_count
+from flexmb.scene.check.exact_beams import MOST_POLYNOMIALS
 from flexmb.scene.schema import ModalState, Scene
-from flexmb.scene.strains import polynomials, strain_count
+from flexmb.scene.strains import polynomials
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.typing import Real
@@ -87,7 +90,7 @@ def _bends(body: Body) -> TypeGuard[BeamBody]:
 
 def _finer(body: BeamBody) -> BeamBody:
     if body.level == "exact":
-        return _of_more_polynomials(body)
+        return _more_strains(body)
     count = MORE * max(body.modes.count, 1)
     attached = mode_count(body) - body.modes.count
     finer = msgspec.structs.replace(body, elements=max(MORE * body.elements, count + attached))
@@ -99,13 +102,14 @@ def _finer(body: BeamBody) -> BeamBody:
     return msgspec.structs.replace(finer, modes=modes)
 
 
-def _of_more_polynomials(body: BeamBody) -> BeamBody:
-    counts = {strain: MORE * count for strain, count in polynomials(body).items()}
-    modes = msgspec.structs.replace(body.modes, polynomials=StrainPolynomials(**counts), points=None)
-    finer, ratio = msgspec.structs.replace(body, modes=modes), body.modes.damping_ratio
+def _more_strains(body: BeamBody) -> BeamBody:
+    more = {strain: min(MORE * count, MOST_POLYNOMIALS) for strain, count in polynomials(body).items()}
+    modes = msgspec.structs.replace(body.modes, polynomials=StrainPolynomials(**more), points=None)
+    ratio = modes.damping_ratio
     if isinstance(ratio, tuple):
-        ratio = (*ratio, *[ratio[-1]] * (strain_count(finer) - len(ratio)))
-    return msgspec.structs.replace(finer, modes=msgspec.structs.replace(modes, damping_ratio=ratio))
+        count = sum(more.values()) * modes.pieces
+        modes = msgspec.structs.replace(modes, damping_ratio=(*ratio, *[ratio[-1]] * (count - len(ratio))))
+    return msgspec.structs.replace(body, modes=modes)
 
 
 def _moved(state: ModalState, scene: Scene, finer: dict[str, BeamBody]) -> ModalState:

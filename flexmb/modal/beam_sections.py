@@ -53,26 +53,24 @@ class ByStrains:
 class BeamSections:
     """Cuts at x (X,) m of a beam, body frame.
 
-    points: inertia points of the whole beam; `share` (X,n): of each beyond each cut. `motion`: how points and
-    sections move. Stiffnesses (X,): EA N, EIy, EIz, GJ N m².
+    points: inertia points of the whole beam; `share` (X,n): of each beyond each cut. `motion`: how points and sections
+    move. stiffness (X,6,6) about the axis, infinite where there is no shear; `plain` if it couples nothing.
     """
 
     x: Real
     points: Points | BeamPoints
     share: Real
     motion: ByShapes | ByStrains
-    EA: Real
-    EIy: Real
-    EIz: Real
-    GJ: Real
+    stiffness: Real
+    plain: bool
 
 
 def beam_sections(body: BeamBody, x: Real) -> BeamSections:
     """A beam with its modes (none at level rigid), cut at ascending x (X,) m."""
     points, share, motion = _by_strains(body, x) if body.level == "exact" else _by_shapes(body, x)
     table = section_table(body)
-    stiffness = {name: table.at(getattr(table, name), x) for name in ("EA", "EIy", "EIz", "GJ")}
-    return BeamSections(x=x, points=points, share=share, motion=motion, **stiffness)
+    stiffness = table.at(table.stiffness, x)
+    return BeamSections(x=x, points=points, share=share, motion=motion, stiffness=stiffness, plain=table.plain)
 
 
 def _by_shapes(body: BeamBody, x: Real) -> tuple[Points, Real, ByShapes]:

@@ -15,9 +15,9 @@ from flexmb.modal.cross import cross_matrix
 from flexmb.modal.eigenproblem import eigenpairs, refined
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming_node
 from flexmb.modal.following import followed
-from flexmb.modal.reduce import BeamModes, damping_matrix
-from flexmb.modal.section import SectionTable, section_table
-from flexmb.modal.stations import lumps
+from flexmb.modal.reduce import BeamModes, damping_matrix, groups, tip_signs
+from flexmb.modal.section import section_table
+from flexmb.modal.stations import lumps, section_masses
 from flexmb.modal.strain_field import StrainField, gauss_weights, strain_field, strain_stiffness
 from flexmb.scene.bodies import IDENTITY, BeamBody, Quaternion
 from flexmb.scene.quaternions import rotation_matrix
@@ -25,8 +25,10 @@ from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.strains import points_of_piece, polynomials
 from flexmb.typing import Index, Real
 
-# Relative to the largest: below it an eigenvalue of the modal masses, or an element, is zero but for rounding.
+# Relative to the largest: below it an eigenvalue of the modal masses is zero but for rounding.
 _MASSLESS = 1e-13
+# Elements of stiffness and masses that are scaled to a unit diagonal: below it they are rounding errors of their sums.
+_UNCOUPLED = 1e-12
 
 
 def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
@@ -36,7 +38,7 @@ def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
     """
     try:
         field, points, M = _polynomial_beam(body, _nodes_at(body))
-        modes = _modes(field, _stiffness(body), M)
+        modes = _modes(body, field, _stiffness(body), M)
         if like is not None:
             modes = followed(modes, M, _reference(like))
         damping = damping_matrix(modes.roots, body.modes.damping_ratio) + body.modes.viscosity_s * modes.stiffness
@@ -65,7 +67,7 @@ def cut_beam(body: BeamBody, x: Real) -> tuple[StrainField, BeamPoints]:
     """The sections of the beam, of which those at x (n,) m are the last, with the strain modes of `exact_model`; its
     inertia points."""
     field, points, M = _polynomial_beam(body, x)
-    return field.with_modes(_modes(field, _stiffness(body), M).columns), points
+    return field.with_modes(_modes(body, field, _stiffness(body), M).columns), points
 
 
 class BeamPoints:
@@ -79,7 +81,7 @@ class BeamPoints:
 @lru_cache(maxsize=8)
 def _reference(body: BeamBody) -> BeamModes:
     field, _, M = _polynomial_beam(body, np.zeros(0))
-    return _modes(field, _stiffness(body), M)
+    return _modes(body, field, _stiffness(body), M)
 
 
 def _polynomial_beam(body: BeamBody, others: Real) -> tuple[StrainField, BeamPoints, Real]:
@@ -96,22 +98,21 @@ def _polynomial_beam(body: BeamBody, others: Real) -> tuple[StrainField, BeamPoi
     field = strain_field(body, places)
     x, weight = gauss_weights(body)
     table = section_table(body)
+    own = section_masses(x, weight[:, None, None] * table.at(table.inertia, x), body, table.plain)
     _, rotation = rest_sections(body, x)
-    local = np.zeros((len(x), 3, 3))
-    if body.points != "line":
-        about_y, about_z = (table.at(values, x) for values in (table.rotary_y, table.rotary_z))
-        for i, values in enumerate((about_y + about_z, about_y, about_z)):
-            local[:, i, i] = weight * values
     at_lumps = len(field.x) - len(places) + np.arange(len(rigid_lumps))
     _, turned = rest_sections(body, np.array([lump.x for lump in rigid_lumps]))
     found = BeamPoints(
-        np.concatenate([weight * table.at(table.mass, x), [lump.mass for lump in rigid_lumps]]),
+        np.concatenate([own.mass, [lump.mass for lump in rigid_lumps]]),
         np.concatenate(
-            [np.zeros((len(x), 3)), *((R @ lump.com)[None] for R, lump in zip(turned, rigid_lumps, strict=True))]
+            [
+                np.einsum("pab,pb->pa", rotation, own.com),
+                *((R @ lump.com)[None] for R, lump in zip(turned, rigid_lumps, strict=True)),
+            ]
         ),
         np.concatenate(
             [
-                rotation @ local @ np.swapaxes(rotation, 1, 2),
+                rotation @ own.inertia @ np.swapaxes(rotation, 1, 2),
                 *((R @ lump.inertia @ R.T)[None] for R, lump in zip(turned, rigid_lumps, strict=True)),
             ]
         ),
@@ -136,54 +137,43 @@ def _stiffness(body: BeamBody) -> Real:
     xi, w = np.polynomial.legendre.leggauss(max(polynomials(body).values()) + 1)
     half = np.diff(edges) / 2.0
     x = (edges[:-1, None] + half[:, None] * (1.0 + xi)).ravel()
-    return strain_stiffness(body, _section_stiffness(body, table, x), x, (half[:, None] * w).ravel())
+    return strain_stiffness(body, table.at(table.stiffness, x), x, (half[:, None] * w).ravel())
 
 
-def _section_stiffness(body: BeamBody, table: SectionTable, x: Real) -> Real:
-    """(n,6,6) of [stretch, shears; twist, curvatures]."""
-    zero = np.zeros_like(x)
-    shears = [zero if each is None else table.at(each, x) for each in (table.GAy, table.GAz)]
-    found = np.zeros((len(x), 6, 6))
-    rows = (table.at(table.EA, x), *shears, *(table.at(each, x) for each in (table.GJ, table.EIy, table.EIz)))
-    for i, values in enumerate(rows):
-        found[:, i, i] = values
-    return found
+def _modes(body: BeamBody, field: StrainField, K: Real, M: Real) -> BeamModes:
+    """The modes of K and M, ascending, with unit modal masses; signs by the last Gauss point (`tip_signs`).
 
-
-def _modes(field: StrainField, K: Real, M: Real) -> BeamModes:
-    """The modes of K and M, ascending, with unit modal masses; the largest motion of the tip is positive."""
-    compliance, columns = np.zeros(len(K)), np.zeros_like(K)
-    for own in _uncoupled(K, M):
-        block = np.ix_(own, own)
-        compliance[own], columns[block] = eigenpairs(M[block], K[block])
-    if not np.min(compliance) > _MASSLESS * np.max(compliance):
+    Strains that neither matrix couples are solved separately, so that modes of one frequency each have their own.
+    """
+    strain = np.repeat(*np.array([(i, n * body.modes.pieces) for i, n in enumerate(polynomials(body).values())]).T)
+    columns, compliance = np.zeros_like(K), np.zeros(len(K))
+    sets = [np.ix_(own, own) for own in _uncoupled(strain, K, M)]
+    for own in sets:
+        compliance[own[1][0]], columns[own] = eigenpairs(M[own], K[own])
+    if not compliance.min() > _MASSLESS * compliance.max():
         raise ValueError(
             "some of its strains move no inertia while the beam is straight: use fewer polynomials, or give the "
             'sections their rotary inertia and points = "section"'
         )
-    squares, columns = refined(K, M, columns / np.sqrt(compliance))
-    # Equal frequencies, as of a round beam in both planes, stay in the order of the strains.
-    ascending = np.argsort(np.round(np.log(squares), 9), kind="stable")
-    squares, columns = squares[ascending], columns[:, ascending]
+    columns /= np.sqrt(compliance)
+    squares = np.zeros(len(K))
+    for own in sets:
+        squares[own[1][0]], columns[own] = refined(K[own], M[own], columns[own])
+    # Frequencies that agree to nine digits count as equal, so that the order of the strains decides.
+    order = np.lexsort((strain, [float(f"{each:.8e}") for each in squares]))
+    columns, frequencies = columns[:, order], np.sqrt(squares[order])
     turn, shift = (shape @ columns for shape in (each[field.gauss[-1]] for each in field.shapes()))
-    rows = np.concatenate([shift, field.x[field.gauss[-1]] * turn])
-    largest = np.argmax(np.abs(rows) > 0.5 * np.max(np.abs(rows), axis=0), axis=0)
-    signs = np.where(rows[largest, np.arange(columns.shape[1])] < 0.0, -1.0, 1.0)
-    return BeamModes(columns * signs, np.sqrt(squares))
+    return BeamModes(columns * tip_signs(shift, body.length_m * turn), frequencies)
 
 
-def _uncoupled(K: Real, M: Real) -> list[Index]:
-    """The strains in sets that neither stiffness nor mass couples, each with the numbers of its own.
-
-    Solved together, strains of two planes of equal frequencies would be mixed as rounding has it.
-    """
-    linked = np.eye(len(K), dtype=bool)
-    for A in (K, M):
-        size = np.sqrt(np.abs(np.diag(A)))
-        linked |= np.abs(A) > _MASSLESS * np.outer(size, size)
-    for _ in range(len(K).bit_length()):
-        linked = linked @ linked  # of truth values: over twice as many links
-    return [np.flatnonzero(row) for row in np.unique(linked, axis=0)[::-1]]
+def _uncoupled(strain: Index, K: Real, M: Real) -> list[Index]:
+    """The coordinates of each set of strains that K and M couple by more than rounding; `strain` (m,): that of each."""
+    sizes = [np.sqrt(np.outer(np.diag(each), np.diag(each))) for each in (K, M)]
+    scaled = [np.abs(each) / np.where(size > 0.0, size, 1.0) for each, size in zip((K, M), sizes, strict=True)]
+    names = np.unique(strain)
+    coupled = [[max(np.max(each[np.ix_(strain == a, strain == b)]) for each in scaled) for b in names] for a in names]
+    label = groups(np.array(coupled) > _UNCOUPLED)
+    return [np.flatnonzero(np.isin(strain, names[np.array(label) == each])) for each in dict.fromkeys(label)]
 
 
 def _nodes_at(body: BeamBody) -> Real:

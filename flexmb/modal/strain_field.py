@@ -1,8 +1,8 @@
 """The sections of a beam whose strains are sums of modes, and the tables from which their exact motion follows.
 
-In a frame that is fixed to the root, section j of the loaded beam is at r_j, turned by R_j from its unloaded position
-r0_j. With the elastic curvature k(s) = sum B_n(s) eta_n and the elastic stretch and shears g(s) = sum G_n(s) eta_n,
-both in the axes of the unloaded section but written in those of the root, and the unloaded tangent t0,
+In a frame that is fixed to the root, section j of the loaded beam is at r_j, turned by R_j from its unloaded place
+r0_j. With the elastic curvature k(s) = sum B_n(s) eta_n, the elastic stretch and shears g(s) = sum G_n(s) eta_n, both
+of the unloaded section but written in the axes of the root, and the unloaded tangent t0,
 
     R' = R k~            r' = R (t0 + g)
 

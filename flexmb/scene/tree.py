@@ -93,6 +93,11 @@ def rest_frames(body: Body) -> dict[str, NodeFrame]:
             assert_never(body)
 
 
+def nodes_along(beam: BeamBody) -> dict[str, float]:
+    """Places (m) along the beam of all its nodes by name, implicit ones included."""
+    return {"origin": 0.0, "root": 0.0, "tip": beam.length_m, **{node.name: node.x_m for node in beam.nodes}}
+
+
 def _on_beam(body: BeamBody, x: float, quaternion: Quaternion) -> NodeFrame:
     """Rest frame of a node at x of a beam."""
     if not is_curved(body):

@@ -21,6 +21,7 @@ from flexmb.modal.beam_sections import BeamSections, ByShapes, ByStrains, beam_s
 from flexmb.modal.flexible_model import SecondOrder
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.problems import SceneWarning
+from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, EXTENSION, TWIST
 from flexmb.scene.tree import place_along
 from flexmb.system.frames import MotionTables, Pose, body_pose, closure_frames_of, hinge_frames_of, link_pose
 from flexmb.system.moved_sections import moved_sections
@@ -41,7 +42,8 @@ class SectionLoads:
     deformed axis there, in axes that turn with the section: as across a hinge. Masses and loads at x itself count as
     beyond it.
     The properties below have the signs of structures: what the part beyond exerts on the face that looks along +x, so
-    that tension is positive. EA (X,) N, EIy, EIz, GJ (X,) N m² are the beam's there.
+    that tension is positive. EA (X,) N, EIy, EIz, GJ (X,) N m² are the beam's there. stiffness (X,6,6): all of it about
+    the axis, where sections are matrices or stated off the axis; EA and the others are then its diagonal.
     """
 
     body: str
@@ -51,6 +53,7 @@ class SectionLoads:
     EIy: Real
     EIz: Real
     GJ: Real
+    stiffness: Real | None = None
 
     def __post_init__(self) -> None:
         """TypeError or ValueError for arrays that do not fit together; checked again before they are used."""
@@ -61,6 +64,8 @@ class SectionLoads:
         for name in ("EA", "EIy", "EIz", "GJ"):
             arguments.held(name, getattr(self, name), self.x.shape)
             arguments.finite(name, getattr(self, name))
+        if self.stiffness is not None:
+            arguments.held("stiffness", self.stiffness, (*self.x.shape, 6, 6))
         more = getattr(self.load, "shape", ())[:-2]
         arguments.held("load", self.load, (*more, len(self.x), 6))
 
@@ -84,19 +89,44 @@ class SectionLoads:
         """(...,X,2) N m about the section's y and z."""
         return 0.0 - self.load[..., 1:3]
 
+    @property
+    def strain(self) -> Real:
+        """(...,X,6) [extension, shear y, shear z, twist 1/m, curvature y, curvature z 1/m] of the axis under the loads.
+
+        Shear is zero where the beam has none.
+        """
+        self._refuse_torn()
+        force = 0.0 - np.concatenate([self.load[..., 3:], self.load[..., :3]], axis=-1)
+        if self.stiffness is None:
+            none = np.zeros_like(self.EA)
+            return force * np.stack([1 / self.EA, none, none, 1 / self.GJ, 1 / self.EIy, 1 / self.EIz], axis=-1)
+        finite = np.isfinite(np.diagonal(self.stiffness, axis1=1, axis2=2))
+        shown = np.einsum("xi,xj->xij", finite, finite)
+        compliance = np.where(shown, np.linalg.inv(np.where(shown, self.stiffness, np.eye(6))), 0.0)
+        strain: Real = np.einsum("xij,...xj->...xi", compliance, force)
+        return strain
+
     def normal_stress(self, E: float, y: float, z: float) -> Real:
         """(...,X) Pa, tension positive, in the fibre at y, z (m) of the section, with Young's modulus E (Pa).
 
-        E times the strain N/EA + z My/EIy - y Mz/EIz.
+        E times the strain of the fibre, N/EA + z My/EIy - y Mz/EIz where the section couples nothing.
         """
         self._refuse_torn()
         E, y, z = arguments.number("E", E), arguments.number("y", y), arguments.number("z", z)
+        if self.stiffness is not None:
+            strain = self.strain
+            return E * (strain[..., 0] + z * strain[..., 4] - y * strain[..., 5])
         bending = z * self.bending[..., 0] / self.EIy - y * self.bending[..., 1] / self.EIz
         return E * (self.axial / self.EA + bending)
 
     def torsion_stress(self, G: float, r: float) -> Real:
-        """(...,X) Pa of shear at the radius r (m) of a round section or tube with shear modulus G (Pa): G r T / GJ."""
+        """(...,X) Pa of shear at the radius r (m) of a round section or tube with shear modulus G (Pa): G r T / GJ.
+
+        G r times the twist, where the section couples it with other strains.
+        """
         self._refuse_torn()
+        if self.stiffness is not None:
+            return arguments.number("G", G) * arguments.number("r", r) * self.strain[..., 3]
         return arguments.number("G", G) * arguments.number("r", r) * self.torsion / self.GJ
 
 
@@ -169,7 +199,9 @@ class SectionBalance:
     def loads(self, values: Real) -> SectionLoads:
         """`SectionLoads` with these loads (...,X,6)."""
         s, p = self.sections, self._places
-        return SectionLoads(self.body, self.x, values, s.EA[p], s.EIy[p], s.EIz[p], s.GJ[p])
+        K = s.stiffness[p]
+        EA, EIy, EIz, GJ = (K[:, i, i] for i in (EXTENSION, ABOUT_Y, ABOUT_Z, TWIST))
+        return SectionLoads(self.body, self.x, values, EA, EIy, EIz, GJ, None if s.plain else K)
 
     def _inertial(self, motion: _Motion, moved: _Moved) -> Real:
         """Rate of momentum (X,6), less gravity, of the parts beyond each cut, about the body's origin, body axes."""
