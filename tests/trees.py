@@ -66,6 +66,9 @@ class Recipe:
 
 
 RIGID = Recipe(carriers=("rigid",))
+SINGLE = Recipe(bodies=60, carriers=("rigid",), hinges=("revolute", "prismatic", "revolute"), conservative=True,
+                prescribed=False, wheels=0, point_masses=0, armatures=True)  # fmt: skip
+"""Rigid bodies on single axes alone, in branches longer than a base point serves."""
 FULL = Recipe()
 RUTHLESS = Recipe(levels=("ruthless",))
 LINEAR = Recipe(levels=("linear",))

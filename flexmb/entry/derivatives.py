@@ -112,13 +112,19 @@ def jacobian(t, y, J, c, w):
     """J (n,n) = d(dy/dt)/dy at y = [q, u, work] (n,), as `flexmb.entry.tangent.jacobian`; returns a status code."""
     load_state(t, y, c, w.sweeps)
     status = forward_dynamics(c, w.sweeps)
-    n, nq, nu = y.shape[0], w.sweeps.q.shape[0], w.sweeps.u.shape[0]
+    if status == OK:
+        sweeps.accelerations_and_power(c, w.sweeps, w.tables)
+        store_jacobian(c, w, J)
+    return status
+
+
+@helper
+def store_jacobian(c, w, J):
+    """J as `jacobian` has it from what `accelerations_and_power` has left in w."""
+    n, nq, nu = J.shape[0], w.sweeps.q.shape[0], w.sweeps.u.shape[0]
     for i in range(nq):
         for j in range(n):
             J[i, j] = 0.0
-    if status != OK:
-        return status
-    sweeps.accelerations_and_power(c, w.sweeps, w.tables)
     for i in range(nu):
         row = w.tables.matrix[w.tables.place[i]]
         by_coordinates(c, w, row, J[nq + i], nq)
@@ -133,7 +139,6 @@ def jacobian(t, y, J, c, w):
             if c.speed[j].prescribed >= 0:
                 _hold(J, c.speed[j].coordinate, n)
                 _hold(J, nq + j, n)
-    return OK
 
 
 @helper

@@ -44,7 +44,6 @@ def pull(t, y, row, moved, c, x):
     """moved (n,) = J'row with the Jacobian J of dy/dt at y = [q, u, work], as `derivatives.jacobian` has it; a status.
 
     The last entry of `row`, of the power, must be zero. Derivatives by the constants in x.p are added to its tables.
-    Not for hinge points on nodes that modes move in their own body.
     """
     w, d, p = x.w.sweeps, x.w.tables, x.p
     load_state(t, y, c, w)

@@ -31,9 +31,9 @@ from flexmb.typing import Real
 class Gradient:
     """A scalar of a run and its derivatives by numbers of the scene, by `gradient`.
 
-    value; parameters (P,) with their values parameter_values (P,); derivatives (P,), each in the unit of the scalar over
-    that of the parameter, in SI units; steps: of the run, each of which was passed forwards twice and backwards once;
-    checkpoints: states that were kept for this; trajectory: the run itself, at its start and end.
+    value; parameters (P,) with their values parameter_values (P,); derivatives (P,), each in the unit of the scalar
+    over that of the parameter, in SI units; steps: of the run, each of which was made three times and passed backwards
+    once; checkpoints: states that were kept for this; trajectory: the run itself, at its start and end.
     """
 
     value: float
@@ -63,7 +63,7 @@ def gradient(
     method: Method = "dop853",
     **settings: Unpack[RunSettings],
 ) -> Gradient:
-    """The gradient of a scalar of a run from t = 0 to `t_end` (s) by many numbers of its scene, by the discrete adjoint.
+    """The gradient of a scalar of a run from t = 0 to `t_end` (s) by many numbers of its scene: the discrete adjoint.
 
     by: paths as for `sensitivities`, which is cheaper for a few numbers and gives whole outputs. of: a `FinalValue`, a
     `Misfit` or a `TimeIntegral` of channels as in `Trajectory.columns`, or a list of them, which are added. settings:

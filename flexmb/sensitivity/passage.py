@@ -55,7 +55,8 @@ class Passage:
         elif leg.system is not self._system:
             assert self.after is not None
             self._blocks = self._systems.then(leg.system, leg.begin.state, self._alive, self.after.held)
-            self._laws = None if self.after.changes else self._laws  # latches and releases leave controllers as they are
+            if self.after.changes:  # latches and releases leave controllers as they are
+                self._laws = None
         self._system = leg.system
         assert self._blocks is not None
         return self._blocks

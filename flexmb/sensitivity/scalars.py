@@ -49,7 +49,7 @@ class FinalValue:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        """TypeError for a name that is no string, or a weight that is no number; ValueError for one that is infinite."""
+        """TypeError for a name that is no string, or a weight that is no number; ValueError for an infinite one."""
         object.__setattr__(self, "channel", _named(self.channel))
         object.__setattr__(self, "weight", arguments.number("weight", self.weight))
 

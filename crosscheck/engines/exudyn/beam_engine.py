@@ -88,8 +88,8 @@ def _refusals(scene: Scene) -> Iterator[str]:
             yield f'load "{load.name}" acts out of the plane'
     if scene.modal_states:
         yield "initial modal coordinates have no meaning here"
-    if any(scene.gravity_m_s2):
-        yield "it takes no gravity"
+    if scene.gravity_m_s2[2]:
+        yield "gravity pulls out of the plane"
     yield from _mode_refusals(beam)
     if not has_plain_sections(beam):
         yield (

@@ -12,8 +12,9 @@ from flexmb.tables.arrays import Constants
 from flexmb.typing import Real
 
 # Rows of `body` and `port`, six each, World axes about the base point. W: virtual velocity. G2, G1, G0: what a unit of
-# s2, s1 and s0 of a body or port does to the virtual power of it and of all that it carries.
-W, G2, G1, G0, PULLED_ROWS = 0, 6, 12, 18, 24
+# s2, s1 and s0 of a body or port does to the virtual power of it and of all that it carries. W_HINGE: W of the hinge
+# point O of a body, which differs from that of the body where the modes move O in it.
+W, G2, G1, G0, W_HINGE, PULLED_ROWS = 0, 6, 12, 18, 24, 30
 # Columns of `spring`: derivatives by stiffness, damping, rest and armature of a speed.
 STIFFNESS, DAMPING, REST, ARMATURE, SPRING_COLUMNS = 0, 1, 2, 3, 4
 

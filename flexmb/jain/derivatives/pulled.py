@@ -6,9 +6,9 @@ changes by
 
     s2 . G2 + s1 . G1 + s0 . G0 + W . (s0 x* F),    G2 = sum I W,  G1 = sum D'W,  G0 = sum E'W,  F = sum F
 
-over all bodies beyond, with W in the last term that of the source's hinge or port. The sums are those of one sweep
-inward, so that each source takes some fifty products; the rows and columns of `flexmb.jain.derivatives.rows` are the
-terms of these sums one by one.
+over all bodies beyond, with W in the last term that of the source's hinge or port itself. The sums are those of one
+sweep inward, so that each source takes some fifty products; the rows and columns of `flexmb.jain.derivatives.rows` are
+the terms of these sums one by one.
 """
 
 from flexmb.jain.derivatives.attached import attach, wheel_axis
@@ -18,7 +18,7 @@ from flexmb.jain.derivatives.hinges import force_to_world, outboard_rotation, to
 from flexmb.jain.derivatives.modes import in_body_axes
 from flexmb.jain.derivatives.motion import move
 from flexmb.jain.derivatives.ports import clear_ports, move_ports
-from flexmb.jain.derivatives.pull_tables import G0, G1, G2, W
+from flexmb.jain.derivatives.pull_tables import G0, G1, G2, W_HINGE, W
 from flexmb.jain.derivatives.strips_of import six_of
 from flexmb.jain.derivatives.tables import (
     BY_ACCELERATION,
@@ -51,7 +51,7 @@ from flexmb.spatial.spatial_vector import (
 )
 from flexmb.spatial.vector import add, cross, dot, mat3, scale, times_t, vec3
 from flexmb.tables.arrays import ON_GROUND
-from flexmb.tables.features import CONNECTORS, INBOARD_NODES, LOADS, MODES, SEVERAL, WHEELS
+from flexmb.tables.features import CONNECTORS, INBOARD_NODES, LOADS, MODES, OUTBOARD_NODES, SEVERAL, WHEELS
 
 ZERO3 = (0.0, 0.0, 0.0)
 
@@ -60,7 +60,7 @@ ZERO3 = (0.0, 0.0, 0.0)
 def pull(c, w, d, p):
     """Replace T in p.virtual.speed by m = -M^-1 T, and write m'dR by displacements and speeds to p.row, but for T.
 
-    Needs forward dynamics in w. Not for hinge points on nodes that modes move in their own body.
+    Needs forward dynamics in w.
     """
     on_ports = has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS)
     for k in range(c.body.shape[0]):
@@ -87,6 +87,8 @@ def pull(c, w, d, p):
         _own(c, d, p, k)
         if on_ports:
             _ports(c, w, d, p, k)
+        if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0 and not is_at_rest(c.body[k].level):
+            _frame(c, d, p, k)
         _hinge(c, w, d, p, k)
 
 
@@ -127,6 +129,10 @@ def _virtual_motion(c, d, p, k):
     V = inboard_virtual(c, d, p, k)
     for n in range(c.body[k].nv):
         V = axpy6(p.virtual.speed[j + n], column6(d.seed, slot + n), V)
+    store6(p.body[k], W_HINGE, V)
+    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
+        for n in range(c.body[k].modes):
+            V = axpy6(p.virtual.speed[c.body[k].etad_index + n], six_of(d.frame_mode[k], MOTION, n), V)
     store6(p.body[k], W, V)
     for row in range(G2, G0 + 6):
         p.body[k, row] = 0.0
@@ -194,9 +200,9 @@ def _pull_of(c, a, s1, s2):
 
 
 @helper
-def _pull_of_turn(c, a, F, J):
-    """s0 . G0 + W . (s0 x* F) for s0 = J."""
-    total = dot6(vec6(a, W), force_cross(J, F))
+def _pull_of_turn(c, a, X, F, J):
+    """s0 . G0 + X . (s0 x* F) for s0 = J."""
+    total = dot6(X, force_cross(J, F))
     if has(c, CONNECTORS):
         return total + dot6(vec6(a, G0), J)
     return total + dot(vec3(a, G0), J[0]) if has(c, LOADS) else total
@@ -219,7 +225,7 @@ def _ports(c, w, d, p, k):
             for n in range(c.body[k].modes):
                 J = six_of(moved, MOTION, n)
                 total = _pull_of(c, a, six_of(moved, BY_RATE, n), six_of(moved, BY_ACCELERATION, n))
-                total += _pull_of_turn(c, a, F, J)
+                total += _pull_of_turn(c, a, vec6(a, W), F, J)
                 for j in range(c.body[k].modes):
                     m = p.virtual.speed[c.body[k].etad_index + j]
                     total += m * dot6(F_body, column6(d.bent[i, j], n))
@@ -228,6 +234,23 @@ def _ports(c, w, d, p, k):
         for row in range(G2, G0 + 6):
             p.body[k, row] += p.port[i, row]
         add6(d.body[k].force, 0, vec6(d.port[i].force, 0))
+
+
+@helper
+def _frame(c, d, p, k):
+    """Columns of the modes of body k, which move its frame against the hinge point O, and all that it carries."""
+    first, nu, nm, a, moved = d.places[k].modes, d.speed.shape[0], c.body[k].modes, p.body[k], d.frame_mode[k]
+    F = vec6(d.body[k].force, 0)
+    F_body = in_body_axes(mat3(d.body[k].rotation, 0), vec3(d.body[k].position, 0), F)
+    for n in range(nm):
+        J = six_of(moved, MOTION, n)
+        total = _pull_of(c, a, six_of(moved, BY_RATE, n), six_of(moved, BY_ACCELERATION, n))
+        total += _pull_of_turn(c, a, vec6(a, W_HINGE), F, J)
+        for j in range(nm):
+            m = p.virtual.speed[c.body[k].etad_index + j]
+            total -= m * dot6(F_body, column6(d.bent[c.body[k].outboard_port, j], n))
+        p.row[first + n] += total
+        p.row[nu + first + n] += _pull_of(c, a, J, six_of(moved, SPEED_BY_ACCELERATION, n))
 
 
 @helper
@@ -254,7 +277,8 @@ def _hinge(c, w, d, p, k):
     for n in range(c.body[k].nv):
         J = column6(d.seed, slot + n)
         s2 = six_of(d.seed, BY_ACCELERATION, slot + n)
-        p.row[first + n] = _pull_of(c, a, six_of(d.seed, BY_RATE, slot + n), s2) + _pull_of_turn(c, a, F, J)
+        p.row[first + n] = _pull_of(c, a, six_of(d.seed, BY_RATE, slot + n), s2)
+        p.row[first + n] += _pull_of_turn(c, a, vec6(a, W_HINGE), F, J)
         p.row[nu + first + n] = _pull_of(c, a, J, six_of(d.seed, SPEED_BY_ACCELERATION, slot + n))
     if has(c, SEVERAL) and c.body[k].axis < 0:
         _same_hinge(c, w, d, p, k, F)

@@ -23,6 +23,14 @@ def inverse_dynamics(c, w, d, masses):
 
     Needs the velocity sweep in w, that of poses if there are connectors, and udot in w.speed.acceleration.
     """
+    forces_of_bodies(c, w, d, masses)
+    rows_of_speeds(c, w, d, masses)
+
+
+@helper
+def forces_of_bodies(c, w, d, masses):
+    """Outward: motion and forces of the bodies and of what is attached to them. `masses`, and what it needs in w: see
+    `inverse_dynamics`."""
     nu = d.speed.shape[0]
     if d.shape[BRANCHES] or has(c, WHEELS):  # else every element is written
         for place in range(nu):
@@ -51,6 +59,11 @@ def _all_bodies(c, w, d, masses):
             attach(c, w, d, k)
     if has(c, CONNECTORS):
         attach_connectors(c, w, d)
+
+
+@helper
+def rows_of_speeds(c, w, d, masses):
+    """Inward, after `forces_of_bodies` and what else acts on the bodies: the matrix, from what they answer."""
     for k in range(c.body.shape[0] - 1, -1, -1):
         if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):
             _answer_of_ports(c, d, k)

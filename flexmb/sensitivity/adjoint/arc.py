@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -63,8 +63,8 @@ class Cost(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What is integrated. begin: prepares its tables for a run from their start, and returns the addresses of kernels and
-    tables as in `Recorded`. is_plain: whether it is the motion of the mechanics alone."""
+    """What is integrated. begin: prepares its tables for a run from their start, and returns the addresses of kernels
+    and tables as in `Recorded`. is_plain: whether it is the motion of the mechanics alone."""
 
     begin: Callable[[], Index]
     is_plain: bool
@@ -212,7 +212,7 @@ class Arc:
             s.y[:] = self._record.state[first // every]
             self._check(stages.forwards(first, stop, s), float(self.t[first]))
             upper = stop
-            for i in [*sorted((i for i in places if first < i < stop), reverse=True), first]:
+            for i in [*(i for i in range(stop - 1, first, -1) if i in places), first]:
                 self._check(stages.backwards(first, i, upper, s), float(self.t[i]))
                 upper = i
                 if i in places and i > 0:

@@ -1,9 +1,10 @@
 """Transposes of the derivatives of a right-hand side and of a projection: by recursion, or by the Jacobian.
 
-m = F'l for a row l, with F = df/dy, and l . df/dp. Most trees are pulled in O(N) without a matrix, by
-`flexmb.entry.pulled`, which also adds up the derivatives by many constants of the tree; else F is the matrix that
-implicit methods use. What is left are parameters on which other constants depend: their lanes are those of the constants
-of the equations of motion in dual numbers, eight in a block (`flexmb.sensitivity.blocks`).
+m = F'l for a row l, with F = df/dy, and l . df/dp. The motion of a tree is pulled in O(N) without a matrix, by
+`flexmb.entry.pulled`, which also adds up the derivatives by many constants of the tree. Only where the scalar depends
+on the work done, F is the matrix that implicit methods use. What is left are parameters on which other constants
+depend: their lanes are those of the constants of the equations of motion in dual numbers, eight in a block
+(`flexmb.sensitivity.blocks`).
 """
 
 from __future__ import annotations
@@ -81,7 +82,8 @@ def transpose(t, y, row, moved, s):
 
 @kernel
 def unproject(t, y, gradient, s):
-    """The gradient by the state y before its projection, from that by the projected one; the rest is the parameters'."""
+    """The gradient by the state y before its projection, from that by the projected one; the rest is that of the
+    parameters."""
     for b in range(s.lanes.block.shape[0]):
         _hold(y, b, s.lanes)
         nothing_at(s.lanes.address[MANIFOLD], (t, s.lanes.block[b]))

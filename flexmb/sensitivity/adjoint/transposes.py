@@ -35,13 +35,12 @@ class Transposes:
 
     def __init__(self, blocks: Blocks, count: int, functions: Sequence[int], of_power: bool) -> None:
         """blocks: the constants in dual numbers, whose first `count` directions are those of parameters and of values
-        at which coordinates are held. functions (F,): those that controllers drive. of_power: whether the scalar depends
-        on the work at the end of the part."""
+        at which coordinates are held. functions (F,): those that controllers drive. of_power: whether the scalar
+        depends on the work done."""
         self._blocks, self._count, plant = blocks, count, blocks.system
         c = plant.constants
-        by_recursion = not of_power and not np.any(c.body["outboard_port"] >= 0)
-        self._x = pull_workspace(c, plant.nq, plant.nu) if by_recursion else None
-        acts = [_acting(each, c, by_recursion, functions) for each in blocks.duals[: -(-count // LANES)]]
+        self._x = None if of_power else pull_workspace(c, plant.nq, plant.nu)
+        acts = [_acting(each, c, not of_power, functions) for each in blocks.duals[: -(-count // LANES)]]
         self._chosen = np.flatnonzero(np.concatenate(acts)[:count])
         self._driven = len(functions)
         lanes = len(self._chosen) + self._driven
@@ -86,14 +85,14 @@ class Transposes:
         if self._x is not None:
             p, c = self._x.p, self._blocks.system.constants
             for b, each in enumerate(self._blocks.duals[: -(-self._count // LANES)]):
-                own = _by_constants(p, c, each.constants)
+                own = by_constants(p, c, each.constants)
                 count = min(LANES, self._count - LANES * b)
                 chosen = np.isin(np.arange(LANES * b, LANES * b + count), self._chosen)
                 found[LANES * b : LANES * b + count] += np.where(chosen, 0.0, own[:count])
         return found
 
 
-def _by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
+def by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
     """(LANES,) by the parameters of a block, from the derivatives by the constants that `Pulled` has."""
     found = np.einsum("ki,kil->l", p.rigid, duals.body["rigid"][..., 1:])
     found = found + np.einsum("ki,kil->l", p.placement[:, :3], duals.body["placement_position"][..., 1:])
@@ -108,7 +107,7 @@ def _by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
 
 
 def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequence[int]) -> Flags:
-    """(LANES,) which parameters of a block the motion depends on; by recursion, but for the constants that `Pulled` has.
+    """(LANES,) which parameters of a block the motion depends on; by recursion, but for constants that `Pulled` has.
 
     What controllers drive has directions of its own.
     """

@@ -15,6 +15,7 @@ import numpy as np
 
 from flexmb.control import loop
 from flexmb.integrate.control import ACCEPTED
+from flexmb.integrate.problem import Clock
 from flexmb.integrate.settings import Settings
 from flexmb.jit.direct import addresses
 from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID
@@ -28,7 +29,6 @@ from flexmb.sensitivity.adjoint.part import Part, Places
 from flexmb.sensitivity.adjoint.sampling import Sampling
 from flexmb.sensitivity.adjoint.seeing import Seeing
 from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
-from flexmb.sensitivity.loops import Loops
 from flexmb.sensitivity.passage import Passage, is_mechanical
 from flexmb.sensitivity.scalars import Probe, ScalarTerm, TimeIntegral
 from flexmb.typing import Index, Real
@@ -125,7 +125,7 @@ class Adjoint:
             if t in probes:
                 part.added[t] = self._added(seeing, t, states[t], probes[t])
 
-    def _begun(self, solve: Integration, leg: Leg) -> tuple[Real, object]:
+    def _begun(self, solve: Integration, leg: Leg) -> tuple[Real, Clock]:
         start = leg.begin.state.t
         return clock_of_leg(solve, leg, np.array([start, max(leg.raw.t, start)]), self._settings)
 

@@ -11,6 +11,7 @@ from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.section import section_inertia, section_stiffness
 from flexmb.scene.bodies import BeamBody, BeamStation, Modes
 from flexmb.scene.sections import matrix, restated, transport
+from flexmb.scene.shapes import coupled_section
 from flexmb.typing import Real
 from tests.flexmb.modal.coupled_references import (
     CORRELATION,
@@ -271,7 +272,18 @@ def test_the_order_of_beamdyn() -> None:
         [0, 0, -m * x_centre, -product - m * x_centre * y_centre, flap + m * x_centre**2, 0],
         [-m * y_centre, m * x_centre, 0, 0, 0, polar + m * (x_centre**2 + y_centre**2)],
     ])  # fmt: skip
-    order = [2, 0, 1, 5, 3, 4]
     J = np.array([[polar, 0.0, 0.0], [0.0, edge, -product], [0.0, -product, flap]])
-    here = section_mass(m, (0.0, x_centre, y_centre), J)
-    np.testing.assert_allclose(of_manual[np.ix_(order, order)], here, atol=1e-18)
+    here, order = section_mass(m, (0.0, x_centre, y_centre), J), [2, 0, 1, 5, 3, 4]
+    found = coupled_section(stiffness=np.diag(np.arange(1.0, 7.0)), inertia=of_manual, order=order)
+    np.testing.assert_allclose(found.inertia, here, atol=1e-18)
+    assert np.diag(found.stiffness).tolist() == [3.0, 1.0, 2.0, 6.0, 4.0, 5.0]
+
+
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"order": [0, 1, 2, 3, 4, 4]}, "each of 0 to 5 once"), ({"stiffness": np.eye(4)}, r"shape \(4, 4\)"),
+    ({"inertia": np.triu(np.ones((6, 6)))}, "inertia is not symmetric"),
+    ({"stiffness": np.full((6, 6), np.nan)}, "stiffness is not symmetric"),
+])  # fmt: skip
+def test_arrays_that_are_no_section_are_refused(changes: dict, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        coupled_section(**({"stiffness": np.eye(6), "inertia": section_mass()} | changes))
