@@ -127,8 +127,8 @@ def store_jacobian(c, w, J):
             J[i, j] = 0.0
     for i in range(nu):
         row = w.tables.matrix[w.tables.place[i]]
-        _row(c, w, row, J[nq + i], nq)
-    _row(c, w, w.tables.work, J[n - 1], nq)
+        by_coordinates(c, w, row, J[nq + i], nq)
+    by_coordinates(c, w, w.tables.work, J[n - 1], nq)
     for k in range(c.body.shape[0]):
         _coordinates(c, w, k, J, nq)
     if has(c, WHEELS):
@@ -149,7 +149,7 @@ def _hold(J, i, n):
 
 
 @helper
-def _row(c, w, row, out, nq):
+def by_coordinates(c, w, row, out, nq):
     """The derivatives by displacements and speeds in `row`, by coordinates and speeds in the order of y to `out`."""
     d, nu = w.tables, w.sweeps.u.shape[0]
     out[nq + nu] = 0.0
@@ -200,7 +200,7 @@ def _coordinates(c, w, k, J, nq):
     """Rows of the rates of the coordinates of body k."""
     i, j = c.body[k].q_index, c.body[k].u_index
     if has(c, QUATERNIONS) and c.body[k].quaternion >= 0:
-        _rates_of_quaternion(c, w, k, J, nq)
+        rates_of_quaternion(c, w, k, J, nq)
     else:
         for n in range(c.body[k].nv):
             J[i + n, nq + j + n] = 1.0
@@ -210,7 +210,7 @@ def _coordinates(c, w, k, J, nq):
 
 
 @helper
-def _rates_of_quaternion(c, w, k, J, nq):
+def rates_of_quaternion(c, w, k, J, nq):
     """The hinge's own function of its coordinates, not normalised, and its speeds by dual numbers."""
     e, i, j, nv = w.tables.duals, c.body[k].q_index, c.body[k].u_index, c.body[k].nv
     for speeds in range(2):

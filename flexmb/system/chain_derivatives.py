@@ -64,7 +64,7 @@ class ChainDerivatives(DifferentiableMotion):
     def _row_count(self) -> int:
         return len(self.closures.constants[1].row)
 
-    def _differentiable(self, state: State, what: str) -> tuple[float, Real]:
+    def _without_kinks(self, state: State, what: str) -> tuple[float, Real]:
         """As of a tree; NotImplementedError for bodies whose inertia is not where closures join them."""
         if self.closures.at_rest:
             raise NotImplementedError(
@@ -72,7 +72,7 @@ class ChainDerivatives(DifferentiableMotion):
                 f'closures join them, and {what} does not support that: use level "linear" or a better one'
             )
         self.initial_state  # noqa: B018 - counts the independent rows, without which no position is seen to be singular
-        return super()._differentiable(state, what)
+        return super()._without_kinks(state, what)
 
     def _given(self, accelerations: Real) -> Real:
         raise NotImplementedError(
