@@ -90,11 +90,11 @@ All keys, with defaults in brackets; the structs below explain them:
 - ``variant``: ``name``; ``scene`` ["scene.toml"]; ``transform`` ["none"], or "rigidify", "modal_points", "segments"
   with their number ``segments``, "substructures" with ``pieces`` and ``eigenmodes`` [0], the last two for
   ``split_body`` [every beam] alone; ``level`` [the scene's] of all flexible bodies; ``refined`` [none] with
-  ``segments``, ``pieces`` or ``elements`` and ``order`` [2.0]; ``engines``; ``also`` [none]; ``efforts`` [the
-  engine's own], each with ``engine``, ``kind`` ("tolerance" or "step"), ``method`` and falling ``values``;
-  ``duration_s`` and ``samples`` [the case's]; ``start`` [the scene's], "equilibrium" near it; ``linear`` [none],
-  what its engines are asked of the linearised motion at every sample: "derivatives", "frequencies" or both; ``note``
-  [none], shown in the report;
+  ``segments``, ``pieces``, ``elements`` or ``polynomials`` and ``order`` [2.0]; ``engines``; ``also`` [none];
+  ``efforts`` [the engine's own], each with ``engine``, ``kind`` ("tolerance" or "step"), ``method`` and falling
+  ``values``; ``duration_s`` and ``samples`` [the case's]; ``start`` [the scene's], "equilibrium" near it; ``linear``
+  [none], what its engines are asked of the linearised motion at every sample: "derivatives", "frequencies" or both;
+  ``note`` [none], shown in the report;
 - ``comparison``: ``name``; ``variant`` with ``engines`` [all of the variant's], or ``a`` and ``b``, each with a
   ``variant`` and an ``engine``; ``goals``; ``scales`` [the ranges] (SI); ``expect`` ["agree"]; ``band``, ``diverged_s``
   or ``because``, as ``expect`` needs; ``reason``;
@@ -133,8 +133,8 @@ MutationKind = Literal[
     "initial_unit", "initial_rate", "initial_speed_sign", "speed_axes", "initial_attitude", "wheel_axis",
     "wheel_momentum", "wheel_inertia", "wheel_inertia_swapped", "wheel_offset", "gravity_sign", "gravity_size",
     "gravity_axis", "gravity_dropped", "load_sign", "load_point", "load_frame", "dropped_stiffening",
-    "dropped_deformation", "mode_sign", "mode_order", "mode_rotation", "section_axes", "motor_sign", "function_size",
-    "function_phase", "connector_stiffness", "connector_rest", "connector_losses", "connector_damping",
+    "dropped_deformation", "mode_sign", "mode_order", "mode_rotation", "section_axes", "section_point", "motor_sign",
+    "function_size", "function_phase", "connector_stiffness", "connector_rest", "connector_losses", "connector_damping",
     "connector_preload", "connector_one_sided", "connector_stop", "stop_stiffness", "friction_torque",
     "friction_speed", "connector_position", "bushing_rotation", "bushing_ends", "bushing_order", "controller_gain",
     "controller_sign", "controller_dynamics", "controller_limit",
@@ -171,14 +171,20 @@ class ComparisonSide(_CasePart, frozen=True, kw_only=True):
 class Refined(_CasePart, frozen=True, kw_only=True):
     """A finer spatial discretisation of the same variant: more segments, pieces or elements per beam.
 
-    `order` is the convergence order of the discretisation's error (2 for finite segments with springs at mid-segment
-    and for pieces of level "full").
+    `polynomials` of a beam of level "exact" are so many more of each of its strains. `order` is the convergence order
+    of the discretisation's error (2 for finite segments with springs at mid-segment and for pieces of level "full");
+    that of polynomials is higher than any, and 2 is then on the safe side.
     """
 
     segments: int | None = None
     pieces: int | None = None
     elements: int | None = None
     order: float = 2.0
+    polynomials: int | None = None
+
+    def __str__(self) -> str:
+        """As figures of variants were accepted by it, which had no polynomials at first."""
+        return repr(self).replace(", polynomials=None", "")
 
 
 class Variant(_CasePart, frozen=True, kw_only=True):

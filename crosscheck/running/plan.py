@@ -28,9 +28,10 @@ from crosscheck.running.held import held_reference
 from crosscheck.running.job import MAIN, REFINED, Job
 from crosscheck.running.ladder import with_efforts
 from crosscheck.running.scheduler import TIME_LIMIT_S
-from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
+from flexmb.scene.bodies import BeamBody, Modes, RigidBody, SidBody, StrainPolynomials
 from flexmb.scene.check import SceneWarning, check_and_warn, check_scene
 from flexmb.scene.schema import Scene
+from flexmb.scene.strains import polynomials
 from flexmb.surrogate import finite_segments, modal_points, rigidify, substructured
 from flexmb.typing import Real
 
@@ -93,10 +94,13 @@ def _with_efforts(run: RunFile, case: Case) -> RunFile:
 
 
 def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None) -> Scene:
-    """The scene with the variant's levels, transformation and start; `refined` sets the number of beam elements."""
+    """The scene with the variant's levels, transformation and start; `refined` sets the number of beam elements, or
+    adds polynomials to strains."""
     scene = at_level(scene, variant)
     if refined is not None and refined.elements is not None:
         scene = _on_beams(scene, elements=refined.elements)
+    if refined is not None and refined.polynomials is not None:
+        scene = _with_polynomials(scene, refined.polynomials)
     return _begun(_transformed(scene, variant), variant)
 
 
@@ -255,6 +259,23 @@ def _engines_compared_across(run: RunFile, variant: Variant) -> tuple[str, ...]:
     crossing = [(a, b) for a, b in (pair.sides for pair in pairs) if a.variant != b.variant]
     found = {side.engine for pair in crossing for side in pair if side.variant == variant.name}
     return tuple(engine for engine in variant.engines if engine in found)
+
+
+def _with_polynomials(scene: Scene, more: int) -> Scene:
+    """The scene with so many polynomials more of each strain of its beams of level "exact"."""
+    bodies = tuple(
+        msgspec.structs.replace(body, modes=_with_more(body, more))
+        if isinstance(body, BeamBody) and body.level == "exact"
+        else body
+        for body in scene.bodies
+    )
+    return msgspec.structs.replace(scene, bodies=bodies)
+
+
+def _with_more(beam: BeamBody, more: int) -> Modes:
+    counts = {strain: count + more for strain, count in polynomials(beam).items()}
+    points = None if beam.modes.points is None else beam.modes.points + more
+    return msgspec.structs.replace(beam.modes, polynomials=StrainPolynomials(**counts), points=points)
 
 
 def _on_flexible(scene: Scene, **changes: object) -> Scene:

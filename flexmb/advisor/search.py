@@ -20,7 +20,7 @@ import numpy as np
 from flexmb.advisor.confirm import Confirmation
 from flexmb.advisor.ladder import Step, highest_frequency
 from flexmb.advisor.methods import RunMethod
-from flexmb.advisor.models import LEVELS, BodyModel, Model
+from flexmb.advisor.models import EXACT, LEVELS, BodyModel, Model
 
 HOPELESS = 20.0
 """Models predicted to miss the tolerance by this factor are tried last on the way up, and never on the way down."""
@@ -36,6 +36,8 @@ with more combinations than this, only pairs of bodies change.
 """
 FINALISTS = 3
 """Number of adequate models, the cheapest by their fine runs, for which the best method is determined."""
+
+_EVERY = (*LEVELS, EXACT)
 
 Choice = dict[str, Step]
 
@@ -103,7 +105,7 @@ class _Walk:
         """For each highest frequency, lowest first, the rungs of least predicted error that do not exceed it."""
         before: Choice | None = None
         for highest in sorted({0.0} | {step.fastest for steps in self.ladders.values() for step in steps}):
-            choice = self.finest_below(highest, LEVELS)
+            choice = self.finest_below(highest, _EVERY)
             if choice != before:
                 yield choice
             before = choice
@@ -132,7 +134,7 @@ class _Walk:
         rung for all, much cheaper combinations, body by body.
         """
         highest = max((step.fastest for step in choice.values()), default=0.0)
-        simpler = (self.finest_below(highest, LEVELS[:n]) for n in range(1, len(LEVELS)))
+        simpler = (self.finest_below(highest, _EVERY[:n]) for n in range(1, len(_EVERY)))
         choice = next(filter(self.fits, simpler), choice)
         choice = self.first_cheaper(choice, sorted(self.alike(choice), key=self.expected)) or choice
         while True:

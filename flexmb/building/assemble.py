@@ -13,6 +13,7 @@ from flexmb.building.inertia_arrays import group, inertia_arrays, second_order_r
 from flexmb.building.links import BodyLink, Port
 from flexmb.building.numbering import Numbering
 from flexmb.building.ports import attached, inboard_frames_and_ports
+from flexmb.building.section_arrays import section_arrays
 from flexmb.hinges.catalogue import KINDS
 from flexmb.jit.strips import whole
 from flexmb.levels.body import LEVELS
@@ -101,6 +102,7 @@ def assemble(
     connected = connector_arrays(scene, at.connectors, numbering, functions.number)
     function, table = pack(functions.all())
     port, wheel = _ports(ports, port_rows), _wheels(wheels, at.wheels, numbering)
+    sections = section_arrays(chain, ports_by_body, body, points["point"], port, m)
     moved = moved_inertia(body, port, inertia["mff"], wheel, len(speed))
     speed["doubtful"] = DOUBTFUL * (moved + speed["armature"])
     constants = a.Constants(
@@ -118,6 +120,7 @@ def assemble(
         **connected,
         **inertia,
         **points,
+        **sections,
     )
     signals = {number: each for number, each in enumerate(functions.all()) if isinstance(each, s.ControlSignal)}
     return Assembled(constants, at.markers, at.closures, signals)

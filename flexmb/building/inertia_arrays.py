@@ -75,6 +75,7 @@ def _points(
     turning = [(p, i) for p in (each.summed for each in bodies.values()) if p is not None for i in range(len(p.mass))]
     point = np.zeros(len(turning), a.POINT)
     for row, (p, i) in zip(point, turning, strict=True):
+        row["section"] = -1 if p.section is None else p.section[i]
         row["mass"], row["position"], row["offset"] = p.mass[i], p.position[i], p.com_offset[i]
         row["inertia"] = six(p.inertia[i])
         row["turning"] = bool(np.any(p.com_offset[i]) or np.any(p.inertia[i]))

@@ -158,6 +158,7 @@ def _seen_from(m: FlexibleModel, origin: tuple[float, ...], frame: tuple[float, 
         rotation=back @ m.rotation,
         second=None if m.second is None else m.second.turned(back),
         nodes={name: node.seen_from(at, back) for name, node in m.nodes.items()},
+        field=None if m.field is None else m.field.seen_from(at, back),
     )
 
 

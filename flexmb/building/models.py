@@ -152,4 +152,5 @@ def _with_wheel(model: FlexibleModel, wheel: s.Wheel) -> FlexibleModel:
         translation=np.concatenate([model.translation, node.translation[None]]),
         rotation=np.concatenate([model.rotation, node.rotation_modes[None]]),
         second=with_node(model, node),
+        section=None if model.section is None else np.append(model.section, node.section),
     )

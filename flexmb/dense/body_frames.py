@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from flexmb.dense.hinge_frames import hinge_frame, rotated
 from flexmb.dense.jets import Jet, MovingFrame, constant, join, quadratic, rotation_exponential, turn
 from flexmb.dense.members import DenseTree, Member, Rotor, Seat
+from flexmb.dense.section_frames import section_frames
 from flexmb.typing import Real
 
 
@@ -85,9 +86,14 @@ def point_frames(tree: DenseTree, frames: list[MovingFrame], motion: Motions) ->
 def on_body(seat: Seat, eta: Jet) -> MovingFrame:
     """A seat seen from its body: the node at x + phi eta, turned by exp((psi eta)~), then the fixed offset.
 
-    At level stiffened the second-order parts are added to phi eta and psi eta.
+    At level stiffened the second-order parts are added to phi eta and psi eta; at level exact the node moves with its
+    section.
     """
     node = seat.node
+    fixed = MovingFrame(constant(seat.offset), constant(seat.rotation))
+    if seat.field is not None and node.section >= 0:
+        section = section_frames(seat.field, eta[:, 0]).chosen(np.array([node.section]))
+        return MovingFrame(section.position, section.rotation @ constant(node.rotation[None, None])).carry(fixed)
     moved = eta.map(lambda x: x @ node.translation.T)
     rotation = constant(node.rotation[None, None])
     if eta.value.shape[-1]:  # most bodies are rigid, and the exponential is expensive
@@ -96,13 +102,15 @@ def on_body(seat: Seat, eta: Jet) -> MovingFrame:
             moved = moved + quadratic(node.second.translation, eta[..., None, :])
             turned = turned + quadratic(node.second.rotation, eta[..., None, :])
         rotation = rotation_exponential(turned) @ rotation
-    fixed = MovingFrame(constant(seat.offset), constant(seat.rotation))
     return MovingFrame(constant(node.position) + moved, rotation).carry(fixed)
 
 
 def field(member: Member, motion: Motions) -> MovingFrame:
     """Mass centres and axes of a member's inertia points in its body frame: Jain & Rodriguez (2) at finite rotation."""
     model, eta = member.model, motion.modes(member)[:, 0]
+    if model.field is not None and model.section is not None:
+        sections = section_frames(model.field, eta).chosen(model.section)
+        return sections.carry(MovingFrame(constant(model.com_offset), constant(np.eye(3)[None])))
     moved = eta.map(lambda x: np.einsum("pam,bm->bpa", model.translation, x))
     turned = eta.map(lambda x: np.einsum("pam,bm->bpa", model.rotation, x))
     if model.second is not None:

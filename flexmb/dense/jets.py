@@ -14,7 +14,7 @@ from types import EllipsisType
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.polynomial.polynomial import polyval
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from flexmb.typing import Real
 
@@ -45,7 +45,7 @@ class Jet:
     def __matmul__(self, other: Jet) -> Jet:
         return product(np.matmul, self, other)
 
-    def __getitem__(self, key: tuple[slice | EllipsisType | None | int, ...] | int) -> Jet:
+    def __getitem__(self, key: tuple[slice | EllipsisType | None | int | NDArray[np.intp], ...] | int) -> Jet:
         return self.map(lambda x: x[key])
 
     def map(self, linear: Callable[[Real], Real]) -> Jet:
@@ -77,6 +77,10 @@ class MovingFrame:
     def first(self) -> MovingFrame:
         """The frames along the first of B motions."""
         return MovingFrame(self.position[0], self.rotation[0])
+
+    def chosen(self, which: NDArray[np.intp]) -> MovingFrame:
+        """The frames with these numbers among the K."""
+        return MovingFrame(self.position[:, which], self.rotation[:, which])
 
     def angular_velocity(self) -> Real:
         """w (...,3) with dR/dt = w~ R."""

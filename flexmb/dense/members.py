@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from flexmb.dense.hinge_frames import hinge_sizes, rotation_of
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
+from flexmb.modal.strain_field import StrainField
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, Vector
 from flexmb.scene.connectors import BetweenNodes
@@ -23,16 +24,20 @@ from flexmb.scene.ends import ends
 from flexmb.scene.tree import GROUND, coordinates, ordered, rest_frames
 from flexmb.typing import Real
 
-LEVELS = ("rigid", "ruthless", "linear", "full", "stiffened")
+LEVELS = ("rigid", "ruthless", "linear", "full", "stiffened", "exact")
 
 
 @dataclass(frozen=True)
 class Seat:
-    """A frame fixed to a node: `offset` (3,) m and `rotation` (3,3) frame -> node, in node axes."""
+    """A frame fixed to a node: `offset` (3,) m and `rotation` (3,3) frame -> node, in node axes.
+
+    `field`: the sections of the node's body, at level exact.
+    """
 
     node: FlexibleNode
     offset: Real
     rotation: Real
+    field: StrainField | None
 
 
 @dataclass(frozen=True)
@@ -162,7 +167,7 @@ def _append_wheel(tree: DenseTree, wheel: s.Wheel, seat: Seat) -> DenseTree:
 
 
 def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY) -> Seat:
-    return Seat(model.nodes[node], np.array(offset, dtype=float), rotation_of(quaternion))
+    return Seat(model.nodes[node], np.array(offset, dtype=float), rotation_of(quaternion), model.field)
 
 
 def _model(body: s.Body, folder: Path | None) -> FlexibleModel:

@@ -37,7 +37,7 @@ from flexmb.integrate.stiff_place import (
 )
 from flexmb.integrate.watch import Ends
 from flexmb.jit.kernel import handed_in, handed_on, helper, kernel, sweep
-from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
+from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, OUT_OF_RANGE
 
 _ITERATIONS = 12  # maximum number of Newton iterations
 _INEXACT = 30  # the same without the Jacobian, whose cost is that of many iterations
@@ -210,6 +210,7 @@ def _linearise(problem, t, y, s, counts):
 def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
     """One step of size h from y to y_new, with a new Jacobian if the iteration does not converge with the old one.
 
+    An iterate beyond the range of a flexible body does not mean that the motion leaves it, unless nothing converges.
     Returns (status, step size of the factors, 0 if they are to be renewed).
     """
     status, iterations = NOT_CONVERGED, 0
@@ -217,7 +218,7 @@ def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
         h_factored = h if factorise(problem, s, h, accuracy, counts) else 0.0
     if h_factored > 0.0:
         status, iterations = newton(problem, min(step.end, step.last), y, h, s, accuracy, counts)
-    if status != NOT_CONVERGED:
+    if status != NOT_CONVERGED and status != OUT_OF_RANGE:
         return status, h_factored if iterations < _WORN else 0.0
     for _ in range(2):  # without the Jacobian where it may be missed, then with it
         status = _linearise(problem, step.start, y, s, counts)
@@ -226,7 +227,7 @@ def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
         status = NOT_CONVERGED
         if factorise(problem, s, h, accuracy, counts):
             status, _ = newton(problem, min(step.end, step.last), y, h, s, accuracy, counts)
-        if status != NOT_CONVERGED or not give_up(s.stiff):
+        if (status != NOT_CONVERGED and status != OUT_OF_RANGE) or not give_up(s.stiff):
             break
     return status, h if status == OK else 0.0
 

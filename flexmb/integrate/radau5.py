@@ -51,6 +51,22 @@ def estimate(problem, y, slope, h, s, accuracy):
 
 
 @helper
+def filtered(problem, y, h, s, accuracy):
+    """Scaled norm of (1 - h J / REAL)^-1 times the last estimate.
+
+    What a long step leaves of a stiff mode, a deflection d far below the tolerance, counts in (8.20) as a speed of
+    about d/h: the more, the shorter a step is tried, until it resolves the ringing of frequency w that this amounts to.
+    Here it counts (REAL / (h w))^2 times as much, so that steps which let it die out are accepted. What a step resolves
+    is hardly changed.
+    """
+    for i in range(y.shape[0]):
+        s.error[i] *= REAL / h
+        s.trial[i] = max(abs(y[i]), abs(s.y_new[i]))
+    solve(problem, s, h, s.error)
+    return scaled_norm(s.error, s.trial, accuracy)
+
+
+@helper
 def new_over_old(h, h_before, error, error_before):
     """New step over old by Gustafsson's predictive controller (8.25), which extrapolates the trend of the error."""
     if error == 0.0:
@@ -65,7 +81,8 @@ def new_over_old(h, h_before, error, error_before):
 def try_step(problem, step, ends, s, filter_again, accuracy, counts):
     """A step from a guess in Z: ends.y_new, projected, and its slope; a status code, and the verdict of `attempt`.
 
-    filter_again: a rejection is confirmed by the estimate (8.20), which no stiff transient can spoil.
+    filter_again: a rejection is confirmed by the estimate (8.20), and by that `filtered`, which no stiff transient can
+    spoil.
     """
     y, h = ends.y, step.end - step.start
     status, iterations, rate = newton(problem, step, y, s, accuracy, counts)
@@ -80,6 +97,8 @@ def try_step(problem, step, ends, s, filter_again, accuracy, counts):
         status = derivative(problem, step.start, s.trial, s.f_new, counts)
         if status == OK:
             error = estimate(problem, y, s.f_new, h, s, accuracy)
+        if status == OK and error >= 1.0:
+            error = filtered(problem, y, h, s, accuracy)
     if status == OK and error < 1.0:
         settle(problem, step.end, REAL / h, s.y_new, s, accuracy)
         status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
@@ -176,9 +195,19 @@ def after_rejection(length, status, factor, rate, fresh):
 @helper
 def by_trend(length, verdict, known):
     """New step over old by the trend of errors, shorter the more iterations Newton's method took."""
-    error, iterations, _ = verdict
-    caution = SAFETY * (2.0 * ITERATIONS + 1.0) / (2.0 * ITERATIONS + iterations)
-    return caution * new_over_old(length, known[STEP_BEFORE], error, known[ERROR_BEFORE])
+    return caution(verdict) * new_over_old(length, known[STEP_BEFORE], verdict[0], known[ERROR_BEFORE])
+
+
+@helper
+def caution(verdict):
+    """Factor on steps, the less the more iterations Newton's method took."""
+    return SAFETY * (2.0 * ITERATIONS + 1.0) / (2.0 * ITERATIONS + verdict[1])
+
+
+@helper
+def by_error(verdict):
+    """New step over old by the error alone: before a rejection, the trend of errors may be that of stiff transients."""
+    return caution(verdict) * verdict[0] ** (-1.0 / _ERROR_EXPONENT)
 
 
 @handed_in
@@ -198,7 +227,7 @@ def accept(step, cut, verdict, s, known, exponent):
 def reject(step, status, verdict, s, known, exponent):
     """See `flexmb.integrate.adaptive.Method`."""
     length, rate = step.end - step.start, verdict[2]
-    factor = by_trend(length, verdict, known) if status == OK else 1.0
+    factor = by_error(verdict) if status == OK else 1.0
     fresh = known[FRESH] != 0.0 and not (status == NOT_CONVERGED and give_up(s.stiff))
     known[STEP], renew = after_rejection(length, status, factor, rate, fresh)
     known[RENEW] = 1.0 if renew else 0.0

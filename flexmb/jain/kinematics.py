@@ -12,6 +12,7 @@ from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.jit.strips import part, put, width
 from flexmb.levels.body import is_at_rest
+from flexmb.levels.section_motion import move_sections
 from flexmb.spatial.spatial_vector import (
     ZERO6,
     shift_acceleration,
@@ -37,7 +38,7 @@ from flexmb.spatial.vector import (
     transpose,
     vec3,
 )
-from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
+from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES, SECTIONS
 
 
 @kernel
@@ -67,6 +68,8 @@ def move_body(c, w, k, shape, rates, displaced):
             modes = c.body[k].modes
             _take(w, w.eta[k], modes, exact or shape, w.q, c.body[k].eta_index)
             _take(w, w.etad[k], modes, exact or rates, w.u, c.body[k].etad_index)
+            if has(c, SECTIONS) and c.body[k].section_stop > c.body[k].section_start:
+                move_sections(c, w, k)
             for i in range(c.body[k].port_start, c.body[k].port_stop):
                 move_port(c, w, k, i)
     _cross_hinge(c, w, k)

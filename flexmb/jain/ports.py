@@ -4,21 +4,24 @@ from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.strips import strip, width
 from flexmb.levels.field import field_motion, second_order_motion
+from flexmb.levels.section_motion import section_point_motion
 from flexmb.spatial.rows import column6, strips6, total6
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, shift_motion, store6, sum6, vec6
 from flexmb.spatial.vector import add, cross, mat3, matmul, scale, store3, store9, vec3
-from flexmb.tables.features import SECOND_ORDER
+from flexmb.tables.features import SECOND_ORDER, SECTIONS
 
 
 @helper
 def move_port(c, w, k, i):
-    """Pose and relative motion of port i of body k, from w.eta and w.etad."""
+    """Pose and relative motion of port i of body k, from w.eta and w.etad, at level exact from its sections."""
     if c.body[k].modes == 0:
         return  # the pose of a rigid body's port is constant, and the workspace was made with it
     x = vec3(c.port[i].position, 0)
     offset = vec3(c.port[i].offset, 0)
-    row = c.port[i].second
-    if has(c, SECOND_ORDER) and row >= 0:
+    row, section = c.port[i].second, c.port[i].section
+    if has(c, SECTIONS) and section >= 0:
+        r, R, w_rel, v_rel, alpha, a = section_point_motion(c, w, k, section, offset, w.port_mode[i])
+    elif has(c, SECOND_ORDER) and row >= 0:
         r, R, w_rel, v_rel, alpha, a = second_order_motion(
             x, offset, c.port_mode[i], c.second_shape[row], w.eta[k], w.etad[k], c.body[k].modes, w.port_mode[i]
         )

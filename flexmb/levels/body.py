@@ -7,11 +7,11 @@ import numpy as np
 
 from flexmb.jit.kernel import helper
 from flexmb.jit.numbered import numbered
-from flexmb.levels import full, linear, rigid, ruthless, stiffened
+from flexmb.levels import exact, full, linear, rigid, ruthless, stiffened
 from flexmb.levels.level import FidelityLevel
 from flexmb.tables.features import LEVEL
 
-LEVELS: tuple[FidelityLevel, ...] = tuple(module.LEVEL for module in (rigid, ruthless, linear, full, stiffened))
+LEVELS: tuple[FidelityLevel, ...] = tuple(module.LEVEL for module in (rigid, ruthless, linear, full, stiffened, exact))
 BY_NAME = {level.name: level for level in LEVELS}
 
 _inertia_and_bias = numbered("inertia_and_bias", LEVEL, [level.inertia_and_bias for level in LEVELS])

@@ -53,6 +53,7 @@ class FidelityLevel:
     flexible: bool = True  # whether the body keeps its modes
     at_rest: bool = False  # whether inertia and kinematics are those of the undeformed shape
     second_order: bool = False  # whether displacements have a part of second order in the coordinates
+    by_strain: bool = False  # whether the coordinates are those of strains, from which sections follow one by one
 
 
 def six(m: Real) -> list[float]:

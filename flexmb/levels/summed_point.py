@@ -1,15 +1,32 @@
-"""Inertia that turns with one point of the modal field, summed at every evaluation: turning points, and wheels.
+"""Inertia that turns with one point of a body, summed at every evaluation: turning points, wheels, beams of strains.
 
 Angular momentum and force are those of the point's exact motion; nothing is truncated.
 """
 
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
-from flexmb.jit.strips import add_across, put, strip, width
+from flexmb.jit.strips import ROW, add_across, put, strip, width
 from flexmb.levels.field import field_motion, second_order_motion
-from flexmb.spatial.inertia import add_inertia, rigid_inertia
+from flexmb.levels.section_motion import section_point_motion
+from flexmb.spatial.inertia import add_inertia, rigid_inertia, store_inertia
 from flexmb.spatial.rows import column6, strips6
-from flexmb.spatial.spatial_vector import plus6
-from flexmb.spatial.vector import add, add3, cross, dot, rotate_sym, scale, sym6, sym_add, sym_times, vec3
+from flexmb.spatial.spatial_vector import ZERO6, plus6
+from flexmb.spatial.vector import add, add3, cross, dot, rotate_sym, scale, store3, sym6, sym_add, sym_times, vec3
+from flexmb.tables.features import SECTIONS
+
+
+@helper
+def clear_inertia(c, w, k):
+    """No rigid inertia, coupling and bias of body k."""
+    zero = ZERO6[0]
+    store_inertia(w.body[k].inertia, 0, rigid_inertia(0.0, zero, ZERO6[0] + ZERO6[1]))
+    store3(w.body[k].force, 0, zero)
+    store3(w.body[k].force, 3, zero)
+    for n in range(0, c.body[k].modes, width(w)):
+        put(w, w.zf[k], n, 0.0)
+    for n in range(c.body[k].modes):
+        for i in range(0, ROW, width(w)):
+            put(w, w.pfr[k, n], i, 0.0)
 
 
 @helper
@@ -20,8 +37,10 @@ def add_point(c, w, k, j):
     mass = c.point[j].mass
     x = vec3(c.point[j].position, 0)
     offset = vec3(c.point[j].offset, 0)
-    row = c.point[j].second
-    if row >= 0:
+    row, section = c.point[j].second, c.point[j].section
+    if has(c, SECTIONS) and section >= 0:
+        r, rotation, w_rel, v_rel, alpha_rel, a_rel = section_point_motion(c, w, k, section, offset, w.point_mode)
+    elif row >= 0:
         r, rotation, w_rel, v_rel, alpha_rel, a_rel = second_order_motion(
             x, offset, c.point_mode[j], c.second_shape[row], w.eta[k], w.etad[k], nm, w.point_mode
         )

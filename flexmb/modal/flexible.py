@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from flexmb.modal.beam import BeamElements, beam_elements
 from flexmb.modal.element_points import Points, axis_points, join, massy_lump, on_axis, section_points, turning_lump
 from flexmb.modal.equivalent import with_equivalent_masses
+from flexmb.modal.exact import exact_model
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, SecondOrder, undeforming_node
 from flexmb.modal.following import followed
 from flexmb.modal.raw import raw_model
@@ -59,6 +60,8 @@ def _of_kind(body: BeamBody | ModalBody, kind: type[Body]) -> Body:
 
 @lru_cache(maxsize=128)
 def _beam(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
+    if body.level == "exact":
+        return exact_model(body, like)
     return with_equivalent_masses(beam_model(body, like), None if like is None else beam_model(like))
 
 
@@ -75,7 +78,7 @@ def beam_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
         modes = beam_modes(elements, elements.stiffness(), M, body.modes)
         if like is not None:
             modes = followed(modes, M, _modes_of(like))
-        damping = damping_matrix(modes.roots, body.modes.damping_ratio)
+        damping = damping_matrix(modes.roots, body.modes.damping_ratio) + body.modes.viscosity_s * modes.stiffness
     except ValueError as error:
         raise ValueError(f"beam '{body.name}': {error}") from error
     points = points_of(body, elements, modes.columns, stations, rigid_lumps)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.typing import Real
+from flexmb.modal.strain_field import StrainField
+from flexmb.typing import Index, Real
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,8 @@ class SecondOrder:
 class FlexibleNode:
     """A node: rest position (3,) m, rest rotation (3,3) node->body, mode shapes translation and rotation (3, m).
 
-    `second` (3,m,m): its second-order field, if the body has one.
+    `second` (3,m,m): its second-order field, if the body has one. `section`: its section, of a body of level exact,
+    whose mode shapes are those at rest; -1 where the node does not deform.
     """
 
     position: Real
@@ -42,6 +44,7 @@ class FlexibleNode:
     translation: Real
     rotation_modes: Real
     second: SecondOrder | None = None
+    section: int = -1
 
     def seen_from(self, origin: Real, turn: Real) -> FlexibleNode:
         """The same node in other axes, R_new_old = `turn`, with the new origin at `origin` (3,) in the old axes."""
@@ -51,6 +54,7 @@ class FlexibleNode:
             turn @ self.translation,
             turn @ self.rotation_modes,
             None if self.second is None else self.second.turned(turn),
+            self.section,
         )
 
 
@@ -67,7 +71,8 @@ class FlexibleModel:
     mass (n,) kg; position (n,3) m; com_offset (n,3) m, in point axes, turning with the point; inertia (n,3,3) kg m^2
     about the point's mass centre, turning with the point; translation and rotation mode shapes (n,3,m); stiffness and
     damping (m,m); `nodes` by name, always with "origin". `clamped`: the modes vanish at the body origin. `second`: the
-    second-order field of the points (n,3,m,m), of bodies of level `stiffened`.
+    second-order field of the points (n,3,m,m), of bodies of level `stiffened`. `field`: how the sections of a beam of
+    level `exact` move, whose mode shapes are those at rest; `section` (n,): the sections that the points are fixed to.
     """
 
     mass: Real
@@ -81,6 +86,8 @@ class FlexibleModel:
     nodes: dict[str, FlexibleNode]
     clamped: bool
     second: SecondOrder | None = None
+    field: StrainField | None = None
+    section: Index | None = None
 
     @property
     def mode_count(self) -> int:

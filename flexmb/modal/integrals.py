@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.flexible_model import FlexibleModel, SecondOrder, join_second
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class TurningPoints:
 
     mass (k,) kg, zero if the mass is part of the polynomial integrals; position (k,3) m; com_offset (k,3) m and inertia
     (k,3,3) kg m^2 about the mass centre, both in point axes; translation and rotation mode shapes (k,3,m);
-    second-order field (k,3,m,m), if the body has one.
+    second-order field (k,3,m,m), if the body has one; section (k,) of each point, at level exact.
     """
 
     mass: Real
@@ -37,6 +37,7 @@ class TurningPoints:
     translation: Real
     rotation: Real
     second: SecondOrder | None = None
+    section: Index | None = None
 
 
 _ARRAYS = ("mass", "position", "com_offset", "inertia", "translation", "rotation")  # of points, also of a FlexibleModel
@@ -130,7 +131,8 @@ def still_points(model: FlexibleModel, chosen: NDArray[np.intp]) -> TurningPoint
 def _chosen(model: FlexibleModel, chosen: NDArray[np.intp]) -> TurningPoints:
     """The points of these numbers."""
     second = None if model.second is None else model.second.map(lambda G: G[chosen])
-    return TurningPoints(*(getattr(model, name)[chosen] for name in _ARRAYS), second=second)
+    section = None if model.section is None else model.section[chosen]
+    return TurningPoints(*(getattr(model, name)[chosen] for name in _ARRAYS), second=second, section=section)
 
 
 def stacked(first: TurningPoints, then: TurningPoints) -> TurningPoints:

@@ -8,8 +8,10 @@ import msgspec
 
 Vector = tuple[float, float, float]
 Matrix3 = tuple[Vector, Vector, Vector]
+Row6 = tuple[float, float, float, float, float, float]
+Matrix6 = tuple[Row6, Row6, Row6, Row6, Row6, Row6]
 Quaternion = tuple[float, float, float, float]
-Level = Literal["rigid", "ruthless", "linear", "full", "stiffened"]
+Level = Literal["rigid", "ruthless", "linear", "full", "stiffened", "exact"]
 Square = tuple[tuple[float, ...], ...]
 VectorSquare = tuple[tuple[Vector, ...], ...]
 
@@ -47,21 +49,35 @@ class RigidBody(SceneStruct, frozen=True, kw_only=True, tag="rigid", tag_field="
 class BeamStation(SceneStruct, frozen=True, kw_only=True):
     """Section properties at one station; they vary linearly between stations.
 
-    x is the beam axis, y and z the principal section axes: `EIz` resists bending in the x-y plane.
-    Shear stiffnesses are used by Timoshenko beams only; rotary inertias per length are rho*Iy, rho*Iz, and the
-    torsional one is their sum.
+    x is the beam axis. A station has its stiffness either by numbers or as a matrix, and so its inertia. By numbers y
+    and z are the principal section axes: `EIz` resists bending in the x-y plane. Shear stiffnesses are used by
+    Timoshenko beams only; rotary inertias per length are rho*Iy, rho*Iz, and the torsional one is their sum.
+
+    `stiffness` (6x6, symmetric, positive definite) maps the strains [extension, shear along y, shear along z, twist,
+    curvature about y, curvature about z] to [N, Qy, Qz, Mx, My, Mz]: N where both are forces and strains, N m where one
+    is a moment or a curvature, N m² where both are. `inertia` (6x6, symmetric) maps the velocities along and the
+    angular velocities about x, y and z to momenta per length: [m 1, -m c~; m c~, J] with the mass m (kg/m), its centre
+    c = (0, cy, cz) and the inertia J (kg m) about the reference point. `reference_point_m` (y, z) is where all
+    properties of the station are stated, by default on the axis of the beam.
+
+    `curvature_1_m`: twist and curvatures of the unloaded axis about the section's x, y and z, for beams of level
+    "exact"; the beam leaves the body's origin along +x.
     """
 
     x_m: float
-    EA_N: float
-    EIy_Nm2: float
-    EIz_Nm2: float
-    GJ_Nm2: float
-    mass_per_length_kg_m: float
+    EA_N: float | None = None
+    EIy_Nm2: float | None = None
+    EIz_Nm2: float | None = None
+    GJ_Nm2: float | None = None
+    mass_per_length_kg_m: float | None = None
     rotary_y_kg_m: float = 0.0
     rotary_z_kg_m: float = 0.0
     GAy_N: float | None = None
     GAz_N: float | None = None
+    curvature_1_m: Vector = ZERO
+    stiffness: Matrix6 | None = None
+    inertia: Matrix6 | None = None
+    reference_point_m: tuple[float, float] = (0.0, 0.0)
 
 
 class TipMass(SceneStruct, frozen=True, kw_only=True):
@@ -81,11 +97,35 @@ class BeamNode(SceneStruct, frozen=True, kw_only=True):
     quaternion: Quaternion = IDENTITY
 
 
+class StrainPolynomials(SceneStruct, frozen=True, kw_only=True):
+    """How many polynomials the strains of a beam of level "exact" have along each of its pieces: with 1 a strain is
+    constant there, with 2 linear.
+
+    `bending_y` is curvature about the section's z, `bending_z` about y, `axial` the stretch.
+    """
+
+    axial: int = 0
+    shear_y: int = 0
+    shear_z: int = 0
+    torsion: int = 0
+    bending_z: int = 0
+    bending_y: int = 0
+
+
 class Modes(SceneStruct, frozen=True, kw_only=True):
     """The modes of a beam: the `count` lowest of the chosen families, clamped at the root or free-free.
 
     `static` adds attachment modes (unit tip force and moment in the chosen families) to the eigenmodes; with `count` 0
     they are the only modes.
+
+    At level "exact" the strains are polynomials along each of `pieces` equal parts of the beam: `count` of them for
+    each curvature of the chosen families and for torsion, and in theory "timoshenko" two fewer, but one at least, for
+    the shear of each; or as many as `polynomials` says, which alone allows stretch. Attachment modes are contained in
+    them. `points`: Gauss points of a piece, three more than the largest number of its polynomials if not given, and six
+    at least.
+
+    Damping is that of `damping_ratio` and, if `viscosity_s` is not zero, of a material (Kelvin and Voigt) whose stress
+    is that of the strain plus `viscosity_s` times the strain rate.
     """
 
     count: int
@@ -94,11 +134,15 @@ class Modes(SceneStruct, frozen=True, kw_only=True):
         "axial", "torsion", "bending_y", "bending_z",
     )  # fmt: skip
     static: bool = False
+    polynomials: StrainPolynomials | None = None
+    pieces: int = 1
+    points: int | None = None
+    viscosity_s: float = 0.0
     damping_ratio: float | tuple[float, ...] = 0.0
 
 
 class BeamBody(SceneStruct, frozen=True, kw_only=True, tag="beam", tag_field="kind"):
-    """A straight beam along +x of the body frame, root at the origin.
+    """A beam along +x of the body frame, root at the origin; straight but for the curvature of its stations.
 
     `bending_y` is deflection along y (resisted by EIz), `bending_z` along z. `points` is the model of the section's
     inertia: "line" omits the rotary inertia of bending and of torsion, "rotary" gives each inertia point a tensor that

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, NamedTuple, TypeVar, assert_never
 
+import numpy as np
 from msgspec.structs import replace
 
 from flexmb.scene import control as c
@@ -15,6 +16,8 @@ from flexmb.scene.couplings import CoupledCoordinate, Coupling
 from flexmb.scene.events import Impact
 from flexmb.scene.freedoms import AngularCoordinate, Coordinate, LinearCoordinate
 from flexmb.scene.hinges import Hinge
+from flexmb.scene.quaternions import quaternion_of, rotation_matrix
+from flexmb.scene.rest_curve import is_curved, rest_sections
 from flexmb.scene.schema import PointMass, Scene, Wheel
 
 GROUND = "ground"
@@ -78,8 +81,8 @@ def rest_frames(body: Body) -> dict[str, NodeFrame]:
         case RigidBody():
             return origin | {node.name: NodeFrame(node.position_m, node.quaternion) for node in body.nodes}
         case BeamBody():
-            ends = {"root": origin["origin"], "tip": NodeFrame((body.length_m, 0.0, 0.0), IDENTITY)}
-            return origin | ends | {n.name: NodeFrame((n.x_m, 0.0, 0.0), n.quaternion) for n in body.nodes}
+            ends = {"root": origin["origin"], "tip": _on_beam(body, body.length_m, IDENTITY)}
+            return origin | ends | {n.name: _on_beam(body, n.x_m, n.quaternion) for n in body.nodes}
         case ModalBody():
             listed = {node.name: NodeFrame(node.position_m, node.quaternion) for node in body.nodes}
             return (origin if body.boundary == "clamped-free" else {}) | listed
@@ -88,6 +91,28 @@ def rest_frames(body: Body) -> dict[str, NodeFrame]:
             raise ValueError(f"{what}: convert it by flexmb import")
         case _:
             assert_never(body)
+
+
+def nodes_along(beam: BeamBody) -> dict[str, float]:
+    """Places (m) along the beam of all its nodes by name, implicit ones included."""
+    return {"origin": 0.0, "root": 0.0, "tip": beam.length_m, **{node.name: node.x_m for node in beam.nodes}}
+
+
+def _on_beam(body: BeamBody, x: float, quaternion: Quaternion) -> NodeFrame:
+    """Rest frame of a node at x of a beam."""
+    if not is_curved(body):
+        return NodeFrame((x, 0.0, 0.0), quaternion)
+    position, rotation = (each[0] for each in rest_sections(body, np.array([x])))
+    at, turn = position.tolist(), quaternion_of(rotation @ rotation_matrix(quaternion)).tolist()
+    return NodeFrame((at[0], at[1], at[2]), (turn[0], turn[1], turn[2], turn[3]))
+
+
+def place_along(body: BeamBody, node: str) -> float:
+    """Where a node of a beam is, in m along its axis from the root; ValueError if there is no such node."""
+    places = {"origin": 0.0, "root": 0.0, "tip": body.length_m} | {n.name: n.x_m for n in body.nodes}
+    if node not in places:
+        raise ValueError(f'body "{body.name}" has no node "{node}"; its nodes are {", ".join(places)}')
+    return places[node]
 
 
 def node_frame(body: Body, node: str) -> NodeFrame:

@@ -166,17 +166,17 @@ exponential_coefficients = by_number(_one_form, _both_forms)
 @helper
 def exponential(theta, k):
     """R = exp(skew(theta)) with k = exponential_coefficients(theta . theta)."""
-    return _in_powers(theta, k[0], k[1])
+    return in_powers(theta, k[0], k[1])
 
 
 @helper
 def left_jacobian(theta, k):
     """J_l(theta): R' = skew(J_l thetadot) R."""
-    return _in_powers(theta, k[1], k[2])
+    return in_powers(theta, k[1], k[2])
 
 
 @helper
-def _in_powers(theta, a, b):
+def in_powers(theta, a, b):
     """1 + a skew(theta) + b skew(theta)^2."""
     x, y, z = theta
     return (

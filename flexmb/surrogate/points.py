@@ -20,12 +20,17 @@ from flexmb.typing import Real
 def modal_points(scene: Scene) -> Scene:
     """The scene with every beam as raw inertia points and modes, so that other codes get exactly the same data.
 
-    A beam of level "stiffened" also has the second-order field of its points and nodes.
+    A beam of level "stiffened" also has the second-order field of its points and nodes. Raises ValueError for beams of
+    level "exact", whose points do not move by modes.
     """
     return replace(scene, bodies=tuple(_modal(each) if isinstance(each, BeamBody) else each for each in scene.bodies))
 
 
 def _modal(beam: BeamBody) -> ModalBody:
+    if beam.level == "exact":
+        raise ValueError(
+            f'beam "{beam.name}" is of level "exact", and its points do not move by modes: make the level "stiffened"'
+        )
     model = flexible_model(beam)
     quaternions = {name: frame.quaternion for name, frame in rest_frames(beam).items()}
     free = beam.modes.boundary == "free-free"

@@ -9,6 +9,9 @@ from typing import Literal
 import numpy as np
 
 from flexmb.scene import schema as s
+from flexmb.scene.rest_curve import is_curved
+from flexmb.scene.sections import has_plain_sections
+from flexmb.scene.strains import polynomials
 from flexmb.scene.tree import rest_frames
 from flexmb.surrogate.chain import (
     NodePlace,
@@ -50,7 +53,7 @@ def finite_segments(scene: s.Scene, body: str | None, n: int) -> s.Scene:
     frequency is O(n^-2), and so is that of finite deflection in a plane; in space it is O(n^-1), because the rotations
     of a hinge are successive. Segments are named `<beam>.seg00` ... and hinges `<beam>.h01` ... (prismatic ones
     `<beam>.a01` ...) from the root. Modal damping becomes proportional to stiffness, exact for the first mode. Raises
-    ValueError for Timoshenko shear and initial modal states, which segments do not have.
+    ValueError for Timoshenko shear and initial modal states, which segments do not have, and for curved beams.
     """
     for beam in beams_named(scene, body):
         scene = _segmented(scene, beam, n)
@@ -58,8 +61,16 @@ def finite_segments(scene: s.Scene, body: str | None, n: int) -> s.Scene:
 
 
 def _segmented(scene: s.Scene, beam: s.BeamBody, n: int) -> s.Scene:
-    if beam.theory == "timoshenko":
+    if is_curved(beam):
+        raise ValueError(f'beam "{beam.name}" is curved: finite segments are for straight ones; join several by welds')
+    if beam.theory == "timoshenko" or not _families(beam) <= {*_TURNS, "axial"}:
         raise ValueError(f'beam "{beam.name}": finite segments have no shear; use theory "euler-bernoulli"')
+    if not has_plain_sections(beam):
+        raise ValueError(
+            f'beam "{beam.name}": the hinges between finite segments have springs that nothing couples, and its '
+            "sections are matrices or stated off its axis; divide it into flexible pieces (substructures), or keep "
+            "its modes"
+        )
     cuts = _cuts(beam, n)
     ends = [0.0, *(cut.x for cut in cuts), beam.length_m]
     places = {}
@@ -81,14 +92,19 @@ def _cuts(beam: s.BeamBody, n: int) -> list[_Cut]:
         raise ValueError(f'beam "{beam.name}": finite segments need at least 2 elements, got {n}')
     length = beam.length_m / n
     cuts = []
-    if any(family in _TURNS for family in beam.modes.families):
+    if any(family in _TURNS for family in _families(beam)):
         cuts += [_Cut((i + 0.5) * length, i * length, (i + 1) * length, "turn") for i in range(n)]
-    if "axial" in beam.modes.families:
+    if "axial" in _families(beam):
         for i in range(1, n):
             start = 0.0 if i == 1 else (i - 0.5) * length
             end = beam.length_m if i == n - 1 else (i + 0.5) * length
             cuts.append(_Cut(i * length, start, end, "axial"))
     return sorted(cuts, key=lambda cut: cut.x)
+
+
+def _families(beam: s.BeamBody) -> set[str]:
+    """What the beam does: its families of modes, or the strains that have polynomials."""
+    return set(polynomials(beam)) if beam.level == "exact" else set(beam.modes.families)
 
 
 def _segments(beam: s.BeamBody, ends: list[float], places: dict[str, NodePlace]) -> list[s.RigidBody]:
@@ -133,7 +149,7 @@ def _turn(beam: s.BeamBody, cut: _Cut, lag: float, placement: dict) -> s.Hinge:
     """A hinge with one rotation for each family that turns sections: revolute for one, else a gimbal."""
     letters, axes, turns = "", [], []
     for family, (letter, axis, key) in _TURNS.items():
-        if family in beam.modes.families:
+        if family in _families(beam):
             k = _spring(beam, key, cut)
             letters += letter
             axes.append(axis)

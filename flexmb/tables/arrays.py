@@ -73,6 +73,12 @@ BODY = _record(  # the fields that rigid bodies use come first, so that they sha
     ("wheel_stop", _I),
     ("load_start", _I),
     ("load_stop", _I),
+    ("section_start", _I),  # level exact: its sections
+    ("section_stop", _I),
+    ("gauss_points", _I),  # number of Gauss points among them
+    ("planar", _I),  # whether all sections turn about one axis
+    ("stretching", _I),  # whether the modes stretch or shear the beam
+    ("bending_axis", _F, (3,)),  # that axis, unit, body axes
     ("parameters", _F, (3,)),  # real numbers of its hinge, such as the pitch of a screw (m/rad)
 )
 SLOPE = _record(  # level linear: mode n of a body by eta_k
@@ -88,12 +94,22 @@ POINT = _record(
     ("inertia", _F, (6,)),  # about the mass centre
     ("turning", _I),  # whether it has an inertia or an offset
     ("second", _I),  # level stiffened: row of `second_shape`, else -1
+    ("section", _I),  # level exact: the section that it is fixed to, else -1
 )
 PORT = _record(
     ("position", _F, (3,)),
     ("offset", _F, (3,)),  # in node axes (parallel to the body's at rest)
     ("frame", _F, (9,)),  # rotation port -> node axes
     ("second", _I),  # level stiffened: row of `second_shape`, else -1
+    ("section", _I),  # level exact: the section that it is fixed to, else -1
+)
+# Level exact: sections of beams, whose motion follows one from the other, see `flexmb.modal.strain_field`.
+SECTION = _record(
+    ("before", _I),  # the section from which it is turned, -1 for the root
+    ("gauss", _I),  # its number among the Gauss points of its body, -1 for others
+    ("commutator", _F),  # sqrt(3)/12 h^2 of the interval in between
+    ("position", _F, (3,)),  # at rest
+    ("tangent", _F, (3,)),  # of the axis at rest
 )
 SHAPE = _record(("translation", _F, (3,)), ("rotation", _F, (3,)))  # of second order, at a port or point
 WHEEL = _record(
@@ -171,7 +187,7 @@ class Constants:
 
     gravity: Real  # (3,) World axes, m/s^2
     body: Record  # (N,) BODY
-    mff: Real  # (N,m,m) modal mass matrix at rest
+    mff: Real  # (N,m,m) modal mass matrix at rest, less that of summed points
     mfr: Real  # (N,6,m) coupling to [angular; linear] at rest
     gyration: Real  # (N,6,m) ruthless, linear: B_n = -1/2 dJ/deta_n, centrifugal force w' B_n w on the mode
     stiffness: Real  # (N,m,m)
@@ -185,6 +201,11 @@ class Constants:
     port: Record  # (P,) PORT
     port_mode: Real  # (P,6,m) mode shapes [rotation; translation]
     second_shape: Record  # (their ports and summed points,m,m) SHAPE: the second-order field G_ni
+    section: Record  # (sections,) SECTION
+    # (sections,12,m) elastic curvature at the two Gauss points of the interval, its integral, stretch and shears at the
+    # section; of bodies that bend about one axis the first row is the angle
+    section_rows: Real
+    section_weight: Real  # (sections,Gauss points) integrals up to the section of Lagrange's polynomials
     wheel: Record  # (W,) WHEEL
     load: Record  # (L,) LOAD
     connector: Record  # (C,) CONNECTOR
@@ -263,6 +284,18 @@ PORT_STATE = _record(
     ("v", _F, (6,)),  # velocity relative to the body
     ("a", _F, (6,)),  # acceleration relative to the body at etaddot = 0
 )
+SECTION_STATE = _record(  # relative to the body, body axes
+    ("r", _F, (3,)),  # position from the body origin
+    ("R", _F, (9,)),  # rotation from the position at rest
+    ("omega", _F, (3,)),
+    ("alpha", _F, (3,)),  # accelerations at etaddot = 0
+    ("v", _F, (3,)),
+    ("a", _F, (3,)),
+)
+TANGENT_STATE = _record(  # of the axis, at a Gauss point
+    ("change", _F, (3,)),  # since rest
+    ("acceleration", _F, (3,)),  # at etaddot = 0
+)
 CONNECTOR_STATE = _record(
     ("load", _F, (6,)),  # [torque; force] on B about B, World axes
     ("arm", _F, (3,)),  # from A to B, World axes
@@ -307,6 +340,10 @@ class Workspace:
     port: Record  # (P,) PORT_STATE
     port_mode: Real  # (P,6,m) [angular; linear] velocity per modal speed
     point_mode: Real  # (6,m or 8) likewise of one summed point; scratch, at least one strip long
+    section: Record  # (sections,) SECTION_STATE
+    section_mode: Real  # (sections,6,m) [angular; linear] velocity per modal speed
+    tangent: Record  # (Gauss points of one body,) TANGENT_STATE; scratch
+    tangent_mode: Real  # (the same,3,m) rate of the tangent per modal speed; scratch
     speed: Record  # (nu,) SPEED_STATE
     connector: Record  # (C,) CONNECTOR_STATE
     hinge_spring: Record  # ALONG_HINGE_STATE

@@ -38,6 +38,9 @@ OUTBOARD_NODES = "outboard nodes"  # hinges whose outboard frame does
 MODES = "modes"
 COUPLED_MODES = "coupled modes"  # modal stiffness or damping is not diagonal
 SECOND_ORDER = "second order"  # shapes of ports and summed points change with the deformation
+SECTIONS = "sections"  # of beams of level exact
+BENT_IN_PLANE = "bent in a plane"  # those whose sections turn about one axis
+BENT_IN_SPACE = "bent in space"  # all others of them
 WHEELS = "wheels"
 LOADS = "loads"
 CONNECTORS = "connectors"  # between two nodes
@@ -66,6 +69,7 @@ class SceneTables(Protocol):
     body: Record
     speed: Record
     second_shape: Real
+    section: Record
     wheel: Record
     load: Record
     connector: Record
@@ -130,6 +134,9 @@ def contained(c: SceneTables) -> frozenset[str]:
         MODES: np.any(body["modes"] > 0),
         COUPLED_MODES: np.any(body["uncoupled"][body["modes"] > 0] == 0),
         SECOND_ORDER: len(c.second_shape) > 0,
+        SECTIONS: len(c.section) > 0,
+        BENT_IN_PLANE: np.any(body["planar"] != 0),
+        BENT_IN_SPACE: np.any((body["section_stop"] > body["section_start"]) & (body["planar"] == 0)),
         WHEELS: len(c.wheel) > 0,
         LOADS: len(c.load) > 0,
         CONNECTORS: len(c.connector) > 0,

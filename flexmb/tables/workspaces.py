@@ -33,6 +33,10 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "port": ports_at_rest(c),
         "port_mode": strip_zeros((len(c.port), 6, m)),
         "point_mode": strip_zeros((6, max(m, ROW))),  # at least one strip: eliminations store their sums there
+        "section": np.zeros(len(c.section), a.SECTION_STATE),
+        "section_mode": strip_zeros((len(c.section), 6, m)),
+        "tangent": np.zeros(c.section_weight.shape[1], a.TANGENT_STATE),
+        "tangent_mode": strip_zeros((c.section_weight.shape[1], 3, m)),
         "speed": np.zeros(nu, a.SPEED_STATE),
         **connector_states(c),
         "function": np.zeros((len(c.function), 3)),

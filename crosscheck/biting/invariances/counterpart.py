@@ -12,6 +12,7 @@ from crosscheck.biting.invariances.linearised import Channels, LinearRelation
 from crosscheck.library.channels import LINEAR_KINDS
 from flexmb.scene.bodies import BeamBody, ModalBody, Quaternion, RigidBody, SidBody, Vector
 from flexmb.scene.schema import Scene
+from flexmb.scene.sections import mass_per_length
 from flexmb.typing import Real
 
 POLAR = (".position", ".velocity", ".force", ".linear")
@@ -118,7 +119,7 @@ def total_mass(scene: Scene) -> float:
             case RigidBody():
                 found += body.mass_kg
             case BeamBody():
-                x, density = np.array([(each.x_m, each.mass_per_length_kg_m) for each in body.stations]).T
+                x, density = np.array([(each.x_m, mass_per_length(each)) for each in body.stations]).T
                 found += float(np.trapezoid(density, x)) + sum(tip.mass_kg for tip in body.tip_masses)
             case ModalBody() if body.points:
                 found += sum(point.mass_kg for point in body.points)

@@ -16,10 +16,14 @@ from crosscheck.engines.exudyn.state import States
 from crosscheck.engines.pace import pace
 from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Planar, Revolute, Weld
+from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import BeamBody, Marker, Scene
+from flexmb.scene.sections import has_plain_sections
+from flexmb.scene.strains import polynomials
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
+PLANAR_STRAINS = {"axial", "shear_y", "bending_y"}
 RUNGS, USUAL = 3, 800
 """Of steps, and how many are worth their time at the coarsest: the beam's bending is followed, its axial vibrations
 are stepped over."""
@@ -84,17 +88,32 @@ def _refusals(scene: Scene) -> Iterator[str]:
             yield f'load "{load.name}" acts out of the plane'
     if scene.modal_states:
         yield "initial modal coordinates have no meaning here"
-    if any(scene.gravity_m_s2):
-        yield "it takes no gravity"
-    if set(beam.modes.families) - {"bending_y", "axial"}:
-        yield 'it is planar: the beam may want the families "bending_y" and "axial" only'
-    if np.any(beam.modes.damping_ratio):
-        yield "it has no modal damping"
+    if scene.gravity_m_s2[2]:
+        yield "gravity pulls out of the plane"
+    yield from _mode_refusals(beam)
+    if not has_plain_sections(beam):
+        yield (
+            "its elements have EA, EI and GA on the axis alone: a section that is a matrix, or stated off the axis, "
+            'couples them; compare with engine "exudyn" after the beam is made points and modes'
+        )
+        return
     if beam.theory == "timoshenko" and any(station.GAy_N is None for station in beam.stations):
         yield "a shear-flexible beam needs GAy_N at every station"
     if beam.level == "rigid":
         yield "the beam is rigid in this scene"
     yield from _hinge_refusals(beam, hinge)
+
+
+def _mode_refusals(beam: BeamBody) -> Iterator[str]:
+    if beam.level == "exact":
+        if beyond := set(polynomials(beam)) - PLANAR_STRAINS:
+            yield f"it is planar, and the beam has polynomials of {', '.join(sorted(beyond))}"
+        if is_curved(beam):
+            yield f'its elements are straight, and beam "{beam.name}" is curved where it is not loaded'
+    elif set(beam.modes.families) - {"bending_y", "axial"}:
+        yield 'it is planar: the beam may want the families "bending_y" and "axial" only'
+    if np.any(beam.modes.damping_ratio) or beam.modes.viscosity_s:
+        yield "it has no modal damping, and none by the rate of strain"
 
 
 def _hinge_refusals(beam: BeamBody, hinge: Hinge) -> Iterator[str]:

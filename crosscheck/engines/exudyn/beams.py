@@ -54,7 +54,7 @@ class PlanarBeam:
 def assemble_beam(scene: Scene, elements: int) -> PlanarBeam:
     """Build the one beam of a scene that the engine supports, with at least `elements` elements."""
     beam, hinge = scene.bodies[0], scene.hinges[0]
-    shop = Workshop(np.zeros(3), explicit=False)
+    shop = Workshop(np.array(scene.gravity_m_s2), explicit=False)
     root = _root(beam, hinge)
     sheared = beam.theory == "timoshenko"
     stations = _stations(scene, beam, elements)
@@ -225,12 +225,13 @@ def _cable(shop: Workshop, beam: BeamBody, stations: Real, root: _Root) -> tuple
         )
     for k, (left, right) in enumerate(zip(stations, stations[1:], strict=False)):
         EA, EI, mass, _ = (section(beam, (left + right) / 2.0, key) for key in SECTION_KEYS)
-        shop.mbs.AddObject(
+        element = shop.mbs.AddObject(
             shop.items.ObjectANCFCable2D(
                 nodeNumbers=nodes[k : k + 2], length=right - left, massPerLength=mass, bendingStiffness=EI,
                 axialStiffness=EA, useReducedOrderIntegration=1,
             )
         )  # fmt: skip
+        shop.weigh(element)
     return tuple(nodes)
 
 
@@ -247,11 +248,12 @@ def _geometrically_exact(shop: Workshop, beam: BeamBody, stations: Real, root: _
     for k, (left, right) in enumerate(zip(stations, stations[1:], strict=False)):
         middle = (left + right) / 2.0
         EA, EI, mass, rotary = (section(beam, middle, key) for key in SECTION_KEYS)
-        shop.mbs.AddObject(
+        element = shop.mbs.AddObject(
             shop.items.ObjectBeamGeometricallyExact2D(
                 nodeNumbers=[nodes[k], node(middle), nodes[k + 1]], length=right - left, massPerLength=mass,
                 crossSectionInertia=rotary, bendingStiffness=EI, axialStiffness=EA,
                 shearStiffness=section(beam, middle, "GAy_N"), includeReferenceRotations=True,
             )
         )  # fmt: skip
+        shop.weigh(element)
     return tuple(nodes)

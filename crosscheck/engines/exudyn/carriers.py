@@ -82,10 +82,14 @@ class Workshop:
                 nodeNumber=node, mass=own.mass, inertia=_six(about_origin), centerOfMass=list(own.com)
             )
         )
+        self.weigh(item)
+        return Carrier(item, node, zero, own)
+
+    def weigh(self, item: int) -> None:
+        """Let gravity, if there is any, act on an object that has mass."""
         if self.gravity.any():
             marker = self.mbs.AddMarker(self.items.MarkerBodyMass(bodyNumber=item))
             self.mbs.AddLoad(self.items.LoadMassProportional(markerNumber=marker, loadVector=list(self.gravity)))
-        return Carrier(item, node, zero, own)
 
     def flexible(
         self, motion: FrameMotion, zero: Real, data: PointIntegrals, eta: Real, rate: Real, crosses: list[Real]

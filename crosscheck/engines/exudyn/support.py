@@ -58,7 +58,9 @@ def _body_refusals(body: Body) -> Iterator[str]:
         case RigidBody():
             return
         case BeamBody():
-            if body.level != "rigid":
+            if body.level == "exact":
+                yield f'body "{body.name}" is of level "exact", and a floating frame has modes instead: use exudyn-beam'
+            elif body.level != "rigid":
                 yield f'body "{body.name}": expand the beam to raw points and modes first'
         case ModalBody() if body.level not in ("rigid", "full"):
             yield f'body "{body.name}": Exudyn\'s floating frame is of level "full", not "{body.level}"'

@@ -76,15 +76,16 @@ def check_ladder(ladder: EffortLadder, duration: float, place: Place) -> Iterato
 
 
 def _refined(variant: Variant, refined: Refined, place: Place) -> Iterator[Defect]:
-    counts = {key: getattr(refined, key) for key in ("segments", "pieces", "elements")}
+    counts = {key: getattr(refined, key) for key in ("segments", "pieces", "elements", "polynomials")}
     if all(count is None for count in counts.values()):
-        yield problem(place, "it refines nothing", "give segments, pieces or elements")
+        yield problem(place, "it refines nothing", "give segments, pieces, elements or polynomials")
     for key, transform in (("segments", "segments"), ("pieces", "substructures")):
         fine, coarse = counts[key], getattr(variant, key)
         if fine is not None and coarse is None:
             yield problem(place.key(key), f'give it with "{transform}" only', "take it out")
         elif fine is not None and not coarse < fine <= MOST_PIECES:
             yield problem(place.key(key), f"{fine} is not finer than {coarse}", f"give more than {coarse}")
-    if counts["elements"] is not None:
-        yield from check_count(counts["elements"], place.key("elements"), 1)
+    for key in ("elements", "polynomials"):
+        if counts[key] is not None:
+            yield from check_count(counts[key], place.key(key), 1)
     yield from check_within(refined.order, ORDERS, place.key("order"))

@@ -70,3 +70,9 @@ def put_until(d, row, n, count, x):
         beyond = count - 1
         x = x - after(d, x, 0, beyond) + after(d, strip(d, row, n), 0, beyond)
     put(d, row, n, x)
+
+
+@helper
+def zero(d, row):
+    """A strip of zeros, of the type of those of a row."""
+    return after(d, strip(d, row, 0), 0, width(d))

@@ -17,11 +17,12 @@ from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import put, strip, width
 from flexmb.levels import full
 from flexmb.levels.body import LEVELS, body_inertia, is_at_rest
+from flexmb.levels.section_motion import move_sections
 from flexmb.spatial.inertia import inertia_times, load_inertia, rotate_inertia, shift_inertia, store_inertia
 from flexmb.spatial.rows import column3, put3, store_column3, strips3
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, plus6, shift_motion, store6, times6_t, vec6
 from flexmb.spatial.vector import add, cross, mat3, scale, times, vec3
-from flexmb.tables.features import LEVEL
+from flexmb.tables.features import LEVEL, SECTIONS
 
 FULL_NUMBER = LEVELS.index(full.LEVEL)
 FULL = f"{LEVEL} {FULL_NUMBER}"
@@ -66,6 +67,8 @@ def _by_duals(c, w, d, k, V, A):
         count = min(LANES, last - first)
         for lane in range(count):
             _seed(e, k, nm, first + lane, lane)
+        if has(c, SECTIONS):
+            move_sections(c, e, k)
         body_inertia(c, e, k)
         _force(c, w, e, k, A)
         for lane in range(count):

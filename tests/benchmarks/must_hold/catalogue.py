@@ -8,6 +8,8 @@ from tests.benchmarks.must_hold import (
     charts,
     derivatives,
     evaluation,
+    exact,
+    exact_runs,
     first_use,
     floating_frames,
     growth,
@@ -22,8 +24,8 @@ from tests.benchmarks.must_hold import (
 from tests.benchmarks.must_hold.row import Row
 
 SOURCES = (
-    evaluation, derivatives, runs, runs_at_equal_error, missions, sensitivity, implicit, modes, floating_frames, growth,
-    charts, start, first_use,
+    evaluation, derivatives, runs, runs_at_equal_error, missions, sensitivity, implicit, modes, floating_frames, exact,
+    exact_runs, growth, charts, start, first_use,
 )  # fmt: skip
 
 

@@ -9,10 +9,9 @@ second, each at the fastest of the settings in `SEARCHED` that is accurate enoug
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import cache, partial
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from crosscheck.running.plan import variant_scene
 from flexmb.integrate.integrator import Method
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import rigidify
+from tests.benchmarks.exudyn_runs import SPECTRAL_RADIUS, Newton, solved
 from tests.benchmarks.must_hold.row import Measured, Row
 from tests.benchmarks.must_hold.tuning import Setting, equal_error
 
@@ -33,7 +33,6 @@ FINEST = (2.0**-9, 2.0**-10)  # of the trapezoidal rule, extrapolated to what Ex
 METHODS: tuple[Method, ...] = ("dop853", "exponential", "radau5")
 TOLERANCES = tuple(10.0**-k for k in range(2, 9))
 CONVERGED = 1e-12
-SPECTRAL_RADIUS = 0.9
 TIGHT = 1e-8  # tolerance of Newton's method, by which a step's own error is found
 TOLERANCES_OF_NEWTON = (1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 NATIVE_NEWTON = 1e-5  # a longer step with closer iterations costs less here than the other way round
@@ -111,11 +110,11 @@ def _exudyn(scene: Scene, times: np.ndarray, bending: float) -> Iterator[Setting
 
     assembly = assemble(scene)
     reference = ("TrapezoidalIndex2", Newton(TIGHT, True, False))
-    coarse, fine = (_tip(assembly, _solved(assembly, times, *reference, step)) for step in FINEST)
+    coarse, fine = (_tip(assembly, solved(assembly, times, *reference, step)) for step in FINEST)
     exact = fine + (fine - coarse) / 3.0
 
     def setting(method: str, newton: Newton, step: float) -> Setting:
-        run = partial(_solved, assembly, times, method, newton, step)
+        run = partial(solved, assembly, times, method, newton, step)
         error = _error(_tip(assembly, run()), exact, bending)
         return Setting(run, f"{method}, step {1e3 * step:.3g} ms, {newton}", error)
 
@@ -131,47 +130,6 @@ def _exudyn(scene: Scene, times: np.ndarray, bending: float) -> Iterator[Setting
             left = [level for level in left if level not in reached]
             if not left:
                 break
-
-
-class Newton(NamedTuple):
-    """Relative and absolute tolerance; whether a Jacobian is kept as long as it contracts; the linear solver."""
-
-    tolerance: float
-    modified: bool
-    sparse: bool
-
-    def __str__(self) -> str:
-        kind, solver = "modified Newton" if self.modified else "Newton", "sparse" if self.sparse else "dense"
-        return f"{kind} to {self.tolerance:g}, {solver}"
-
-
-def _solved(assembly: Any, times: np.ndarray, method: str, newton: Newton, step: float) -> Any:
-    """States at `times` by fixed steps; fewer where Exudyn gives up."""
-    from crosscheck.engines.exudyn.solve import Recorder
-
-    shop = assembly.shop
-    settings = shop.exu.SimulationSettings()
-    settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = float(times[1])
-    solvers = shop.exu.LinearSolverType
-    settings.linearSolver.solverType = solvers.EigenSparse if newton.sparse else solvers.EXUdense
-    control = settings.timeIntegration
-    control.verboseMode, control.adaptiveStep = 0, False
-    control.solverType = getattr(shop.exu.DynamicSolverType, method)
-    control.endTime, control.numberOfSteps = float(times[-1]), round(times[-1] / step)
-    control.newton.useModifiedNewton = newton.modified
-    control.newton.relativeTolerance = control.newton.absoluteTolerance = newton.tolerance
-    control.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
-    recorder = Recorder(assembly)
-
-    def sample(mbs, t, sensors, factors, configuration) -> list[float]:
-        recorder.take(t)
-        return [0.0]
-
-    shop.mbs.SetSensorParameter(assembly.sampler, "sensorUserFunction", sample)
-    with suppress(shop.exu.SolverError, shop.exu.ModelError):  # what was recorded so far is too short to be taken
-        shop.mbs.SolveDynamic(settings, updateInitialValues=False, showHints=False, showCausingItems=False)
-    return recorder.states()
 
 
 def _tip(assembly: Any, states: Any) -> np.ndarray:

@@ -18,7 +18,7 @@ from flexmb.scene.connectors import SpringDamper
 from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Load, Scene
 from tests import trees
-from tests.benchmarks.rivals import flexible_chain
+from tests.benchmarks.rivals import flexible_chain, rigid_chain
 from tests.flexmb.connectors import connected_scenes
 from tests.flexmb.entry import interpreted
 from tests.flexmb.entry.terms import Term, modules, terms
@@ -110,7 +110,8 @@ def scenes() -> list[Compared]:
     made = [
         tethered(flexible_chain(10, 1, "full")), twisted(drawn(trees.ARMED_RIGID, 5, 0)), drawn(trees.FULL, 4, 0),
         drawn(trees.EVERY_LEVEL, 4, 0), tethered(drawn(trees.FULL, 4, 1)), drawn(trees.EVERY_LEVEL, 5, 1),
-        drawn(trees.LATER, 4, 1), connected_scenes.everything("full"),
+        drawn(trees.LATER, 4, 1), connected_scenes.everything("full"), drawn(trees.SINGLE, 8, 0),
+        rigid_chain(10),
     ]  # fmt: skip
     return [compared(scene) for scene in made]
 

@@ -326,6 +326,10 @@ def calls() -> dict[str, Call]:
     by = {"t_end": 0.01, "by": ["gravity_m_s2.0"], "of": ["elbow.rotation"], "samples": 3}
     add("sensitivities", lambda **given: fm.sensitivities(W.scene, **given).derivatives, by,
         by=chosen(None, 5, "elbow", [], ["nobody"], [None]), of=outputs, samples=SAMPLES, **RUN)  # fmt: skip
+    scalar = {"t_end": 0.01, "by": ["gravity_m_s2.0"], "of": fm.FinalValue("elbow.rotation")}
+    add("gradient", lambda **given: fm.gradient(W.scene, **given).derivatives, scalar,
+        by=chosen(None, 5, "elbow", [], ["nobody"], [None]),
+        of=chosen(5, [], None, fm.FinalValue("nobody")), **RUN)  # fmt: skip
     doubt = {"given": {"gravity_m_s2.0": 0.1}, "of": ["elbow.rotation"]}
     add("uncertainty", lambda given, of: fm.uncertainty(W.scene, 0.01, given, of, samples=3).sigma, doubt,
         given=chosen(None, 5, {}, {"nobody": 0.1}, {"gravity_m_s2.0": -1.0}, {"gravity_m_s2.0": np.nan}),

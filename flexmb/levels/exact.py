@@ -1,0 +1,53 @@
+"""Level exact: a beam whose strains are sums of modes; its kinematics are exact at any rotation.
+
+The strain energy is 1/2 eta' K eta with constant K, and the kinetic energy the sum over inertia points that are fixed
+to the sections (`flexmb.levels.section_motion`), which must have been moved. Nothing is truncated.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from flexmb.jit.kernel import helper
+from flexmb.levels import full
+from flexmb.levels.level import FidelityLevel, InertiaTables
+from flexmb.levels.masses import modal_masses
+from flexmb.levels.summed_point import add_point, clear_inertia
+from flexmb.modal.flexible_model import FlexibleModel
+from flexmb.modal.integrals import TurningPoints, modal_integrals
+
+
+@helper
+def inertia_and_bias(c, w, k):
+    """The sum over all points of body k, after modal masses that are zero unless a matrix was added to them."""
+    modal_masses(c, w, k)
+    clear_inertia(c, w, k)
+    for j in range(c.body[k].point_start, c.body[k].point_stop):
+        add_point(c, w, k, j)
+
+
+def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
+    """Every point is summed, and there are no other modal masses; the tables have the rigid inertia at rest."""
+    i = modal_integrals(model)
+    m = i.mode_count
+    at_rest = full.polynomial(i, model)
+    summed = TurningPoints(
+        mass=model.mass,
+        position=model.position,
+        com_offset=model.com_offset,
+        inertia=model.inertia,
+        translation=model.translation,
+        rotation=model.rotation,
+        section=model.section,
+    )
+    return replace(at_rest, mff=np.zeros((m, m)), mfr=i.spatial_mass[m:, :m], product=None, summed=summed)
+
+
+LEVEL = FidelityLevel(
+    name="exact",
+    inertia_and_bias=inertia_and_bias,
+    without_masses=inertia_and_bias,
+    tables=tables,
+    cost=2.5,
+    by_strain=True,
+)

@@ -1,0 +1,216 @@
+"""The sections of a beam whose strains are sums of modes, and the tables from which their exact motion follows.
+
+In a frame that is fixed to the root, section j of the loaded beam is at r_j, turned by R_j from its unloaded place
+r0_j. With the elastic curvature k(s) = sum B_n(s) eta_n, the elastic stretch and shears g(s) = sum G_n(s) eta_n, both
+of the unloaded section but written in the axes of the root, and the unloaded tangent t0,
+
+    R' = R k~            r' = R (t0 + g)
+
+Between one section and the next, R advances by exp(Omega~) with Magnus' expansion to the fourth order,
+
+    Omega = int k ds + sqrt(3)/12 h^2 k1 x k2            k1, k2: k at the two Gauss points of the interval
+
+which is exact where k keeps its direction. Positions are collocated: r_i - r0_i = sum_j A_ij (R_j (t0_j + g_j) - t0_j),
+where A_ij is the integral up to section i of Lagrange's polynomials on the Gauss points j of the beam.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexmb.scene.bodies import BeamBody
+from flexmb.scene.collocation import partial_integrals
+from flexmb.scene.rest_curve import rest_sections
+from flexmb.scene.strains import STRAINS, points_of_piece, polynomials
+from flexmb.typing import Index, Real
+
+FIRST, SECOND, MEAN, STRETCH = range(4)
+"""Tables of a section: k at the two Gauss points of the interval before it, int k over it, g at the section."""
+
+
+@dataclass(frozen=True, eq=False)
+class StrainField:
+    """n sections of a beam with m strain modes, in the axes of a body frame that is fixed to the root.
+
+    x (n,) m along the beam; before (n,): the section from which R is advanced, -1 for the root; commutator (n,) m^2:
+    sqrt(3)/12 h^2 of that interval; position (n,3) m and tangent (n,3) at rest; rows (n,4,3,m): FIRST, SECOND (1/m),
+    MEAN, STRETCH for each mode; weight (n,q) m: A_ij, whose columns are the q Gauss points; gauss (q,): their numbers.
+    The first `steps` sections are these points and the ends of the intervals that they lie in; others turn from these.
+    """
+
+    x: Real
+    before: Index
+    commutator: Real
+    position: Real
+    tangent: Real
+    rows: Real
+    weight: Real
+    gauss: Index
+    steps: int
+
+    @property
+    def mode_count(self) -> int:
+        return self.rows.shape[-1]
+
+    def seen_from(self, origin: Real, turn: Real) -> StrainField:
+        """The same sections in other axes, R_new_old = `turn`, with the new origin at `origin` (3,) in the old axes."""
+        return replace(
+            self,
+            position=(self.position - origin) @ turn.T,
+            tangent=self.tangent @ turn.T,
+            rows=np.einsum("ab,ncbm->ncam", turn, self.rows),
+        )
+
+    def with_modes(self, columns: Real) -> StrainField:
+        """The field of other modes, which are the `columns` (m,k) of the present ones."""
+        return replace(self, rows=self.rows @ columns)
+
+    def shapes(self) -> tuple[Real, Real]:
+        """Mode shapes (n,3,m) at rest: rotations and translations of the sections."""
+        turn = np.zeros(self.rows[:, MEAN].shape)
+        for j, i in enumerate(self.before):
+            turn[j] = self.rows[j, MEAN] + (turn[i] if i >= 0 else 0.0)
+        rate = np.cross(turn, self.tangent[:, :, None], axis=1) + self.rows[:, STRETCH]
+        return turn, np.einsum("ij,jam->iam", self.weight, rate[self.gauss])
+
+    @property
+    def axis(self) -> Real | None:
+        """The unit axis (3,) about which all sections turn, if there is one; None for turns about several."""
+        turning = np.moveaxis(self.rows[:, :STRETCH], 2, -1).reshape(-1, 3)
+        size = np.linalg.norm(turning, axis=1)
+        if not np.any(size):
+            return None
+        axis = turning[np.argmax(size)] / size.max()
+        across = np.linalg.norm(turning - np.outer(turning @ axis, axis), axis=1)
+        return axis if across.max() <= STRAIGHT * size.max() else None
+
+
+STRAIGHT = 64.0 * np.finfo(float).eps
+"""Relative size below which the part of curvatures across a common axis is a rounding error of the frames."""
+
+
+def strain_field(body: BeamBody, places: Real) -> StrainField:
+    """The sections of a beam at the Gauss points, then at `places` (n,) m; the modes are Legendre's polynomials.
+
+    Strain by strain in the order of `flexmb.scene.strains.polynomials`, in each piece by piece, by ascending degree.
+    """
+    grid, gauss, breaks = _grid(body)
+    main = np.unique(np.concatenate([gauss, breaks[1:-1]]))
+    before = np.concatenate([np.arange(-1, len(main) - 1), np.searchsorted(main, places, side="right") - 1])
+    x = np.concatenate([main, places])
+    left = np.where(before >= 0, x[before], 0.0)
+    h = x - left
+    s = np.sqrt(3.0) / 6.0
+    position, rotation = rest_sections(body, x)
+    shapes = _Polynomials(body)
+    rows = np.stack(
+        [
+            *(_turned(body, left + h * (0.5 + at), shapes, 3, left) for at in (-s, s)),
+            _mean(body, left, h, shapes),
+            rotation @ shapes.at(x)[:, :3],
+        ],
+        axis=1,
+    )
+    return StrainField(
+        x=x,
+        before=before,
+        commutator=np.sqrt(3.0) / 12.0 * h**2,
+        position=position,
+        tangent=rotation[:, :, 0],
+        rows=rows,
+        weight=_weights(x, grid, gauss),
+        gauss=np.searchsorted(main, gauss),
+        steps=len(main),
+    )
+
+
+class _Polynomials:
+    """Legendre's polynomials of all strains on the pieces of a beam."""
+
+    def __init__(self, body: BeamBody) -> None:
+        self._counts, self._pieces = polynomials(body), body.modes.pieces
+        self._edges = np.linspace(0.0, body.length_m, self._pieces + 1)
+
+    def at(self, x: Real, within: Real | None = None) -> Real:
+        """(n,6,m) [stretch, shears; twist, curvatures] of each mode at x (n,) m, in the pieces of the points `within`:
+        at an edge there are two."""
+        inside = x if within is None else within
+        piece = np.clip(np.searchsorted(self._edges, inside, side="right") - 1, 0, self._pieces - 1)
+        width = self._edges[1] - self._edges[0]
+        xi = 2.0 * (x - self._edges[piece]) / width - 1.0
+        found = np.zeros((len(x), 6, sum(self._counts.values()) * self._pieces))
+        column = 0
+        for strain, count in self._counts.items():
+            values = np.polynomial.legendre.legvander(xi, count - 1)
+            for each in range(self._pieces):
+                found[:, STRAINS.index(strain), column : column + count] = values * (piece == each)[:, None]
+                column += count
+        return found
+
+
+def _turned(body: BeamBody, x: Real, shapes: _Polynomials, first: int, left: Real) -> Real:
+    """Three strains from row `first` at x (n,), in root axes; each x belongs to the piece that begins at or before
+    `left`."""
+    _, rotation = rest_sections(body, x)
+    return np.asarray(rotation @ shapes.at(x, within=left)[:, first : first + 3])
+
+
+def _mean(body: BeamBody, left: Real, h: Real, shapes: _Polynomials) -> Real:
+    """int k (n,3,m) over the intervals from `left` (n,) of length h (n,), by Gauss points enough for all digits."""
+    degree = max(polynomials(body).values())
+    xi, w = np.polynomial.legendre.leggauss(degree + 12)
+    return np.asarray(
+        sum(
+            (0.5 * weight * h)[:, None, None] * _turned(body, left + 0.5 * h * (1.0 + at), shapes, 3, left)
+            for at, weight in zip(xi, w, strict=True)
+        )
+    )
+
+
+def _grid(body: BeamBody) -> tuple[list[tuple[float, float, int]], Real, Real]:
+    """Intervals with their numbers of Gauss points, these points, and the ends of the intervals (m).
+
+    The intervals end where pieces do and where the section's data have a kink. One that is shorter than a piece has
+    fewer points, because the strains vary less along it.
+    """
+    pieces, length = body.modes.pieces, body.length_m
+    width = length / pieces
+    kinks = [station.x_m for station in body.stations if 0.0 < station.x_m < length]
+    breaks = np.unique(np.concatenate([np.linspace(0.0, length, pieces + 1), kinks]))
+    breaks = breaks[np.concatenate([[True], np.diff(breaks) > 1e-12 * length])]
+    whole = points_of_piece(body)
+    intervals = []
+    for left, right in zip(breaks[:-1], breaks[1:], strict=True):
+        share = (right - left) / width
+        count = whole if share > 1.0 - 1e-9 else min(whole, max(3, int(np.ceil(whole * share)) + 1))
+        intervals.append((float(left), float(right), count))
+    gauss = np.concatenate(
+        [left + (right - left) / 2.0 * (1.0 + np.polynomial.legendre.leggauss(n)[0]) for left, right, n in intervals]
+    )
+    return intervals, gauss, breaks
+
+
+def _weights(x: Real, grid: list[tuple[float, float, int]], gauss: Real) -> Real:
+    """A (n,q): the integrals from 0 to x (n,) of Lagrange's polynomials on the Gauss points of each interval."""
+    found, column = np.zeros((len(x), len(gauss))), 0
+    for left, right, count in grid:
+        inside = np.clip(2.0 * (x - left) / (right - left) - 1.0, -1.0, 1.0)
+        found[:, column : column + count] = (right - left) / 2.0 * partial_integrals(inside, count)
+        found[x <= left, column : column + count] = 0.0
+        column += count
+    return found
+
+
+def gauss_weights(body: BeamBody) -> tuple[Real, Real]:
+    """The Gauss points of the beam (q,) m, and their weights (q,) m."""
+    grid, gauss, _ = _grid(body)
+    weights = [(right - left) / 2.0 * np.polynomial.legendre.leggauss(n)[1] for left, right, n in grid]
+    return gauss, np.concatenate(weights)
+
+
+def strain_stiffness(body: BeamBody, section: Real, x: Real, weight: Real) -> Real:
+    """K (m,m) = int B' C B of the polynomials, by points x (p,) m with these weights, where C is `section` (p,6,6)."""
+    B = _Polynomials(body).at(x)
+    return np.asarray(np.einsum("p,pam,pab,pbn->mn", weight, B, section, B, optimize=True))

@@ -1,0 +1,82 @@
+"""Checks of beams of level exact, and that other levels are not given what only that level has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from flexmb.scene.bodies import BeamBody, Modes
+from flexmb.scene.problems import Defect, Doubt, Place
+from flexmb.scene.strains import STRAINS, points_of_piece, polynomials
+
+MOST_PIECES, MOST_POLYNOMIALS, MOST_POINTS = 1000, 40, 200
+"""Of a piece: the fastest modes of more polynomials than this are ten thousand times as fast as the first."""
+
+
+def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
+    """Strains, points and damping of a beam of level exact."""
+    modes = place.key("modes")
+    yield from _numbers(modes, body)
+    if body.modes.boundary != "clamped-free":
+        remedy = 'leave it out: the body frame is at the root, and a hinge may sit on any node of the beam'
+        yield Defect(str(modes.key("boundary")), "strains have no boundary conditions to choose", remedy)
+    if body.mass != "consistent":
+        yield Defect(str(place.key("mass")), f'mass is "{body.mass}"', 'use "consistent": inertia is at Gauss points')
+    try:
+        found = polynomials(body)
+    except (TypeError, ValueError):
+        return
+    if not found:
+        remedy = 'give polynomials of a curvature, or make the level "rigid"'
+        yield Defect(str(modes.key("count")), "the beam has no strain", remedy)
+        return
+    if body.modes.points is not None and (points := body.modes.points) <= (most := max(found.values())):
+        what = f"{points} points for {most} polynomials of one strain leave motions without inertia"
+        yield Defect(str(modes.key("points")), what, f"use {most + 1} points at least: {most + 3} have all digits")
+    elif points_of_piece(body) > MOST_POINTS:
+        yield Defect(str(modes.key("points")), f"{points_of_piece(body)} points", f"use {MOST_POINTS} at most")
+    for shear, key in (("shear_y", "GAy_N"), ("shear_z", "GAz_N")):
+        if shear in found and any(each.stiffness is None and getattr(each, key) is None for each in body.stations):
+            spot = str(place.key("stations"))
+            yield Defect(spot, f"{shear} has polynomials, and a station no {key}", f"give {key} at every station")
+    yield from damping(modes, body.modes, sum(found.values()) * max(body.modes.pieces, 1))
+
+
+def _numbers(place: Place, body: BeamBody) -> Iterator[Defect]:
+    modes = body.modes
+    counts = {"count": modes.count}
+    if modes.polynomials is not None:
+        counts = {f"polynomials.{strain}": getattr(modes.polynomials, strain) for strain in STRAINS}
+    for key, count in counts.items():
+        if not 0 <= count <= MOST_POLYNOMIALS:
+            remedy = f"give 0 to {MOST_POLYNOMIALS}, and more pieces where these are not enough"
+            yield Defect(str(place.key(key)), f"{count} polynomials", remedy)
+    if not 1 <= modes.pieces <= MOST_PIECES:
+        yield Defect(str(place.key("pieces")), f"{modes.pieces} pieces", f"give 1 to {MOST_PIECES}")
+
+
+def without_strains(place: Place, body: BeamBody) -> Iterator[Defect]:
+    """A beam of another level is not given what only level exact has."""
+    standard = Modes(count=1)
+    for key in ("polynomials", "pieces", "points"):
+        if body.level != "rigid" and getattr(body.modes, key) != getattr(standard, key):
+            what = f'{key} is for strains, which level "{body.level}" does not have'
+            yield Defect(str(place.key("modes", key)), what, 'leave it out, or make the level "exact"')
+    for i, station in enumerate(body.stations):
+        if any(station.curvature_1_m):
+            what = f'level "{body.level}" has straight beams only'
+            spot = place.key("stations", i, "curvature_1_m")
+            yield Defect(str(spot), what, 'make the level "exact", or join straight beams by welds')
+
+
+def damping(place: Place, modes: Modes, count: int) -> Iterator[Defect]:
+    """Damping ratios and the viscosity of a beam with `count` modes."""
+    ratios = modes.damping_ratio
+    if isinstance(ratios, tuple) and len(ratios) != count:
+        what = f"{len(ratios)} damping ratios for {count} modes"
+        yield Defect(str(place.key("damping_ratio")), what, "give one ratio for all modes, or one for each")
+    if any(ratio < 0.0 for ratio in (ratios if isinstance(ratios, tuple) else (ratios,))):
+        what, remedy = "a negative damping ratio feeds energy into the mode", "give ratios of at least zero"
+        yield Doubt(str(place.key("damping_ratio")), what, remedy, "negative_damping")
+    if modes.viscosity_s < 0.0:
+        what, remedy = "a negative viscosity feeds energy into the beam", "give a time of at least zero"
+        yield Doubt(str(place.key("viscosity_s")), what, remedy, "negative_damping")

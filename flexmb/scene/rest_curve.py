@@ -1,0 +1,93 @@
+"""The unloaded axis of a beam whose stations have curvature: position and rotation of its sections.
+
+With curvature and twist kappa in section axes, R' = R kappa~ and r' = R e_x. On spans that turn by less than a radian
+the quaternion of R and then r are found by collocation at Gauss points, to rounding errors.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.scene.bodies import BeamBody
+from flexmb.scene.collocation import partial_integrals
+from flexmb.scene.quaternions import rotation_matrix
+from flexmb.typing import Real
+
+POINTS = 16
+"""Gauss points of a span: the error of a solution that turns by one radian is some (1/2)^32 / 32!."""
+
+
+class _Span(NamedTuple):
+    """Gauss points at `start` + length/2 (1 + xi), where quaternions change at the rates (n,4) and the axis runs along
+    the directions (n,3), from quaternion and position at the start."""
+
+    start: float
+    length: float
+    quaternion: Real
+    position: Real
+    rates: Real
+    directions: Real
+
+
+def is_curved(body: BeamBody) -> bool:
+    """Whether the unloaded axis of a beam is curved or twisted."""
+    return any(any(station.curvature_1_m) for station in body.stations)
+
+
+def rest_sections(body: BeamBody, x: Real) -> tuple[Real, Real]:
+    """Position (n,3) and rotation (n,3,3), section to body axes, of the unloaded sections at x (n,) m."""
+    x = np.asarray(x, float)
+    if not is_curved(body):
+        zero = np.zeros_like(x)
+        return np.column_stack([x, zero, zero]), np.tile(np.eye(3), (len(x), 1, 1))
+    spans = _spans(tuple((s.x_m, s.curvature_1_m) for s in body.stations), body.length_m)
+    at = np.searchsorted([span.start for span in spans], x, side="right") - 1
+    quaternion, position = np.zeros((len(x), 4)), np.zeros((len(x), 3))
+    for i, (place, s) in enumerate(zip(np.maximum(at, 0), x, strict=True)):
+        span = spans[place]
+        row = span.length / 2.0 * partial_integrals(np.array([2.0 * (s - span.start) / span.length - 1.0]), POINTS)[0]
+        quaternion[i], position[i] = span.quaternion + row @ span.rates, span.position + row @ span.directions
+    return position, rotation_matrix(quaternion)
+
+
+@lru_cache(maxsize=128)
+def _spans(stations: tuple[tuple[float, tuple[float, float, float]], ...], length: float) -> list[_Span]:
+    quaternion, position = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
+    spans = []
+    xi, _ = np.polynomial.legendre.leggauss(POINTS)
+    inner, whole = partial_integrals(xi, POINTS), partial_integrals(np.ones(1), POINTS)[0]
+    for (left, first), (right, last) in zip(stations, stations[1:], strict=False):
+        turn = max(np.linalg.norm(first), np.linalg.norm(last)) * (right - left)
+        count = max(1, ceil(turn))
+        for start, stop in zip(*_ends(left, right, count), strict=True):
+            if stop == start:
+                continue
+            half = (stop - start) / 2.0
+            middle = start + half * (1.0 + xi)
+            # Within the interval of these two stations: at a jump, np.interp could not tell its sides apart.
+            share = ((middle - left) / (right - left))[:, None]
+            kappa = (1.0 - share) * np.array(first) + share * np.array(last)
+            # q at the Gauss points: q_i = q_0 + half sum_j inner_ij 1/2 Omega(kappa_j) q_j
+            rate = 0.5 * np.array([_right_product(k) for k in kappa])
+            system = np.eye(4 * POINTS) - half * np.einsum("ij,jab->iajb", inner, rate).reshape(4 * POINTS, -1)
+            at_points = np.linalg.solve(system, np.tile(quaternion, POINTS)).reshape(POINTS, 4)
+            rates = np.einsum("jab,jb->ja", rate, at_points)
+            directions = rotation_matrix(at_points)[:, :, 0]
+            spans.append(_Span(start, stop - start, quaternion, position, rates, directions))
+            quaternion, position = quaternion + half * whole @ rates, position + half * whole @ directions
+    return spans
+
+
+def _ends(left: float, right: float, count: int) -> tuple[Real, Real]:
+    breaks = np.linspace(left, right, count + 1)
+    return breaks[:-1], breaks[1:]
+
+
+def _right_product(kappa: Real) -> Real:
+    """The matrix (4,4) of q -> q (0, kappa)."""
+    x, y, z = kappa
+    return np.array([[0.0, -x, -y, -z], [x, 0.0, z, -y], [y, -z, 0.0, x], [z, y, -x, 0.0]])
