@@ -110,7 +110,7 @@ def scenes() -> list[Compared]:
     made = [
         tethered(flexible_chain(10, 1, "full")), twisted(drawn(trees.ARMED_RIGID, 5, 0)), drawn(trees.FULL, 4, 0),
         drawn(trees.EVERY_LEVEL, 4, 0), tethered(drawn(trees.FULL, 4, 1)), drawn(trees.EVERY_LEVEL, 5, 1),
-        drawn(trees.LATER, 4, 1), connected_scenes.everything("full"), drawn(trees.SINGLE, 8, 0),
+        drawn(trees.LATER, 4, 1), rigid_chain(10), connected_scenes.everything("full"), drawn(trees.SINGLE, 8, 0),
         rigid_chain(10),
     ]  # fmt: skip
     return [compared(scene) for scene in made]
