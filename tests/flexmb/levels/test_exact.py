@@ -315,9 +315,9 @@ def _at(station: s.BeamStation, x: float) -> s.BeamStation:
 
 def _between(first: s.BeamStation, last: s.BeamStation) -> s.BeamStation:
     def mean(a: Any, b: Any) -> Any:
-        if isinstance(a, tuple):
-            return tuple(map(mean, a, b))
-        return None if a is None else 0.5 * (a + b)
+        if a is None:
+            return None
+        return tuple(map(mean, a, b)) if isinstance(a, tuple) else 0.5 * (a + b)
 
     names = s.BeamStation.__struct_fields__
     return s.BeamStation(**{name: mean(getattr(first, name), getattr(last, name)) for name in names})
