@@ -14,6 +14,7 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 import flexmb
 from flexmb.dense.jets import Jet
 from flexmb.dense.section_frames import section_frames
+from flexmb.interchange.sid import sid_of
 from flexmb.modal.beam import beam_elements
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.exact import exact_model
@@ -24,7 +25,9 @@ from flexmb.scene.check import SceneError
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.strains import points_of_piece
+from flexmb.system.frames import node_pose
 from flexmb.system.moved_sections import MovedSections, moved_sections
+from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 from tests.bounds import UNIT_ROUNDOFF, observed_order, relative
 from tests.flexmb.levels.strain_beams import PLANE, SIX, SPACE, beam, body_of, curve, field_of, stations, strained
@@ -446,6 +449,41 @@ def test_frisch_and_regressor_refuse_it():
         system.accelerations(system.initial_state, algorithm="frisch")
     with pytest.raises(NotImplementedError, match='"exact"'):
         system.inertia_regressor()
+
+
+@pytest.mark.parametrize("name", BEAMS)
+def test_poses_of_nodes(name):
+    """As markers have them, also of a beam that hangs on its tip."""
+    builder = beam(**BEAMS[name], nodes={"a": 0.37})
+    builder.revolute("hinge", "ground", "rod", child_node="tip", axis=(0, 0.6, 0.8))
+    system = flexmb.compile(builder.marker("a", "rod", node="a").scene())
+    state = system.initial_state
+    state.q[system.coordinate("rod.modes")] = bent(system.links[0].model.field)[0]
+    seen = system.evaluate(0.0, state.q, state.u).markers["a"]
+    pose = node_pose(system, system.all_loads(state).motion, "rod", "a")
+    np.testing.assert_allclose(pose.position, seen.position, atol=ROUNDING)
+    np.testing.assert_allclose(pose.rotation, seen.rotation, atol=ROUNDING)
+
+
+def test_diverged():
+    """Four turns of even curvature are within the range of the level, five are beyond it."""
+    rod = beam(s.Modes(count=1, families=PLANE), section=stations(1.0, rotary=1e-6))
+    system = flexmb.compile(rod.weld("clamp", "ground", "rod").scene())
+    field = system.links[0].model.field
+    per_unit = np.abs(field.rows[0, 0, 2, 0])
+    for turns, is_within in ((4.0, True), (5.0, False)):
+        state = system.state([2.0 * np.pi * turns / per_unit], [0.0])
+        if is_within:
+            assert np.isfinite(system.accelerations(state)).all()
+        else:
+            with pytest.raises(DynamicsError):
+                system.accelerations(state)
+
+
+def test_standard_input_data_refuses_it():
+    """Strains are no modes of that format; the message says what is."""
+    with pytest.raises(ValueError, match="stiffened"):
+        sid_of(body_of(beam(s.Modes(count=2, families=PLANE))))
 
 
 def test_roll_up_closes():

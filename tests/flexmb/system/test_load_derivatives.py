@@ -15,7 +15,7 @@ from tests.flexmb.system.test_derivatives import asked, directions
 pytestmark = pytest.mark.filterwarnings("ignore:.*is doubtful")
 
 
-@pytest.mark.parametrize("name", ["every level", "stiffened", "connectors"])
+@pytest.mark.parametrize("name", ["every level", "stiffened", "exact", "connectors"])
 def test_loads_of_given_accelerations(name: str) -> None:
     """By accelerations they are linear; by the state and time as differences of inverse dynamics say."""
     at = asked(name)
@@ -42,9 +42,13 @@ def test_loads_of_given_accelerations(name: str) -> None:
         assert np.max(np.abs(found - expected)) <= 30.0 * np.max(doubt) + 1e-10 * size
 
 
-@pytest.mark.parametrize(("axes", "node"), [("outboard", None), ("inboard", "tip"), ("world", "origin")])
-def test_loads_in_other_axes_against_differences(axes: Any, node: str | None) -> None:
-    at = asked("every level")
+@pytest.mark.parametrize(
+    ("name", "axes", "node"),
+    [("every level", "outboard", None), ("every level", "inboard", "tip"), ("every level", "world", "origin"),
+     ("exact", "inboard", "tip")],
+)  # fmt: skip
+def test_loads_in_other_axes_against_differences(name: str, axes: Any, node: str | None) -> None:
+    at = asked(name)
     system, state = at.system, at.state
     beam = next(each.name for each in system.scene.bodies if isinstance(each, fm.BeamBody))
     about = None if node is None else (beam if node == "tip" else "ground", node)
@@ -59,14 +63,15 @@ def test_loads_in_other_axes_against_differences(axes: Any, node: str | None) ->
         assert np.max(np.abs(found - expected)) <= allowed
         assert np.max(np.abs(found * (1.0 + 1e-5) - expected)) > allowed, "a planted error"
     plain = system.hinge_load_derivatives(state)
-    for name, each in at.of_all.loads.items():
-        for one, other in zip(plain[name], each, strict=True):
+    for hinge, each in at.of_all.loads.items():
+        for one, other in zip(plain[hinge], each, strict=True):
             np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-14 * np.max(np.abs(other), initial=1e-300))
 
 
-@pytest.mark.parametrize("connected", [False, True])
-def test_section_loads_against_differences(connected: bool) -> None:
-    scene = sections.everything(connected=connected)
+@pytest.mark.parametrize(("connected", "level"), [(False, "full"), (True, "full"), (False, "exact")])
+def test_section_loads_against_differences(connected: bool, level: fm.Level) -> None:
+    modes = {"modes": fm.Modes(count=2)} if level == "exact" else {}
+    scene = sections.everything(connected=connected, level=level, **modes)
     system = fm.compile(scene)
     state, body, x = sections.somewhere(system), "beam", [0.0, 0.7, 1.6]
     rng = np.random.default_rng(8)
