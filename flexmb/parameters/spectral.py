@@ -66,8 +66,8 @@ def derivative(
 
 
 def _on_interval(
-    function: Callable[[float], Real], x: float, width: float, middle: Real, scale: float, parts: Sequence[slice | Index],
-    is_last: bool,
+    function: Callable[[float], Real], x: float, width: float, middle: Real, scale: float,
+    parts: Sequence[slice | Index], is_last: bool,
 ) -> Derivative:  # fmt: skip
     """By interpolation on [x - width, x + width]: points are added until the derivative does not change.
 

@@ -23,14 +23,19 @@ def inverse_dynamics(c, w, d, masses):
 
     Needs the velocity sweep in w, that of poses if there are connectors, and udot in w.speed.acceleration.
     """
-    forces_of_bodies(c, w, d, masses)
-    rows_of_speeds(c, w, d, masses)
+    if is_rigid_tree(c):
+        _begin(c, w, d, masses)
+        for k in range(c.body.shape[0]):
+            move(c, w, d, k)
+        rigid_tree(c, w, d, masses)
+    else:
+        forces_of_bodies(c, w, d, masses)
+        rows_of_speeds(c, w, d, masses)
 
 
 @helper
-def forces_of_bodies(c, w, d, masses):
-    """Outward: motion and forces of the bodies and of what is attached to them. `masses`, and what it needs in w: see
-    `inverse_dynamics`."""
+def _begin(c, w, d, masses):
+    """Clear the matrix where it is not written, and copy the functions of time."""
     nu = d.speed.shape[0]
     if d.shape[BRANCHES] or has(c, WHEELS):  # else every element is written
         for place in range(nu):
@@ -38,17 +43,13 @@ def forces_of_bodies(c, w, d, masses):
     for f in range(c.function.shape[0]):
         for i in range(3):
             d.duals.function[f, i] = w.function[f, i]
-    if is_rigid_tree(c):
-        for k in range(c.body.shape[0]):
-            move(c, w, d, k)
-        rigid_tree(c, w, d, masses)
-    else:
-        _all_bodies(c, w, d, masses)
 
 
 @helper
-def _all_bodies(c, w, d, masses):
-    """The same for bodies of all kinds."""
+def forces_of_bodies(c, w, d, masses):
+    """Outward: motion and forces of the bodies and of what is attached to them. `masses`, and what it needs in w: see
+    `inverse_dynamics`."""
+    _begin(c, w, d, masses)
     for k in range(c.body.shape[0]):
         move(c, w, d, k)
         if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):

@@ -315,6 +315,8 @@ def _at(station: s.BeamStation, x: float) -> s.BeamStation:
 
 def _between(first: s.BeamStation, last: s.BeamStation) -> s.BeamStation:
     def mean(a: Any, b: Any) -> Any:
+        if a is None:
+            return None
         return tuple(map(mean, a, b)) if isinstance(a, tuple) else 0.5 * (a + b)
 
     names = s.BeamStation.__struct_fields__
