@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from flexmb.modal.cross import cross_matrix
-from flexmb.modal.eigenproblem import eigenpairs
+from flexmb.modal.eigenproblem import eigenpairs, refined
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming_node
 from flexmb.modal.following import followed
 from flexmb.modal.reduce import BeamModes, damping_matrix, groups, tip_signs
@@ -134,6 +134,7 @@ def _stiffness(body: BeamBody) -> Real:
     """K (m,m) of the polynomials, by Gauss points that are exact for sections that vary linearly."""
     table = section_table(body)
     edges = np.unique(np.concatenate([np.linspace(0.0, body.length_m, body.modes.pieces + 1), table.x]))
+    edges = edges[edges <= body.length_m]
     xi, w = np.polynomial.legendre.leggauss(max(polynomials(body).values()) + 1)
     half = np.diff(edges) / 2.0
     x = (edges[:-1, None] + half[:, None] * (1.0 + xi)).ravel()
@@ -147,23 +148,29 @@ def _modes(body: BeamBody, field: StrainField, K: Real, M: Real) -> BeamModes:
     """
     strain = np.repeat(*np.array([(i, n * body.modes.pieces) for i, n in enumerate(polynomials(body).values())]).T)
     columns, compliance = np.zeros_like(K), np.zeros(len(K))
-    for own in _uncoupled(strain, K, M):
-        compliance[own], columns[np.ix_(own, own)] = eigenpairs(M[np.ix_(own, own)], K[np.ix_(own, own)])
+    sets = [np.ix_(own, own) for own in _uncoupled(strain, K, M)]
+    for own in sets:
+        compliance[own[1][0]], columns[own] = eigenpairs(M[own], K[own])
     if not compliance.min() > _MASSLESS * compliance.max():
         raise ValueError(
             "some of its strains move no inertia while the beam is straight: use fewer polynomials, or give the "
             'sections their rotary inertia and points = "section"'
         )
+    columns /= np.sqrt(compliance)
+    squares = np.zeros(len(K))
+    for own in sets:
+        squares[own[1][0]], columns[own] = refined(K[own], M[own], columns[own])
     # Frequencies that agree to nine digits count as equal, so that the order of the strains decides.
-    order = np.lexsort((strain, [float(f"{-each:.8e}") for each in compliance]))
-    columns, frequencies = columns[:, order] / np.sqrt(compliance[order]), 1.0 / np.sqrt(compliance[order])
+    order = np.lexsort((strain, [float(f"{each:.8e}") for each in squares]))
+    columns, frequencies = columns[:, order], np.sqrt(squares[order])
     turn, shift = (shape @ columns for shape in (each[field.gauss[-1]] for each in field.shapes()))
     return BeamModes(columns * tip_signs(shift, body.length_m * turn), frequencies)
 
 
 def _uncoupled(strain: Index, K: Real, M: Real) -> list[Index]:
     """The coordinates of each set of strains that K and M couple by more than rounding; `strain` (m,): that of each."""
-    scaled = [np.abs(each) / np.sqrt(np.outer(np.diag(each), np.diag(each))) for each in (K, M)]
+    sizes = [np.sqrt(np.outer(np.diag(each), np.diag(each))) for each in (K, M)]
+    scaled = [np.abs(each) / np.where(size > 0.0, size, 1.0) for each, size in zip((K, M), sizes, strict=True)]
     names = np.unique(strain)
     coupled = [[max(np.max(each[np.ix_(strain == a, strain == b)]) for each in scaled) for b in names] for a in names]
     label = groups(np.array(coupled) > _UNCOUPLED)

@@ -103,8 +103,9 @@ def restated(station: BeamStation, point: tuple[float, float]) -> BeamStation:
     """The same section, as matrices that are stated at the point (y, z) m."""
     back = transport((-point[0], -point[1]))
     K, M = (back.T @ each @ back for each in (stiffness_on_axis(station), inertia_on_axis(station)))
+    by_numbers = dict.fromkeys((*STIFFNESS_KEYS, *SHEAR_KEYS, INERTIA_KEYS[0])) | dict.fromkeys(INERTIA_KEYS[1:], 0.0)
     return replace(
-        BeamStation(x_m=station.x_m), stiffness=matrix(K), inertia=matrix(M), reference_point_m=point,
+        station, **by_numbers, stiffness=matrix(K), inertia=matrix(M), reference_point_m=point,
     )  # fmt: skip
 
 

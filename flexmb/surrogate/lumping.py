@@ -21,7 +21,7 @@ from flexmb.typing import Real
 _GAUSS_POINTS = 3
 """Exact to degree 5: the second moment of a linearly varying section has degree 3."""
 _CURVED_PARTS = 64
-"""Of a curved beam: over five turns its mass centre is then known to rounding errors."""
+"""Of a curved beam: half a turn leaves rounding errors of its inertia, five turns 2e-10 of it."""
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ POLAR_KEYS = (
     "gravity_m_s2", "com_m", "position_m", "offset_m", "com_offset_m", "parent_position_m", "child_position_m",
     "position_a_m", "position_b_m", "velocity_m_s", "translation_modes", "second_translation",
 )  # fmt: skip
-AXIAL_KEYS = ("angular_velocity_rad_s", "rotation_modes", "second_rotation")
+AXIAL_KEYS = ("angular_velocity_rad_s", "rotation_modes", "second_rotation", "curvature_1_m")
 SCREW_KEYS = ("pitch_m_rad",)
 QUATERNION_KEYS = ("quaternion", "parent_quaternion", "child_quaternion", "quaternion_a", "quaternion_b")
 

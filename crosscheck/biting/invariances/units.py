@@ -74,6 +74,7 @@ OF_UNIT = {
     "m/s²": Dimension(1, 0, -2), "rad/s": Dimension(time=-1), "kg/m": Dimension(-1, 1), "kg m": Dimension(1, 1),
     "kg m²": Dimension(2, 1), "N/m": Dimension(0, 1, -2), "N s/m": Dimension(0, 1, -1), "N m/rad": ENERGY,
     "N m s/rad": Dimension(2, 1, -1), "m/rad": Dimension(1), "s/rad": Dimension(time=1), "s/m": Dimension(-1, 0, 1),
+    "1/m": Dimension(-1),
 }  # fmt: skip
 QUATERNIONS = ("quaternion_a", "quaternion_b")
 # Of bushings: the first three rows and columns are of turns, the others of displacements.

@@ -13,7 +13,7 @@ from crosscheck.biting.invariances import NotApplicable
 from crosscheck.biting.invariances.restated import RESTATED
 from flexmb.scene.bodies import BeamBody, BeamStation
 from flexmb.scene.build import SceneBuilder
-from flexmb.scene.schema import Modes, Scene
+from flexmb.scene.schema import Modes, Scene, StrainPolynomials
 from flexmb.scene.sections import matrix
 from flexmb.scene.shapes import beam_section
 from tests.crosscheck.biting.test_invariances import BY_NAME, rigid, strangers
@@ -25,7 +25,7 @@ WIRE = BeamStation(x_m=0.0, EA_N=1e7, EIy_Nm2=3.0, EIz_Nm2=3.0, GJ_Nm2=2.0, mass
 
 @cache
 def blades() -> Scene:
-    """Beams of four levels with coupled sections, and ones by numbers, with and without shear and rotary inertia."""
+    """Beams of all levels with coupled sections, and ones by numbers, with and without shear and rotary inertia."""
     builder = SceneBuilder("blades", gravity=(0.3, -0.5, -9.81))
     builder.rigid_body("hub", mass=50.0, inertia=(1.0, 2.0, 2.5))
     builder.free("base", "ground", "hub", angular_velocity=(0.5, 0.4, -1.0))
@@ -38,6 +38,14 @@ def blades() -> Scene:
         )  # fmt: skip
         builder.revolute(f"flap {i}", "hub", f"blade {i}", axis=(0.0, 1.0, 0.0), angle=0.2 * i, rate=0.3, stiffness=4.0)
         builder.marker(f"end {i}", f"blade {i}", node="tip")
+    curved = [msgspec.structs.replace(each, curvature_1_m=(0.3, -0.2, 0.5)) for each in (section, tip)]
+    strains = StrainPolynomials(axial=1, shear_y=1, shear_z=1, torsion=2, bending_y=2, bending_z=2)
+    builder.beam(
+        "bow", length=1.5, elements=4, modes=Modes(count=0, polynomials=strains), section=curved, theory="timoshenko",
+        level="exact", points="section",
+    )  # fmt: skip
+    builder.revolute("flap of bow", "hub", "bow", axis=(0.0, 1.0, 0.0), angle=-0.4, rate=0.3, stiffness=4.0)
+    builder.marker("end of bow", "bow", node="tip")
     for name, section, more in (
         ("rod", SQUARE, {}), ("wire", WIRE, {"modes": Modes(count=4, families=("bending_y", "bending_z"))}),
         ("short", SQUARE, {"theory": "timoshenko"}),
@@ -45,6 +53,7 @@ def blades() -> Scene:
         builder.beam(name, length=1.0, elements=4, section=section, **({"modes": 4} | more))
         builder.revolute(f"joint of {name}", "hub", name, axis=(0.0, 0.6, 0.8), rate=0.7)
         builder.marker(f"end of {name}", name, node="tip")
+    builder.modal_state("bow", coordinates=(3e-3, *(0.0,) * 8))
     for body, count in (("blade 1", 4), ("rod", 4)):
         builder.modal_state(body, coordinates=tuple(0.003 * (i + 1) for i in range(count)), rates=(0.1,) * count)
     return builder.scene()
@@ -73,7 +82,7 @@ def test_a_wrong_transport_is_noticed(fault: str) -> None:
         return msgspec.structs.replace(each, **{key: matrix(values)})
 
     counterpart = RESTATED.of(blades())
-    for name in ("blade 1", "blade 2"):
+    for name in ("blade 1", "blade 2", "bow"):
         bodies = tuple(
             msgspec.structs.replace(body, stations=tuple(map(spoilt, body.stations)))
             if isinstance(body, BeamBody) and body.name == name
@@ -91,7 +100,7 @@ def test_nothing_changes_in_a_scene_of_coupled_sections(name: str) -> None:
     assert strangers(_without_states(), counterpart) == []
 
 
-@pytest.mark.parametrize("key", ["stiffness", "inertia", "reference_point_m"])
+@pytest.mark.parametrize("key", ["stiffness", "inertia", "reference_point_m", "curvature_1_m"])
 @pytest.mark.parametrize("name", ["rescaled", "mirrored"])
 def test_a_matrix_left_as_it_was_is_noticed(name: str, key: str) -> None:
     counterpart = BY_NAME[name].of(_without_states())
@@ -102,7 +111,7 @@ def test_a_matrix_left_as_it_was_is_noticed(name: str, key: str) -> None:
     bodies = list(counterpart.scene.bodies)
     for i, old in enumerate(_without_states().bodies):
         new = bodies[i]
-        if isinstance(new, BeamBody) and isinstance(old, BeamBody) and old.name in ("blade 1", "blade 2"):
+        if isinstance(new, BeamBody) and isinstance(old, BeamBody) and old.name in ("blade 1", "blade 2", "bow"):
             stations = tuple(map(kept, new.stations, old.stations))
             bodies[i] = msgspec.structs.replace(new, stations=stations)
     wrong = msgspec.structs.replace(counterpart.scene, bodies=tuple(bodies), allow=("wave_speed", "thick_section"))

@@ -146,7 +146,7 @@ def test_refusals_name_their_reason():
         (replace(scene, loads=(replace(push, type="torque", direction=(1.0, 0.0, 0.0)),)), "out of the plane"),
         (replace(scene, loads=(replace(push, direction=(0.0, 1.0, 0.0), frame="node"),)), "World axes"),
         (replace(scene, hinges=(sprung,)), "without spring"),
-        (replace(scene, gravity_m_s2=(0.0, -9.8, 0.0)), "gravity"),
+        (replace(scene, gravity_m_s2=(0.0, 0.0, -9.8)), "gravity"),
         (replace(scene, bodies=(every_family,)), "planar"),
         (replace(scene, hinges=(tilted,)), "World z"),
         (replace(scene, bodies=(s.RigidBody(name="beam", mass_kg=1.0, inertia_kg_m2=np.eye(3).tolist()),)), "one beam"),

@@ -10,7 +10,16 @@ from flexmb.modal import flexible_model
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.check import check_scene
 from flexmb.scene.functions import Constant
-from flexmb.scene.schema import Closure, Gimbal, Prismatic, Revolute, TipMass
+from flexmb.scene.schema import (
+    BeamBody,
+    Closure,
+    Gimbal,
+    Modes,
+    Prismatic,
+    Revolute,
+    StrainPolynomials,
+    TipMass,
+)
 from flexmb.scene.tree import ordered
 from flexmb.surrogate import finite_segments, modal_points, rigidify
 from flexmb.surrogate.lumping import beam_piece, combine, inertia_of, rigid_equivalent
@@ -162,3 +171,42 @@ def test_rigidify_keeps_nodes_and_needs_no_modes():
     check_scene(rigid)
     assert rest_positions(rigid)["tip"] == pytest.approx([LENGTH, 0.0, 0.0])
     assert rigid.modal_states == ()
+
+
+def _curved(turn: float) -> BeamBody:
+    """A beam of level exact on an arc that turns by so much (rad) to the left."""
+    (boom, *_) = beam_scene().bodies
+    stations = tuple(replace(each, curvature_1_m=(0.0, 0.0, turn / LENGTH)) for each in boom.stations)
+    return replace(boom, level="exact", stations=stations)
+
+
+@pytest.mark.parametrize(("turn", "rel"), [(0.5, 1e-12), (np.pi, 1e-12), (30.0, 1e-9)])
+def test_a_rigid_curved_beam_has_its_mass_along_the_arc(turn, rel):
+    """The centroid of an arc, and its polar moment less that of the offset; the sections' own moments are added."""
+    whole, radius = beam_piece(_curved(turn), 0.0, LENGTH), LENGTH / turn
+    centre = radius * np.array([(1.0 - np.cos(turn)) / turn, 1.0 - np.sin(turn) / turn])
+    assert whole.com[:2] == pytest.approx(centre, rel=rel, abs=rel * LENGTH)
+    about_root = 2.0 * radius**2 * (1.0 - np.sin(turn) / turn)  # mean square distance from the root
+    polar = SECTION.mass_per_length_kg_m * LENGTH * (about_root - centre @ centre) + SECTION.rotary_z_kg_m * LENGTH
+    assert whole.inertia[2, 2] == pytest.approx(polar, rel=rel)
+
+
+def test_what_a_curved_beam_or_one_of_level_exact_cannot_become_is_refused():
+    curved = replace(beam_scene(), bodies=(_curved(0.5), beam_scene().bodies[1]))
+    with pytest.raises(ValueError, match='beam "boom" is curved: finite segments are for straight ones'):
+        finite_segments(curved, None, 4)
+    with pytest.raises(ValueError, match='beam "boom" is of level "exact", and its points do not move by modes'):
+        modal_points(curved)
+
+
+def test_segments_of_an_exact_beam_have_the_hinges_of_its_strains():
+    (boom, panel) = beam_scene().bodies
+    strains = StrainPolynomials(bending_z=2, axial=1)
+    exact = replace(boom, level="exact", modes=Modes(count=0, polynomials=strains))
+    chain = finite_segments(replace(beam_scene(), bodies=(exact, panel)), "boom", 2)
+    assert [(h.name, type(h)) for h in chain.hinges if h.name.startswith("boom.")] == [
+        ("boom.h01", Revolute), ("boom.a01", Prismatic), ("boom.h02", Revolute),
+    ]  # fmt: skip
+    sheared = replace(exact, modes=Modes(count=0, polynomials=StrainPolynomials(bending_z=2, shear_z=1)))
+    with pytest.raises(ValueError, match="finite segments have no shear"):
+        finite_segments(replace(beam_scene(), bodies=(sheared, panel)), "boom", 2)
