@@ -134,6 +134,7 @@ def _stiffness(body: BeamBody) -> Real:
     """K (m,m) of the polynomials, by Gauss points that are exact for sections that vary linearly."""
     table = section_table(body)
     edges = np.unique(np.concatenate([np.linspace(0.0, body.length_m, body.modes.pieces + 1), table.x]))
+    edges = edges[edges <= body.length_m]
     xi, w = np.polynomial.legendre.leggauss(max(polynomials(body).values()) + 1)
     half = np.diff(edges) / 2.0
     x = (edges[:-1, None] + half[:, None] * (1.0 + xi)).ravel()
