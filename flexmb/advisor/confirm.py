@@ -69,6 +69,7 @@ class Confirmation:
         predicted number of operations of one reference; `known`: the references, from coarse to fine.
         """
         self.bench, self.tolerance, self.cost, self.budget = bench, tolerance, cost, budget
+        self.references: list[Model] = []  # those that ran, from coarse to fine
         self._integrators: dict[Model, str] = {}
         self.fine, self.drift = min(FINE * tolerance, LOOSEST), 0.0
         self.measured: dict[Model, float] = {}
@@ -178,6 +179,7 @@ class Confirmation:
             if done is None or not done.finished:
                 history.append(f"{name}: {system if done is None else done.message}")
                 continue
+            self.references.append(model)
             if last is None:
                 self._refine(model)
                 done = self.run(model)

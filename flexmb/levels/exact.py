@@ -10,11 +10,12 @@ import numpy as np
 
 from flexmb.jit.kernel import helper
 from flexmb.levels import full
-from flexmb.levels.level import FidelityLevel, InertiaTables
+from flexmb.levels.level import FidelityLevel, InertiaTables, six
 from flexmb.levels.masses import modal_masses
 from flexmb.levels.summed_point import add_point, clear_inertia
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import TurningPoints, modal_integrals
+from flexmb.typing import Real
 
 
 @helper
@@ -40,7 +41,15 @@ def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
         rotation=model.rotation,
         section=model.section,
     )
-    return replace(at_rest, mff=np.zeros((m, m)), mfr=i.spatial_mass[m:, :m], product=None, summed=summed)
+    at_rest = replace(at_rest, rigid=_rigid(i.spatial_mass[m:, m:]), mff=np.zeros((m, m)), mfr=i.spatial_mass[m:, :m])
+    return replace(at_rest, product=None, summed=summed)
+
+
+def _rigid(inertia: Real) -> Real:
+    """(10,) mass, first moment and inertia of a spatial inertia (6,6), angular first; also of masses off their points,
+    which the integrals of level full leave out."""
+    moment = inertia[[2, 0, 1], [4, 5, 3]]  # of m c~
+    return np.array([inertia[3, 3], *moment, *six(inertia[:3, :3])])
 
 
 LEVEL = FidelityLevel(

@@ -152,6 +152,7 @@ class Derivatives:
     port_mode: Real  # (P,MOVED_ROWS,m) what modes do to ports relative to the body
     frame_mode: Real  # (N,MOVED_ROWS,m) to the body frame relative to O; zero unless they move O in the body
     mode: Real  # (N,MODE_ROWS,m)
+    answer: Real  # (m,12) l2, l1 and l0 of the modes of one body
     bent: Real  # (P,m,6,m) derivatives of the motion of a port at unit speed of mode j by displacement n: [j, ., n]
     change: Real  # (18,m) of one port: of its V_r and A_r by displacements, of A_r by speeds, in body axes
     end: Real  # (2,END_ROWS,nu) what all sources do to the two ends of a connector
@@ -202,6 +203,7 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
         port_mode=strip_zeros((len(c.port), MOVED_ROWS, m)),
         frame_mode=strip_zeros((len(c.body), MOVED_ROWS, m)),
         mode=strip_zeros((len(c.body), MODE_ROWS, m)),
+        answer=np.zeros((m, 12)),
         bent=strip_zeros((len(c.port), m, 6, m)),
         change=strip_zeros((18, m)),
         end=strip_zeros((2, END_ROWS, (nu if len(c.connector) + len(c.load) else 0) + LANES)),

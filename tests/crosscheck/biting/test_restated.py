@@ -53,7 +53,8 @@ def blades() -> Scene:
         builder.beam(name, length=1.0, elements=4, section=section, **({"modes": 4} | more))
         builder.revolute(f"joint of {name}", "hub", name, axis=(0.0, 0.6, 0.8), rate=0.7)
         builder.marker(f"end of {name}", name, node="tip")
-    for body, count in (("blade 1", 4), ("rod", 4), ("bow", 9)):
+    builder.modal_state("bow", coordinates=(3e-3, *(0.0,) * 8))
+    for body, count in (("blade 1", 4), ("rod", 4)):
         builder.modal_state(body, coordinates=tuple(0.003 * (i + 1) for i in range(count)), rates=(0.1,) * count)
     return builder.scene()
 

@@ -12,10 +12,12 @@ import inspect
 import pkgutil
 import textwrap
 from collections.abc import Iterator
+from functools import cache
+from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 from flexmb.jain import derivatives
-from flexmb.jain.derivatives import blocks
+from flexmb.jain.derivatives import blocks, sweeps
 from flexmb.jit.duals import rate
 from flexmb.spatial.spatial_vector import axpy6, dot6, plus6, sub6, sum6
 from flexmb.spatial.vector import add, axpy, dot, sub
@@ -41,12 +43,12 @@ def modules() -> list[str]:
 
 
 def terms(module: str) -> Iterator[Term]:
-    """All terms of a module."""
+    """All terms of a module that the derivatives of accelerations and inverse dynamics have."""
     loaded = importlib.import_module(f"{derivatives.__name__}.{module}")
-    names = vars(loaded)
+    names, used = vars(loaded), _reached()
     for name, function in names.items():
         python = getattr(function, "py_func", None)
-        if python is None or python.__module__ != loaded.__name__:
+        if python is None or python.__module__ != loaded.__name__ or python not in used:
             continue
         source = textwrap.dedent(inspect.getsource(python))
         for i in range(len(_changes(ast.parse(source), names))):
@@ -56,6 +58,28 @@ def terms(module: str) -> Iterator[Term]:
             [definition] = _Replaced(node, left).visit(tree).body
             definition.decorator_list = []
             yield Term(f"{module}.{name}", said, function, ast.fix_missing_locations(definition))
+
+
+@cache
+def _reached() -> frozenset[FunctionType]:
+    """The functions that these kernels call, directly or not."""
+    found, waiting = set[FunctionType](), [sweeps.accelerations_and_power.py_func, sweeps.inverse_dynamics.py_func]
+    while waiting:
+        function = waiting.pop()
+        if function not in found:
+            found.add(function)
+            waiting += _called(function)
+    return frozenset(found)
+
+
+def _called(function: FunctionType) -> list[FunctionType]:
+    """The helpers that a function names: as they are, as attributes of modules, and those that it chooses among."""
+    names = function.__code__.co_names
+    known = [function.__globals__[name] for name in names if name in function.__globals__]
+    known += [getattr(module, name, None) for module in known if isinstance(module, ModuleType) for name in names]
+    known += [cell.cell_contents for cell in function.__closure__ or ()]
+    plain = [each for each in known if isinstance(each, FunctionType) and each.__closure__]
+    return [each.py_func for each in known if isinstance(getattr(each, "py_func", None), FunctionType)] + plain
 
 
 def _changes(tree: ast.AST, names: dict[str, Any]) -> list[tuple[ast.AST, ast.AST]]:
