@@ -19,6 +19,7 @@ _HOME = {
     "flexmb.closure.closures": "ClosureError",
     "flexmb.control.user": "user_function",
     "flexmb.linear.campbell": "Campbell campbell",
+    "flexmb.linear.controlled_motion": "ControlledDerivatives ControlledMotion",
     "flexmb.linear.equilibrium": "equilibrium",
     "flexmb.linear.linear_model": "LinearModel",
     "flexmb.linear.linearize": "linearize",
@@ -39,7 +40,9 @@ _HOME = {
     "flexmb.scene.problems": "SceneError SceneWarning",
     "flexmb.scene.user_code": "no_user_code",
     "flexmb.sensitivity.fit": "Fit fit",
+    "flexmb.sensitivity.gradient": "Gradient gradient",
     "flexmb.sensitivity.jump": "EventError",
+    "flexmb.sensitivity.scalars": "FinalValue Misfit TimeIntegral",
     "flexmb.sensitivity.sensitivities": "EventSensitivity Sensitivities sensitivities",
     "flexmb.sensitivity.uncertainty": "Uncertainties uncertainty",
     "flexmb.system.batch": "Batch",
@@ -63,6 +66,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.control.user import user_function as user_function
     from flexmb.linear.campbell import Campbell as Campbell
     from flexmb.linear.campbell import campbell as campbell
+    from flexmb.linear.controlled_motion import ControlledDerivatives as ControlledDerivatives
+    from flexmb.linear.controlled_motion import ControlledMotion as ControlledMotion
     from flexmb.linear.equilibrium import equilibrium as equilibrium
     from flexmb.linear.linear_model import LinearModel as LinearModel
     from flexmb.linear.linearize import linearize as linearize
@@ -92,7 +97,12 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.scene.user_code import no_user_code as no_user_code
     from flexmb.sensitivity.fit import Fit as Fit
     from flexmb.sensitivity.fit import fit as fit
+    from flexmb.sensitivity.gradient import Gradient as Gradient
+    from flexmb.sensitivity.gradient import gradient as gradient
     from flexmb.sensitivity.jump import EventError as EventError
+    from flexmb.sensitivity.scalars import FinalValue as FinalValue
+    from flexmb.sensitivity.scalars import Misfit as Misfit
+    from flexmb.sensitivity.scalars import TimeIntegral as TimeIntegral
     from flexmb.sensitivity.sensitivities import EventSensitivity as EventSensitivity
     from flexmb.sensitivity.sensitivities import Sensitivities as Sensitivities
     from flexmb.sensitivity.sensitivities import sensitivities as sensitivities

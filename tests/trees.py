@@ -14,12 +14,15 @@ import numpy as np
 from numpy.random import Generator
 from scipy.spatial.transform import Rotation
 
+from flexmb.modal.flexible import flexible_model
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, angular, linear
 from flexmb.scene.check import check_scene
 from flexmb.scene.convert import plain
 from flexmb.scene.hinges import WITH_AXIS
 from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.sections import inertia_on_axis, restated, stiffness_on_axis, transport
+from flexmb.scene.sections import matrix as section_matrix
 from flexmb.scene.shapes import beam_section
 from flexmb.scene.tree import coordinates, with_coordinates
 
@@ -39,8 +42,9 @@ class Recipe:
     """What a random scene contains.
 
     `carriers`: kinds of bodies, drawn in turn: "rigid", "modal" (raw, clamped), "floating" (raw, free-free), "beam",
-    "masses" (raw, clamped, points without inertia). `at_clamps`: hinges sit where the modes of the outboard body are
-    clamped, unless it floats. `conservative` leaves out dampers, motors, loads and prescribed motion.
+    "blade" (a beam whose sections couple everything), "masses" (raw, clamped, points without inertia). `at_clamps`:
+    hinges sit where the modes of the outboard body are clamped, unless it floats. `conservative` leaves out dampers,
+    motors, loads and prescribed motion.
     `hinges`: kinds drawn in turn. `armatures`: two of three coordinates of hinges and point masses have one, of the
     size of the bodies' inertia; they are drawn apart, so that all else of a scene is the same without them.
     """
@@ -62,14 +66,20 @@ class Recipe:
 
 
 RIGID = Recipe(carriers=("rigid",))
+SINGLE = Recipe(bodies=60, carriers=("rigid",), hinges=("revolute", "prismatic", "revolute"), conservative=True,
+                prescribed=False, wheels=0, point_masses=0, armatures=True)  # fmt: skip
+"""Rigid bodies on single axes alone, in branches longer than a base point serves."""
 FULL = Recipe()
 RUTHLESS = Recipe(levels=("ruthless",))
 LINEAR = Recipe(levels=("linear",))
 STIFFENED = Recipe(levels=("stiffened", "full", "stiffened"))
+EXACT = Recipe(carriers=("beam", "modal", "beam", "rigid", "beam"), levels=("exact",))
+"""Beams whose strains are polynomials, each kind of `_strains` in turn; modal bodies are of level full."""
 MIXED = Recipe(levels=("full", "ruthless", "rigid"))
 EVERY_LEVEL = Recipe(levels=("linear", "full", "linear", "ruthless", "rigid"))
 ARMED = replace(EVERY_LEVEL, armatures=True, hinges=(*KINDS, *LATER_KINDS))
 ARMED_RIGID = replace(RIGID, armatures=True, hinges=(*KINDS, *LATER_KINDS))
+BLADES = Recipe(bodies=6, carriers=("blade", "rigid"), levels=("linear", "full", "stiffened", "ruthless", "rigid"))
 LATER = Recipe(hinges=(*LATER_KINDS, "spherical", *LATER_KINDS, "prismatic"))
 CONSERVATIVE = Recipe(conservative=True, prescribed=False)
 FREE_FLYING = replace(CONSERVATIVE, grounded=False)
@@ -86,6 +96,8 @@ def random_scene(seed: int, recipe: Recipe = FULL) -> s.Scene:
     for k in range(recipe.bodies):
         carrier = carriers[k % len(carriers)]
         level = recipe.levels[k % len(recipe.levels)]
+        if level == "exact" and carrier != "beam":  # strains belong to beams
+            level = "full"
         nodes.append(_body(scene, rng, f"b{k}", carrier, level, recipe))
         parent = int(rng.integers(-1 if recipe.grounded else 0, k)) if k > 1 and recipe.branching else k - 1
         kind = "free" if k == 0 and not recipe.grounded else kinds[k % len(kinds)]
@@ -152,8 +164,11 @@ def _body(
         corner = s.Node(name="corner", position_m=tuple(vector(rng, 0.5)), quaternion=tuple(quaternion(rng)))
         scene.rigid_body(name, mass=mass, com=vector(rng, 0.2), inertia=inertia(rng, mass, 0.6), nodes=[corner])
         return ["origin", "corner"]
-    if carrier == "beam":
-        modes = _beam(scene, rng, name, level, recipe)
+    if carrier == "beam" and level == "exact":
+        _exact_beam(scene, rng, name, recipe)
+        return ["root", "tip", "middle"]
+    if carrier in ("beam", "blade"):
+        modes = _beam(scene, rng, name, level, recipe, coupled=carrier == "blade")
         nodes = ["root", "tip", "middle"]
     else:
         modes = 3
@@ -163,15 +178,20 @@ def _body(
         )  # fmt: skip
         nodes = ["a", "b"] if carrier == "floating" else ["origin", "a", "b"]
     if level != "rigid":
-        size = recipe.deformation if carrier != "beam" else 0.3 * recipe.deformation
+        size = recipe.deformation if carrier not in ("beam", "blade") else 0.3 * recipe.deformation
         scene.modal_state(name, coordinates=rng.uniform(-size, size, modes), rates=rng.uniform(-size, size, modes))
     return nodes
 
 
-def _beam(scene: SceneBuilder, rng: Generator, name: str, level: s.Level, recipe: Recipe) -> int:
+def _beam(
+    scene: SceneBuilder, rng: Generator, name: str, level: s.Level, recipe: Recipe, *, coupled: bool
+) -> int:  # fmt: skip
     length = rng.uniform(0.8, 1.5)
     root = beam_section(E=2e9, G=8e8, A=9e-4, Iy=8e-8, Iz=5e-8, rho=1500.0)
     tip = beam_section(E=2e9, G=8e8, A=6e-4, Iy=5e-8, Iz=3e-8, rho=1500.0, x=length)
+    theory = "euler-bernoulli"
+    if coupled:
+        theory, root, tip = "timoshenko", _coupled(root, rng), _coupled(tip, rng)
     lump = s.TipMass(
         x_m=length, mass_kg=0.2, com_m=tuple(vector(rng, 0.05)), inertia_kg_m2=matrix(inertia(rng, 0.2, 0.1))
     )
@@ -179,9 +199,67 @@ def _beam(scene: SceneBuilder, rng: Generator, name: str, level: s.Level, recipe
     scene.beam(
         name, length=length, elements=3, section=[root, tip], level=level, tip_masses=[lump], nodes=[middle],
         modes=s.Modes(count=4, damping_ratio=0.0 if recipe.conservative else 0.02),
-        points=str(rng.choice(recipe.beam_points)),
+        points=str(rng.choice(recipe.beam_points)), theory=theory,
     )  # fmt: skip
     return 4
+
+
+def _exact_beam(scene: SceneBuilder, rng: Generator, name: str, recipe: Recipe) -> None:
+    """A beam of level exact, with a tip mass and a lump along it, bent by some 4 recipe.deformation radians."""
+    length, (modes, curvature, theory) = rng.uniform(0.8, 1.5), _strains(int(name.removeprefix("b")))
+    shear = {"GAy_N": 4e4, "GAz_N": 3e4}
+    root, tip = (
+        msgspec.structs.replace(
+            beam_section(E=2e9, G=8e8, A=A, Iy=Iy, Iz=Iz, rho=1500.0, x=x), EA_N=5e4, rotary_y_kg_m=rotary,
+            rotary_z_kg_m=0.8 * rotary, curvature_1_m=tuple(share * np.array(curvature)), **shear,
+        )
+        for A, Iy, Iz, x, rotary, share in (
+            (9e-4, 8e-8, 5e-8, 0.0, 2e-3, 1.0), (6e-4, 5e-8, 3e-8, length, 1e-3, 0.6),
+        )
+    )  # fmt: skip
+    lumps = [
+        s.TipMass(x_m=x, mass_kg=0.2, com_m=tuple(vector(rng, 0.05)), inertia_kg_m2=matrix(inertia(rng, 0.2, 0.1)))
+        for x in (length, 0.4 * length)
+    ]
+    middle = s.BeamNode(name="middle", x_m=0.55 * length, quaternion=tuple(quaternion(rng)))
+    damping = {} if recipe.conservative else {"damping_ratio": 0.01, "viscosity_s": 1e-3}
+    beam: dict[str, Any] = {
+        "length": length, "elements": 3, "section": [root, tip], "level": "exact", "tip_masses": lumps,
+        "nodes": [middle], "modes": msgspec.structs.replace(modes, **damping), "points": "section", "theory": theory,
+    }  # fmt: skip
+    scene.beam(name, **beam)
+    alone = SceneBuilder("alone").beam(name, **beam).weld("clamp", "ground", name).scene()
+    frequency = np.sqrt(np.diag(flexible_model(alone.bodies[0]).stiffness))
+    size = 40.0 * recipe.deformation / frequency
+    coordinates, rates = (rng.uniform(-size, size) for _ in range(2))
+    scene.modal_state(name, coordinates=coordinates, rates=rates)
+
+
+def _strains(kind: int) -> tuple[s.Modes, tuple[float, float, float], str]:
+    """Strains, curvature at rest (1/m) and theory of one of six kinds of beams of level exact."""
+    euler, timoshenko = "euler-bernoulli", "timoshenko"
+    one_plane, planes = ("bending_z",), ("bending_z", "bending_y")
+    six = s.StrainPolynomials(axial=1, shear_y=1, shear_z=2, torsion=2, bending_y=3, bending_z=3)
+    return (
+        (s.Modes(count=3, families=one_plane), (0.0, 0.0, 0.0), euler),
+        (s.Modes(count=2, families=("torsion", *planes)), (0.0, 0.0, 0.0), euler),
+        (s.Modes(count=3, polynomials=six), (0.4, 0.3, -0.5), timoshenko),
+        (s.Modes(count=2, pieces=2, families=("torsion", *planes)), (0.0, 0.6, 0.4), euler),
+        (s.Modes(count=3, families=("bending_y",)), (0.0, 0.0, 0.7), timoshenko),
+        (s.Modes(count=2, families=planes, points=5), (1.0, 0.0, 0.0), euler),
+    )[kind % 6]
+
+
+def _coupled(section: s.BeamStation, rng: Generator) -> s.BeamStation:
+    """The section with correlations of all strains and its mass centre off the axis, stated at a random point."""
+    stiffness, inertia = stiffness_on_axis(section), inertia_on_axis(section)
+    size, random = np.sqrt(np.diag(stiffness)), np.triu(rng.uniform(-0.15, 0.15, (6, 6)), 1)
+    stiffness += (random + random.T) * np.outer(size, size)
+    T = transport(rng.uniform(-0.02, 0.02, 2))
+    on_axis = s.BeamStation(
+        x_m=section.x_m, stiffness=section_matrix(stiffness), inertia=section_matrix(T.T @ inertia @ T)
+    )
+    return restated(on_axis, tuple(rng.uniform(-0.02, 0.02, 2)))
 
 
 def _modal(

@@ -19,6 +19,7 @@ from crosscheck.engines.checked import NO_START
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
 from crosscheck.judging.verdict import Finding, Signal, Status, compare
+from crosscheck.library.channels import LINEAR_KINDS, is_judged
 from crosscheck.library.find import Case
 from crosscheck.library.patterns import most_specific
 from crosscheck.records.archive import read
@@ -108,7 +109,7 @@ def run_invariances(
 
 
 def _planned(what: JudgedVariant, provider: str, limits: Limits) -> _Set:
-    record, (true,) = plan(_of_motion(reduced(what)), (), provider, limits.time_s)
+    record, (true,) = plan(reduced(what), (), provider, limits.time_s)
     counterparts: dict[str, Counterpart] = {}
     without: dict[str, str] = {}
     jobs = [true]
@@ -127,12 +128,6 @@ def _planned(what: JudgedVariant, provider: str, limits: Limits) -> _Set:
     bare = msgspec.structs.replace(what.variant, efforts=())
     record = msgspec.structs.replace(record, run=msgspec.structs.replace(record.run, variants=(bare,)))
     return _Set(what, counterparts, without, record, jobs)
-
-
-def _of_motion(case: Case) -> Case:
-    """The case without the linearised motion, whose matrices depend on units and on the order of the coordinates."""
-    variants = tuple(msgspec.structs.replace(each, linear=msgspec.UNSET) for each in case.run.variants)
-    return replace(case, run=msgspec.structs.replace(case.run, variants=variants))
 
 
 def _job(true: Job, name: str, counterpart: Counterpart) -> Job:
@@ -185,11 +180,20 @@ def _judged(each: _Set, results: CaseResults) -> list[InvarianceVerdict]:
         if ended is not None:
             found.append(msgspec.structs.replace(head, status=ended.status, reason=ended.message))
             continue
-        if true.rests:
+        if true.rests and not _is_linearised(true):
             found.append(msgspec.structs.replace(head, reason="nothing moves"))
             continue
         found.append(_verdict(head, _findings(what, true, other, each.counterparts[invariance.name])))
     return found
+
+
+def _is_linearised(true: Result) -> bool:
+    return any(_is_linear(name) for name in true.channels)
+
+
+def _is_linear(channel: str) -> bool:
+    """Whether a channel is one of the linearised motion, which there is at rest too."""
+    return channel.partition(".")[0] in LINEAR_KINDS
 
 
 def _findings(what: JudgedVariant, true: Result, other: Result, counterpart: Counterpart) -> dict[str, Finding]:
@@ -197,7 +201,7 @@ def _findings(what: JudgedVariant, true: Result, other: Result, counterpart: Cou
     told = _told(other, counterpart)
     found: dict[str, Finding] = {}
     for name in true.channels:
-        if name not in told.channels:
+        if name not in told.channels or not is_judged(name) or (true.rests and not _is_linear(name)):
             continue
         pattern = most_specific(what.goals, name)
         scale = most_specific(what.scales, name)
@@ -223,7 +227,7 @@ def _run(run: RunRecord, other: Result, counterpart: Counterpart) -> RunRecord:
     if run.times is None or set(run.channels) != set(other.finest.channels):
         return msgspec.structs.replace(run, channels={})
     times = (unpack(run.times) - counterpart.starts_s) / counterpart.clock
-    channels = counterpart.back(times, {name: unpack(packed) for name, packed in run.channels.items()})
+    channels = counterpart.told(times, {name: unpack(packed) for name, packed in run.channels.items()})
     return msgspec.structs.replace(
         run,
         times=pack(times),

@@ -18,8 +18,9 @@ from crosscheck.records.drawing import CarriedPoint, Drawing, DrawnWheel, Line
 from flexmb.scene.bodies import ZERO, BeamBody, Body, ModalBody, RigidBody, SidBody, Vector
 from flexmb.scene.connectors import BetweenNodes, HingeSpring
 from flexmb.scene.ends import ends
+from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.schema import Marker, Scene, Wheel
-from flexmb.scene.tree import GROUND, node_frame
+from flexmb.scene.tree import GROUND, node_frame, nodes_along
 from flexmb.typing import Real
 
 LARGEST_ASPECT = 12.0
@@ -110,15 +111,21 @@ def _carried(scene: Scene, body: str, node: str, offset: Vector) -> CarriedPoint
 
 
 def _flexible(scene: Scene, body: Body, markers: list[Marker]) -> Line:
-    """A line through the body's nodes with markers in the order of their distance from its origin; it begins at the
-    inboard hinge if a marker carries that."""
+    """A line through the body's nodes with markers in their order along a beam, otherwise in that of their distance
+    from the origin; it begins at the inboard hinge if a marker carries that."""
     nodes = {marker.node: marker for marker in reversed(markers)}
-    placed = sorted(nodes.values(), key=lambda marker: float(np.linalg.norm(_node_point(body, marker.node, ZERO))))
+    along_beam = nodes_along(body) if isinstance(body, BeamBody) else {}
+    placed = sorted(
+        nodes.values(),
+        key=lambda marker: along_beam.get(marker.node, float(np.linalg.norm(_node_point(body, marker.node, ZERO)))),
+    )
     rest = np.array([_node_point(body, marker.node, ZERO) for marker in placed])
     root = _root_point(scene, body)
     from_root = root is not None and float(np.linalg.norm(rest[0])) > 0.0
     along = np.vstack([np.zeros(3), rest]) if from_root else rest
     tangents = _directions(along)[-len(placed) :]
+    if isinstance(body, BeamBody):
+        tangents = rest_sections(body, np.array([along_beam[marker.node] for marker in placed]))[1][:, :, 0]
     points = [
         CarriedPoint(marker.name, _vector(-np.array(marker.offset_m)), _vector(_pose(body, marker)[1].inv().apply(way)))
         for marker, way in zip(placed, tangents, strict=True)

@@ -25,7 +25,7 @@ from flexmb.scene.tree import coordinates, rest_frames
 ENGINE = "native"
 FRAMES = 161
 EFFORT = Effort("tolerance", 1e-10, "dop853")  # if the case prescribes none
-PIECES = 6  # into which additional nodes divide a beam
+PIECES, PIECES_OF_EXACT = 6, 12  # into which additional nodes divide a beam, and one that may bend to circles
 ADDED = "drawn"
 NO_INERTIA = ((0.0,) * 3,) * 3
 
@@ -81,7 +81,8 @@ def _hung(scene: Scene) -> Scene:
 def _with_markers(scene: Scene, body: Body) -> Scene:
     """The scene with a marker on every node of the body that is drawn."""
     if isinstance(body, BeamBody):
-        inside = np.linspace(0.0, body.length_m, PIECES + 1)[1:-1]
+        pieces = PIECES_OF_EXACT if body.level == "exact" else PIECES
+        inside = np.linspace(0.0, body.length_m, pieces + 1)[1:-1]
         added = tuple(BeamNode(name=f"{ADDED} {i}", x_m=float(x)) for i, x in enumerate(inside, start=1))
         longer = msgspec.structs.replace(body, nodes=(*body.nodes, *added))
         bodies = tuple(longer if each.name == body.name else each for each in scene.bodies)

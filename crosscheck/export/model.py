@@ -76,6 +76,11 @@ def _deforms(body: BeamBody | ModalBody) -> bool:
         case "linear" | "ruthless":
             what = f'body "{body.name}" is of level "{body.level}"'
             raise CaseError(f'{what}, whose truncated mass matrix an export cannot say: take level "full"')
+        case "exact":
+            raise CaseError(
+                f'body "{body.name}" is of level "exact", whose motion is no sum of mode shapes: take pieces of level '
+                '"stiffened"'
+            )
         case _:
             assert_never(body.level)
 

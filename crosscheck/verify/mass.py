@@ -8,6 +8,7 @@ import numpy as np
 
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
 from flexmb.scene.schema import Scene
+from flexmb.scene.sections import mass_per_length
 
 
 def total_mass(scene: Scene) -> float | None:
@@ -24,7 +25,7 @@ def _mass(body: Body) -> float | None:
         case BeamBody():
             stations = sorted(body.stations, key=lambda station: station.x_m)
             places = [0.0, *(each.x_m for each in stations), body.length_m]
-            densities = [each.mass_per_length_kg_m for each in (stations[0], *stations, stations[-1])]
+            densities = [mass_per_length(each) for each in (stations[0], *stations, stations[-1])]
             return float(np.trapezoid(densities, places)) + sum(tip.mass_kg for tip in body.tip_masses)
         case ModalBody() if body.points:
             return sum(point.mass_kg for point in body.points)

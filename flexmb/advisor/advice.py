@@ -10,13 +10,13 @@ import numpy as np
 from flexmb.advisor.bench import Bench
 from flexmb.advisor.confirm import Confirmation, NoReference, Reference
 from flexmb.advisor.indicators import Indicators, indicators, of_level, predicted
-from flexmb.advisor.ladder import Cost, Step, cost, model_cost, rungs, step
+from flexmb.advisor.ladder import Cost, Step, cost, model_cost, references, rungs, softest, step
 from flexmb.advisor.methods import RunMethod
 from flexmb.advisor.modal_response import RigidRun, modal_response, rigid_run
-from flexmb.advisor.models import BodyModel, Model, built, flexible_bodies, levels
+from flexmb.advisor.models import EXACT, LEVELS, BodyModel, Model, built, flexible_bodies, levels
 from flexmb.advisor.quantity import Quantity, measured, quantities, scales
 from flexmb.advisor.search import search
-from flexmb.scene.bodies import BeamBody
+from flexmb.scene.bodies import BeamBody, Level, ModalBody
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
@@ -24,8 +24,12 @@ from flexmb.tables import arguments
 
 BUDGET = 4e10
 """The search for cheaper models ends when its runs have taken this many operations (about 20 s)."""
-REFERENCE = 1e10
+REFERENCE = 4e10
 """A reference whose predicted cost exceeds this number of operations is not run."""
+FAR = 0.2
+"""Deflection over length, predicted by linear modes, beyond which references are of level exact."""
+NEGLECTED = 0.1
+"""Bodies get rungs of level exact if stiffened ones are predicted to neglect more than this part of the tolerance."""
 _EXCITED = 1e-3
 """A family of modes that contributes less than this fraction of the tolerance counts as not excited."""
 
@@ -151,7 +155,9 @@ class Prepared:
 
     def confirmation(self) -> Confirmation:
         """Run the references; returns what measures candidates against them. Raises NoReference."""
-        return Confirmation(self.bench, self.tolerance, self.hidden, self.cost, REFERENCE)
+        far = frozenset(name for name, each in self.known.items() if each.deflection > FAR)
+        known = references(self.bench.scene, far if self.known else softest(self.bench.scene))
+        return Confirmation(self.bench, self.tolerance, self.hidden, self.cost, REFERENCE, known)
 
 
 def prepare(
@@ -189,10 +195,17 @@ def _hidden(scene: Scene, known: dict[str, Indicators]) -> float:
     """Predicted error of the finest models of bodies that cannot be refined: raw ones and beams that start bent."""
     bent = {state.body for state in scene.modal_states}
     return sum(
-        of_level(levels(body)[-1], known[body.name])
+        of_level(_finest(body), known[body.name])
         for body in flexible_bodies(scene)
         if body.name in known and (body.name in bent or not isinstance(body, BeamBody))
     )
+
+
+def _finest(body: BeamBody | ModalBody) -> Level:
+    """The level of a body in references that do not divide it."""
+    if isinstance(body, BeamBody):
+        return EXACT if body.level == EXACT else LEVELS[-1]
+    return levels(body)[-1]
 
 
 def _ladders(scene: Scene, known: dict[str, Indicators], tolerance: float) -> dict[str, tuple[Step, ...]]:
@@ -201,7 +214,8 @@ def _ladders(scene: Scene, known: dict[str, Indicators], tolerance: float) -> di
     for body in flexible_bodies(scene):
         of = known.get(body.name)
         excited = of.families_above(_EXCITED * tolerance) if of else frozenset[str]()
-        every = rungs(scene, body, excited)
+        far = of is None or body.level == EXACT or of_level(LEVELS[-1], of) > NEGLECTED * tolerance
+        every = rungs(scene, body, excited, far)
         steps = [step(scene, body.name, rung, predicted(rung, of) if of else 0.0) for rung in every]
         found[body.name] = tuple(each for each in steps if each is not None)
     return found

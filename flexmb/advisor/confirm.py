@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexmb.advisor.bench import Bench, BenchRun
-from flexmb.advisor.ladder import STAGES, Cost, highest_frequency, model_cost, references
-from flexmb.advisor.methods import FINEST, RunMethod, ladders
+from flexmb.advisor.ladder import STAGES, Cost, highest_frequency, model_cost
+from flexmb.advisor.methods import FINEST, TOLERANCES, RunMethod, ladders
 from flexmb.advisor.models import Model
 from flexmb.advisor.quantity import Signals, error, scales
 from flexmb.integrate.catalogue import INTEGRATORS
@@ -32,6 +32,15 @@ INTEGRATION, ROOM = 0.1, 0.05
 """Fractions of the tolerance: largest integration error of a reference; part that is reserved for the integrator."""
 _FEW_EVALUATIONS = 1000
 """Methods that linearise are not tried if the fine run takes fewer evaluations than this."""
+
+
+EXPLICIT, IMPLICIT = "dop853", "radau5"
+CHEAP = 1e9
+"""Explicit runs that are predicted to take fewer operations are not compared with implicit ones."""
+OVERCOUNTED = 4.0
+"""Runs of Radau 5 may have so many times the budget, because their Jacobians are counted column by column, as they are
+not computed."""
+References = tuple[tuple[str, Model], ...]
 
 
 class NoReference(ValueError):
@@ -53,14 +62,18 @@ class Reference:
 class Confirmation:
     """Measures errors of models relative to references, which it determines first."""
 
-    def __init__(self, bench: Bench, tolerance: float, hidden: float, cost: Cost, budget: float) -> None:
+    def __init__(
+        self, bench: Bench, tolerance: float, hidden: float, cost: Cost, budget: float, known: References
+    ) -> None:
         """`hidden`: predicted error that all references have in common; `cost`: predictions; `budget`: largest
-        predicted number of operations of one reference.
+        predicted number of operations of one reference; `known`: the references, from coarse to fine.
         """
-        self.bench, self.tolerance, self.cost = bench, tolerance, cost
+        self.bench, self.tolerance, self.cost, self.budget = bench, tolerance, cost, budget
+        self.references: list[Model] = []  # those that ran, from coarse to fine
+        self._integrators: dict[Model, str] = {}
         self.fine, self.drift = min(FINE * tolerance, LOOSEST), 0.0
         self.measured: dict[Model, float] = {}
-        self.reference = self._reference(hidden, budget)
+        self.reference = self._reference(hidden, known)
 
     def run(self, model: Model) -> BenchRun:
         """The run of the model with an integration error that is negligible beside the error of the model."""
@@ -68,7 +81,27 @@ class Confirmation:
 
     def finely(self, model: Model) -> RunMethod:
         """The method of fine runs."""
-        return RunMethod("dop853", max(FINEST, self.fine), self.bench.algorithm(model))
+        return self._method(model, self._integrator(model), max(FINEST, self.fine))
+
+    def _method(self, model: Model, integrator: str, rtol: float) -> RunMethod:
+        """Only the recursion has the derivatives that Radau 5 needs."""
+        return RunMethod(integrator, rtol, "articulated" if integrator == IMPLICIT else self.bench.algorithm(model))
+
+    def _integrator(self, model: Model) -> str:
+        """DOP853, or Radau 5 for strains if it takes fewer operations than the highest frequency demands of DOP853."""
+        if model not in self._integrators:
+            chosen = EXPLICIT
+            expected = model_cost(self.bench.scene, model, self.cost)
+            strains = any(rung.kind == "strains" for _, rung in model)
+            if strains and expected > CHEAP and not isinstance(self.bench.system(model), str):
+                most = min(expected, OVERCOUNTED * self.budget)
+                done = self.bench.run(model, self._method(model, IMPLICIT, LOOSEST), most)
+                chosen = IMPLICIT if done.finished and done.operations < most else EXPLICIT
+            self._integrators[model] = chosen
+        return self._integrators[model]
+
+    def _too_costly(self, model: Model) -> bool:
+        return self._integrator(model) == EXPLICIT and model_cost(self.bench.scene, model, self.cost) > self.budget
 
     def error(self, model: Model) -> float:
         """Error of a model, U included; infinite if it cannot be compiled or does not finish."""
@@ -111,7 +144,10 @@ class Confirmation:
         highest, slow = highest_frequency(scene, model), self.cost.slow / (STAGES * self.bench.t_end)
         best, least = self.finely(model), self.run(model).operations
         short = self.run(model).evaluations < _FEW_EVALUATIONS
-        for ladder in ladders(highest, slow, algorithm, not scene.constraints):
+        chosen = ladders(highest, slow, algorithm, not scene.constraints)
+        if scene.constraints and self._integrator(model) == IMPLICIT:
+            chosen = (tuple(self._method(model, IMPLICIT, rtol) for rtol in TOLERANCES), *chosen)
+        for ladder in chosen:
             if short and INTEGRATORS[ladder[0].integrator].linearises:
                 continue
             before: RunMethod | None = None
@@ -130,13 +166,12 @@ class Confirmation:
                 before = method if fits else None
         return best
 
-    def _reference(self, hidden: float, budget: float) -> Reference:
+    def _reference(self, hidden: float, known: References) -> Reference:
         history: list[str] = []
         steps: list[float] = []
         last: Reference | None = None
-        known = references(self.bench.scene)
         for name, model in known:
-            if last is not None and model_cost(self.bench.scene, model, self.cost) > budget:
+            if last is not None and self._too_costly(model):
                 history.append(f"{name}: would cost too much")
                 continue
             system = self.bench.system(model)
@@ -144,6 +179,7 @@ class Confirmation:
             if done is None or not done.finished:
                 history.append(f"{name}: {system if done is None else done.message}")
                 continue
+            self.references.append(model)
             if last is None:
                 self._refine(model)
                 done = self.run(model)
@@ -154,7 +190,7 @@ class Confirmation:
             apart = error(done.signals, last.signals, scale)
             history.append(f"{last.name} and {name} differ by {apart:.2g}")
             falls = max(apart / steps[-1], SECOND_ORDER) if steps and steps[-1] > 0.0 else 1.0
-            steps += [apart] if last.name.endswith("pieces") else []
+            steps += [apart] if " pieces" in last.name else []
             left = apart * falls / (1.0 - falls) if falls < 0.5 else apart
             last = Reference(name, model, done.signals, scale, left + hidden + self.drift, tuple(history))
             if last.uncertainty <= AGREED * self.tolerance:

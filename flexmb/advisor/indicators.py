@@ -7,7 +7,8 @@ indicators, which use the modal response to the rigid motion:
     stiffening      kappa_n = K_G,nn / omega_n^2: geometric stiffness by the axial force of spin, gravity and tip loads,
                     relative to the modal stiffness; -1 is buckling. Levels without second-order shapes omit it
     spin            (w / omega_1)^2, the softening that `ruthless` omits; at 1 and above, `full` is unstable
-    deflection      the largest deflection relative to the length: each order of it is omitted by some levels
+    deflection      the largest deflection relative to the length: each order of it is omitted by some levels, none by
+                    level exact, whose polynomials converge to the strain
     equivalence     mismatch of effective inertia of the best spring hinge, (149)-(151) of Frisch
 
 Predictions order the ladder and select the start of the search; the decisions are based on runs.
@@ -33,6 +34,8 @@ from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 _TINY = np.finfo(float).tiny
+POLYNOMIAL_ERROR = 0.1
+"""Ratio of the errors of n + 1 and n polynomials of a curvature, about that of a cantilever in motion."""
 SEGMENT_ERROR = 4.5
 """Phase error of the first modes of a chain of n segments after some periods: SEGMENT_ERROR / n^2 of the response."""
 
@@ -119,6 +122,9 @@ def predicted(rung: BodyModel, body: Indicators) -> float:
     if rung.kind == "pieces":
         held = len(set(body.family.tolist())) * (rung.pieces + rung.modes)
         return of_level(rung.level, body) / rung.pieces**2 + float(body.dynamic[held:].sum())
+    if rung.kind == "strains":
+        held = len(set(body.family.tolist())) * rung.pieces * rung.polynomials
+        return whole * POLYNOMIAL_ERROR**rung.polynomials / rung.pieces**2 + float(body.dynamic[held:].sum())
     chosen = np.isin(body.family, [FAMILIES.index(name) for name in rung.families if name in FAMILIES])
     among = chosen if rung.families else np.ones(len(body.static), dtype=bool)
     kept = among & (np.cumsum(among) <= rung.modes)
@@ -131,6 +137,8 @@ def predicted(rung: BodyModel, body: Indicators) -> float:
 def of_level(level: str, body: Indicators) -> float:
     """Predicted error of a level, relative to the scale."""
     whole, bent = body.flexibility, body.deflection
+    if level == "exact":
+        return 0.0
     third_order = whole * bent**2
     if level == "stiffened":
         return third_order
@@ -144,7 +152,7 @@ def of_level(level: str, body: Indicators) -> float:
 
 def _axis(body: BeamBody) -> tuple[Real, Real, Real]:
     """x (n,), mass (n,) along the axis and slopes (n,3,m) of the eigenmodes there."""
-    model = eigenmodes(replace(body, points="line"))
+    model = eigenmodes(body if body.level == "exact" else replace(body, points="line"))
     root, tip = model.nodes["root"], model.nodes["tip"]
     x = np.concatenate([model.position[:, 0], [root.position[0], tip.position[0]]])
     slopes = np.concatenate([model.rotation, [root.rotation_modes, tip.rotation_modes]])

@@ -10,14 +10,32 @@ import numpy as np
 from msgspec.structs import replace
 from scipy.linalg import eigvalsh
 
-from flexmb.advisor.models import COUNTS, LEVELS, PIECES, SEGMENTS, BodyModel, Model, built, flexible_bodies, levels
+from flexmb.advisor.models import (
+    COUNTS,
+    EXACT,
+    LEVELS,
+    PIECES,
+    SEGMENTS,
+    STRAINS,
+    BodyModel,
+    Model,
+    built,
+    flexible_bodies,
+    levels,
+)
 from flexmb.jain.cost import articulated
 from flexmb.levels.body import BY_NAME
 from flexmb.modal import flexible_model
 from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import BeamBody, Body, ModalBody
+from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import Scene
+from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, mass_per_length, stiffness_on_axis
+from flexmb.scene.strains import polynomials
 
+EXACT_REFERENCES = ((1, 4), (1, 6), (1, 8), (2, 6), (4, 6), (8, 6))
+"""Pieces, and polynomials of each curvature along one, of references for beams that bend far."""
+SOFT = 0.05  # of the largest compliance
 STEP_AT_HIGHEST = 3.4
 """Step of DOP853 times the highest frequency when that frequency limits the step (measured)."""
 STAGES = 12
@@ -55,8 +73,11 @@ class Cost:
         return each * max(self.slow, STAGES * self.t_end * fastest / STEP_AT_HIGHEST)
 
 
-def rungs(scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str]) -> tuple[BodyModel, ...]:
-    """All rungs of one body, in no particular order. `moving`: families of a beam that are predicted to be excited."""
+def rungs(
+    scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str], bends_far: bool = True
+) -> tuple[BodyModel, ...]:
+    """All rungs of one body, in no particular order. `moving`: families of a beam that are predicted to be excited;
+    `bends_far`: whether level exact may make a difference to it."""
     if isinstance(body, ModalBody):
         every = flexible_model(body).mode_count
         counts = sorted({n for n in COUNTS if n < every} | {every})
@@ -67,40 +88,82 @@ def rungs(scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str]) -> t
     if some and set(some) != set(body.modes.families):
         sets.append(some)
     carries = body.modes.static or any(hinge.parent == body.name for hinge in scene.hinges)
+    sets_of_strains = (False, True) if _stretches(body) else (False,)
     found = [BodyModel("rigid"), BodyModel("sprung")]
     for families in sets:
         for level in LEVELS:
             found += [BodyModel("modes", n, level, False, families) for n in COUNTS]
             if carries:
                 found += [BodyModel("modes", n, level, True, families) for n in (0, 1, 2, 4)]
+        if bends_far:
+            found += [_strains(n, pieces, more, families) for pieces, n in STRAINS for more in sets_of_strains]
     found += [BodyModel("segments", pieces=n) for n in SEGMENTS]
     found += [BodyModel("pieces", pieces=n, level=level) for n in PIECES for level in LEVELS[-2:]]
     return tuple(found)
 
 
-def references(scene: Scene) -> tuple[tuple[str, Model], ...]:
+def _stretches(body: BeamBody) -> bool:
+    """Whether the beam has stretch or shear."""
+    return "axial" in body.modes.families or body.theory == "timoshenko"
+
+
+def _strains(polynomials: int, pieces: int, stretching: bool, families: tuple[str, ...] = ()) -> BodyModel:
+    return BodyModel(
+        "strains", level=EXACT, families=families, pieces=pieces, polynomials=polynomials, stretching=stretching
+    )
+
+
+def references(scene: Scene, bend_far: frozenset[str] = frozenset()) -> tuple[tuple[str, Model], ...]:
     """Models against which candidates are measured, from coarse to fine; successive ones show their uncertainty.
 
     First all bodies with the modes that the scene gives them, and four more if it has no attachment modes; then beams
-    in pieces, which converge to the geometrically exact beam. A raw body has no other modes than its own. A beam that
-    starts bent cannot be divided; it gets four more modes, then another four.
+    in pieces, which converge to the geometrically exact beam. If some of them `bend_far` (names), these are of level
+    exact instead, with more and more polynomials, then in pieces of six, and the others get more modes. A raw body has
+    no other modes than its own. A beam that starts bent cannot be divided; it gets four more modes, or two more
+    polynomials, then as many again.
     """
     bodies = flexible_bodies(scene)
     bent = {state.body for state in scene.modal_states}
-    splits = [b.name for b in bodies if isinstance(b, BeamBody) and b.name not in bent]
+    splits = {b.name for b in bodies if isinstance(b, BeamBody) and b.name not in bent}
+    far = splits & (bend_far | {b.name for b in bodies if isinstance(b, BeamBody) and is_curved(b)})
 
     def rung(body: BeamBody | ModalBody, more: int, pieces: int) -> BodyModel:
         if isinstance(body, ModalBody):
             return BodyModel("modes", flexible_model(body).mode_count, levels(body)[-1])
         if pieces and body.name in splits:
             return BodyModel("pieces", 0, LEVELS[-1], pieces=pieces)
+        if body.level == EXACT:
+            return strains(body, max(polynomials(body).values()) + more // 2, body.modes.pieces)
         return BodyModel("modes", body.modes.count + more, LEVELS[-1], body.modes.static)
 
+    def strains(body: BeamBody, count: int, pieces: int) -> BodyModel:
+        return _strains(count, pieces, _stretches(body))
+
+    def exact(body: BeamBody | ModalBody, count: int, pieces: int) -> BodyModel:
+        if isinstance(body, BeamBody) and body.name in far:
+            return strains(body, count, pieces)
+        return rung(body, count - 4 if pieces == 1 else count, 0)
+
+    if far:
+        sizes = [(f"{p} pieces of {n}" if p > 1 else f"{n}", n, p) for p, n in EXACT_REFERENCES]
+        return tuple((f"{size} polynomials", tuple((b.name, exact(b, n, p)) for b in bodies)) for size, n, p in sizes)
     first = tuple((b.name, rung(b, 0 if isinstance(b, BeamBody) and b.modes.static else 4, 0)) for b in bodies)
     finer = [(f"{n} pieces", tuple((b.name, rung(b, 4, n)) for b in bodies)) for n in (2, 4, 8, 16)]
     if not splits:
         finer = [("still more modes", tuple((b.name, rung(b, 8, 0)) for b in bodies))]
     return (("modes" if bodies else "the scene", first), *((name, model) for name, model in finer if model != first))
+
+
+def softest(scene: Scene) -> frozenset[str]:
+    """The beam that bends most under a force at its tip, and those that bend nearly as much: at least `SOFT` of it."""
+    bends = {b.name: _compliance(b) for b in flexible_bodies(scene) if isinstance(b, BeamBody)}
+    return frozenset(name for name, value in bends.items() if value >= SOFT * max(bends.values()))
+
+
+def _compliance(beam: BeamBody) -> float:
+    """L^3 / (3 EI) (m/N) in its weak plane, of the stiffest section."""
+    sections = [stiffness_on_axis(each) for each in beam.stations]
+    return beam.length_m**3 / (3.0 * float(max(min(K[ABOUT_Y, ABOUT_Y], K[ABOUT_Z, ABOUT_Z]) for K in sections)))
 
 
 def step(scene: Scene, name: str, rung: BodyModel, error: float) -> Step | None:
@@ -145,8 +208,9 @@ def _fastest(body: Body, rung: BodyModel, parts: list[Body]) -> float:
 
 def _squares(body: Body) -> tuple[float, ...]:
     """Squares of the frequencies of a body with its base fixed, none if it is rigid; cached for any name."""
-    is_flexible = isinstance(body, BeamBody | ModalBody) and body.level != "rigid"
-    return _squares_of(replace(body, name="body", level="full")) if is_flexible else ()
+    if not isinstance(body, BeamBody | ModalBody) or body.level == "rigid":
+        return ()
+    return _squares_of(replace(body, name="body", level=EXACT if body.level == EXACT else "full"))
 
 
 @lru_cache(maxsize=4096)
@@ -161,6 +225,6 @@ def _squares_of(body: BeamBody | ModalBody) -> tuple[float, ...]:
 
 def _beam_rate(beam: BeamBody) -> float:
     """sqrt(EI / (m L^4)) (rad/s) of the stiffest section."""
-    station = max(beam.stations, key=lambda s: max(s.EIy_Nm2, s.EIz_Nm2) / s.mass_per_length_kg_m)
-    stiff = max(station.EIy_Nm2, station.EIz_Nm2)
-    return float(np.sqrt(stiff / (station.mass_per_length_kg_m * beam.length_m**4)))
+    sections = ((stiffness_on_axis(each), mass_per_length(each)) for each in beam.stations)
+    stiffest = max(max(K[ABOUT_Y, ABOUT_Y], K[ABOUT_Z, ABOUT_Z]) / mass for K, mass in sections)
+    return float(np.sqrt(stiffest / beam.length_m**4))

@@ -128,9 +128,10 @@ def modal_response(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody) ->
 
 
 def eigenmodes(body: BeamBody | ModalBody) -> FlexibleModel:
-    """The body's eigenmodes with unit modal mass, lowest first; of a beam up to `MODES`, whatever its scene has."""
+    """The body's eigenmodes with unit modal mass, lowest first; of a beam up to `MODES`, whatever its scene has, unless
+    it has strains in their place."""
     if isinstance(body, BeamBody):
-        return _beam(replace(body, name="beam", level="full"))
+        return flexible_model(body) if body.level == "exact" else _beam(replace(body, name="beam", level="full"))
     model = flexible_model(body)
     m = model.mode_count
     return combined(model, eigh(model.stiffness, modal_integrals(model).spatial_mass[:m, :m])[1])
@@ -189,7 +190,8 @@ def _initial(scene: Scene, body: BeamBody | ModalBody, model: FlexibleModel) -> 
     start = np.zeros((model.mode_count, 2))
     state = next((each for each in scene.modal_states if each.body == body.name), None)
     if state is not None:
-        own = flexible_model(body)
+        # At level stiffened, equivalent masses would replace the points that both models have at level full.
+        own = flexible_model(body if body.level == "exact" else replace(body, level="full"))
         onto = np.einsum("p,pim,pin->mn", own.mass, mass_shapes(model), mass_shapes(own), optimize=True)
         start[:, 0] = onto @ np.array(state.coordinates)
         start[:, 1] = onto @ np.array(state.rates or [0.0] * own.mode_count)

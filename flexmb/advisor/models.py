@@ -11,23 +11,28 @@ from typing import Literal, assert_never
 
 from msgspec.structs import replace
 
-from flexmb.advisor.modes import with_modes
+from flexmb.advisor.modes import with_modes, with_strains
 from flexmb.advisor.sprung import spring_hinged
 from flexmb.levels import body as fidelity
 from flexmb.scene.bodies import BeamBody, Level, ModalBody
 from flexmb.scene.check.second_order import second_order
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Place
+from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import finite_segments, substructured
 
-LEVELS: tuple[Level, ...] = tuple(level.name for level in fidelity.LEVELS if level.flexible)
+LEVELS: tuple[Level, ...] = tuple(each.name for each in fidelity.LEVELS if each.flexible and not each.by_strain)
+"""Levels of modes, each of which neglects less than the one before."""
+EXACT: Level = "exact"
 COUNTS = (1, 2, 3, 4, 6, 8)
 SEGMENTS = (2, 4, 8)
 PIECES = (2, 4, 8, 16)
+STRAINS = (*((1, n) for n in COUNTS), (2, 3), (2, 4), (2, 6), (4, 3), (4, 4), (4, 6), (8, 3), (8, 4))
+"""Pieces of level exact, and polynomials of each curvature along one."""
 PLURAL = {1: "mode"}
 
-Kind = Literal["rigid", "sprung", "modes", "segments", "pieces"]
+Kind = Literal["rigid", "sprung", "modes", "segments", "pieces", "strains"]
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,9 @@ class BodyModel:
     """One model of a flexible body.
 
     "rigid"; "sprung": rigid on a spring hinge; "modes": its `modes` lowest of `families` (all if empty), at `level`,
-    with attachment modes if `static`; "segments": `pieces` rigid pieces on sprung hinges.
+    with attachment modes if `static`; "segments": `pieces` rigid pieces on sprung hinges; "pieces": flexible ones, with
+    `modes` eigenmodes; "strains": `pieces` of level exact with that many `polynomials` of each curvature of `families`,
+    and of stretch and shear, as far as the body has them, if `stretching`.
     """
 
     kind: Kind
@@ -44,6 +51,8 @@ class BodyModel:
     static: bool = False
     families: tuple[str, ...] = ()
     pieces: int = 0
+    polynomials: int = 0
+    stretching: bool = False
 
     def __str__(self) -> str:
         if self.kind == "rigid":
@@ -56,6 +65,11 @@ class BodyModel:
             more = f" and {self.modes} eigenmodes" if self.modes else ""
             return f"{self.pieces} pieces with static shapes{more}, {self.level}"
         of = f" of {', '.join(self.families)}" if self.families else ""
+        if self.kind == "strains":
+            pieces = f"{self.pieces} pieces with " if self.pieces > 1 else ""
+            number = "1 polynomial" if self.polynomials == 1 else f"{self.polynomials} polynomials"
+            more = " and stretch and shear" if self.stretching else ""
+            return f"{pieces}{number}{of or ' of each curvature'}{more}, {self.level}"
         static = " and static shapes" if self.static else ""
         return f"{self.modes} {PLURAL.get(self.modes, 'modes')}{of}{static}, {self.level}"
 
@@ -70,9 +84,10 @@ def flexible_bodies(scene: Scene) -> tuple[BeamBody | ModalBody, ...]:
 
 
 def levels(body: BeamBody | ModalBody) -> tuple[Level, ...]:
-    """Levels for which the body has the data; raw bodies seldom have a second-order field."""
+    """Levels for which the body has the data: raw bodies seldom have a second-order field, and only beams have
+    strains, in which alone those with a curved axis can be expressed."""
     if isinstance(body, BeamBody):
-        return LEVELS
+        return (EXACT,) if is_curved(body) else (*LEVELS, EXACT)
     stiffened = replace(body, level="stiffened")
     return LEVELS[:-1] if any(second_order(Place(), stiffened, modal_arrays(body))) else LEVELS
 
@@ -89,6 +104,8 @@ def built(scene: Scene, model: Model) -> Scene:
                 scene = finite_segments(scene, name, rung.pieces)
             case "pieces":
                 scene = substructured(scene, name, rung.pieces, level=rung.level, eigenmodes=rung.modes)
+            case "strains":
+                scene = with_strains(scene, name, rung.polynomials, rung.pieces, rung.stretching, rung.families)
             case "modes":
                 scene = with_modes(scene, name, rung.modes, rung.level, rung.static, rung.families)
             case _:

@@ -1,7 +1,11 @@
-"""A flexible body with other modes: fewer or more for a beam, the lowest for a raw body; with its initial state."""
+"""A flexible body with other modes: fewer or more for a beam, the lowest for a raw body; with its initial state.
+
+A beam of level exact has strains in their place.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,9 +16,12 @@ from flexmb.advisor.modal_response import mass_shapes
 from flexmb.modal import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
-from flexmb.scene.bodies import BeamBody, Level, ModalBody, ModalNode
+from flexmb.scene.bodies import BeamBody, Level, ModalBody, ModalNode, Modes, StrainPolynomials
 from flexmb.scene.modal_data import inertia_points, modal_arrays, node_arrays
+from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import ModalState, Scene
+from flexmb.scene.strains import points_of_piece, twists
+from flexmb.surrogate import substructured
 from flexmb.surrogate.lumping import vector
 from flexmb.typing import Real
 
@@ -39,18 +46,68 @@ def with_modes(scene: Scene, name: str, count: int, level: Level, static: bool, 
     return replace(scene, bodies=bodies, modal_states=states)
 
 
+def with_strains(
+    scene: Scene, name: str, polynomials: int, pieces: int, stretching: bool, families: tuple[str, ...]
+) -> Scene:
+    """The scene with the beam `name` in `pieces` of level exact, welded to one another.
+
+    They have `polynomials` of each curvature of `families` (of the beam's own if empty); if `stretching` two fewer, but
+    one at least, of the stretch if "axial" is among its families, and of the shears in bending if its theory is
+    "timoshenko". An initial modal state is projected as by `with_modes`. Raises ValueError for a beam that has no such
+    strain or no stretch, and for several pieces of one that starts bent.
+    """
+    body = next(each for each in scene.bodies if each.name == name)
+    if not isinstance(body, BeamBody):
+        raise ValueError(f'body "{name}" is no beam, and has no strains')
+    strains = _strains(body, polynomials, stretching, families or body.modes.families)
+    if pieces > 1:
+        return substructured(scene, name, pieces, level="exact", polynomials=strains)
+    modes = replace(
+        body.modes, count=0, polynomials=strains, static=False, boundary="clamped-free", pieces=1, points=None
+    )
+    new = _damped(replace(body, level="exact", mass="consistent"), modes)
+    bodies = tuple(new if each.name == name else each for each in scene.bodies)
+    states = tuple(_projected(body, new, each) if each.body == name else each for each in scene.modal_states)
+    return replace(scene, bodies=bodies, modal_states=states)
+
+
+def _strains(beam: BeamBody, count: int, stretching: bool, families: tuple[str, ...]) -> StrainPolynomials:
+    curved = {name: count for name in families if name != "axial" and (name != "torsion" or twists(beam))}
+    if not curved:
+        raise ValueError(f'beam "{beam.name}" has no curvature among {", ".join(families)}')
+    if not stretching:
+        return StrainPolynomials(**curved)
+    fewer = max(1, count - 2)
+    stretched = {"axial": fewer} if "axial" in families else {}
+    if beam.theory == "timoshenko":
+        stretched |= {name.replace("bending", "shear"): fewer for name in curved if name.startswith("bending")}
+    if not stretched:
+        raise ValueError(f'beam "{beam.name}" has no stretch or shear: its families and its theory exclude them')
+    return StrainPolynomials(**curved, **stretched)
+
+
 def mode_count(body: BeamBody | ModalBody) -> int:
     """The number of modes of the body, attachment modes included."""
     return flexible_model(body).mode_count
 
 
 def _beam(beam: BeamBody, count: int, level: Level, static: bool, families: tuple[str, ...]) -> BeamBody:
-    modes = replace(beam.modes, count=count, static=static, families=families or beam.modes.families)
-    ratio = beam.modes.damping_ratio
-    if isinstance(ratio, tuple):  # modes beyond those listed have the damping of the last
+    if level == "exact" or is_curved(beam):
+        raise ValueError(f'beam "{beam.name}": level "exact" has strains, and other levels have straight beams only')
+    modes = replace(
+        beam.modes, count=count, static=static, families=families or beam.modes.families,
+        polynomials=None, pieces=1, points=None,
+    )  # fmt: skip
+    return _damped(replace(beam, level=level), modes)
+
+
+def _damped(beam: BeamBody, modes: Modes) -> BeamBody:
+    """The beam with these modes; where damping is listed, those beyond the list have the damping of the last."""
+    ratio = modes.damping_ratio
+    if isinstance(ratio, tuple):
         total = mode_count(replace(beam, modes=replace(modes, damping_ratio=0.0)))
         modes = replace(modes, damping_ratio=(*ratio, *[ratio[-1]] * total)[:total])
-    return replace(beam, modes=modes, level=level)
+    return replace(beam, modes=modes)
 
 
 def _raw(body: ModalBody, count: int, level: Level) -> ModalBody:
@@ -117,8 +174,9 @@ def _combined(shapes: tuple[tuple[float, float, float], ...], X: Real) -> tuple[
 
 def _projected(old: BeamBody | ModalBody, new: BeamBody | ModalBody, state: ModalState) -> ModalState:
     """The initial state in the new modes that is nearest in the norm of kinetic energy."""
-    # At level full both models have the same inertia points; at stiffened each has its own equivalent masses.
-    before, after = (flexible_model(replace(each, level="full")) for each in (old, new))
+    if {old.level, new.level} > {"exact"}:
+        raise ValueError(f'body "{new.name}" starts bent: a bend in strains is not one in modes')
+    before, after = _on_equal_points(old, new)
     onto = np.linalg.solve(_products(after, after), _products(after, before))
     rates = np.array(state.rates or [0.0] * before.mode_count)
     return ModalState(
@@ -126,6 +184,17 @@ def _projected(old: BeamBody | ModalBody, new: BeamBody | ModalBody, state: Moda
         coordinates=tuple((onto @ np.array(state.coordinates)).tolist()),
         rates=tuple((onto @ rates).tolist()) if np.any(rates) else (),
     )
+
+
+def _on_equal_points(*bodies: BeamBody | ModalBody) -> Iterator[FlexibleModel]:
+    """The models with equal inertia points: at stiffened each has its own equivalent masses, at exact Gauss points."""
+    exact = [each for each in bodies if isinstance(each, BeamBody) and each.level == "exact"]
+    for each in bodies:
+        if isinstance(each, BeamBody) and each.level == "exact":
+            points = max(map(points_of_piece, exact))
+            yield flexible_model(replace(each, modes=replace(each.modes, points=points)))
+        else:
+            yield flexible_model(replace(each, level="full"))
 
 
 def _products(a: FlexibleModel, b: FlexibleModel) -> Real:

@@ -20,7 +20,7 @@ import numpy as np
 from flexmb.advisor.confirm import Confirmation
 from flexmb.advisor.ladder import Step, highest_frequency
 from flexmb.advisor.methods import RunMethod
-from flexmb.advisor.models import LEVELS, BodyModel, Model
+from flexmb.advisor.models import EXACT, LEVELS, BodyModel, Model
 
 HOPELESS = 20.0
 """Models predicted to miss the tolerance by this factor are tried last on the way up, and never on the way down."""
@@ -36,6 +36,8 @@ with more combinations than this, only pairs of bodies change.
 """
 FINALISTS = 3
 """Number of adequate models, the cheapest by their fine runs, for which the best method is determined."""
+
+_EVERY = (*LEVELS, EXACT)
 
 Choice = dict[str, Step]
 
@@ -81,6 +83,7 @@ class _Walk:
         self.most = confirmation.bench.spent + budget
         self.missed: dict[str, set[BodyModel]] = {name: set() for name in ladders}
         self.hopeless = HOPELESS * confirmation.tolerance
+        self.predicted = any(step.error > 0.0 for steps in self.ladders.values() for step in steps)
 
     def fits(self, choice: Choice) -> bool:
         return self.confirmation.adequate(model_of(choice))
@@ -92,18 +95,30 @@ class _Walk:
     def up(self) -> Choice | None:
         """The first choice on the way up that is adequate.
 
-        If none is, the choices with a large predicted error are tried, and then every rung of every body.
+        If none is, the choices with a large predicted error are tried, and then every rung of every body. Without
+        predictions, the references come first, which have run, the cheapest at the head.
         """
+        if not self.predicted:
+            known = [choice for model in self.confirmation.references if (choice := self.choice_of(model)) is not None]
+            for choice in sorted(known, key=lambda each: self.confirmation.run_cost(model_of(each))):
+                if self.fits(choice):
+                    return choice
         way = list(self.way())
         hopeful = [choice for choice in way if _error(choice) <= self.hopeless]
         others = [choice for choice in way if _error(choice) > self.hopeless]
         return next(filter(self.fits, (*hopeful, *others, *self.finest())), None)
 
+    def choice_of(self, model: Model) -> Choice | None:
+        """The steps of a model, or None if one of its rungs is not among them."""
+        steps = {name: {step.rung: step for step in self.ladders[name]}.get(rung) for name, rung in model}
+        found = {name: step for name, step in steps.items() if step is not None}
+        return found if len(found) == len(steps) else None
+
     def way(self) -> Iterator[Choice]:
         """For each highest frequency, lowest first, the rungs of least predicted error that do not exceed it."""
         before: Choice | None = None
         for highest in sorted({0.0} | {step.fastest for steps in self.ladders.values() for step in steps}):
-            choice = self.finest_below(highest, LEVELS)
+            choice = self.finest_below(highest, _EVERY)
             if choice != before:
                 yield choice
             before = choice
@@ -132,7 +147,10 @@ class _Walk:
         rung for all, much cheaper combinations, body by body.
         """
         highest = max((step.fastest for step in choice.values()), default=0.0)
-        simpler = (self.finest_below(highest, LEVELS[:n]) for n in range(1, len(LEVELS)))
+        simpler = (self.finest_below(highest, _EVERY[:n]) for n in range(1, len(_EVERY)))
+        if not self.predicted:  # nothing says that they are adequate, and they may cost more
+            most = self.confirmation.run_cost(model_of(choice))
+            simpler = (other for other in simpler if self.expected(other) <= most)
         choice = next(filter(self.fits, simpler), choice)
         choice = self.first_cheaper(choice, sorted(self.alike(choice), key=self.expected)) or choice
         while True:

@@ -33,7 +33,8 @@ def moved_inertia(body: Record, port: Record, mff: Real, wheel: Record, speeds: 
             inertia[parent[k]] += _about(about_hinge, mass[k], arm[k])
     for k in np.flatnonzero(body["modes"]):
         first, n = body["etad_index"][k], body["modes"][k]
-        moved[first : first + n] = np.diagonal(mff[k])[:n]
+        by_strain = body["section_stop"][k] > body["section_start"][k]  # unit masses at rest, all of summed points
+        moved[first : first + n] = 1.0 if by_strain else np.diagonal(mff[k])[:n]
     moved[wheel["u_index"]] = wheel["axial"]
     return moved
 

@@ -89,6 +89,25 @@ def closed_jacobian(t, y, load, J, c, w, cc, cw):
     return status
 
 
+@kernel
+def change_by_time(t, y, load, out, c, w, cc, cw):
+    """out (n+2G,): the last column of `closed_jacobian` alone; returns a status code."""
+    n, rows = y.shape[0], cc.row.shape[0]
+    w.time[0] = t
+    w.time[0] = seeded(w.time[0], 0)
+    for i in range(n):
+        w.state[i] = y[i]
+    for r in range(rows):
+        cw.row[r].load = load[r]
+    status = evaluate(c, w, cc, cw)
+    for i in range(n):
+        out[i] = rate(w.slope[i], 0)
+    for r in range(rows):
+        out[n + r] = rate(cw.row[r].rate, 0)
+        out[n + rows + r] = rate(cw.row[r].acceleration, 0)
+    return status
+
+
 @helper
 def _read_column(J, j, lane, w, cw):
     n, rows = w.slope.shape[0], cw.row.shape[0]

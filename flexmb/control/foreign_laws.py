@@ -2,8 +2,9 @@
 
 Along each direction the law is differentiated by central differences over two steps, whose combination (Richardson) has
 an error of fourth order. A law of polynomials up to the fourth degree is differentiated to rounding. Where both differ
-by more than `SMOOTH`, the steps are shortened, since a corner of the law may lie between their ends; a law that has
-none of these derivatives gets NaN, which ends the run.
+by more than `SMOOTH`, the steps are shortened, since a corner of the law may lie between their ends. So they are where
+the slopes before and behind the point do not approach each other as the step does: about a corner in the middle, as
+|x| has at 0, central differences agree. A law that has none of these derivatives gets NaN, which ends the run.
 """
 
 from math import nan
@@ -39,11 +40,10 @@ def compiled_along(s, t, i):
 def _along(s, t, i):
     o, p = s.controller[i], s.plain
     status = _at(s, t, i, 0, 0.0)
+    _keep(o, p, p.value)
     for j in range(o.outputs):
-        p.value[j] = p.output[o.output + j]
         s.output[o.output + j] = p.value[j]
     for j in range(o.states):
-        p.value[o.outputs + j] = p.change[o.state + j]
         s.change[o.state + j] = p.value[o.outputs + j]
     for lane in range(LANES):
         size = _size(s, i, lane)
@@ -81,15 +81,18 @@ def _differentiated(s, t, i, lane, step):
     """Derivatives along a direction, to p.fine; returns a status code."""
     p, n = s.plain, s.controller[i].outputs + s.controller[i].states
     for _ in range(ATTEMPTS):
-        status = _difference(s, t, i, lane, step, p.coarse)
+        status = _difference(s, t, i, lane, step, p.coarse, p.bend)
         if status == OK:
-            status = _difference(s, t, i, lane, 0.5 * step, p.fine)
+            status = _difference(s, t, i, lane, 0.5 * step, p.fine, p.less_bend)
         if status != OK:
             return status
         smooth = True
         for j in range(n):
-            apart = abs(p.fine[j] - p.coarse[j])
-            if not apart <= SMOOTH * (abs(p.fine[j]) + abs(p.coarse[j])) + ROUNDING * abs(p.value[j]) / step:
+            limit = SMOOTH * (abs(p.fine[j]) + abs(p.coarse[j])) + ROUNDING * abs(p.value[j]) / step
+            if not abs(p.fine[j] - p.coarse[j]) <= limit:
+                smooth = False
+            # of a smooth law it is halved with the step, up to its fourth derivative times the third power of the step
+            if not abs(p.less_bend[j] - 0.5 * p.bend[j]) <= SMOOTH * abs(p.bend[j]) + limit:
                 smooth = False
             p.fine[j] += (p.fine[j] - p.coarse[j]) / 3.0
         if smooth:
@@ -101,21 +104,29 @@ def _differentiated(s, t, i, lane, step):
 
 
 @helper
-def _difference(s, t, i, lane, step, into):
-    """Central differences of outputs and changes over a step along a direction; returns a status code."""
+def _difference(s, t, i, lane, step, slope, bend):
+    """Central differences of outputs and changes over a step along a direction, and by how much those behind the point
+    exceed those before it; returns a status code."""
     o, p = s.controller[i], s.plain
     status = _at(s, t, i, lane, step)
+    _keep(o, p, slope)
+    if status == OK:
+        status = _at(s, t, i, lane, -step)
+    _keep(o, p, bend)
+    for j in range(o.outputs + o.states):
+        ahead, behind = slope[j] - p.value[j], p.value[j] - bend[j]
+        slope[j] = (ahead + behind) / (2.0 * step)
+        bend[j] = (ahead - behind) / step
+    return status
+
+
+@helper
+def _keep(o, p, into):
+    """The outputs and changes of a law, as it has just written them."""
     for j in range(o.outputs):
         into[j] = p.output[o.output + j]
     for j in range(o.states):
         into[o.outputs + j] = p.change[o.state + j]
-    if status == OK:
-        status = _at(s, t, i, lane, -step)
-    for j in range(o.outputs):
-        into[j] = (into[j] - p.output[o.output + j]) / (2.0 * step)
-    for j in range(o.states):
-        into[o.outputs + j] = (into[o.outputs + j] - p.change[o.state + j]) / (2.0 * step)
-    return status
 
 
 @sweep

@@ -120,6 +120,12 @@ def respond(t, s):
     return status
 
 
+@kernel
+def put_drive(i, value, s):
+    """Give the function of time that drive i sets another value."""
+    s.function[s.drive[i].function].data[0] = value
+
+
 @helper
 def settle(t, y, s):
     """Project the mechanical part of y on its manifold, and keep the controller states with the last accepted state."""

@@ -2,7 +2,7 @@
 
 from flexmb.control import tables as a
 from flexmb.jit.direct import nothing_at, status_at
-from flexmb.jit.kernel import by_bundle, helper, sweep
+from flexmb.jit.kernel import by_bundle, helper, kernel, sweep
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.vector import dot, mat3, store3, sub, times_t, vec3
 from flexmb.tables.functions import evaluate
@@ -151,3 +151,17 @@ def _store_quaternion(row, signal, first):
     signal[first + 1] = sign * x
     signal[first + 2] = sign * y
     signal[first + 3] = sign * z
+
+
+@kernel
+def sensors_by_time(t, s, out):
+    """out (S,): how the signals of sensors change with time while the state is held, into zeros."""
+    for i in range(s.sensor.shape[0]):
+        sensor = s.sensor[i]
+        if sensor.kind == a.TIME:
+            out[sensor.signal] = 1.0
+        elif sensor.kind == a.PROFILE:
+            f = s.course[sensor.place]
+            _, rate, acceleration = evaluate(f.kind, f.data, f.start, f.stop, s.piece, t)
+            out[sensor.signal] = rate
+            out[sensor.signal + 1] = acceleration

@@ -6,9 +6,21 @@ states and of the outputs that they hold change there by the chain rule.
 
 from __future__ import annotations
 
+import numpy as np
+
 from flexmb.control import loop
+from flexmb.control.tables import Loop, PlainLaw
 from flexmb.jit.kernel import kernel
 from flexmb.tables.status import OK
+
+
+def plain_laws(made: Loop) -> PlainLaw:
+    """The arrays of floats in which the laws of a loop look."""
+    most = int(np.max(made.controller["outputs"] + made.controller["states"], initial=0))
+    return PlainLaw(
+        input=made.input, state=made.state, number=made.number, output=made.output, change=made.change,
+        value=np.zeros(most), coarse=np.zeros(most), fine=np.zeros(most), bend=np.zeros(most), less_bend=np.zeros(most),
+    )  # fmt: skip
 
 
 @kernel

@@ -45,7 +45,7 @@ class Jet:
     def __matmul__(self, other: Jet) -> Jet:
         return product(np.matmul, self, other)
 
-    def __getitem__(self, key: tuple[slice | EllipsisType | None | int, ...] | int) -> Jet:
+    def __getitem__(self, key: tuple[slice | EllipsisType | None | int | NDArray[np.intp], ...] | int) -> Jet:
         return self.map(lambda x: x[key])
 
     def map(self, linear: Callable[[Real], Real]) -> Jet:

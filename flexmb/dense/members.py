@@ -37,7 +37,7 @@ class Seat:
     node: FlexibleNode
     offset: Real
     rotation: Real
-    field: StrainField | None = None
+    field: StrainField | None
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,11 @@ from flexmb.modal.strain_field import FIRST, MEAN, SECOND, STRETCH, StrainField
 
 def section_frames(field: StrainField, eta: Jet) -> MovingFrame:
     """All sections of a beam with strains eta (B,m): position (B,n,3), rotation (B,n,3,3) from the section at rest."""
-    k1, k2, mean, stretch = (
-        eta.map(lambda x, row=row: np.einsum("jam,bm->bja", field.rows[:, row], x))
-        for row in (FIRST, SECOND, MEAN, STRETCH)
-    )
+
+    def sums(row: int) -> Jet:
+        return eta.map(lambda x: np.einsum("jam,bm->bja", field.rows[:, row], x))
+
+    k1, k2, mean, stretch = (sums(row) for row in (FIRST, SECOND, MEAN, STRETCH))
     commutator = product(np.cross, k1, k2).map(lambda x: field.commutator[:, None] * x)
     step = rotation_exponential(mean + commutator)
     rotations = list[Jet]()

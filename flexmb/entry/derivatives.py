@@ -112,17 +112,23 @@ def jacobian(t, y, J, c, w):
     """J (n,n) = d(dy/dt)/dy at y = [q, u, work] (n,), as `flexmb.entry.tangent.jacobian`; returns a status code."""
     load_state(t, y, c, w.sweeps)
     status = forward_dynamics(c, w.sweeps)
-    n, nq, nu = y.shape[0], w.sweeps.q.shape[0], w.sweeps.u.shape[0]
+    if status == OK:
+        sweeps.accelerations_and_power(c, w.sweeps, w.tables)
+        store_jacobian(c, w, J)
+    return status
+
+
+@helper
+def store_jacobian(c, w, J):
+    """J as `jacobian` has it from what `accelerations_and_power` has left in w."""
+    n, nq, nu = J.shape[0], w.sweeps.q.shape[0], w.sweeps.u.shape[0]
     for i in range(nq):
         for j in range(n):
             J[i, j] = 0.0
-    if status != OK:
-        return status
-    sweeps.accelerations_and_power(c, w.sweeps, w.tables)
     for i in range(nu):
         row = w.tables.matrix[w.tables.place[i]]
-        _row(c, w, row, J[nq + i], nq)
-    _row(c, w, w.tables.work, J[n - 1], nq)
+        by_coordinates(c, w, row, J[nq + i], nq)
+    by_coordinates(c, w, w.tables.work, J[n - 1], nq)
     for k in range(c.body.shape[0]):
         _coordinates(c, w, k, J, nq)
     if has(c, WHEELS):
@@ -133,7 +139,6 @@ def jacobian(t, y, J, c, w):
             if c.speed[j].prescribed >= 0:
                 _hold(J, c.speed[j].coordinate, n)
                 _hold(J, nq + j, n)
-    return OK
 
 
 @helper
@@ -144,7 +149,7 @@ def _hold(J, i, n):
 
 
 @helper
-def _row(c, w, row, out, nq):
+def by_coordinates(c, w, row, out, nq):
     """The derivatives by displacements and speeds in `row`, by coordinates and speeds in the order of y to `out`."""
     d, nu = w.tables, w.sweeps.u.shape[0]
     out[nq + nu] = 0.0
@@ -195,7 +200,7 @@ def _coordinates(c, w, k, J, nq):
     """Rows of the rates of the coordinates of body k."""
     i, j = c.body[k].q_index, c.body[k].u_index
     if has(c, QUATERNIONS) and c.body[k].quaternion >= 0:
-        _rates_of_quaternion(c, w, k, J, nq)
+        rates_of_quaternion(c, w, k, J, nq)
     else:
         for n in range(c.body[k].nv):
             J[i + n, nq + j + n] = 1.0
@@ -205,7 +210,7 @@ def _coordinates(c, w, k, J, nq):
 
 
 @helper
-def _rates_of_quaternion(c, w, k, J, nq):
+def rates_of_quaternion(c, w, k, J, nq):
     """The hinge's own function of its coordinates, not normalised, and its speeds by dual numbers."""
     e, i, j, nv = w.tables.duals, c.body[k].q_index, c.body[k].u_index, c.body[k].nv
     for speeds in range(2):

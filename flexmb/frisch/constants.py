@@ -27,8 +27,8 @@ def nested_constants(
     The partitions phiR_H, phiT_H, phiR_W vanish for hinges and wheels at nodes that do not deform. They have no entries
     in S, unless `null_partitions` keeps those for which the constants have ports.
 
-    Raises ValueError if a body is of level stiffened, or if any defect is kept and the modes of a body are not clamped
-    at its origin.
+    Raises ValueError if a body is of level stiffened or exact, or if any defect is kept and the modes of a body are not
+    clamped at its origin.
     """
     parameters = [_parameters(link, errata) for link in chain]
     element, mode, pair, slopes = _elements(parameters, constants.mff.shape[2])
@@ -55,6 +55,11 @@ def _parameters(link: BodyLink, errata: Set[Erratum]) -> ModeParameters:
             'stiffness, which level "stiffened" needs; use level "linear" or "full", or algorithm "articulated"'
         )
     first_wheel = len(model.mass) - link.wheels
+    if link.level.by_strain:
+        raise ValueError(
+            f'body "{link.name}": these equations are of first order in the deformation, and level "exact" is of no '
+            'finite order; use level "linear" or "full", or algorithm "articulated"'
+        )
     inertia = np.where((np.arange(len(model.mass)) < first_wheel)[:, None, None], model.inertia, 0.0)
     model = replace(model, inertia=inertia)
     corrected = mode_parameters(model)

@@ -37,6 +37,8 @@ _SLOW, _POOR = 1e-3, 0.03  # a contraction above this asks for a new Jacobian, a
 _INEXACT = 0.1  # the same for the stiff part in place of the Jacobian, which contracts no faster where it is new
 _CONTRACTION = 0.15  # target contraction of Newton's method, where convergence limits the step
 _CUT = 0.7  # upper bound of the factor on a step for which Newton's method failed
+_FILTERED = 0.9  # an error that another filter reduces below this fraction is not that of rigid motion
+_DIED_OUT = 0.5  # what then counts as its error, for the size of the next step
 _ERROR_EXPONENT = 4.0  # the error estimate is O(h^4)
 
 
@@ -45,6 +47,22 @@ def estimate(problem, y, slope, h, s, accuracy):
     """Scaled norm of the embedded formula's error (8.19): the defect at the start, stiff parts filtered out."""
     for i in range(y.shape[0]):
         s.error[i] = slope[i] + (E[0] * s.Z[0, i] + E[1] * s.Z[1, i] + E[2] * s.Z[2, i]) / h
+        s.trial[i] = max(abs(y[i]), abs(s.y_new[i]))
+    solve(problem, s, h, s.error)
+    return scaled_norm(s.error, s.trial, accuracy)
+
+
+@helper
+def filtered(problem, y, h, s, accuracy):
+    """Scaled norm of (1 - h J / REAL)^-1 times the last estimate.
+
+    What a long step leaves of a stiff mode, a deflection d far below the tolerance, counts in (8.20) as a speed of
+    about d/h: the more, the shorter a step is tried, until it resolves the ringing of frequency w that this amounts to.
+    Here it counts (REAL / (h w))^2 times as much, so that steps which let it die out are accepted. What a step resolves
+    is hardly changed.
+    """
+    for i in range(y.shape[0]):
+        s.error[i] *= REAL / h
         s.trial[i] = max(abs(y[i]), abs(s.y_new[i]))
     solve(problem, s, h, s.error)
     return scaled_norm(s.error, s.trial, accuracy)
@@ -62,10 +80,26 @@ def new_over_old(h, h_before, error, error_before):
 
 
 @helper
-def try_step(problem, step, ends, s, filter_again, accuracy, counts):
+def transient(problem, y, h, s, error, accuracy):
+    """Whether the last estimate, of this norm, is that of a stiff transient which the step lets die out.
+
+    It then falls if it is filtered again, and what it amounts to in displacements is far below the tolerance.
+    """
+    n, total = accuracy.coordinates, 0.0
+    for i in range(n, accuracy.controlled):
+        ratio = s.error[i] * h / (REAL * accuracy.atol)
+        total += ratio * ratio
+    small = total < accuracy.controlled - n
+    return small and filtered(problem, y, h, s, accuracy) < _FILTERED * error
+
+
+@helper
+def try_step(problem, step, ends, s, tried, accuracy, counts):
     """A step from a guess in Z: ends.y_new, projected, and its slope; a status code, and the verdict of `attempt`.
 
-    filter_again: a rejection is confirmed by the estimate (8.20), which no stiff transient can spoil.
+    tried: the error of a longer step from here that was rejected, inf where it had none, 0 without one. After one, a
+    rejection is confirmed by the estimate (8.20), and by that `filtered`, which stiff transients spoil less. Errors of
+    what is smooth fall with the step: if they have grown instead, and are those of a `transient`, the step is accepted.
     """
     y, h = ends.y, step.end - step.start
     status, iterations, rate = newton(problem, step, y, s, accuracy, counts)
@@ -74,12 +108,16 @@ def try_step(problem, step, ends, s, filter_again, accuracy, counts):
     for i in range(y.shape[0]):
         s.y_new[i] = y[i] + s.Z[2, i]
     error = estimate(problem, y, s.f, h, s, accuracy)
-    if error >= 1.0 and filter_again:
+    if error >= 1.0 and tried > 0.0:
         for i in range(y.shape[0]):
             s.trial[i] = y[i] + s.error[i]
         status = derivative(problem, step.start, s.trial, s.f_new, counts)
         if status == OK:
             error = estimate(problem, y, s.f_new, h, s, accuracy)
+        if status == OK and error >= 1.0:
+            error = filtered(problem, y, h, s, accuracy)
+        if status == OK and error >= max(1.0, tried) and transient(problem, y, h, s, error, accuracy):
+            error = _DIED_OUT
     if status == OK and error < 1.0:
         settle(problem, step.end, REAL / h, s.y_new, s, accuracy)
         status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
@@ -101,8 +139,8 @@ def attempt(problem, step, ends, s, known, accuracy, counts):
     if known[FACTORED] == 0.0:
         return NOT_CONVERGED, nothing
     guess(s.Z_before, known[STEP_BEFORE], length, s.Z)
-    filter_again = known[RETRIED] != 0.0 or known[STEP_BEFORE] == 0.0
-    return try_step(problem, step, ends, s, filter_again, accuracy, counts)
+    tried = math.inf if known[STEP_BEFORE] == 0.0 and known[RETRIED] == 0.0 else known[RETRIED]
+    return try_step(problem, step, ends, s, tried, accuracy, counts)
 
 
 @handed_on
@@ -165,7 +203,7 @@ def after_acceptance(h, length, cut, factor, rejected, worn):
 def after_rejection(length, status, factor, rate, fresh):
     """(Step, whether with a new Jacobian) after a trial of this length that was not accepted."""
     if status == OK:
-        return length * max(SHRINK, min(1.0, factor)), False
+        return length * max(SHRINK, min(1.0, factor)), not fresh  # an old Jacobian filters the wrong directions
     if status == NOT_CONVERGED and not fresh:
         return length, True  # the Jacobian may be too old, not the step too long
     if status == NOT_CONVERGED and rate > 0.0:
@@ -176,9 +214,22 @@ def after_rejection(length, status, factor, rate, fresh):
 @helper
 def by_trend(length, verdict, known):
     """New step over old by the trend of errors, shorter the more iterations Newton's method took."""
-    error, iterations, _ = verdict
-    caution = SAFETY * (2.0 * ITERATIONS + 1.0) / (2.0 * ITERATIONS + iterations)
-    return caution * new_over_old(length, known[STEP_BEFORE], error, known[ERROR_BEFORE])
+    return caution(verdict) * new_over_old(length, known[STEP_BEFORE], verdict[0], known[ERROR_BEFORE])
+
+
+@helper
+def caution(verdict):
+    """Factor on steps, the less the more iterations Newton's method took."""
+    return SAFETY * (2.0 * ITERATIONS + 1.0) / (2.0 * ITERATIONS + verdict[1])
+
+
+@helper
+def by_error(verdict):
+    """New step over old by the error alone, where a trial was rejected: that step ends no trend, and the errors of the
+    trials may be those of stiff transients."""
+    if verdict[0] == 0.0:
+        return _GROW
+    return caution(verdict) * verdict[0] ** (-1.0 / _ERROR_EXPONENT)
 
 
 @handed_in
@@ -186,7 +237,8 @@ def accept(step, cut, verdict, s, known, exponent):
     """See `flexmb.integrate.adaptive.Method`."""
     length, (error, iterations, rate) = step.end - step.start, verdict
     worn = rate > (_INEXACT if suffices(s.stiff) else _SLOW if iterations > 2 else _POOR)
-    factor = min(by_trend(length, verdict, known), by_contraction(rate))
+    by_errors = by_error(verdict) if known[RETRIED] != 0.0 else by_trend(length, verdict, known)
+    factor = min(by_errors, by_contraction(rate))
     known[STEP] = after_acceptance(known[STEP], length, cut, factor, known[RETRIED] != 0.0, worn)
     known[STEP_BEFORE], known[ERROR_BEFORE] = length, max(1e-2, error)
     known[RENEW], known[FRESH], known[RETRIED] = 1.0 if worn else 0.0, 0.0, 0.0
@@ -198,12 +250,12 @@ def accept(step, cut, verdict, s, known, exponent):
 def reject(step, status, verdict, s, known, exponent):
     """See `flexmb.integrate.adaptive.Method`."""
     length, rate = step.end - step.start, verdict[2]
-    factor = by_trend(length, verdict, known) if status == OK else 1.0
+    factor = by_error(verdict) if status == OK else 1.0
     fresh = known[FRESH] != 0.0 and not (status == NOT_CONVERGED and give_up(s.stiff))
     known[STEP], renew = after_rejection(length, status, factor, rate, fresh)
     known[RENEW] = 1.0 if renew else 0.0
     if known[STEP] < length:
-        known[RETRIED] = 1.0
+        known[RETRIED] = verdict[0] if status == OK else math.inf
 
 
 @handed_in

@@ -140,7 +140,8 @@ def newton(problem, step, y, s, accuracy, counts):
     """Solve for the stages Z, which hold a first guess. Returns (status, iterations, last contraction).
 
     Ends where the next correction would be below a fraction of the tolerance, with NOT_CONVERGED where it would not get
-    there in time.
+    there in time. The first ratio of corrections says little of that: it is that of a guess, which may happen to fulfil
+    the linear equations.
     """
     h = step.end - step.start
     tolerance = max(10.0 * 2.0**-52 / accuracy.rtol, min(0.03, math.sqrt(accuracy.rtol)))
@@ -161,7 +162,7 @@ def newton(problem, step, y, s, accuracy, counts):
             return NONFINITE, iteration, rate
         if iteration > 1:
             rate = size / before
-            if rate >= 1.0 or rate ** (ITERATIONS - iteration) / (1.0 - rate) * size > tolerance:
+            if rate >= 1.0 or (iteration > 2 and rate ** (ITERATIONS - iteration) / (1.0 - rate) * size > tolerance):
                 return NOT_CONVERGED, iteration, rate
         if size == 0.0 or (iteration > 1 and rate / (1.0 - rate) * size < tolerance):
             return OK, iteration, rate

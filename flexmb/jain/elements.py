@@ -182,7 +182,7 @@ def _wheel(tree: DenseTree, rotor: Rotor) -> Member:
     model = rigid_model(mass, np.zeros(3), rotor.inertia, {"origin": ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))})
     hinge = s.Revolute(name=wheel.name, parent=wheel.body, child=wheel.name, axis=wheel.axis)
     q, u, none = slice(rotor.q, rotor.q + 1), slice(rotor.u, rotor.u + 1), slice(0, 0)
-    own = Seat(model.nodes["origin"], np.zeros(3), np.eye(3))
+    own = Seat(model.nodes["origin"], np.zeros(3), np.eye(3), model.field)
     return Member(wheel.name, rotor.member, hinge, rotor.seat, own, model, "rigid", q, u, none, none)
 
 

@@ -1,8 +1,10 @@
 """The range of deflections in which a modal field is meaningful."""
 
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import every, kept
 from flexmb.levels.body import is_at_rest
+from flexmb.tables.features import SECTIONS
 
 RANGE = 10.0  # in sizes of the body: a larger deflection means that the motion has diverged
 
@@ -11,6 +13,10 @@ RANGE = 10.0  # in sizes of the body: a larger deflection means that the motion 
 def is_out_of_range(c, eta, k):
     """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size.
 
+    A beam of level exact deflects by its own size at most. There eta'eta / m is the deflection of the linear beam with
+    the same strains, whose modes have unit masses at rest; a uniform beam with constant curvature ends at some
+    25 radians.
+
     eta (m,) is zero at level ruthless, whose bodies are never out of range. In lanes the answer is True if all copies
     are; the copies in which the body is so alone get NaN and end by that.
     """
@@ -18,6 +24,8 @@ def is_out_of_range(c, eta, k):
         return False
     body = c.body[k].rigid
     limit = RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])
+    if has(c, SECTIONS) and c.body[k].section_stop > c.body[k].section_start:
+        return _is_beyond(_squares(c, eta, k), limit, eta)
     diagonal = 0.0
     for n in range(c.body[k].modes):
         diagonal += eta[n] * c.mff[k, n, n] * eta[n]
@@ -27,5 +35,19 @@ def is_out_of_range(c, eta, k):
     for n in range(c.body[k].modes):
         for i in range(c.body[k].modes):
             squares += eta[n] * c.mff[k, n, i] * eta[i]
+    return _is_beyond(squares, limit, eta)
+
+
+@helper
+def _squares(c, eta, k):
+    """eta'eta."""
+    squares = 0.0
+    for n in range(c.body[k].modes):
+        squares += eta[n] * eta[n]
+    return squares
+
+
+@helper
+def _is_beyond(squares, limit, eta):
     eta[0] = kept(squares.real <= limit.real, eta[0])
     return every(squares.real > limit.real)

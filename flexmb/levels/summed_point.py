@@ -17,7 +17,7 @@ from flexmb.tables.features import SECTIONS
 
 @helper
 def clear_inertia(c, w, k):
-    """No inertia, coupling and bias of body k."""
+    """No rigid inertia, coupling and bias of body k."""
     zero = ZERO6[0]
     store_inertia(w.body[k].inertia, 0, rigid_inertia(0.0, zero, ZERO6[0] + ZERO6[1]))
     store3(w.body[k].force, 0, zero)
@@ -27,8 +27,6 @@ def clear_inertia(c, w, k):
     for n in range(c.body[k].modes):
         for i in range(0, ROW, width(w)):
             put(w, w.pfr[k, n], i, 0.0)
-        for i in range(0, c.body[k].modes, width(w)):
-            put(w, w.pff[k, n], i, 0.0)
 
 
 @helper

@@ -1,8 +1,9 @@
 """First variations of closed chains, in independent coordinates.
 
 The derivatives of the tree under constraint loads f, and those of the rows, are exact at fixed f
-(`flexmb.closure.tangent`). Let J be the Jacobian of the rows by the n free speeds, and L L' = M their mass matrix. Then
-J L'^-1 = U S V' has as many nonzero singular values as there are independent rows. With its null space V_0,
+(`flexmb.closure.constant_loads`). Let J be the Jacobian of the rows by the n free speeds, and L L' = M their mass
+matrix. Then J L'^-1 = U S V' has as many nonzero singular values as there are independent rows. With its null space
+V_0,
 
     P = L'^-1 V S^-1 U'     smallest change of speeds, in kinetic energy, with given row rates
     N_0 = L'^-1 V_0         motions that the closures allow
@@ -26,8 +27,10 @@ from scipy.linalg import qr, solve_triangular
 
 from flexmb.closure.assembly import consistent
 from flexmb.closure.closures import ClosureError
+from flexmb.closure.constant_loads import Changes, ConstantLoads
 from flexmb.closure.factor import DEPENDENT
-from flexmb.closure.tangent import closed_jacobian, closure_tangent_workspace
+from flexmb.closure.tangent import closure_tangent_workspace
+from flexmb.entry.variation import coordinate_motion
 from flexmb.linear.variations import Equations, Variations
 from flexmb.system.closed import ClosedSystem
 from flexmb.tables.arrays import Constants
@@ -36,21 +39,13 @@ from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real
 
 
-class _Derivatives(NamedTuple):
-    """Of n or G values at fixed closure loads: by displacements and speeds (n or G, n), and by time."""
-
-    by_displacement: Real
-    by_speed: Real
-    by_time: Real
-
-
 class _Slopes(NamedTuple):
     """udot (n,) of the free speeds with its derivatives, those of the rows' rates and accelerations, N of the tree."""
 
     rates: Real
-    of_rates: _Derivatives
-    of_row_rates: _Derivatives
-    of_row_accelerations: _Derivatives
+    of_rates: Changes
+    of_row_rates: Changes
+    of_row_accelerations: Changes
     motion: Real
 
 
@@ -87,6 +82,7 @@ class ClosedEquations(Equations):
         self.rank = system.rank
         """Number of independent rows of the closures."""
         self._rows_w = closure_tangent_workspace(self._closures.constants[1])
+        self._constant_loads = ConstantLoads(self._closures, self._w)
 
     @property
     def freedom(self) -> int:
@@ -151,19 +147,18 @@ class ClosedEquations(Equations):
         return State(y[: self.system.nq], y[self.system.nq : -1], state.t, self.system.layout)
 
     def _slopes(self, state: State) -> _Slopes:
-        y, nq, free = pack(state), self.system.nq, self.free
+        y, free, motion = pack(state), self.free, np.zeros((self.system.nq, self.system.nu))
+        coordinate_motion(state.t, y, motion, self.constants, self._real_w)
         rates, load = self.rates(state), self._closures.row_loads
-        n, rows = len(y), len(load)
-        J = np.empty((n + 2 * rows, n + 1))
-        own = self._closures.constants[1]
-        status = closed_jacobian(state.t, y, load, J, self.constants, self._w, own, self._rows_w)
-        self.system.check_status(status, int(self._w.fault[0]))
-        motion = J[:nq, nq + free]
+        found = self._constant_loads.changes(state.t, y, load)
 
-        def of(values: Real) -> _Derivatives:
-            return _Derivatives(values[:, :nq] @ motion, values[:, nq + free], values[:, n])
+        def of(changes: Changes, rows: Index | slice) -> Changes:
+            by_displacement, by_speed, by_time = changes
+            return Changes(by_displacement[rows][:, free], by_speed[rows][:, free], by_time[rows])
 
-        return _Slopes(rates, of(J[nq + free]), of(J[n : n + rows]), of(J[n + rows :]), motion)
+        every = slice(None)
+        slopes = of(found.of_accelerations, free), of(found.of_row_rates, every), of(found.of_row_accelerations, every)
+        return _Slopes(rates, *slopes, motion[:, free])
 
     def _freedom(self, state: State, J: Real) -> _Freedom:
         """DynamicsError at a singular position."""

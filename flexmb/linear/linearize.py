@@ -26,7 +26,8 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     chain the states are the independent coordinates; the dependent ones are among the outputs. For a scene with
     controllers it is the model of the closed loop about the controllers' initial states, which come last in x. Sensor
     signals are among the outputs: "gyro[0]", or "angle" for a single number; loads and accelerations have direct
-    feedthrough, D. Raises DynamicsError where the accelerations do not exist, NotImplementedError for sampled
+    feedthrough, D. Raises DynamicsError where the accelerations do not exist, `NotDifferentiableError` (one of them)
+    where a controller is exactly at a limit, NotImplementedError for sampled
     controllers and closures on bodies of level "ruthless", ValueError or TypeError for a state that does not belong to
     this system or leaves closures open.
     """

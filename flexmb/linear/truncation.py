@@ -1,5 +1,7 @@
 """Effect of modal truncation of beams on the eigenvalues of a linear model, by a model with twice as many modes.
 
+Beams of level exact get twice as many polynomials of each strain instead.
+
 By the Rayleigh-Ritz principle, truncation makes an undamped structure stiffer: its frequencies decrease towards their
 limit when modes are added. So the change by the next modes estimates the truncation error. The effect of still higher
 modes is not included: for eigenmodes of a beam with a heavy body at its tip it is of about the same size.
@@ -18,9 +20,11 @@ from scipy.optimize import linear_sum_assignment
 from flexmb.linear.linear_model import Complex, LinearModel, modal_assurance
 from flexmb.linear.linearize import linearize
 from flexmb.modal.flexible import flexible_model
-from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
+from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody, StrainPolynomials
 from flexmb.scene.check.beams import available_modes, mode_count
+from flexmb.scene.check.exact_beams import MOST_POLYNOMIALS
 from flexmb.scene.schema import ModalState, Scene
+from flexmb.scene.strains import polynomials
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.typing import Real
@@ -72,7 +76,8 @@ def truncation(
 
 
 def finer_scene(scene: Scene) -> Scene:
-    """The scene with twice the eigenmodes of every flexible beam, and the elements for them."""
+    """The scene with twice the eigenmodes of every flexible beam, and the elements for them; twice the polynomials of
+    beams of level exact."""
     finer = {body.name: _finer(body) for body in scene.bodies if _bends(body)}
     bodies = tuple(finer.get(body.name, body) for body in scene.bodies)
     states = tuple(_moved(state, scene, finer) for state in scene.modal_states)
@@ -84,6 +89,8 @@ def _bends(body: Body) -> TypeGuard[BeamBody]:
 
 
 def _finer(body: BeamBody) -> BeamBody:
+    if body.level == "exact":
+        return _more_strains(body)
     count = MORE * max(body.modes.count, 1)
     attached = mode_count(body) - body.modes.count
     finer = msgspec.structs.replace(body, elements=max(MORE * body.elements, count + attached))
@@ -93,6 +100,16 @@ def _finer(body: BeamBody) -> BeamBody:
         ratio = (*ratio, *[ratio[-1]] * (count - body.modes.count))
     modes = msgspec.structs.replace(body.modes, count=count, damping_ratio=ratio)
     return msgspec.structs.replace(finer, modes=modes)
+
+
+def _more_strains(body: BeamBody) -> BeamBody:
+    more = {strain: min(MORE * count, MOST_POLYNOMIALS) for strain, count in polynomials(body).items()}
+    modes = msgspec.structs.replace(body.modes, polynomials=StrainPolynomials(**more), points=None)
+    ratio = modes.damping_ratio
+    if isinstance(ratio, tuple):
+        count = sum(more.values()) * modes.pieces
+        modes = msgspec.structs.replace(modes, damping_ratio=(*ratio, *[ratio[-1]] * (count - len(ratio))))
+    return msgspec.structs.replace(body, modes=modes)
 
 
 def _moved(state: ModalState, scene: Scene, finer: dict[str, BeamBody]) -> ModalState:
@@ -110,7 +127,7 @@ def _moved(state: ModalState, scene: Scene, finer: dict[str, BeamBody]) -> Modal
 def _across(coarse: BeamBody, fine: BeamBody) -> Real:
     """(fine, coarse) modal coordinates of the finer beam for unit coordinates of the other, by least squares."""
     shapes = []
-    count = SEEN_AT * (fine.modes.count + 2)
+    count = SEEN_AT * (mode_count(fine) + 2)
     for body in (coarse, fine):
         nodes = tuple(BeamNode(name=f"seen {i}", x_m=i / count * body.length_m) for i in range(1, count + 1))
         found = flexible_model(msgspec.structs.replace(body, nodes=nodes)).nodes

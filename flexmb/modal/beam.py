@@ -1,8 +1,9 @@
 """Finite-element model of a straight beam: stiffness and mass of axial motion, torsion and two bending planes.
 
-The four families of motion are uncoupled in the beam itself, because its axis is centroidal and the section axes are
-principal; a rigid lump with an offset mass centre or a product of inertia may couple them. A point of the axis moves by
-[displacement; rotation], the rotation about y being -w' and about z v' (without shear).
+The four families of motion are uncoupled in a beam whose axis is centroidal and whose section axes are principal. They
+are coupled by sections that are given as matrices or at a point off the axis, and by rigid lumps with an offset mass
+centre or a product of inertia. A point of the axis moves by [displacement; rotation], the rotation about y being -w'
+and about z v' (without shear). Families that are not chosen are held fixed.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from flexmb.typing import Real
 # Rows of [ux, uy, uz, rx, ry, rz] that a family moves: translation row, rotation row, sign of the rotation.
 _BENDING_ROWS = {"bending_y": (1, 5, 1.0), "bending_z": (2, 4, -1.0)}
 _LINE_ROWS = {"axial": 0, "torsion": 3}
+_TURNS_ABOUT = {"torsion": 0, "bending_y": 2, "bending_z": 1}
 FAMILIES = ("axial", "torsion", "bending_y", "bending_z")
 
 
@@ -93,8 +95,12 @@ class BeamElements:
         return stretch, turn
 
     def stiffness(self) -> Real:
-        """Stiffness matrix (size, size) of the energy 1/2 int EA e^2 + GJ twist^2 + EI curvature^2 + GA shear^2 dx."""
+        """Stiffness matrix (size, size) of the energy 1/2 int strain' C strain dx; for sections that couple nothing
+        1/2 int EA e^2 + GJ twist^2 + EI curvature^2 + GA shear^2 dx."""
         x, weight = quadrature(self.mesh, self.table)
+        if not self.table.plain:
+            strain = np.concatenate(self.strain(x, np.eye(self.size)), axis=1)
+            return _congruent(strain, weight[:, None, None] * self.table.strain_stiffness(x))
         K = np.zeros((self.size, self.size))
         for name, field in self.fields.items():
             own = self.coordinates(name)
@@ -105,25 +111,24 @@ class BeamElements:
                 EI, GA = _plane_stiffness(self.table, name)
                 rows = field.at(x)
                 K[own, own] = _weighted(rows.curvature, weight * self.table.at(EI, x))
-                if GA is not None:
+                if self.table.sheared:
                     K[own, own] += _weighted(rows.shear, weight * self.table.at(GA, x))
         return K
 
     def mass(self, stations: Stations, lumps: tuple[Lump, ...]) -> Real:
         """Mass matrix (size, size) of the stations and the lumps."""
         M = np.zeros((self.size, self.size))
-        turning = {
-            "torsion": stations.inertia_y + stations.inertia_z,
-            "bending_y": stations.inertia_z,
-            "bending_z": stations.inertia_y,
-        }
-        for name, field in self.fields.items():
-            own = self.coordinates(name)
-            if isinstance(field, LineField):
-                M[own, own] = _weighted(field.at(stations.x).value, turning.get(name, stations.mass))
-            else:
-                rows = field.at(stations.x)
-                M[own, own] = _weighted(rows.deflection, stations.mass) + _weighted(rows.rotation, turning[name])
+        if not stations.plain:
+            M = _congruent(self.motion(stations.x, np.eye(self.size)), stations.matrices())
+        else:
+            turning = {name: stations.about(axis) for name, axis in _TURNS_ABOUT.items()}
+            for name, field in self.fields.items():
+                own = self.coordinates(name)
+                if isinstance(field, LineField):
+                    M[own, own] = _weighted(field.at(stations.x).value, turning.get(name, stations.mass))
+                else:
+                    rows = field.at(stations.x)
+                    M[own, own] = _weighted(rows.deflection, stations.mass) + _weighted(rows.rotation, turning[name])
         for lump in lumps:
             U = self.motion(np.array([lump.x]), np.eye(self.size))[0]
             M += U.T @ lump_mass(lump) @ U
@@ -149,10 +154,18 @@ def lump_mass(lump: Lump) -> Real:
     return np.block([[lump.mass * np.eye(3), -lump.mass * c], [lump.mass * c, lump.inertia - lump.mass * c @ c]])
 
 
-def _plane_stiffness(table: SectionTable, family: str) -> tuple[Real, Real | None]:
+def _plane_stiffness(table: SectionTable, family: str) -> tuple[Real, Real]:
+    """EI and GA (n,) of a bending plane."""
     return (table.EIz, table.GAy) if family == "bending_y" else (table.EIy, table.GAz)
 
 
 def _weighted(rows: Real, weight: Real) -> Real:
     """rows' diag(weight) rows."""
     return rows.T @ (weight[:, None] * rows)
+
+
+def _congruent(rows: Real, matrices: Real) -> Real:
+    """sum rows_n' matrices_n rows_n of rows (n, 6, size) and symmetric matrices (n, 6, 6)."""
+    size = rows.shape[2]
+    found: Real = rows.reshape(-1, size).T @ (matrices @ rows).reshape(-1, size)
+    return 0.5 * (found + found.T)

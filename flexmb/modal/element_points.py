@@ -33,29 +33,43 @@ def join(groups: list[Points]) -> Points:
 
 
 def axis_points(elements: BeamElements, columns: Real, stations: Stations) -> Points:
-    """One point per station; the section's inertia is a tensor that turns with the point."""
+    """One point per station; the section's inertia is a tensor that turns with the point, as its mass centre does."""
     moved = elements.motion(stations.x, columns)
-    inertia = np.zeros((len(stations.x), 3, 3))
-    inertia[:, 0, 0] = stations.inertia_y + stations.inertia_z
-    inertia[:, 1, 1] = stations.inertia_y
-    inertia[:, 2, 2] = stations.inertia_z
-    offset = np.zeros((len(stations.x), 3))
-    return Points(stations.x, stations.mass, on_axis(stations.x), offset, inertia, moved[:, :3], moved[:, 3:])
+    place = on_axis(stations.x)
+    return Points(stations.x, stations.mass, place, stations.com, stations.inertia, moved[:, :3], moved[:, 3:])
 
 
 def section_points(elements: BeamElements, columns: Real, stations: Stations) -> Points:
-    """Four point masses per station at (+-a, +-b), a^2 = inertia_z / mass, b^2 = inertia_y / mass.
+    """Four point masses per station at its mass centre +- a +- b; a and b are the columns of the square root of S/mass,
+    S being the second moments of the section about its mass centre.
 
-    Their second moments are those of the section, so that the mass matrix is that of `axis_points`. Without turning
-    tensors the kinetic energy is a polynomial in the modal coordinates. Sections without inertia keep one point.
+    With principal axes a and b are along y and z, a^2 = inertia_z / mass, b^2 = inertia_y / mass. Their second moments
+    are those of the section, so that the mass matrix is that of `axis_points`. Without turning tensors the kinetic
+    energy is a polynomial in the modal coordinates. Sections without inertia keep one point.
     """
-    if not (np.any(stations.inertia_y) or np.any(stations.inertia_z)):
-        return axis_points(elements, columns, stations)
-    a = np.sqrt(stations.inertia_z / stations.mass)
-    b = np.sqrt(stations.inertia_y / stations.mass)
+    if not np.any(stations.inertia):
+        return _massy(elements, columns, stations.x, stations.com, stations.mass)
+    a, b = _arms(stations)
     corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)]
-    offsets = [np.column_stack([np.zeros_like(a), sy * a, sz * b]) for sy, sz in corners]
+    offsets = [stations.com + (sy * a + sz * b) for sy, sz in corners]
     return join([_massy(elements, columns, stations.x, offset, stations.mass / 4.0) for offset in offsets])
+
+
+def _arms(stations: Stations) -> tuple[Real, Real]:
+    """Columns (n,3) of the symmetric square root of [Jz, -Jyz; -Jyz, Jy] / mass.
+
+    Of a matrix A (2,2) that is (A + sqrt(det A) 1) / sqrt(trace A + 2 sqrt(det A)), which is smooth in A > 0.
+    """
+    yy, zz, yz = stations.about(2), stations.about(1), -stations.inertia[:, 1, 2]
+    a, b = np.zeros((2, len(stations.x), 3))
+    if stations.plain:
+        a[:, 1], b[:, 2] = np.sqrt(yy / stations.mass), np.sqrt(zz / stations.mass)
+        return a, b
+    root = np.sqrt(np.maximum(yy * zz - yz**2, 0.0))  # a thin strip has none, up to rounding
+    size = np.sqrt(stations.mass * np.maximum(yy + zz + 2.0 * root, 0.0))
+    size[size == 0.0] = 1.0  # a section without inertia, beside others
+    a[:, 1], a[:, 2], b[:, 1], b[:, 2] = ((yy + root) / size, yz / size, yz / size, (zz + root) / size)
+    return a, b
 
 
 def turning_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:

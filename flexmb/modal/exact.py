@@ -12,21 +12,23 @@ from functools import lru_cache
 import numpy as np
 
 from flexmb.modal.cross import cross_matrix
-from flexmb.modal.eigenproblem import eigenpairs
+from flexmb.modal.eigenproblem import eigenpairs, refined
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming_node
 from flexmb.modal.following import followed
-from flexmb.modal.reduce import BeamModes, damping_matrix
-from flexmb.modal.section import SectionTable, section_table
-from flexmb.modal.stations import lumps
+from flexmb.modal.reduce import BeamModes, damping_matrix, groups, tip_signs
+from flexmb.modal.section import section_table
+from flexmb.modal.stations import lumps, section_masses
 from flexmb.modal.strain_field import StrainField, gauss_weights, strain_field, strain_stiffness
 from flexmb.scene.bodies import IDENTITY, BeamBody, Quaternion
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.rest_curve import rest_sections
-from flexmb.scene.strains import STRAINS, points_of_piece, polynomials
+from flexmb.scene.strains import points_of_piece, polynomials
 from flexmb.typing import Index, Real
 
 # Relative to the largest: below it an eigenvalue of the modal masses is zero but for rounding.
 _MASSLESS = 1e-13
+# Elements of stiffness and masses that are scaled to a unit diagonal: below it they are rounding errors of their sums.
+_UNCOUPLED = 1e-12
 
 
 def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
@@ -35,8 +37,8 @@ def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
     `like`: see `flexmb.modal.flexible.flexible_model`. Raises ValueError for modes without inertia.
     """
     try:
-        field, points, M = _polynomial_beam(body)
-        modes = _modes(field, _stiffness(body), M)
+        field, points, M = _polynomial_beam(body, _nodes_at(body))
+        modes = _modes(body, field, _stiffness(body), M)
         if like is not None:
             modes = followed(modes, M, _reference(like))
         damping = damping_matrix(modes.roots, body.modes.damping_ratio) + body.modes.viscosity_s * modes.stiffness
@@ -61,9 +63,16 @@ def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
     )
 
 
-class _Points:
+def cut_beam(body: BeamBody, x: Real) -> tuple[StrainField, BeamPoints]:
+    """The sections of the beam, of which those at x (n,) m are the last, with the strain modes of `exact_model`; its
+    inertia points."""
+    field, points, M = _polynomial_beam(body, x)
+    return field.with_modes(_modes(body, field, _stiffness(body), M).columns), points
+
+
+class BeamPoints:
     """Inertia points: mass (n,), com_offset (n,3) and inertia (n,3,3) about it in the axes of the root, at rest; the
-    number of the section that each is fixed to (n,)."""
+    number of the section that each is fixed to (n,). The first are those at the Gauss points."""
 
     def __init__(self, mass: Real, com_offset: Real, inertia: Real, section: Index) -> None:
         self.mass, self.com_offset, self.inertia, self.section = mass, com_offset, inertia, section
@@ -71,12 +80,13 @@ class _Points:
 
 @lru_cache(maxsize=8)
 def _reference(body: BeamBody) -> BeamModes:
-    field, _, M = _polynomial_beam(body)
-    return _modes(field, _stiffness(body), M)
+    field, _, M = _polynomial_beam(body, np.zeros(0))
+    return _modes(body, field, _stiffness(body), M)
 
 
-def _polynomial_beam(body: BeamBody) -> tuple[StrainField, _Points, Real]:
-    """Sections at Gauss points, lumps, then nodes; inertia points; modal masses (m,m) of the polynomials at rest."""
+def _polynomial_beam(body: BeamBody, others: Real) -> tuple[StrainField, BeamPoints, Real]:
+    """Sections at Gauss points, lumps, then at `others` (n,) m; inertia points; modal masses (m,m) of the polynomials
+    at rest."""
     rigid_lumps = lumps(body)
     most, points = max(polynomials(body).values(), default=0), points_of_piece(body)
     if points <= most:
@@ -84,26 +94,25 @@ def _polynomial_beam(body: BeamBody) -> tuple[StrainField, _Points, Real]:
             f"{points} points for {most} polynomials of one strain along a piece leave motions without inertia: use "
             f"{most + 1} points at least, or fewer polynomials"
         )
-    places = np.array([*(lump.x for lump in rigid_lumps), *(x for _, x, _ in _listed(body))])
+    places = np.concatenate([[lump.x for lump in rigid_lumps], others])
     field = strain_field(body, places)
     x, weight = gauss_weights(body)
     table = section_table(body)
+    own = section_masses(x, weight[:, None, None] * table.at(table.inertia, x), body, table.plain)
     _, rotation = rest_sections(body, x)
-    local = np.zeros((len(x), 3, 3))
-    if body.points != "line":
-        about_y, about_z = (table.at(values, x) for values in (table.rotary_y, table.rotary_z))
-        for i, values in enumerate((about_y + about_z, about_y, about_z)):
-            local[:, i, i] = weight * values
     at_lumps = len(field.x) - len(places) + np.arange(len(rigid_lumps))
     _, turned = rest_sections(body, np.array([lump.x for lump in rigid_lumps]))
-    found = _Points(
-        np.concatenate([weight * table.at(table.mass, x), [lump.mass for lump in rigid_lumps]]),
+    found = BeamPoints(
+        np.concatenate([own.mass, [lump.mass for lump in rigid_lumps]]),
         np.concatenate(
-            [np.zeros((len(x), 3)), *((R @ lump.com)[None] for R, lump in zip(turned, rigid_lumps, strict=True))]
+            [
+                np.einsum("pab,pb->pa", rotation, own.com),
+                *((R @ lump.com)[None] for R, lump in zip(turned, rigid_lumps, strict=True)),
+            ]
         ),
         np.concatenate(
             [
-                rotation @ local @ np.swapaxes(rotation, 1, 2),
+                rotation @ own.inertia @ np.swapaxes(rotation, 1, 2),
                 *((R @ lump.inertia @ R.T)[None] for R, lump in zip(turned, rigid_lumps, strict=True)),
             ]
         ),
@@ -112,7 +121,7 @@ def _polynomial_beam(body: BeamBody) -> tuple[StrainField, _Points, Real]:
     return field, found, _modal_masses(field, found)
 
 
-def _modal_masses(field: StrainField, points: _Points) -> Real:
+def _modal_masses(field: StrainField, points: BeamPoints) -> Real:
     """(m,m) at rest: the sum of m U'U + W' J W, with U of the mass centres and W of the points."""
     turn, shift = field.shapes()
     W = turn[points.section]
@@ -125,37 +134,52 @@ def _stiffness(body: BeamBody) -> Real:
     """K (m,m) of the polynomials, by Gauss points that are exact for sections that vary linearly."""
     table = section_table(body)
     edges = np.unique(np.concatenate([np.linspace(0.0, body.length_m, body.modes.pieces + 1), table.x]))
+    edges = edges[edges <= body.length_m]
     xi, w = np.polynomial.legendre.leggauss(max(polynomials(body).values()) + 1)
     half = np.diff(edges) / 2.0
     x = (edges[:-1, None] + half[:, None] * (1.0 + xi)).ravel()
-    return strain_stiffness(body, _section_stiffness(body, table, x), x, (half[:, None] * w).ravel())
+    return strain_stiffness(body, table.at(table.stiffness, x), x, (half[:, None] * w).ravel())
 
 
-def _section_stiffness(body: BeamBody, table: SectionTable, x: Real) -> Real:
-    """(n,6,6) of [stretch, shears; twist, curvatures]."""
-    zero = np.zeros_like(x)
-    shears = [zero if each is None else table.at(each, x) for each in (table.GAy, table.GAz)]
-    found = np.zeros((len(x), 6, 6))
-    rows = (table.at(table.EA, x), *shears, *(table.at(each, x) for each in (table.GJ, table.EIy, table.EIz)))
-    for i, values in enumerate(rows):
-        found[:, i, i] = values
-    return found
+def _modes(body: BeamBody, field: StrainField, K: Real, M: Real) -> BeamModes:
+    """The modes of K and M, ascending, with unit modal masses; signs by the last Gauss point (`tip_signs`).
 
-
-def _modes(field: StrainField, K: Real, M: Real) -> BeamModes:
-    """The modes of K and M, ascending, with unit modal masses; the largest motion of the tip is positive."""
-    compliance, columns = eigenpairs(M, K)
-    if not compliance[0] > _MASSLESS * compliance[-1]:
+    Strains that neither matrix couples are solved separately, so that modes of one frequency each have their own.
+    """
+    strain = np.repeat(*np.array([(i, n * body.modes.pieces) for i, n in enumerate(polynomials(body).values())]).T)
+    columns, compliance = np.zeros_like(K), np.zeros(len(K))
+    sets = [np.ix_(own, own) for own in _uncoupled(strain, K, M)]
+    for own in sets:
+        compliance[own[1][0]], columns[own] = eigenpairs(M[own], K[own])
+    if not compliance.min() > _MASSLESS * compliance.max():
         raise ValueError(
             "some of its strains move no inertia while the beam is straight: use fewer polynomials, or give the "
             'sections their rotary inertia and points = "section"'
         )
-    columns = columns[:, ::-1] / np.sqrt(compliance[::-1])
+    columns /= np.sqrt(compliance)
+    squares = np.zeros(len(K))
+    for own in sets:
+        squares[own[1][0]], columns[own] = refined(K[own], M[own], columns[own])
+    # Frequencies that agree to nine digits count as equal, so that the order of the strains decides.
+    order = np.lexsort((strain, [float(f"{each:.8e}") for each in squares]))
+    columns, frequencies = columns[:, order], np.sqrt(squares[order])
     turn, shift = (shape @ columns for shape in (each[field.gauss[-1]] for each in field.shapes()))
-    rows = np.concatenate([shift, field.x[field.gauss[-1]] * turn])
-    largest = np.argmax(np.abs(rows) > 0.5 * np.max(np.abs(rows), axis=0), axis=0)
-    signs = np.where(rows[largest, np.arange(columns.shape[1])] < 0.0, -1.0, 1.0)
-    return BeamModes(columns * signs, 1.0 / np.sqrt(compliance[::-1]))
+    return BeamModes(columns * tip_signs(shift, body.length_m * turn), frequencies)
+
+
+def _uncoupled(strain: Index, K: Real, M: Real) -> list[Index]:
+    """The coordinates of each set of strains that K and M couple by more than rounding; `strain` (m,): that of each."""
+    sizes = [np.sqrt(np.outer(np.diag(each), np.diag(each))) for each in (K, M)]
+    scaled = [np.abs(each) / np.where(size > 0.0, size, 1.0) for each, size in zip((K, M), sizes, strict=True)]
+    names = np.unique(strain)
+    coupled = [[max(np.max(each[np.ix_(strain == a, strain == b)]) for each in scaled) for b in names] for a in names]
+    label = groups(np.array(coupled) > _UNCOUPLED)
+    return [np.flatnonzero(np.isin(strain, names[np.array(label) == each])) for each in dict.fromkeys(label)]
+
+
+def _nodes_at(body: BeamBody) -> Real:
+    """The places (n,) m of `_listed`."""
+    return np.array([x for _, x, _ in _listed(body)])
 
 
 def _listed(body: BeamBody) -> list[tuple[str, float, Quaternion]]:

@@ -108,7 +108,8 @@ def points_of(
     body: BeamBody, elements: BeamElements, columns: Real, stations: Stations, rigid_lumps: tuple[Lump, ...]
 ) -> Points:
     """Stations and lumps in the form of `body.points`."""
-    along, at_lump = (section_points, massy_lump) if body.points == "section" else (axis_points, turning_lump)
+    along = axis_points if body.points == "rotary" else section_points  # sections without inertia are masses alone
+    at_lump = massy_lump if body.points == "section" else turning_lump
     return join([along(elements, columns, stations), *(at_lump(elements, columns, lump) for lump in rigid_lumps)])
 
 

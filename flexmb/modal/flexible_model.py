@@ -35,8 +35,8 @@ class SecondOrder:
 class FlexibleNode:
     """A node: rest position (3,) m, rest rotation (3,3) node->body, mode shapes translation and rotation (3, m).
 
-    `second` (3,m,m): its second-order field, if the body has one. `section`: its section, of a body of level exact, whose
-    mode shapes are those at rest; -1 where the node does not deform.
+    `second` (3,m,m): its second-order field, if the body has one. `section`: its section, of a body of level exact,
+    whose mode shapes are those at rest; -1 where the node does not deform.
     """
 
     position: Real

@@ -12,7 +12,7 @@ from flexmb.modal.eigenproblem import eigenpairs, forward, solve_definite
 from flexmb.scene.bodies import Modes
 from flexmb.typing import Real
 
-# Relative size below which a modal mass, and the coupling of two families by the mass matrix, are taken for rounding
+# Relative size below which a modal mass, and the coupling of two families by mass or stiffness, are taken for rounding
 # errors. A motion without mass has an infinite frequency and is never among the lowest modes.
 _ROUND_OFF = 64 * np.finfo(float).eps
 
@@ -46,7 +46,7 @@ class BeamModes:
 
 @dataclass(frozen=True)
 class _Coupled:
-    """A set of families that the mass matrix couples: stiffness K and mass M over their free coordinates `index`.
+    """A set of families that mass or stiffness couple: stiffness K and mass M over their free coordinates `index`.
 
     `rigid` (n, r): M-orthonormal rigid motions (none for a clamped beam). `A` is K, made positive definite on the rigid
     motions; `M_elastic` is M, deflated by them. (A, M_elastic) has the elastic eigenpairs of (K, M), and the rigid
@@ -64,10 +64,10 @@ def beam_modes(elements: BeamElements, K: Real, M: Real, modes: Modes) -> BeamMo
     """The `modes.count` lowest eigenmodes of the chosen families, with attachment modes if `modes.static`.
 
     Uncoupled families are solved separately, so that degenerate bending modes each lie in one plane; their modes are
-    merged by frequency, then in the order axial, torsion, bending_y, bending_z. Families that a lump couples are solved
-    together; families that are not chosen are held fixed. Families without inertia have no modes. Free-free modes are
-    orthogonal to the rigid motions of the chosen families, which makes the body frame a mean-axis (Buckens) frame.
-    Raises ValueError if the finite-element model has fewer modes than requested.
+    merged by frequency, then in the order axial, torsion, bending_y, bending_z. Families that a section or a lump
+    couples are solved together; families that are not chosen are held fixed. Families without inertia have no modes.
+    Free-free modes are orthogonal to the rigid motions of the chosen families, which makes the body frame a mean-axis
+    (Buckens) frame. Raises ValueError if the finite-element model has fewer modes than requested.
     """
     found: list[tuple[float, int, Real]] = []
     parts = _parts(elements, K, M, modes.boundary == "clamped-free")
@@ -110,11 +110,13 @@ def _order(mode: tuple[float, int, Real]) -> tuple[float, int]:
 
 
 def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Coupled]:
-    """Sets of families that M couples (K couples none), in order, without those that have no inertia."""
+    """Sets of families that M or K couples, in order, without those that have no inertia."""
     names = list(elements.fields)
     blocks = [elements.coordinates(name) for name in names]
-    coupled = np.array([[_coupled(M[a, b], M[a, a], M[b, b]) for b in blocks] for a in blocks])
-    label = _groups(coupled)
+    coupled = np.array(
+        [[any(_coupled(A[a, b], A[a, a], A[b, b]) for A in (M, K)) for b in blocks] for a in blocks]
+    )
+    label = groups(coupled)
     free = np.ones(elements.size, dtype=bool)
     if clamped:
         free[elements.clamped_coordinates()] = False
@@ -132,7 +134,7 @@ def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Cou
     return parts
 
 
-def _groups(coupled: NDArray[np.bool_]) -> list[int]:
+def groups(coupled: NDArray[np.bool_]) -> list[int]:
     """For each family the first one that it is coupled with, directly or through others."""
     label = list(range(len(coupled)))
     for a, b in np.argwhere(coupled):
@@ -140,9 +142,9 @@ def _groups(coupled: NDArray[np.bool_]) -> list[int]:
     return label
 
 
-def _coupled(M_ab: Real, M_aa: Real, M_bb: Real) -> bool:
-    """Whether M couples two families by more than the rounding error of a lump's position."""
-    return bool(np.abs(M_ab).max() > _ROUND_OFF * np.sqrt(np.abs(M_aa).max() * np.abs(M_bb).max()))
+def _coupled(ab: Real, aa: Real, bb: Real) -> bool:
+    """Whether blocks of mass or stiffness couple two families by more than the rounding error of a lump's position."""
+    return bool(np.abs(ab).max() > _ROUND_OFF * np.sqrt(np.abs(aa).max() * np.abs(bb).max()))
 
 
 def _part(index: NDArray[np.intp], K: Real, M: Real, rigid: Real) -> _Coupled:
@@ -204,11 +206,16 @@ def _mass_normalised(compliance: Real, columns: Real, M: Real) -> list[tuple[flo
 
 
 def _tip_signs(elements: BeamElements, columns: Real) -> Real:
-    """Signs (m,) that make the tip's largest displacement positive, or its largest rotation if it is not displaced."""
+    """`tip_signs` of coordinate columns (size,m)."""
     length = elements.mesh.nodes[-1]
     tip = elements.motion(np.array([length]), columns)[0]
-    displacement, turn = tip[:3], length * tip[3:]
+    return tip_signs(tip[:3], length * tip[3:])
+
+
+def tip_signs(displacement: Real, turn: Real) -> Real:
+    """Signs (m,) that make the tip's largest displacement (3,m) positive, or its largest turn (3,m), times the length,
+    if it is not displaced."""
     moves = np.abs(displacement).max(axis=0) > 1e-6 * np.abs(turn).max(axis=0)
     rows = np.where(moves, displacement, turn)
     largest = np.argmax(np.abs(rows), axis=0)
-    return np.where(rows[largest, np.arange(columns.shape[1])] < 0.0, -1.0, 1.0)
+    return np.where(rows[largest, np.arange(rows.shape[1])] < 0.0, -1.0, 1.0)

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import assert_never
 
 import numpy as np
 
 from flexmb.modal.interpolation import ElementMesh
 from flexmb.modal.section import SectionTable
 from flexmb.scene.bodies import BeamBody
+from flexmb.scene.sections import inertia_matrices, mass_centres
 from flexmb.typing import Real
 
 GAUSS_POINTS = 6
@@ -22,15 +24,25 @@ GAUSS_POINTS = 6
 
 @dataclass(frozen=True)
 class Stations:
-    """Inertia on the axis: position x (n,) m, mass (n,) kg, section inertia about y and z (n,) kg m^2.
+    """Inertia of sections: positions x (n,) m of their axis points and mass (n,) kg; mass centre (n,3) m from the axis
+    point and inertia (n,3,3) kg m^2 about the mass centre.
 
-    The inertia about x is the sum of the two.
+    `plain`: all mass centres are on the axis, and the inertias are diagonal.
     """
 
     x: Real
     mass: Real
-    inertia_y: Real
-    inertia_z: Real
+    com: Real
+    inertia: Real
+    plain: bool
+
+    def about(self, axis: int) -> Real:
+        """Moments of inertia (n,) kg m^2 about an axis through the mass centre: 0, 1, 2 for x, y, z."""
+        return self.inertia[:, axis, axis]
+
+    def matrices(self) -> Real:
+        """Mass matrices (n,6,6) for [displacement; rotation] of the axis points."""
+        return inertia_matrices(self.mass, self.com, self.inertia)
 
 
 @dataclass(frozen=True)
@@ -59,24 +71,39 @@ def inertia_stations(
 ) -> Stations:
     """The beam's own inertia: at the Gauss points ("consistent") or at the element nodes ("lumped").
 
-    Lumped: each node receives the inertia weighted by its hat function. `points = "line"` omits the section's inertia.
-    Stations without mass are left out. The intervals of the Gauss points end at the `cuts` (m).
+    Lumped: each node receives the inertia weighted by its hat function. `points = "line"` omits the section's inertia
+    about its mass centre. Stations without mass are left out. The intervals of the Gauss points end at the `cuts` (m).
     """
     x, weight = quadrature(mesh, table, cuts)
-    mass = weight * table.at(table.mass, x)
-    inertia_y = weight * table.at(table.rotary_y, x)
-    inertia_z = weight * table.at(table.rotary_z, x)
-    if body.points == "line":
-        inertia_y, inertia_z = np.zeros_like(x), np.zeros_like(x)
+    inertia = weight[:, None, None] * table.at(table.inertia, x)
     if body.mass == "lumped":
         element, xi, _ = mesh.locate(x)
-        x = mesh.nodes
-        mass, inertia_y, inertia_z = (
-            np.bincount(element, values * (1.0 - xi), len(x)) + np.bincount(element + 1, values * xi, len(x))
-            for values in (mass, inertia_y, inertia_z)
-        )
-    kept = mass > 0.0  # a point without mass would divide by zero in `section_points`
-    return Stations(x[kept], mass[kept], inertia_y[kept], inertia_z[kept])
+        x, (near, far) = mesh.nodes, np.zeros((2, len(mesh.nodes), 6, 6))
+        np.add.at(near, element, inertia * (1.0 - xi)[:, None, None])
+        np.add.at(far, element + 1, inertia * xi[:, None, None])
+        inertia = near + far
+    kept = inertia[:, 0, 0] > 0.0  # a point without mass would divide by zero in `section_points`
+    return section_masses(x[kept], inertia[kept], body, table.plain)
+
+
+def section_masses(x: Real, inertia: Real, body: BeamBody, plain: bool) -> Stations:
+    """Mass centres and inertias about them from mass matrices (n,6,6) about the axis."""
+    if plain:
+        mass, com, about_com = inertia[:, 0, 0], np.zeros((len(x), 3)), inertia[:, 3:, 3:]
+    else:
+        mass, com, about_com = mass_centres(inertia)
+    match body.points:
+        case "line":
+            about_com = np.zeros_like(about_com)
+        case "section":  # the masses are in the plane of the section
+            about_com[:, 0, 1:], about_com[:, 1:, 0] = 0.0, 0.0
+        case "rotary":
+            pass
+        case _:
+            assert_never(body.points)
+    if plain or body.points == "section":
+        about_com[:, 0, 0] = about_com[:, 1, 1] + about_com[:, 2, 2]
+    return Stations(x, mass, com, about_com, plain)
 
 
 def lumps(body: BeamBody) -> tuple[Lump, ...]:

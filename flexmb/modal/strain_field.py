@@ -1,8 +1,8 @@
 """The sections of a beam whose strains are sums of modes, and the tables from which their exact motion follows.
 
-In a frame that is fixed to the root, section j of the loaded beam is at r_j, turned by R_j from its unloaded position
-r0_j. With the elastic curvature k(s) = sum B_n(s) eta_n and the elastic stretch and shears g(s) = sum G_n(s) eta_n, both
-in the axes of the unloaded section but written in those of the root, and the unloaded tangent t0,
+In a frame that is fixed to the root, section j of the loaded beam is at r_j, turned by R_j from its unloaded place
+r0_j. With the elastic curvature k(s) = sum B_n(s) eta_n, the elastic stretch and shears g(s) = sum G_n(s) eta_n, both
+of the unloaded section but written in the axes of the root, and the unloaded tangent t0,
 
     R' = R k~            r' = R (t0 + g)
 
@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flexmb.modal.section import section_table
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.collocation import partial_integrals
 from flexmb.scene.rest_curve import rest_sections
@@ -177,8 +178,7 @@ def _grid(body: BeamBody) -> tuple[list[tuple[float, float, int]], Real, Real]:
     """
     pieces, length = body.modes.pieces, body.length_m
     width = length / pieces
-    kinks = [station.x_m for station in body.stations if 0.0 < station.x_m < length]
-    breaks = np.unique(np.concatenate([np.linspace(0.0, length, pieces + 1), kinks]))
+    breaks = np.unique(np.concatenate([np.linspace(0.0, length, pieces + 1), _kinks(body)]))
     breaks = breaks[np.concatenate([[True], np.diff(breaks) > 1e-12 * length])]
     whole = points_of_piece(body)
     intervals = []
@@ -190,6 +190,21 @@ def _grid(body: BeamBody) -> tuple[list[tuple[float, float, int]], Real, Real]:
         [left + (right - left) / 2.0 * (1.0 + np.polynomial.legendre.leggauss(n)[0]) for left, right, n in intervals]
     )
     return intervals, gauss, breaks
+
+
+def _kinks(body: BeamBody) -> Real:
+    """Stations inside the beam (n,) m, but not an outermost one beyond which the data go on as before it.
+
+    The length of a beam with a station at its tip is then a number like others, by which motions have a derivative.
+    """
+    table = section_table(body)
+    curvature = np.array([s.curvature_1_m for s in sorted(body.stations, key=lambda station: station.x_m)])
+    data = np.hstack([table.stiffness.reshape(-1, 36), table.inertia.reshape(-1, 36), curvature])
+    inside = (table.x > 0.0) & (table.x < body.length_m)
+    if len(data) > 1:
+        for end, neighbour in ((0, 1), (-1, -2)):
+            inside[end] &= bool(np.any(data[end] != data[neighbour]))
+    return table.x[inside]
 
 
 def _weights(x: Real, grid: list[tuple[float, float, int]], gauss: Real) -> Real:

@@ -50,11 +50,11 @@ class BodyParameters(NamedTuple):
 
 
 def body_parameters(link: BodyLink, c: Constants, k: int) -> BodyParameters:
-    """The parameters of body k; NotImplementedError for level stiffened, which sums over points."""
-    if link.level.name == "stiffened":
+    """The parameters of body k; NotImplementedError for levels stiffened and exact, which sum over points."""
+    if link.level.second_order or link.level.by_strain:
         raise NotImplementedError(
-            f'body "{link.name}" has level "stiffened", whose inertia is a sum over points and has no parameters '
-            'of its own: use level "full"'
+            f'body "{link.name}" has level "{link.level.name}", whose inertia is a sum over points and has no '
+            'parameters of its own: use level "full"'
         )
     modes = int(c.body["modes"][k])
     slots = _Slots(link.name, k)

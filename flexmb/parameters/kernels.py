@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.closure.couplings import relieve_drives
+from flexmb.closure.dual_jacobian import hold_rows
 from flexmb.closure.dynamics import closure_loads, linearise
-from flexmb.closure.jacobian import hold_rows
 from flexmb.closure.rows import load_on_b
 from flexmb.closure.tables import COUPLINGS, ClosureConstants
 from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace, evaluate

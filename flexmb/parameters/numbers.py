@@ -38,10 +38,21 @@ class Number:
 
     @property
     def scale(self) -> float:
-        """A size of the number: its own magnitude or that of its largest neighbour in an array; 1 if all are zero."""
+        """A size of the number: its own magnitude or that of its largest neighbour in an array; 1 if all are zero.
+
+        In a matrix of a station, whose elements have several units, that of the diagonal elements beside it.
+        """
         steps = self.name.split(".")
         neighbours = [0.0]
-        if steps[-1].isdecimal():
+        if steps[-5:-4] == ["stations"] and steps[-2].isdecimal() and steps[-1].isdecimal():
+
+            def beside(value: Any) -> Any:
+                i, j = map(int, steps[-2:])
+                neighbours.append(math.sqrt(abs(value[i][i] * value[j][j])))
+                return value
+
+            changed_at(self._scene, ".".join(steps[:-2]), beside)
+        elif steps[-1].isdecimal():
 
             def look(value: Any) -> Any:
                 neighbours.extend(abs(each) for each in value if isinstance(each, float))

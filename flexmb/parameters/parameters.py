@@ -12,7 +12,7 @@ and ordered in the scene; when a number changes, modes follow (`flexmb.modal.fol
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,8 +26,10 @@ from flexmb.parameters.numbers import Number, numbers
 from flexmb.parameters.plant import Plant
 from flexmb.parameters.spectral import NotSmooth, derivative
 from flexmb.parameters.tables import ParameterBlock, Tables, blocks, diagonal, numbers_of, parts, structure
+from flexmb.parameters.together import derivatives_together
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
+from flexmb.scene.values import with_values
 from flexmb.tables.per_thread import Own, per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.tables.status import OK
@@ -59,7 +61,7 @@ class Parameters:
         self.plant = plant.with_numbers(plant.scene)
         """The same system, with equal functions of time kept apart: numbers of one may change without the other's."""
         found = _Differentiation(self.plant)
-        rates = [found.by(each) for each in chosen]
+        rates = found.by_all(chosen)
         self.errors = np.array([each.error for each in rates])
         of_tables = np.column_stack([each.values for each in rates])
         self.blocks: tuple[ParameterBlock, ...] = blocks(found.tables, found.diagonal, self.names, of_tables)
@@ -213,6 +215,14 @@ class _Differentiation:
                 f'parameter "{number.name}" = {number.value:g}: the motion has no derivative by it ({error}); take a '
                 "value at which nothing appears, vanishes or changes its order, or another parameter"
             ) from None
+
+    def by_all(self, chosen: Sequence[Number]) -> list[Any]:
+        """The same for many numbers."""
+
+        def tables(values: Mapping[str, float]) -> Real:
+            return self._at(with_values(self._plant.scene, values)) if values else self._middle
+
+        return derivatives_together(tables, chosen, self._parts, self.by)
 
     def _at(self, scene: Scene) -> Real:
         tables = _tables(self._plant.with_numbers(scene))

@@ -15,12 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 INTERVALS = (2, 4, 8, 16)  # of the points cos(pi k / n), each set of which contains the one before
 WIDTHS = (2.0**-3, 2.0**-5, 2.0**-8, 2.0**-11, 2.0**-14)  # half-widths that are tried, relative to the scale
 ENOUGH = 1e-11  # relative error at which no smaller width is tried
-HOPELESS = 1e-5  # an error with half of the points that all of them will not bring down to ENOUGH
 LARGEST = 1e-9  # relative error that is accepted
 # Shares of values over scale, and of values over width, that count as rounding. That of an eigenproblem is some hundred
 # eps, and is magnified by the inverse of the width.
@@ -38,7 +37,9 @@ class Derivative(NamedTuple):
     error: float
 
 
-def derivative(function: Callable[[float], Real], x: float, scale: float, parts: Sequence[slice]) -> Derivative:
+def derivative(
+    function: Callable[[float], Real], x: float, scale: float, parts: Sequence[slice | Index]
+) -> Derivative:
     """df/dx (n,) at x of a function that returns (n,), or raises ValueError where it is not defined.
 
     scale: size of changes of x that change the function by its own size. Errors are relative to the largest derivative,
@@ -48,7 +49,7 @@ def derivative(function: Callable[[float], Real], x: float, scale: float, parts:
     best, trouble = Derivative(np.zeros_like(middle), np.inf), ""
     for width in WIDTHS:
         try:
-            found = _on_interval(function, x, width * scale, middle, scale, parts)
+            found = _on_interval(function, x, width * scale, middle, scale, parts, width == WIDTHS[-1])
         except ValueError as error:  # that the value is outside of its range: a smaller interval may not be
             trouble = str(error)
             continue
@@ -65,9 +66,14 @@ def derivative(function: Callable[[float], Real], x: float, scale: float, parts:
 
 
 def _on_interval(
-    function: Callable[[float], Real], x: float, width: float, middle: Real, scale: float, parts: Sequence[slice]
-) -> Derivative:
-    """By interpolation on [x - width, x + width]: points are added until the derivative does not change."""
+    function: Callable[[float], Real], x: float, width: float, middle: Real, scale: float,
+    parts: Sequence[slice | Index], is_last: bool,
+) -> Derivative:  # fmt: skip
+    """By interpolation on [x - width, x + width]: points are added until the derivative does not change.
+
+    They are not added where the errors so far, which fall as powers of the number of points, say that all of them would
+    not do: a smaller interval needs fewer. The smallest one, `is_last`, is not left before half of them are there.
+    """
     odd, even = dict[float, Real](), dict[float, Real]()  # f(x + d) -+ f(x - d) by d / width
     size = np.abs(middle)
     before, error = None, np.inf
@@ -84,13 +90,14 @@ def _on_interval(
             jump = sum(weight * even[place] for place, weight in zip(places, _rest(intervals), strict=True)) / width
             rounding = size * (ROUNDING / scale + MAGNIFIED / width)
             error = max(_relative(each, now, rounding, parts) for each in (now - before, jump))
-            if error <= ENOUGH or intervals == INTERVALS[-2] and error > HOPELESS:
+            is_hopeless = error ** (INTERVALS[-1] / intervals) > ENOUGH
+            if error <= ENOUGH or is_hopeless and not (is_last and intervals < INTERVALS[-2]):
                 break
         before = now
     return Derivative(now, error)
 
 
-def _relative(change: Real, derivative: Real, rounding: Real, parts: Sequence[slice]) -> float:
+def _relative(change: Real, derivative: Real, rounding: Real, parts: Sequence[slice | Index]) -> float:
     """The largest change of a part's derivatives beyond rounding, relative to the largest of these derivatives."""
     worst = 0.0
     for part in parts:

@@ -25,6 +25,8 @@ from flexmb.run.simulate_batch import simulate_batch
 from flexmb.scene.bodies import Level
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
+from flexmb.sensitivity.gradient import gradient
+from flexmb.sensitivity.scalars import FinalValue
 from flexmb.sensitivity.sensitivities import sensitivities
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS, ON_CHAINS, RUNNING, WITH_JACOBIAN
@@ -90,6 +92,10 @@ def _derivatives(builder: Callable[[], SceneBuilder]) -> None:
         scenes.with_feedback(builder()),
     ):
         sensitivities(scene, T_END, ["bob.mass_kg"], of, samples=3)
+    final = FinalValue("pivot.rotation")
+    if not builder().scene().constraints:
+        gradient(builder().scene(), T_END, ["bob.mass_kg"], [final, FinalValue("work")])
+        gradient(scenes.with_feedback(builder(), period=4e-4, delay=1e-4), T_END, ["bob.mass_kg", "servo.kp"], final)
 
 
 def _linear_models() -> None:

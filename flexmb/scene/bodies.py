@@ -8,6 +8,8 @@ import msgspec
 
 Vector = tuple[float, float, float]
 Matrix3 = tuple[Vector, Vector, Vector]
+Row6 = tuple[float, float, float, float, float, float]
+Matrix6 = tuple[Row6, Row6, Row6, Row6, Row6, Row6]
 Quaternion = tuple[float, float, float, float]
 Level = Literal["rigid", "ruthless", "linear", "full", "stiffened", "exact"]
 Square = tuple[tuple[float, ...], ...]
@@ -47,23 +49,35 @@ class RigidBody(SceneStruct, frozen=True, kw_only=True, tag="rigid", tag_field="
 class BeamStation(SceneStruct, frozen=True, kw_only=True):
     """Section properties at one station; they vary linearly between stations.
 
-    x is the beam axis, y and z the principal section axes: `EIz` resists bending in the x-y plane.
-    Shear stiffnesses are used by Timoshenko beams only; rotary inertias per length are rho*Iy, rho*Iz, and the
-    torsional one is their sum. `curvature_1_m`: twist and curvatures of the unloaded axis about the section's x, y and
-    z, for beams of level "exact"; the beam leaves the body's origin along +x.
+    x is the beam axis. A station has its stiffness either by numbers or as a matrix, and so its inertia. By numbers y
+    and z are the principal section axes: `EIz` resists bending in the x-y plane. Shear stiffnesses are used by
+    Timoshenko beams only; rotary inertias per length are rho*Iy, rho*Iz, and the torsional one is their sum.
+
+    `stiffness` (6x6, symmetric, positive definite) maps the strains [extension, shear along y, shear along z, twist,
+    curvature about y, curvature about z] to [N, Qy, Qz, Mx, My, Mz]: N where both are forces and strains, N m where one
+    is a moment or a curvature, N m² where both are. `inertia` (6x6, symmetric) maps the velocities along and the
+    angular velocities about x, y and z to momenta per length: [m 1, -m c~; m c~, J] with the mass m (kg/m), its centre
+    c = (0, cy, cz) and the inertia J (kg m) about the reference point. `reference_point_m` (y, z) is where all
+    properties of the station are stated, by default on the axis of the beam.
+
+    `curvature_1_m`: twist and curvatures of the unloaded axis about the section's x, y and z, for beams of level
+    "exact"; the beam leaves the body's origin along +x.
     """
 
     x_m: float
-    EA_N: float
-    EIy_Nm2: float
-    EIz_Nm2: float
-    GJ_Nm2: float
-    mass_per_length_kg_m: float
+    EA_N: float | None = None
+    EIy_Nm2: float | None = None
+    EIz_Nm2: float | None = None
+    GJ_Nm2: float | None = None
+    mass_per_length_kg_m: float | None = None
     rotary_y_kg_m: float = 0.0
     rotary_z_kg_m: float = 0.0
     GAy_N: float | None = None
     GAz_N: float | None = None
     curvature_1_m: Vector = ZERO
+    stiffness: Matrix6 | None = None
+    inertia: Matrix6 | None = None
+    reference_point_m: tuple[float, float] = (0.0, 0.0)
 
 
 class TipMass(SceneStruct, frozen=True, kw_only=True):

@@ -92,9 +92,10 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         """A beam along +x of `length` (m), root at the body origin.
 
         `section`: one BeamStation for a uniform beam (see `beam_section`), or stations from 0 to `length`. `modes`: the
-        number of clamped-free modes, or a Modes struct. `nodes`: names and stations (m); "root" and "tip" always exist.
-        `model`: `theory` ("euler-bernoulli" or "timoshenko"), `mass` ("consistent" or "lumped"), `points` ("section",
-        "rotary" or "line") and `tip_masses`, see BeamBody.
+        number of clamped-free modes, or a Modes struct; at `level` "exact" the number of polynomials of each curvature
+        (docs/exact.md), for which `elements` has no meaning. `nodes`: names and stations (m); "root" and "tip" always
+        exist. `model`: `theory` ("euler-bernoulli" or "timoshenko"), `mass` ("consistent" or "lumped"), `points`
+        ("section", "rotary" or "line") and `tip_masses`, see BeamBody.
         """
         if isinstance(section, s.BeamStation):
             section = [msgspec.structs.replace(section, x_m=x) for x in (0.0, length)]

@@ -60,7 +60,6 @@ def _spans(stations: tuple[tuple[float, tuple[float, float, float]], ...], lengt
     spans = []
     xi, _ = np.polynomial.legendre.leggauss(POINTS)
     inner, whole = partial_integrals(xi, POINTS), partial_integrals(np.ones(1), POINTS)[0]
-    places, values = [x for x, _ in stations], np.array([value for _, value in stations])
     for (left, first), (right, last) in zip(stations, stations[1:], strict=False):
         turn = max(np.linalg.norm(first), np.linalg.norm(last)) * (right - left)
         count = max(1, ceil(turn))

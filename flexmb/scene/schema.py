@@ -201,7 +201,8 @@ __all__ = [
     "InertiaPoint", "Latch", "Level", "Load", "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody",
     "ModalNode", "ModalState", "Modes", "Node", "Pid", "PointMass", "ProfileSensor", "Pulse", "Quaternion", "Ramp",
     "Release", "RigidBody", "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep",
-    "SpinUp", "StateSpace", "StrainPolynomials", "Table", "TimeSensor", "TipMass", "UserLaw", "Vector", "Waiver", "Wheel",
+    "SpinUp", "StateSpace", "StrainPolynomials", "Table", "TimeSensor", "TipMass", "UserLaw", "Vector", "Waiver",
+    "Wheel",
 ]  # fmt: skip
 __all__ += hinges.__all__
 __all__ += connectors.__all__

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from flexmb.scene.bodies import BeamStation, Matrix3
 from flexmb.scene.options import SectionShape, refuse_others
+from flexmb.scene.sections import matrix
 
 
 def inertia_moments(
@@ -52,3 +57,27 @@ def beam_section(
         GAy_N=k * G * A,
         GAz_N=k * G * A,
     )
+
+
+def coupled_section(
+    *, stiffness: ArrayLike, inertia: ArrayLike, x: float = 0.0, reference_point: tuple[float, float] = (0.0, 0.0),
+    order: Sequence[int] = range(6),
+) -> BeamStation:  # fmt: skip
+    """Section of a beam at station `x` (m) by matrices (6,6) of stiffness and of inertia per length (see BeamStation).
+
+    Both are stated at `reference_point` (y, z) (m). `order`: which rows and columns of the given matrices are those of
+    [x, y, z, about x, about y, about z] with x along the beam: [2, 0, 1, 5, 3, 4] where its axis is z, as in BeamDyn.
+    ValueError unless both are symmetric to ten digits and `order` has each of 0 to 5 once.
+    """
+    if sorted(order) != list(range(6)):
+        raise ValueError(f"order: give each of 0 to 5 once, not {list(order)}")
+    found = []
+    for name, given in (("stiffness", stiffness), ("inertia", inertia)):
+        values = np.array(given, dtype=float)
+        if values.shape != (6, 6):
+            raise ValueError(f"{name} has the shape {values.shape}: give a matrix (6, 6)")
+        slack = 1e-9 * np.sqrt(np.outer(np.diag(values), np.diag(values)).clip(0.0))
+        if not np.all(np.abs(values - values.T) <= slack):
+            raise ValueError(f"{name} is not symmetric: give the same value on both sides of the diagonal")
+        found.append(matrix(values[np.ix_(list(order), list(order))]))
+    return BeamStation(x_m=x, stiffness=found[0], inertia=found[1], reference_point_m=reference_point)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flexmb.scene.bodies import BeamBody, Level
+from flexmb.scene.sections import has_plain_sections
 
 MOST_BYTES = 2**32
 """Limit of the memory that the model of one body may need while it is made, the same as for the outputs of a run."""
@@ -16,10 +17,12 @@ MOST_MODES = 2_000  # of one body: the dense eigenproblem of its matrices takes 
 ENDLESS = 10**18  # larger integers, which files can contain, are replaced by this one, so that floats do not overflow
 _COORDINATES = {"axial": 1, "torsion": 1, "bending_y": 2, "bending_z": 2}  # per element; bending with shear: twice
 _PER_COORDINATE = 170.0  # bytes, times the square of the number of coordinates
+_PER_COUPLED = 90.0  # the same where sections may couple all families, times the square of all their coordinates
 _PER_PAIR = 130.0  # bytes per inertia point and pair of modes, level stiffened
 _PER_TRIPLE = 500.0  # bytes per triple of modes, level linear
 _POINTS = {"line": 6, "rotary": 6, "section": 24}  # inertia points per element
 _SPEED = 8.6e5  # cube of the number of coordinates per millisecond, of the dense eigenproblem
+_SPEED_COUPLED = 1.7e6  # where sections may couple the families, of all their coordinates
 PLENTY, PER_MODE = 200, 8  # doubt "many_elements": more than PLENTY and more than PER_MODE for each mode
 
 
@@ -40,12 +43,17 @@ def beam_estimate(body: BeamBody, modes: int) -> Estimate:
     """The estimate for a beam with this number of modes, attachment modes included."""
     shear = 2 if body.theory == "timoshenko" else 1
     elements, modes = float(min(body.elements, ENDLESS)), min(modes, ENDLESS)
+    points = elements * _POINTS[body.points]
+    if not has_plain_sections(body):  # one eigenproblem of all families
+        bending = 9 if body.theory == "timoshenko" else 4
+        coupled = elements * sum(bending if name.startswith("bending") else 4 for name in body.modes.families)
+        memory = _PER_COUPLED * coupled**2 + modes_memory(body.level, points, modes)
+        return Estimate(memory, 1e-3 * coupled**3 / _SPEED_COUPLED)
     size = elements * sum(
         count * (shear if name.startswith("bending") else 1)
         for name, count in _COORDINATES.items()
         if name in body.modes.families
     )
-    points = elements * _POINTS[body.points]
     memory = _PER_COORDINATE * size**2 + modes_memory(body.level, points, modes)
     return Estimate(memory, 1e-3 * size**3 / _SPEED)
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import Literal
 
 from flexmb.scene.bodies import BeamBody
+from flexmb.scene.sections import twists_with_inertia
 
 Strain = Literal["axial", "shear_y", "shear_z", "torsion", "bending_z", "bending_y"]
 STRAINS: tuple[Strain, ...] = ("axial", "shear_y", "shear_z", "torsion", "bending_z", "bending_y")
 """In the order of the rows [stretch, shears; twist, curvatures about y and z]."""
 CURVATURES: tuple[Strain, ...] = ("torsion", "bending_z", "bending_y")
 
-MORE_POINTS, FEWEST_POINTS = 3, 6  # Gauss points of a piece beyond its polynomials, and at least (docs/exact.md)
+# Gauss points of a piece beyond its polynomials, and at least (docs/notation.md, section 5)
+MORE_POINTS, FEWEST_POINTS = 3, 6
 
 
 def polynomials(body: BeamBody) -> dict[Strain, int]:
@@ -24,7 +26,8 @@ def polynomials(body: BeamBody) -> dict[Strain, int]:
         if not twists(body):
             wanted["torsion"] = 0
         if body.theory == "timoshenko":
-            for shear, bending in (("shear_y", "bending_y"), ("shear_z", "bending_z")):
+            pairs: tuple[tuple[Strain, Strain], ...] = (("shear_y", "bending_y"), ("shear_z", "bending_z"))
+            for shear, bending in pairs:
                 wanted[shear] = max(1, wanted[bending] - 2) if wanted[bending] else 0
     return {strain: wanted[strain] for strain in STRAINS if wanted.get(strain, 0) > 0}
 
@@ -43,6 +46,5 @@ def points_of_piece(body: BeamBody) -> int:
 
 def twists(body: BeamBody) -> bool:
     """Whether something of the beam has an inertia about its axis, without which a straight beam has no torsion."""
-    rotary = body.points != "line" and any(s.rotary_y_kg_m > 0.0 or s.rotary_z_kg_m > 0.0 for s in body.stations)
     lumps = any(lump.inertia_kg_m2[0][0] > 0.0 or any(lump.com_m[1:]) for lump in body.tip_masses)
-    return rotary or lumps
+    return lumps or twists_with_inertia(body)

@@ -93,6 +93,11 @@ def rest_frames(body: Body) -> dict[str, NodeFrame]:
             assert_never(body)
 
 
+def nodes_along(beam: BeamBody) -> dict[str, float]:
+    """Places (m) along the beam of all its nodes by name, implicit ones included."""
+    return {"origin": 0.0, "root": 0.0, "tip": beam.length_m, **{node.name: node.x_m for node in beam.nodes}}
+
+
 def _on_beam(body: BeamBody, x: float, quaternion: Quaternion) -> NodeFrame:
     """Rest frame of a node at x of a beam."""
     if not is_curved(body):
@@ -100,6 +105,14 @@ def _on_beam(body: BeamBody, x: float, quaternion: Quaternion) -> NodeFrame:
     position, rotation = (each[0] for each in rest_sections(body, np.array([x])))
     at, turn = position.tolist(), quaternion_of(rotation @ rotation_matrix(quaternion)).tolist()
     return NodeFrame((at[0], at[1], at[2]), (turn[0], turn[1], turn[2], turn[3]))
+
+
+def place_along(body: BeamBody, node: str) -> float:
+    """Where a node of a beam is, in m along its axis from the root; ValueError if there is no such node."""
+    places = {"origin": 0.0, "root": 0.0, "tip": body.length_m} | {n.name: n.x_m for n in body.nodes}
+    if node not in places:
+        raise ValueError(f'body "{body.name}" has no node "{node}"; its nodes are {", ".join(places)}')
+    return places[node]
 
 
 def node_frame(body: Body, node: str) -> NodeFrame:

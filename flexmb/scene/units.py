@@ -6,7 +6,7 @@ UNITS = {
     "s": "s", "m": "m", "kg": "kg", "rad": "rad", "N": "N", "Nm": "N m", "Nm2": "N m²",
     "m_s": "m/s", "m_s2": "m/s²", "rad_s": "rad/s", "kg_m": "kg/m", "kg_m2": "kg m²",
     "N_m": "N/m", "Ns_m": "N s/m", "Nm_rad": "N m/rad", "Nms_rad": "N m s/rad", "s_m": "s/m", "s_rad": "s/rad",
-    "m_rad": "m/rad",
+    "m_rad": "m/rad", "1_m": "1/m",
 }  # fmt: skip
 
 # In these keys the suffix means kg m, not kg/m: moments of inertia per length have the unit kg m²/m.

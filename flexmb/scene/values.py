@@ -9,12 +9,15 @@ from typing import Any, cast
 
 import msgspec
 
+from flexmb.scene.bodies import BeamStation
 from flexmb.scene.convert import to_struct
 from flexmb.scene.functions import Function
 from flexmb.scene.problems import SceneError, closest
 from flexmb.scene.reading import Unreadable, parse_toml
 
 EVERY = "*"
+SYMMETRIC = ("stiffness", "inertia")
+"""Matrices of a beam's station, of which an element off the diagonal stands for both."""
 
 
 class PathError(ValueError):
@@ -26,7 +29,8 @@ def with_values(scene: Any, values: Mapping[str, Any]) -> Any:
 
     The array of an item may be omitted if only one item has the name. Numbers are replaced by numbers (counts by whole
     ones), arrays by arrays of the same length, structures (such as functions of time) and None by structures of the
-    schema or None. Raises PathError if a path or a value does not fit. The scene is checked when it is run.
+    schema or None. An element off the diagonal of a station's matrix stands for both: the matrix stays symmetric.
+    Raises PathError if a path or a value does not fit. The scene is checked when it is run.
     """
     for path, value in values.items():
         scene = changed_at(scene, path, partial(_replaced, new=value, path=path))
@@ -74,7 +78,10 @@ def _changed(node: Any, steps: list[str], path: str, change: Callable[[Any], Any
     if isinstance(node, msgspec.Struct):
         if step not in node.__struct_fields__:
             raise _no_way(path, step, node.__struct_fields__)
-        return msgspec.structs.replace(node, **{step: _changed(getattr(node, step), rest, path, change)})
+        changed = _changed(getattr(node, step), rest, path, change)
+        if isinstance(node, BeamStation) and step in SYMMETRIC and len(rest) == 2 and rest[0] != rest[1]:
+            changed = _changed(changed, rest[::-1], path, change)
+        return msgspec.structs.replace(node, **{step: changed})
     if isinstance(node, tuple):
         chosen = {index for index, item in enumerate(node) if step in (EVERY, str(index), getattr(item, "name", None))}
         if not chosen:

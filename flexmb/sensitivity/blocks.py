@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple
 
@@ -157,6 +157,22 @@ class Blocks:
     def joined(self, duals: Sequence[Real]) -> Real:
         """The derivatives (...,P) of one array of duals (...,9) for each block."""
         return np.concatenate([each[..., 1:] for each in duals], axis=-1)[..., : self.directions]
+
+
+def dual_parts(table: Any) -> Iterator[tuple[str, str | None, Any]]:
+    """Name, name of the field of its records, and the duals (...,9) of every array of a table in dual numbers."""
+    for each in fields(table):
+        for field, part in array_parts(getattr(table, each.name)):
+            yield each.name, field, part
+
+
+def array_parts(array: Any) -> Iterator[tuple[str | None, Any]]:
+    """The duals (...,9) of an array, or of each field of its records, with the name of the field."""
+    if array.dtype == np.float64:
+        yield None, array
+    for name in array.dtype.names or ():
+        if (array.dtype[name].subdtype or (array.dtype[name],))[0] == np.float64:
+            yield name, array[name]
 
 
 def set_lanes(duals: Real, rates: Real, b: int) -> None:

@@ -1,14 +1,14 @@
 """The equations of motion of a closed chain in dual numbers, for one block of directions.
 
-The loads of closures follow from the implicit function theorem, as in `flexmb.closure.jacobian`: directions are
+The loads of closures follow from the implicit function theorem, as in `flexmb.closure.dual_jacobian`: directions are
 evaluated under constant loads, then under loads that change so that the rows keep their accelerations.
 """
 
 from __future__ import annotations
 
 from flexmb.closure.couplings import relieve_drives
+from flexmb.closure.dual_jacobian import hold_rows
 from flexmb.closure.dynamics import slope
-from flexmb.closure.jacobian import hold_rows
 from flexmb.closure.projection import project_closed
 from flexmb.closure.rows import load_on_b
 from flexmb.closure.tables import COUPLINGS, Closed, ClosureConstants

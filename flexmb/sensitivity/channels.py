@@ -115,6 +115,21 @@ def _all(system: System, signals: dict[str, slice]) -> Iterator[tuple[str, Chann
             yield f"signal.{name}[{i}]", _signal(place.start + i)
 
 
+def value(system: System, channel: Channel, name: str, itself: Seen) -> float:
+    """The value of a channel where a state, everything observable and signals are in one column each.
+
+    All but quaternions are linear in these, so that they are read like derivatives along one direction.
+    """
+    marker, _, axis = name.rpartition(".quaternion.")
+    observation = system.observation
+    if marker not in observation.names.markers or axis not in "wxyz":
+        return float(channel(itself)[0])
+    assert itself.observed is not None
+    first = observation.columns["markers"][0].start + 24 * list(observation.names.markers).index(marker) + 3
+    R = itself.observed.row[first : first + 9].reshape(3, 3)
+    return float(Rotation.from_matrix(R).as_quat(canonical=True, scalar_first=True)["wxyz".index(axis)])
+
+
 def _each(name: str, axes: str, first: int) -> Iterator[tuple[str, Channel]]:
     for i, axis in enumerate(axes):
         yield f"{name}.{axis}", _row(first + i)

@@ -2,7 +2,7 @@
 
 With y' = f(t, y; p) and the scaled derivatives s_k = scale_k dy/dp_k of P parameters, the state is
 
-    z = [y without work, s_1 .. s_P without work, work, its P derivatives],    s_k' = df/dy s_k + scale_k df/dp_k.
+    z = [y_1, its P derivatives, y_2, its P derivatives ...],    s_k' = df/dy s_k + scale_k df/dp_k.
 
 Eight directions are evaluated at once: y is a dual number whose lanes carry s_k, and so are the constants of the
 equations of motion, whose lanes carry scale_k dc/dp_k. The kernels of the recursion are compiled once more for them;
@@ -86,41 +86,47 @@ def evaluate(t, b, s):
 @helper
 def take(z, b, s):
     """Copy y and the directions of a block from z to its state."""
-    n, x, P = s.state.shape[1] - 1, s.continuous.shape[0], s.directions[0]
-    m = n + x
-    count = min(LANES, P - LANES * b)
+    n, x, row = s.state.shape[1] - 1, s.continuous.shape[0], 1 + s.directions[0]
     for i in range(n):
-        s.state[b, i, 0] = z[i]
+        _take(z[i * row : (i + 1) * row], b, s.state[b, i])
     for j in range(x):
-        s.law[b, s.continuous[j], 0] = z[n + j]
-    s.state[b, n, 0] = z[m * (1 + P)]
-    for lane in range(count):
-        k = LANES * b + lane
-        first = m * (1 + k)
-        for i in range(n):
-            s.state[b, i, 1 + lane] = z[first + i]
-        for j in range(x):
-            s.law[b, s.continuous[j], 1 + lane] = z[first + n + j]
-        s.state[b, n, 1 + lane] = z[m * (1 + P) + 1 + k]
+        _take(z[(n + j) * row : (n + j + 1) * row], b, s.law[b, s.continuous[j]])
+    _take(z[(n + x) * row :], b, s.state[b, n])
+
+
+@helper
+def _take(row, b, number):
+    """A number with the derivatives of block b from those of all."""
+    number[0] = row[0]
+    part = row[1 + LANES * b :]
+    if part.shape[0] >= LANES:  # this number of them is known when the kernel is compiled: they are one vector
+        for lane in range(LANES):
+            number[1 + lane] = part[lane]
+    else:
+        for lane in range(part.shape[0]):
+            number[1 + lane] = part[lane]
 
 
 @helper
 def _give(of_motion, of_laws, b, s, z):
     """Copy states, or their rates, to z."""
-    n, x, P = s.state.shape[1] - 1, s.continuous.shape[0], s.directions[0]
-    m = n + x
-    count = min(LANES, P - LANES * b)
+    n, x, row = s.state.shape[1] - 1, s.continuous.shape[0], 1 + s.directions[0]
+    for i in range(n):
+        _put(of_motion[b, i], b, z[i * row : (i + 1) * row])
+    for j in range(x):
+        _put(of_laws[b, s.continuous[j]], b, z[(n + j) * row : (n + j + 1) * row])
+    _put(of_motion[b, n], b, z[(n + x) * row :])
+
+
+@helper
+def _put(number, b, row):
+    """The inverse of `_take`."""
     if b == 0:
-        for i in range(n):
-            z[i] = of_motion[b, i, 0]
-        for j in range(x):
-            z[n + j] = of_laws[b, s.continuous[j], 0]
-        z[m * (1 + P)] = of_motion[b, n, 0]
-    for lane in range(count):
-        k = LANES * b + lane
-        first = m * (1 + k)
-        for i in range(n):
-            z[first + i] = of_motion[b, i, 1 + lane]
-        for j in range(x):
-            z[first + n + j] = of_laws[b, s.continuous[j], 1 + lane]
-        z[m * (1 + P) + 1 + k] = of_motion[b, n, 1 + lane]
+        row[0] = number[0]
+    part = row[1 + LANES * b :]
+    if part.shape[0] >= LANES:
+        for lane in range(LANES):
+            part[lane] = number[1 + lane]
+    else:
+        for lane in range(part.shape[0]):
+            part[lane] = number[1 + lane]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -14,11 +13,8 @@ from flexmb.run.propagate import Integration, integration
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.schema import Scene
 from flexmb.sensitivity.channels import Chosen, Seen, channels
-from flexmb.sensitivity.jump import EventError, Jumped, jumped
-from flexmb.sensitivity.law_rates import LawRates, event_rates, law_rates
 from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
-from flexmb.sensitivity.loops import Loops
-from flexmb.sensitivity.systems import Systems
+from flexmb.sensitivity.passage import Passage, is_mechanical
 from flexmb.typing import Real
 
 # Derivatives are integrated as changes by this part of each number. The error of a step is held below rtol times them
@@ -35,47 +31,35 @@ class Following:
     def __init__(
         self, scene: Scene, found: Sequence[Number], settings: Settings, trajectory: Trajectory, outputs: Chosen
     ) -> None:
-        self._order = np.argsort([not _is_mechanical(scene, each) for each in found], kind="stable")
-        self._numbers = [found[k] for k in self._order]
-        self._scales = np.array([SHARE * each.scale for each in self._numbers])
-        self._scene, self._settings, self._trajectory, self._outputs = scene, settings, trajectory, outputs
-        mechanical = sum(_is_mechanical(scene, each) for each in found)
-        self._systems = Systems(self._numbers, self._scales, mechanical)
-        self._levels = event_rates(scene, self._numbers, self._scales)
-        self._changes: list[tuple[str, Any]] = []
-        self._alive = [True] * len(found)
-        self._laws: LawRates | None = None
-        P = len(found)
-        self._derivatives = np.full((len(trajectory.t), len(outputs.names), P), np.nan)
+        self._order = np.argsort([not is_mechanical(scene, each) for each in found], kind="stable")
+        numbers = [found[k] for k in self._order]
+        self._scales = np.array([SHARE * each.scale for each in numbers])
+        self._settings, self._trajectory, self._outputs = settings, trajectory, outputs
+        self._passage = Passage(scene, numbers, self._scales, settings, float(trajectory.t[-1] - trajectory.t[0]))
+        self._derivatives = np.full((len(trajectory.t), len(outputs.names), len(found)), np.nan)
         self._events: EventTimes = []
-        self._energy = np.zeros(P)
 
     def __call__(self, course: Sequence[Leg]) -> tuple[Real, EventTimes]:
         """Derivatives (T,K,P) of the outputs, and those of the times of events."""
-        blocks, start = self._systems.first(course[0].system)
-        before, after = None, None
-        system, loops = course[0].system, None
+        loops = None
         for i, leg in enumerate(course):
-            if leg.system is not system:
-                assert after is not None
-                blocks, system = self._systems.then(leg.system, leg.begin.state, self._alive, after.held), leg.system
-                self._laws = None if after.changes else self._laws  # latches and releases leave controllers as they are
+            blocks = self._passage.blocks(leg)
             with integration(leg.system, "articulated", 0.0, self._settings.integrator) as solve:
                 is_last, stop = i + 1 == len(course), leg.raw.t
                 times = self._times(leg, is_last)
                 y, clock = clock_of_leg(
                     solve, leg, np.unique([leg.begin.state.t, *self._trajectory.t[times], stop]), self._settings
                 )
-                loops = self._loops(solve, blocks, loops, is_last and bool(i) and leg.begin.state.t == stop)
+                loops = self._passage.loops(solve, loops, is_last and bool(i) and leg.begin.state.t == stop)
                 variation = Variation(leg, blocks, loops)
-                at = self._begun(variation, y, start, before, after)
+                at = self._passage.begun(variation, y)
                 states = (
                     variation.integrate(at, clock.times, clock, self._settings) if stop > leg.begin.state.t else [at]
                 )
                 before = Course(leg.raw.y, states[-1].Y)
                 self._see(variation, solve, clock.times, states, times, is_last)
-                after = self._jumped(variation, before, {} if after is None else after.held)
-                start = after.D
+                found = self._passage.ended(variation, before)
+                self._events += [(each.event.name, stop, each.dt) for each in found.crossings]
         order = np.argsort(self._order)
         scaled = self._derivatives / self._scales
         return scaled[..., order], [(name, t, (dt / self._scales)[order]) for name, t, dt in self._events]
@@ -88,56 +72,6 @@ class Following:
             return slice(len(t) - 1, len(t))
         last = int(np.searchsorted(t, stop, side="right" if is_last else "left"))
         return slice(first, last)
-
-    def _loops(self, solve: Integration, blocks: Any, before: Loops | None, ends: bool) -> Loops | None:
-        if solve.feedback is None:
-            return None
-        if self._laws is None:
-            alive = [each if self._alive[k] else None for k, each in enumerate(self._numbers)]
-            self._laws = law_rates(solve.system, alive, self._scales)
-        return Loops(solve.feedback, blocks, self._laws, before, ends)
-
-    def _begun(self, variation: Variation, y: Real, start: Real, before: Course | None, after: Jumped | None) -> Course:
-        """The state at the start of a part of the run, with its derivatives."""
-        loops, t = variation.loops, variation.leg.begin.state.t
-        if before is None or after is None:  # the run begins
-            if loops is None:
-                return Course(y, start)
-            P = start.shape[1]
-            states = np.zeros((len(loops.continuous), P))
-            whole = Course(y, np.vstack([start[:-1], states, start[-1:]]))
-            variation.take(whole)
-            loops.begin(t)
-            states[:] = loops.blocks.joined(list(loops.law[:, loops.continuous]))
-            return Course(y, np.vstack([start[:-1], states, start[-1:]]))
-        at = Course(y, after.D.copy())
-        if np.any(after.dt) and loops is not None and loops.is_due(t):
-            raise EventError(
-                f'event "{after.crossings[0].event.name}" happens at t = {t:g} s, when a sampled controller acts: '
-                "which comes first changes what follows, so that the run has no derivative beyond; move one of them"
-            )
-        if after.changes:  # the work includes the energy that changes of values bring
-            at.Y[-1] += variation.energy_rates(t, at) - self._energy
-        if np.any(after.dt):
-            at = Course(y, at.Y - np.outer(variation.slope(t, at).y, after.dt))
-        return at
-
-    def _jumped(self, variation: Variation, end: Course, held: dict[str, Real]) -> Jumped:
-        leg, settings = variation.leg, self._settings
-        length = float(self._trajectory.t[-1] - self._trajectory.t[0])
-        tolerance = np.array([settings.atol, settings.rtol, length])
-        found = jumped(variation, end, self._levels, held, tolerance)
-        self._events += [(each.event.name, leg.raw.t, each.dt) for each in found.crossings]
-        if found.changes:
-            self._changes += found.changes
-            self._alive = [self._matters(each) for each in self._numbers]
-            self._energy = variation.energy_rates(leg.raw.t, Course(end.y, found.D))
-        return found
-
-    def _matters(self, number: Number) -> bool:
-        """Whether the scene after the changes so far depends on a number."""
-        other = number.scene_at(number.value + 2.0**-6 * number.scale)
-        return bool(_changed(other, self._changes) != _changed(self._scene, self._changes))
 
     def _see(
         self,
@@ -173,16 +107,3 @@ class Following:
                     self._derivatives[sample, k] = known[name](seen)
                 elif ".drive[" in name:  # of a coordinate that is free here
                     self._derivatives[sample, k] = 0.0
-
-
-def _changed(scene: Scene, changes: Sequence[tuple[str, Any]]) -> Scene:
-    for path, value in changes:
-        scene = scene.with_values({path: value})
-    return scene
-
-
-def _is_mechanical(scene: Scene, number: Number) -> bool:
-    """Whether the tables of the mechanics may depend on a number."""
-    other = number.scene_at(number.value + 2.0**-6 * number.scale)
-    steady = {"controllers", "events", "sensors"}
-    return any(getattr(other, key) != getattr(scene, key) for key in scene.__struct_fields__ if key not in steady)

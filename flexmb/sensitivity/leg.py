@@ -10,6 +10,7 @@ from flexmb.integrate.control import ACCEPTED, COUNTS, REJECTED, SAMPLES, STOP
 from flexmb.integrate.problem import Accuracy, Clock, problem
 from flexmb.integrate.settings import Settings
 from flexmb.jit.direct import undispatched
+from flexmb.jit.lanes import LANES
 from flexmb.run.driver import Leg
 from flexmb.run.interruption import interruptible
 from flexmb.run.outputs import ending
@@ -56,13 +57,12 @@ class Variation:
 
     def joined(self, at: Course) -> Real:
         """z of a state with its derivatives."""
-        return np.concatenate([at.y[:-1], at.Y[:-1].T.ravel(), at.y[-1:], at.Y[-1]])
+        return np.column_stack([at.y, at.Y]).ravel()
 
     def parted(self, z: Real) -> Course:
         """The inverse of `joined`."""
-        m, P = self._width - 1, self.blocks.directions
-        y, works = np.r_[z[:m], z[m * (1 + P)]], z[m * (1 + P) + 1 :]
-        return Course(y, np.vstack([z[m : m * (1 + P)].reshape(P, m).T, works]))
+        rows = z.reshape(self._width, -1)
+        return Course(rows[:, 0].copy(), rows[:, 1:].copy())
 
     def slope(self, t: float, at: Course) -> Course:
         """The rates of a state and of its derivatives; DynamicsError where they do not exist."""
@@ -79,9 +79,14 @@ class Variation:
 
     def take(self, at: Course) -> None:
         """Set the states of all blocks without evaluating them."""
-        z = self.joined(at)
-        for b in range(len(self.blocks)):
-            flow.take.py_func(z, b, self.flow)
+        tables = self.flow
+        motion = np.r_[: self._width - 1 - len(tables.continuous), self._width - 1]
+        laws = np.arange(len(motion) - 1, self._width - 1)
+        for b, (state, law) in enumerate(zip(tables.state, tables.law, strict=True)):
+            lanes = slice(LANES * b, min(LANES * (b + 1), at.Y.shape[1]))
+            state[:, 0], state[:, 1 : 1 + lanes.stop - lanes.start] = at.y[motion], at.Y[motion, lanes]
+            law[tables.continuous, 0] = at.y[laws]
+            law[tables.continuous, 1 : 1 + lanes.stop - lanes.start] = at.Y[laws, lanes]
 
     def energy_rates(self, t: float, at: Course) -> Real:
         """The derivatives (P,) of the energy at a state."""

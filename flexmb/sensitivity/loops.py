@@ -48,7 +48,7 @@ class Loops:
         """before: the loops of the part of the run before, None at its start; ends: whether the run ends where this
         part begins, so that controllers which act there have acted in floats only."""
         made, self._feedback, self.blocks = feedback.running, feedback, blocks
-        plain, shape = _plain(made), (len(blocks), len(made.state))
+        plain, shape = variation.plain_laws(made), (len(blocks), len(made.state))
         self.law, self.law_rate = (wide_zeros(shape, width=DualType.width) for _ in range(2))
         self.law[..., 0] = made.state
         self.continuous = np.array(feedback.continuous_states, np.int64)
@@ -122,14 +122,6 @@ class Loops:
             self.blocks.check(variation.look(t, each))
         self._feedback.raise_trouble()
         return self.tables[0].signal[:, 0].copy(), self.blocks.joined([each.signal for each in self.tables])
-
-
-def _plain(made: Loop) -> PlainLaw:
-    most = int(np.max(made.controller["outputs"] + made.controller["states"], initial=0))
-    return PlainLaw(
-        input=made.input, state=made.state, number=made.number, output=made.output, change=made.change,
-        value=np.zeros(most), coarse=np.zeros(most), fine=np.zeros(most),
-    )  # fmt: skip
 
 
 def _variation(made: Loop, feedback: Feedback, plain: PlainLaw, blocks: Blocks, b: int, **own: Any) -> LoopVariation:

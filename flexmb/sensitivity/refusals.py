@@ -10,6 +10,7 @@ from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse
 from flexmb.scene.schema import DriveSensor, LoadSensor, Scene
+from flexmb.scene.tree import watches_signals
 
 _SCHEDULE = "period_s", "offset_s", "delay_s"
 _ENDS = "start_s", "duration_s"
@@ -48,3 +49,17 @@ def _schedule(scene: Scene) -> list[tuple[float | None, ...]]:
 
 def _pulses(scene: Scene) -> list[tuple[float, float]]:
     return [(each.start_s, each.duration_s) for _, _, each in values(ROOT, scene) if isinstance(each, Pulse)]
+
+
+def refuse_beyond_adjoint(scene: Scene) -> None:
+    """NotImplementedError for scenes whose runs are not passed backwards."""
+    for has, what in (
+        (scene.constraints, "closures or couplings"),
+        (any(each.period_s is None for each in scene.controllers), "continuous controllers"),
+        (watches_signals(scene), "events that watch signals"),
+    ):
+        if has:
+            raise NotImplementedError(
+                f'scene "{scene.name}" has {what}, through which the adjoint does not pass: use `sensitivities`, which '
+                "integrates forwards"
+            )

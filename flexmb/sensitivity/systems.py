@@ -42,10 +42,11 @@ class KnownTables(NamedTuple):
 class Systems:
     """Makes the blocks of one part of a run after the other.
 
-    numbers: those that the directions belong to; those that no table depends on come last. scales (P,).
+    numbers: those that the directions belong to, None for a direction that belongs to none; those that no table depends
+    on come last. scales (P,).
     """
 
-    def __init__(self, numbers: Sequence[Number], scales: Real, mechanical: int) -> None:
+    def __init__(self, numbers: Sequence[Number | None], scales: Real, mechanical: int) -> None:
         """mechanical: how many of the first numbers the tables of the mechanics may depend on."""
         self._numbers, self._scales, self._mechanical = numbers, scales, mechanical
         self._known: KnownTables | None = None
@@ -67,12 +68,17 @@ class Systems:
             _alike(found.duals)
         else:
             start = np.zeros((system.nq + system.nu + 1, len(self._numbers)))
-            names = [k for k in range(self._mechanical) if alive[k] and _exists(system.scene, self._numbers[k].name)]
+            names = [k for k in range(self._mechanical) if alive[k] and _exists(system.scene, self._name(k))]
             found = self._differentiated(system, names, start)
         self._known = found
         if found.system.closures is not None:  # the rows that are independent here
             found.system.closures.begin_at(state.t, pack(state))
         return self._blocks(found, held)
+
+    def _name(self, k: int) -> str:
+        number = self._numbers[k]
+        assert number is not None  # one of the first ones
+        return number.name
 
     def _differentiated(self, system: System, chosen: Sequence[int], start: Real) -> KnownTables:
         """The tables of a system by those of the numbers that are chosen; the part of its initial state to `start`."""
@@ -82,7 +88,7 @@ class Systems:
             plant.initial_state  # noqa: B018  (counts the rows of closures)
             sources = list[tuple[Any, Any]]()
         else:
-            parameters = system.parameters([self._numbers[k].name for k in chosen])
+            parameters = system.parameters([self._name(k) for k in chosen])
             sources = [(each.constants, each.closures) for each in parameters.blocks]
             assert isinstance(parameters.plant, System)  # it is the same one with its functions of time kept apart
             plant = parameters.plant

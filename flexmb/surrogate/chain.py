@@ -86,9 +86,10 @@ def outward(joints: Sequence[Hinge], root: int) -> list[Hinge]:
 
 
 def stiffness_damping(beam: BeamBody) -> float:
-    """Ratio (s) of damping and stiffness of all parts: 2 zeta/omega of the first mode, whose damping is thus exact."""
+    """Ratio (s) of damping and stiffness of all parts: the viscosity and 2 zeta/omega of the first mode, whose damping
+    is thus exact."""
     if not np.any(beam.modes.damping_ratio):
-        return 0.0
+        return beam.modes.viscosity_s
     model = flexible_model(beam)
     return float(model.damping[0, 0] / model.stiffness[0, 0])
 

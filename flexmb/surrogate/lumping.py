@@ -14,6 +14,7 @@ import numpy as np
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.rest_curve import is_curved, rest_sections
 from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, SidBody, TipMass, Vector
+from flexmb.scene.sections import inertia_on_axis, mass_centres
 from flexmb.scene.tree import rest_frames
 from flexmb.typing import Real
 
@@ -52,7 +53,18 @@ def section_properties(body: BeamBody, x: Real, *keys: str) -> tuple[Real, ...]:
     return tuple(np.interp(x, at, [getattr(station, key) for station in stations]) for key in keys)
 
 
-def quadrature(body: BeamBody, cuts: Sequence[float]) -> tuple[Real, Real]:
+def _sections(body: BeamBody, x: Real) -> tuple[Real, Real, Real]:
+    """Masses per length (n,), mass centres (n,3) from the axis and inertias (n,3,3) about these at x (n,)."""
+    stations = sorted(body.stations, key=lambda station: station.x_m)
+    at, values = [station.x_m for station in stations], np.array([inertia_on_axis(station) for station in stations])
+    found = np.zeros((len(x), 6, 6))
+    for i, j in np.ndindex(6, 6):
+        found[:, i, j] = np.interp(x, at, values[:, i, j])
+    mass, com, inertia = mass_centres(found)
+    return mass, com, np.zeros_like(inertia) if body.points == "line" else inertia
+
+
+def quadrature(body: BeamBody, cuts: Sequence[float] | Real) -> tuple[Real, Real]:
     """Gauss points and weights (n,) between the cuts (ascending) and stations, where the sections have kinks."""
     inside = [station.x_m for station in body.stations if cuts[0] < station.x_m < cuts[-1]]
     ends = np.unique([*cuts, *inside])
@@ -67,12 +79,10 @@ def beam_piece(body: BeamBody, start: float, end: float) -> Inertia:
     A tip mass exactly at `end` belongs to the next piece, except at the end of the beam.
     """
     x, weight = quadrature(body, np.linspace(start, end, 1 + _CURVED_PARTS) if is_curved(body) else (start, end))
-    mass, rotary_y, rotary_z = section_properties(body, x, "mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
-    turning = 0.0 if body.points == "line" else 1.0
     position, rotation = rest_sections(body, x)
     parts = [
-        Inertia(length * m, at, turning * length * R @ np.diag([iy + iz, iy, iz]) @ R.T)
-        for at, R, length, m, iy, iz in zip(position, rotation, weight, mass, rotary_y, rotary_z, strict=True)
+        Inertia(length * m, at + R @ com, length * R @ J @ R.T)
+        for at, R, length, m, com, J in zip(position, rotation, weight, *_sections(body, x), strict=True)
     ]
     here = [lump for lump in body.tip_masses if start <= lump.x_m < end or lump.x_m == end == body.length_m]
     return combine([*parts, *_lumps(body, here)])
@@ -91,12 +101,11 @@ def _lumped_beam(body: BeamBody) -> Inertia:
     nodes = np.linspace(0.0, body.length_m, body.elements + 1)
     x, weight = quadrature(body, tuple(nodes))
     hats = np.maximum(0.0, 1.0 - np.abs(x[:, None] - nodes) * body.elements / body.length_m)
-    mass, rotary_y, rotary_z = section_properties(body, x, "mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
-    turning = 0.0 if body.points == "line" else 1.0
+    sections = list(zip(*_sections(body, x), strict=True))
     parts = [*_lumps(body, body.tip_masses)]
     for node, hat in zip(nodes, (weight[:, None] * hats).T, strict=True):
-        iy, iz = turning * hat @ rotary_y, turning * hat @ rotary_z
-        parts.append(Inertia(hat @ mass, np.array([node, 0.0, 0.0]), np.diag([iy + iz, iy, iz])))
+        here = zip(hat, sections, strict=True)
+        parts.append(combine([Inertia(each * m, com + [node, 0.0, 0.0], each * J) for each, (m, com, J) in here]))
     return combine(parts)
 
 

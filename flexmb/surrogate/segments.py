@@ -10,6 +10,7 @@ import numpy as np
 
 from flexmb.scene import schema as s
 from flexmb.scene.rest_curve import is_curved
+from flexmb.scene.sections import has_plain_sections
 from flexmb.scene.strains import polynomials
 from flexmb.scene.tree import rest_frames
 from flexmb.surrogate.chain import (
@@ -64,6 +65,12 @@ def _segmented(scene: s.Scene, beam: s.BeamBody, n: int) -> s.Scene:
         raise ValueError(f'beam "{beam.name}" is curved: finite segments are for straight ones; join several by welds')
     if beam.theory == "timoshenko" or not _families(beam) <= {*_TURNS, "axial"}:
         raise ValueError(f'beam "{beam.name}": finite segments have no shear; use theory "euler-bernoulli"')
+    if not has_plain_sections(beam):
+        raise ValueError(
+            f'beam "{beam.name}": the hinges between finite segments have springs that nothing couples, and its '
+            "sections are matrices or stated off its axis; divide it into flexible pieces (substructures), or keep "
+            "its modes"
+        )
     cuts = _cuts(beam, n)
     ends = [0.0, *(cut.x for cut in cuts), beam.length_m]
     places = {}

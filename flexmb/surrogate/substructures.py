@@ -3,19 +3,33 @@
 The deformation of each piece is small in its own frame, which turns with the section at its root. The chain converges
 to the geometrically exact beam as the pieces become short, provided that they have attachment modes: neighbours load a
 piece with forces and moments at its tip, and eigenmodes with a free tip do not span the resulting deflections.
+
+Pieces of level "exact" may turn by any angle, so that few of them suffice. Their strains are polynomials, of which the
+two lowest of each curvature are those under forces and moments at the tip.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
 
 from flexmb.modal import flexible_model
 from flexmb.scene.check.beams import twisting_points
-from flexmb.scene.schema import BeamBody, BeamStation, Hinge, Level, Modes, Scene, Weld
-from flexmb.scene.tree import rest_frames
+from flexmb.scene.rest_curve import is_curved
+from flexmb.scene.schema import BeamBody, BeamStation, Hinge, Level, Modes, Scene, StrainPolynomials, Weld
+from flexmb.scene.sections import (
+    INERTIA_KEYS,
+    SHEAR_KEYS,
+    STIFFNESS_KEYS,
+    inertia_on_axis,
+    is_plain,
+    matrix,
+    stiffness_on_axis,
+)
+from flexmb.scene.tree import nodes_along
 from flexmb.surrogate.chain import (
     NodePlace,
     beams_named,
@@ -26,11 +40,20 @@ from flexmb.surrogate.chain import (
     stiffness_damping,
 )
 
-_SECTION_KEYS = tuple(key for key in BeamStation.__struct_fields__ if key not in ("x_m", "curvature_1_m"))
+CURVATURES = 3
+"""Polynomials of each curvature of a piece of level "exact": as costly as the two under loads at the tip and one
+eigenmode, with errors of the sixth power of the length."""
+_NUMBERS = (*STIFFNESS_KEYS, *SHEAR_KEYS, *INERTIA_KEYS, "curvature_1_m")
 
 
 def substructured(
-    scene: Scene, body: str | None, pieces: int, *, level: Level | None = None, eigenmodes: int = 0
+    scene: Scene,
+    body: str | None,
+    pieces: int,
+    *,
+    level: Level | None = None,
+    eigenmodes: int = 0,
+    polynomials: int | StrainPolynomials | None = None,
 ) -> Scene:
     """The beam `body` (all beams if None) as `pieces` equal flexible pieces, welded section to section.
 
@@ -38,34 +61,68 @@ def substructured(
     at its tip: one mode for axial motion, one for torsion, two for each plane of bending) and, in addition,
     `eigenmodes` eigenmodes. Its level is the beam's unless `level` is given. The chain converges to the geometrically
     exact beam with the square of the length of a piece at level "full", and with its third power at "stiffened"; where
-    the twist varies along the beam, the third power requires an eigenmode of torsion in each piece. Sections, theory,
-    tip masses and the choice of inertia points are those of the beam; modal damping becomes proportional to stiffness,
-    exact for the beam's first mode.
+    the twist varies along the beam, the third power requires an eigenmode of torsion in each piece.
+
+    A piece of level "exact" has `polynomials` of each curvature of the beam's families, or of each strain, instead of
+    modes; by default those that one piece of the beam has if it is of level "exact" itself, otherwise `CURVATURES`.
+    With p of them the chain converges with the power 2 p of the length of a piece. A beam of that level whose axis is
+    curved has pieces of that level only.
+
+    Sections, theory, tip masses and the choice of inertia points are those of the beam; modal damping becomes
+    proportional to stiffness, exact for the beam's first mode.
 
     Pieces are named `<beam>.p00` ... and welds `<beam>.w01` ... from the root; a node or a tip mass at a cut belongs to
     the outer piece. Raises ValueError for a body that is not a beam or is rigid, for fewer than one piece, for an
-    initial modal state, and for torsion of pieces without rotary inertia.
+    initial modal state, for torsion of pieces without rotary inertia, and for `eigenmodes` or `polynomials` that
+    pieces of the level do not have.
     """
     if pieces < 1:
         raise ValueError(f"a beam is divided into at least one piece, got {pieces}")
     if eigenmodes < 0:
         raise ValueError(f"the number of eigenmodes of a piece is {eigenmodes}: give zero or more")
     for beam in beams_named(scene, body):
-        scene = _split(scene, beam, pieces, level or beam.level, eigenmodes)
+        of_piece = level or beam.level
+        _refuse(beam, of_piece, eigenmodes, polynomials)
+        modes = _strains(beam, polynomials) if of_piece == "exact" else _eigenmodes(beam, eigenmodes)
+        scene = _split(scene, beam, pieces, of_piece, modes)
     return scene
 
 
-def _split(scene: Scene, beam: BeamBody, count: int, level: Level, eigenmodes: int) -> Scene:
+def _refuse(beam: BeamBody, level: Level, eigenmodes: int, polynomials: int | StrainPolynomials | None) -> None:
     if level == "rigid":
         raise ValueError(f'beam "{beam.name}" is rigid: pieces need a level at which they deform, such as "full"')
+    if level == "exact" and eigenmodes:
+        remedy = f"give polynomials={eigenmodes + CURVATURES}"
+        raise ValueError(f'beam "{beam.name}": pieces of level "exact" have no eigenmodes; {remedy}')
+    if level != "exact" and polynomials is not None:
+        raise ValueError(f'beam "{beam.name}": only pieces of level "exact" have polynomials; give eigenmodes')
+    if level != "exact" and is_curved(beam):
+        raise ValueError(f'beam "{beam.name}" is curved at rest: its pieces need level "exact"')
+
+
+def _eigenmodes(beam: BeamBody, count: int) -> Modes:
+    return Modes(count=count, families=beam.modes.families, static=True)
+
+
+def _strains(beam: BeamBody, polynomials: int | StrainPolynomials | None) -> Modes:
+    """The strains of a piece of level exact; they have its damping, which is that of a material."""
+    own = beam.modes
+    if polynomials is None and beam.level == "exact":
+        return Modes(count=own.count, families=own.families, polynomials=own.polynomials, points=own.points)
+    if isinstance(polynomials, StrainPolynomials):
+        return Modes(count=0, families=own.families, polynomials=polynomials)
+    return Modes(count=CURVATURES if polynomials is None else polynomials, families=own.families)
+
+
+def _split(scene: Scene, beam: BeamBody, count: int, level: Level, modes: Modes) -> Scene:
     ends = [float(x) for x in np.linspace(0.0, beam.length_m, count + 1)]
     places = {}
-    for name, frame in rest_frames(beam).items():
-        piece = piece_at(ends, frame.position[0])
+    for name, x in nodes_along(beam).items():
+        piece = piece_at(ends, x)
         # Nodes keep their names: the beam's root is the root of the first piece, its tip the tip of the last one.
         places[name] = NodePlace(piece, _piece_name(beam, piece), name)
     lag = stiffness_damping(beam)
-    parts = [_piece(beam, i, ends, places, replace(beam.modes, count=eigenmodes), level, lag) for i in range(count)]
+    parts = [_piece(beam, i, ends, places, modes, level, lag) for i in range(count)]
     root = places[inboard_hinge(scene, beam).child_node].piece
     return in_pieces(scene, beam, parts, outward(_welds(beam, count, root), root), places)
 
@@ -83,7 +140,7 @@ def _piece(
         # Two elements resolve the attachment modes, even with lumped masses; each further eigenmode adds half a wave.
         elements=max(-(-beam.elements // (len(ends) - 1)), 2 + modes.count),
         stations=_sections(beam, start, end),
-        modes=replace(modes, boundary="clamped-free", static=True, damping_ratio=0.0),
+        modes=replace(modes, viscosity_s=lag) if level == "exact" else modes,
         level=level,
         tip_masses=tuple(
             replace(lump, x_m=lump.x_m - start)
@@ -99,7 +156,7 @@ def _piece(
             f'beam "{beam.name}": its pieces cannot be twisted, because they have no inertia about the axis; give '
             'sections rotary inertia and choose points "section" or "rotary", or leave "torsion" out of the families'
         )
-    if lag == 0.0:
+    if lag == 0.0 or level == "exact":
         return piece
     frequencies = np.sqrt(np.diag(flexible_model(piece).stiffness))
     ratios = tuple(float(0.5 * lag * omega) for omega in frequencies)
@@ -120,13 +177,29 @@ def _between(stations: list[BeamStation], right: int, x: float) -> BeamStation:
     """The section at x between the stations `right` - 1 and `right`, constant beyond the outer ones."""
     a, b = stations[max(right - 1, 0)], stations[min(right, len(stations) - 1)]
     share = (x - a.x_m) / (b.x_m - a.x_m) if b.x_m > a.x_m else 0.0
+    if not (is_plain(a) and is_plain(b)):
+        return replace(a, x_m=x) if share == 0.0 else _mixed_matrices(a, b, share, x)
     values = {}
-    for key in _SECTION_KEYS:
-        at_a, at_b = getattr(a, key), getattr(b, key)
-        values[key] = at_a if share == 0.0 or None in (at_a, at_b) else at_a + share * (at_b - at_a)
-    ends = zip(a.curvature_1_m, b.curvature_1_m, strict=True)
-    curvature = tuple((1.0 - share) * at_a + share * at_b for at_a, at_b in ends)
-    return replace(a, x_m=x, curvature_1_m=curvature, **values)
+    for key in _NUMBERS:
+        values[key] = _mixed(getattr(a, key), getattr(b, key), share)
+    return replace(a, x_m=x, **values)
+
+
+def _mixed_matrices(a: BeamStation, b: BeamStation, share: float, x: float) -> BeamStation:
+    """The section at x between two, one of which at least is a matrix or off the axis: matrices about the axis."""
+    stiffness = (1.0 - share) * stiffness_on_axis(a) + share * stiffness_on_axis(b)
+    inertia = (1.0 - share) * inertia_on_axis(a) + share * inertia_on_axis(b)
+    curvature = _mixed(a.curvature_1_m, b.curvature_1_m, share)
+    return BeamStation(x_m=x, stiffness=matrix(stiffness), inertia=matrix(inertia), curvature_1_m=curvature)
+
+
+def _mixed(a: Any, b: Any, share: float) -> Any:
+    """A property of a station, or its components, between those of two stations."""
+    if share == 0.0 or a is None or b is None:
+        return a
+    if isinstance(a, tuple):
+        return tuple(_mixed(*pair, share) for pair in zip(a, b, strict=True))
+    return a + share * (b - a)
 
 
 def _welds(beam: BeamBody, count: int, root: int) -> list[Hinge]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.closure.closures import Closures
+from flexmb.closure.constant_loads import ConstantLoads
 from flexmb.closure.given_motion import observe_given, rows_tangent
-from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace
 from flexmb.entry.given_motion import motion_tangent
 from flexmb.entry.observed_tangent import outputs_tangent
 from flexmb.entry.variation import FreeVariation
@@ -43,14 +43,14 @@ class ChainDerivatives(DifferentiableMotion):
         self.accelerations(self.layout.known(t, y))  # with its errors and warnings
         mass = np.empty((self.nu, self.nu))
         self._fill_mass_matrix(t, y, mass)
-        found = variation(self.closures, t, y, mass, (self._tangent, self._closure_tangent))
+        found = variation(self.closures, t, y, mass, self._coordinate_motion(t, y), self._constant_loads)
         for part in (*found.of_accelerations, *found.of_loads):
             finite_result(part, t)
         return found
 
     @per_thread
-    def _closure_tangent(self) -> ClosureTangentWorkspace:
-        return closure_tangent_workspace(self.closures.constants[1])
+    def _constant_loads(self) -> ConstantLoads:
+        return ConstantLoads(self.closures, self._tangent)
 
     @per_thread
     def _pushforward(self) -> Pushforward:
@@ -64,7 +64,7 @@ class ChainDerivatives(DifferentiableMotion):
     def _row_count(self) -> int:
         return len(self.closures.constants[1].row)
 
-    def _differentiable(self, state: State, what: str) -> tuple[float, Real]:
+    def _without_kinks(self, state: State, what: str) -> tuple[float, Real]:
         """As of a tree; NotImplementedError for bodies whose inertia is not where closures join them."""
         if self.closures.at_rest:
             raise NotImplementedError(
@@ -72,7 +72,7 @@ class ChainDerivatives(DifferentiableMotion):
                 f'closures join them, and {what} does not support that: use level "linear" or a better one'
             )
         self.initial_state  # noqa: B018 - counts the independent rows, without which no position is seen to be singular
-        return super()._differentiable(state, what)
+        return super()._without_kinks(state, what)
 
     def _given(self, accelerations: Real) -> Real:
         raise NotImplementedError(

@@ -18,7 +18,7 @@ from flexmb.closure.assembly import consistent
 from flexmb.closure.branch import noticed, watch_steps
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures, Spread, called
 from flexmb.closure.constants import closure_constants, slowest_mode
-from flexmb.closure.jacobian import chain_tangent
+from flexmb.closure.jacobian import chain_jacobian
 from flexmb.closure.leap import back, beside, leap
 from flexmb.closure.operators import ClosureOperators, closure_operators
 from flexmb.closure.tables import Closed
@@ -325,7 +325,7 @@ class ClosedSystem(ChainDerivatives, System):
         )
 
     def _linear(self, chain: Closed, _: Closed) -> Linear:
-        tangent = chain_tangent(chain.c, chain.cc, self.nq, self.nu)
+        tangent = chain_jacobian(chain, self.nq, self.nu)
         return Linear(closed_jacobian.jacobian, closed_jacobian.move, chain, tangent, settles=True)
 
     def _on_chains(self, algorithm: Algorithm) -> Callable[[Closures, float, Real], ClosedMotion]:

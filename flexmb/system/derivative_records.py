@@ -43,7 +43,18 @@ class OfGivenMotion(NamedTuple):
     by_time: Real
 
 
-By = TypeVar("By", OfFreeMotion, OfGivenMotion)
+class OfControlledMotion(NamedTuple):
+    """The same for the motion under continuous controllers, whose forces change with the state; by_states (...,X): by
+    the states of the controllers."""
+
+    by_displacement: Real
+    by_speed: Real
+    by_states: Real
+    by_force: Real
+    by_time: Real
+
+
+By = TypeVar("By", OfFreeMotion, OfGivenMotion, OfControlledMotion)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ linear equations is solved for. `docs/derivatives.md` says what is held fixed.
 from __future__ import annotations
 
 from functools import cached_property, partial
-from typing import Any, overload
+from typing import Any, NamedTuple, TypeVar, overload
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from flexmb.system.complex_step import load_row, section_row
 from flexmb.system.derivative_evaluator import DerivativeEvaluator, fresh_derivative_evaluator
 from flexmb.system.derivative_records import (
     AccelerationDerivatives,
-    By,
     EvaluationDerivatives,
     InverseDynamicsDerivatives,
     OfFreeMotion,
@@ -45,7 +44,8 @@ from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Flags, Index, Real
 
-_INSTEAD = "linearise the closed loop by flexmb.linearize(scene)"
+_Four = TypeVar("_Four", OfFreeMotion, OfGivenMotion)
+_INSTEAD = "have the controllers chained through by flexmb.ControlledMotion(scene)"
 
 
 class DifferentiableMotion(FreeMotion):
@@ -108,18 +108,12 @@ class DifferentiableMotion(FreeMotion):
         inverse dynamics.
         """
         t, y = self._differentiable(state, "system.evaluation_derivatives")
-        push, observation = self._pushforward, self.observation
-        kind: Any = OfFreeMotion if accelerations is None else OfGivenMotion
         if accelerations is None:
-            motion, directions = self._freely(t, y)
-        else:
-            motion, directions = self._as_given(t, y, self._given(accelerations))
-        change = finite_result(push.derivatives(motion, directions, push.row), t)
-        row = push.row(slice(0, 1))[:, 0]
-        if accelerations is None:
-            self._relieve_drives(change)
-            change[self._open_row(t, y)] = np.nan
-        return by_names(observation, row, change, partial(_split, self.nu, kind))
+            row, change, _ = self._free_row(t, y)
+            return by_names(self.observation, row, change, partial(_split, self.nu, OfFreeMotion))
+        motion, directions = self._as_given(t, y, self._given(accelerations))
+        row, change = self._row_along(motion, directions)
+        return by_names(self.observation, row, change, partial(_split, self.nu, OfGivenMotion))
 
     def hinge_load_derivatives(
         self, state: State, *, axes: Axes = "world", about: tuple[str, str] | None = None
@@ -252,8 +246,12 @@ class DifferentiableMotion(FreeMotion):
     # Directions
 
     def _differentiable(self, state: State, what: str) -> tuple[float, Real]:
-        """Time and y of a state at which derivatives exist."""
+        """Time and y of a state at which derivatives exist; NotImplementedError for scenes with controllers."""
         refuse_feedback(self.scene, what, _INSTEAD)
+        return self._without_kinks(state, what)
+
+    def _without_kinks(self, state: State, what: str) -> tuple[float, Real]:
+        """The same for what is driven by given values."""
         t, y = self.layout.entering(state)
         if self._has_corners:
             self._inverse(t, y, np.zeros(self.nu))  # evaluates the connectors
@@ -274,6 +272,20 @@ class DifferentiableMotion(FreeMotion):
         self._move(0.0, self._at_start, N)
         N.flags.writeable = False
         return N
+
+    def _free_row(self, t: float, y: Real) -> FreeRow:
+        """Everything observable of the free motion; NaN where this does not determine it."""
+        motion, directions = self._freely(t, y)
+        row, change = self._row_along(motion, directions)
+        self._relieve_drives(change)
+        change[self._open_row(t, y)] = np.nan
+        return FreeRow(row, change, directions.state[: self.nq, : self.nu])
+
+    def _row_along(self, motion: GivenMotion, directions: Directions) -> tuple[Real, Real]:
+        """A row (E,) of everything observable, and its derivatives along directions."""
+        push = self._pushforward
+        change = finite_result(push.derivatives(motion, directions, push.row), motion.t)
+        return push.row(slice(0, 1))[:, 0], change
 
     def _freely(self, t: float, y: Real) -> tuple[GivenMotion, Directions]:
         """The free motion, and how it changes by displacements and speeds, forces and time."""
@@ -332,6 +344,20 @@ class DifferentiableMotion(FreeMotion):
         change[self.observation.columns["drives"][0].start + driven, 2 * self.nu + driven] -= 1.0
 
 
-def _split(nu: int, kind: type[By], change: Real) -> By:
+class FreeRow(NamedTuple):
+    """A row (E,) of everything observable, its change (E,3nu+1) by displacements, speeds, forces and time, and the
+    change (nq,nu) of the coordinates by displacements."""
+
+    value: Real
+    change: Real
+    motion: Real
+
+
+def free_row(system: DifferentiableMotion, state: State, what: str) -> FreeRow:
+    """Of the free motion, with the outputs of controllers held at what the functions of time have now."""
+    return system._free_row(*system._without_kinks(state, what))
+
+
+def _split(nu: int, kind: type[_Four], change: Real) -> _Four:
     """A record of derivatives (...,3nu+1), whose columns are those of `_freely` or `_as_given`."""
     return kind(change[..., :nu], change[..., nu : 2 * nu], change[..., 2 * nu : 3 * nu], change[..., 3 * nu])

@@ -8,9 +8,11 @@ import numpy as np
 
 from flexmb.building.links import Side, closure_sides
 from flexmb.modal.flexible_model import FlexibleNode
+from flexmb.modal.strain_field import StrainField
 from flexmb.scene.bodies import SidBody
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.tree import GROUND, rest_frames
+from flexmb.system.moved_sections import moved_sections
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.system.turning_points import rotation_along
 from flexmb.typing import Real
@@ -79,13 +81,20 @@ def node_pose(arrays: SceneArrays, w: MotionTables, body: str, node: str) -> Pos
         at = arrays.links[k].node(node)
     except (KeyError, ValueError) as error:
         raise ValueError(_without_node(arrays, body, node)) from error
-    pose = link_pose(w, k)
-    turn, position = deformed(at, w.eta[k, : arrays.links[k].mode_count])
+    pose, field = link_pose(w, k), None if arrays.links[k].is_rigid else arrays.links[k].model.field
+    turn, position = deformed(at, w.eta[k, : arrays.links[k].mode_count], field)
     return Pose(pose.rotation @ turn, pose.position + pose.rotation @ position)
 
 
-def deformed(at: FlexibleNode, eta: Real) -> tuple[Real, Real]:
-    """Rotation (3,3) node -> link and position (3,) of a node of a link with modal coordinates eta (m,)."""
+def deformed(at: FlexibleNode, eta: Real, field: StrainField | None) -> tuple[Real, Real]:
+    """Rotation (3,3) node -> link and position (3,) of a node of a link with modal coordinates eta (m,).
+
+    `field`: the sections of the link, at level exact.
+    """
+    if field is not None and at.section >= 0:
+        still = np.zeros_like(eta)
+        sections = moved_sections(field, eta, still, still)
+        return sections.R[at.section] @ at.rotation, sections.r[at.section]
     position, theta = at.position + at.translation @ eta, at.rotation_modes @ eta
     if at.second is not None:
         position = position + 0.5 * np.einsum("amn,m,n->a", at.second.translation, eta, eta)

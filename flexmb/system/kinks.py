@@ -37,18 +37,19 @@ def refuse_kinks(arrays: SceneArrays, w: Workspace) -> None:
     for spring, row in zip(springs, c.hinge_spring, strict=True):
         q = float(w.q[c.speed["coordinate"][row["speed"]]])
         for limit in (float(row["lower"]), float(row["upper"])):
-            if row["stop_stiffness"] > 0.0 and _meet(q, limit, abs(limit)):
+            if row["stop_stiffness"] > 0.0 and meets(q, limit, abs(limit)):
                 raise _at_corner(spring.name, "its coordinate is exactly at a stop, where the load has a corner")
     for i, connector in enumerate(between_nodes(arrays.scene)):
         row = c.connector[i]
         if row["acts"] != BOTH:
             length = float(np.hypot(np.linalg.norm(w.connector["arm"][i]), row["smoothing"]))
             slack = float(row["free_length"] + c.law[row["start"] + 1, 0])  # the second of its two pieces begins there
-            if _meet(length, slack, abs(row["free_length"]) + length):
+            if meets(length, slack, abs(row["free_length"]) + length):
                 raise _at_corner(connector.name, "it has exactly the length at which it becomes slack")
 
 
-def _meet(x: float, corner: float, size: float) -> bool:
+def meets(x: float, corner: float, size: float) -> bool:
+    """Whether x is at a corner of a law, as far as rounding of numbers of this size lets one say."""
     return abs(x - corner) <= ROUNDINGS * size
 
 

@@ -11,18 +11,20 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, assert_never
 
 import numpy as np
 
 from flexmb.building.connector_arrays import between_nodes
 from flexmb.building.links import closure_sides
-from flexmb.modal.beam_sections import beam_sections
+from flexmb.modal.beam_sections import BeamSections, ByShapes, ByStrains, beam_sections
 from flexmb.modal.flexible_model import SecondOrder
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.problems import SceneWarning
-from flexmb.scene.tree import node_frame
+from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, EXTENSION, TWIST
+from flexmb.scene.tree import place_along
 from flexmb.system.frames import MotionTables, Pose, body_pose, closure_frames_of, hinge_frames_of, link_pose
+from flexmb.system.moved_sections import moved_sections
 from flexmb.system.observables import Evaluation
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.system.turning_points import rotation_along, turning
@@ -40,7 +42,8 @@ class SectionLoads:
     deformed axis there, in axes that turn with the section: as across a hinge. Masses and loads at x itself count as
     beyond it.
     The properties below have the signs of structures: what the part beyond exerts on the face that looks along +x, so
-    that tension is positive. EA (X,) N, EIy, EIz, GJ (X,) N m² are the beam's there.
+    that tension is positive. EA (X,) N, EIy, EIz, GJ (X,) N m² are the beam's there. stiffness (X,6,6): all of it about
+    the axis, where sections are matrices or stated off the axis; EA and the others are then its diagonal.
     """
 
     body: str
@@ -50,6 +53,7 @@ class SectionLoads:
     EIy: Real
     EIz: Real
     GJ: Real
+    stiffness: Real | None = None
 
     def __post_init__(self) -> None:
         """TypeError or ValueError for arrays that do not fit together; checked again before they are used."""
@@ -60,6 +64,8 @@ class SectionLoads:
         for name in ("EA", "EIy", "EIz", "GJ"):
             arguments.held(name, getattr(self, name), self.x.shape)
             arguments.finite(name, getattr(self, name))
+        if self.stiffness is not None:
+            arguments.held("stiffness", self.stiffness, (*self.x.shape, 6, 6))
         more = getattr(self.load, "shape", ())[:-2]
         arguments.held("load", self.load, (*more, len(self.x), 6))
 
@@ -83,19 +89,44 @@ class SectionLoads:
         """(...,X,2) N m about the section's y and z."""
         return 0.0 - self.load[..., 1:3]
 
+    @property
+    def strain(self) -> Real:
+        """(...,X,6) [extension, shear y, shear z, twist 1/m, curvature y, curvature z 1/m] of the axis under the loads.
+
+        Shear is zero where the beam has none.
+        """
+        self._refuse_torn()
+        force = 0.0 - np.concatenate([self.load[..., 3:], self.load[..., :3]], axis=-1)
+        if self.stiffness is None:
+            none = np.zeros_like(self.EA)
+            return force * np.stack([1 / self.EA, none, none, 1 / self.GJ, 1 / self.EIy, 1 / self.EIz], axis=-1)
+        finite = np.isfinite(np.diagonal(self.stiffness, axis1=1, axis2=2))
+        shown = np.einsum("xi,xj->xij", finite, finite)
+        compliance = np.where(shown, np.linalg.inv(np.where(shown, self.stiffness, np.eye(6))), 0.0)
+        strain: Real = np.einsum("xij,...xj->...xi", compliance, force)
+        return strain
+
     def normal_stress(self, E: float, y: float, z: float) -> Real:
         """(...,X) Pa, tension positive, in the fibre at y, z (m) of the section, with Young's modulus E (Pa).
 
-        E times the strain N/EA + z My/EIy - y Mz/EIz.
+        E times the strain of the fibre, N/EA + z My/EIy - y Mz/EIz where the section couples nothing.
         """
         self._refuse_torn()
         E, y, z = arguments.number("E", E), arguments.number("y", y), arguments.number("z", z)
+        if self.stiffness is not None:
+            strain = self.strain
+            return E * (strain[..., 0] + z * strain[..., 4] - y * strain[..., 5])
         bending = z * self.bending[..., 0] / self.EIy - y * self.bending[..., 1] / self.EIz
         return E * (self.axial / self.EA + bending)
 
     def torsion_stress(self, G: float, r: float) -> Real:
-        """(...,X) Pa of shear at the radius r (m) of a round section or tube with shear modulus G (Pa): G r T / GJ."""
+        """(...,X) Pa of shear at the radius r (m) of a round section or tube with shear modulus G (Pa): G r T / GJ.
+
+        G r times the twist, where the section couples it with other strains.
+        """
         self._refuse_torn()
+        if self.stiffness is not None:
+            return arguments.number("G", G) * arguments.number("r", r) * self.strain[..., 3]
         return arguments.number("G", G) * arguments.number("r", r) * self.torsion / self.GJ
 
 
@@ -159,37 +190,35 @@ class SectionBalance:
         pose = body_pose(arrays, w, k)
         m = arrays.links[k].mode_count
         eta, etad, etadd = w.eta[k, :m], w.etad[k, :m], w.etadd[k, :m]
-        needed = self._inertial(_motion_in(pose, link_pose(w, k), w, k), eta, etad, etadd)
+        moved, cuts = _moved(self.sections, eta, etad, etadd)
+        needed = self._inertial(_motion_in(pose, link_pose(w, k), w, k), moved)
         for outer in self._outer(w, pose, exerted):
             needed[: outer.beyond] -= outer.wrench
-        return self._in_sections(needed, eta)[self._places]
+        return _in_sections(needed, *cuts)[self._places]
 
     def loads(self, values: Real) -> SectionLoads:
         """`SectionLoads` with these loads (...,X,6)."""
         s, p = self.sections, self._places
-        return SectionLoads(self.body, self.x, values, s.EA[p], s.EIy[p], s.EIz[p], s.GJ[p])
+        K = s.stiffness[p]
+        EA, EIy, EIz, GJ = (K[:, i, i] for i in (EXTENSION, ABOUT_Y, ABOUT_Z, TWIST))
+        return SectionLoads(self.body, self.x, values, EA, EIy, EIz, GJ, None if s.plain else K)
 
-    def _inertial(self, motion: _Motion, eta: Real, etad: Real, etadd: Real) -> Real:
+    def _inertial(self, motion: _Motion, moved: _Moved) -> Real:
         """Rate of momentum (X,6), less gravity, of the parts beyond each cut, about the body's origin, body axes."""
-        s, points = self.sections, self.sections.points
+        points = self.sections.points
         w, alpha, a = motion
-        r, v, bend = _field(points.translation, s.second, "translation", eta, etad, etadd)
-        r = points.position + r
-        acceleration = a + np.cross(alpha, r) + np.cross(w, np.cross(w, r)) + 2.0 * np.cross(w, v) + bend
+        r = moved.r
+        acceleration = a + np.cross(alpha, r) + np.cross(w, np.cross(w, r)) + 2.0 * np.cross(w, moved.v) + moved.a
         torque = np.zeros_like(r)
         if np.any(points.com_offset) or np.any(points.inertia):
-            R, spin, spin_rate = turning(*_field(points.rotation, s.second, "rotation", eta, etad, etadd))
-            omega, turn = w + spin, alpha + spin_rate + np.cross(w, spin)
+            R, omega, turn = moved.R, w + moved.omega, alpha + moved.alpha + np.cross(w, moved.omega)
             arm = np.einsum("nab,nb->na", R, points.com_offset)
             J = R @ points.inertia @ np.swapaxes(R, 1, 2)
             r = r + arm
-            acceleration += np.cross(turn, arm) + np.cross(omega, np.cross(omega, arm))
+            acceleration = acceleration + np.cross(turn, arm) + np.cross(omega, np.cross(omega, arm))
             torque = np.einsum("nab,nb->na", J, turn) + np.cross(omega, np.einsum("nab,nb->na", J, omega))
         force = points.mass[:, None] * acceleration
-        each = np.hstack([np.cross(r, force) + torque, force])
-        between = np.zeros((len(s.x) + 1, 6), each.dtype)
-        np.add.at(between, s.beyond, each)
-        return np.cumsum(between[::-1], axis=0)[::-1][1:]
+        return np.asarray(self.sections.share @ np.hstack([np.cross(r, force) + torque, force]))
 
     def _outer(self, w: MotionTables, pose: Pose, exerted: Evaluation) -> list[_Outer]:
         """All loads on the beam, with their places along it."""
@@ -199,7 +228,7 @@ class SectionBalance:
         found: list[_Outer] = []
 
         def add(node: str, torque: Real, force: Real, point: Real, *, at: bool = True) -> None:
-            x = node_frame(self._beam, node).position[0]
+            x = place_along(self._beam, node)
             beyond = int(np.searchsorted(self._cuts, x, side="right" if at else "left"))
             about = torque + np.cross(point - pose.position, force)
             found.append(_Outer(beyond, np.concatenate([pose.rotation.T @ about, pose.rotation.T @ force])))
@@ -240,16 +269,6 @@ class SectionBalance:
                     add(side.node, load[:3], load[3:], closure_frames_of(arrays, w, i).point)
         return found
 
-    def _in_sections(self, wrench: Real, eta: Real) -> Real:
-        """Wrenches (X,6) about the body's origin in body axes, referred to the deformed sections and their axes."""
-        s, none = self.sections, np.zeros_like(eta)
-        axis = _field(s.motion[:, :3], s.second_motion, "translation", eta, none, none)[0]
-        theta = _field(s.motion[:, 3:], s.second_motion, "rotation", eta, none, none)[0]
-        axis[:, 0] += s.x
-        torque = wrench[:, :3] - np.cross(axis, wrench[:, 3:])
-        R = rotation_along(theta)
-        return np.hstack([np.einsum("nba,nb->na", R, each) for each in (torque, wrench[:, 3:])])
-
 
 class _Motion(NamedTuple):
     """Angular velocity, angular acceleration, acceleration of the origin less gravity (3,) of a body, its own axes."""
@@ -266,6 +285,41 @@ def _motion_in(pose: Pose, link: Pose, w: MotionTables, k: int) -> _Motion:
     omega, (alpha, a) = w.body["velocity"][k, :3], w.body["accel"][k].reshape(2, 3)
     at_origin = a + np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
     return _Motion(turn @ omega, turn @ alpha, turn @ at_origin)
+
+
+class _Moved(NamedTuple):
+    """As `flexmb.system.moved_sections.MovedSections`, of inertia points."""
+
+    r: Real
+    v: Real
+    a: Real
+    R: Real
+    omega: Real
+    alpha: Real
+
+
+def _moved(s: BeamSections, eta: Real, etad: Real, etadd: Real) -> tuple[_Moved, tuple[Real, Real]]:
+    """The inertia points relative to the body; positions (X,3) and axes (X,3,3), section to body, of the cuts."""
+    match s.motion:
+        case ByShapes(points=points, second=second, sections=shapes, second_sections=second_sections):
+            r, v, a = _field(points.translation, second, "translation", eta, etad, etadd)
+            turns = turning(*_field(points.rotation, second, "rotation", eta, etad, etadd))
+            none = np.zeros_like(eta)
+            axis = _field(shapes[:, :3], second_sections, "translation", eta, none, none)[0]
+            theta = _field(shapes[:, 3:], second_sections, "rotation", eta, none, none)[0]
+            axis[:, 0] += s.x
+            return _Moved(points.position + r, v, a, *turns), (axis, rotation_along(theta))
+        case ByStrains(field=field, points=at, cuts=cuts, rotation=rotation):
+            found = moved_sections(field, eta, etad, etadd)
+            return _Moved(*(each[at] for each in found)), (found.r[cuts], found.R[cuts] @ rotation)
+        case _:
+            assert_never(s.motion)
+
+
+def _in_sections(wrench: Real, axis: Real, R: Real) -> Real:
+    """Wrenches (X,6) about the body's origin in body axes, referred to sections at `axis` (X,3) with axes R (X,3,3)."""
+    torque = wrench[:, :3] - np.cross(axis, wrench[:, 3:])
+    return np.hstack([np.einsum("nba,nb->na", R, each) for each in (torque, wrench[:, 3:])])
 
 
 def _field(

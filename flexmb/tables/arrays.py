@@ -187,7 +187,7 @@ class Constants:
 
     gravity: Real  # (3,) World axes, m/s^2
     body: Record  # (N,) BODY
-    mff: Real  # (N,m,m) modal mass matrix at rest
+    mff: Real  # (N,m,m) modal mass matrix at rest, less that of summed points
     mfr: Real  # (N,6,m) coupling to [angular; linear] at rest
     gyration: Real  # (N,6,m) ruthless, linear: B_n = -1/2 dJ/deta_n, centrifugal force w' B_n w on the mode
     stiffness: Real  # (N,m,m)

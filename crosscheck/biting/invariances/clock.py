@@ -18,6 +18,7 @@ from crosscheck.biting.invariances.counterpart import (
     without_events,
     without_feedback,
 )
+from crosscheck.biting.invariances.linearised import relation
 from crosscheck.library.time_functions import in_functions
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene
@@ -50,7 +51,7 @@ def _rewritten(scene: Scene) -> Counterpart:
     other = in_functions(scene, on_another_clock)
     if other == scene:
         raise NotApplicable("nothing depends on the clock")
-    return Counterpart(other, lambda times, channels: channels)
+    return Counterpart(other, lambda times, channels: channels, linear=relation(scene, other))
 
 
 CLOCK = Invariance("clock", "functions of time written on another clock", _rewritten)

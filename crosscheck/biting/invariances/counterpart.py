@@ -8,11 +8,13 @@ from typing import assert_never
 
 import numpy as np
 
+from crosscheck.biting.invariances.linearised import Channels, LinearRelation
+from crosscheck.library.channels import LINEAR_KINDS
 from flexmb.scene.bodies import BeamBody, ModalBody, Quaternion, RigidBody, SidBody, Vector
 from flexmb.scene.schema import Scene
+from flexmb.scene.sections import mass_per_length
 from flexmb.typing import Real
 
-Channels = dict[str, Real]
 POLAR = (".position", ".velocity", ".force", ".linear")
 AXIAL = (".angular_velocity", ".torque", ".angular")
 
@@ -24,13 +26,20 @@ class NotApplicable(ValueError):
 @dataclass(frozen=True)
 class Counterpart:
     """A scene that moves like another. `back(times, channels)` transforms its channels (T, k) to those of the other at
-    the other's `times` (T,); channels that it omits are not compared. Its clock is `clock` times as fast, and shows
-    `starts_s` (s) where the other's shows 0."""
+    the other's `times` (T,); channels that it omits are not compared. `linear` does so for the linearised motion, which
+    is not compared if it is None. Its clock is `clock` times as fast, and shows `starts_s` (s) where the other's shows
+    0."""
 
     scene: Scene
     back: Callable[[Real, Channels], Channels]
     clock: float = 1.0
     starts_s: float = 0.0
+    linear: LinearRelation | None = None
+
+    def told(self, times: Real, channels: Channels) -> Channels:
+        """All channels (T,k) of the counterpart in the terms of the scene, at the scene's times (T,)."""
+        motion = {name: rows for name, rows in channels.items() if name.partition(".")[0] not in LINEAR_KINDS}
+        return self.back(times, motion) | ({} if self.linear is None else self.linear.back(channels))
 
 
 @dataclass(frozen=True)
@@ -110,7 +119,7 @@ def total_mass(scene: Scene) -> float:
             case RigidBody():
                 found += body.mass_kg
             case BeamBody():
-                x, density = np.array([(each.x_m, each.mass_per_length_kg_m) for each in body.stations]).T
+                x, density = np.array([(each.x_m, mass_per_length(each)) for each in body.stations]).T
                 found += float(np.trapezoid(density, x)) + sum(tip.mass_kg for tip in body.tip_masses)
             case ModalBody() if body.points:
                 found += sum(point.mass_kg for point in body.points)

@@ -11,6 +11,7 @@ from typing import TypeVar
 from msgspec.structs import replace
 
 from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, NotApplicable
+from crosscheck.biting.invariances.linearised import relation
 from crosscheck.library.time_functions import delayed, in_functions
 from flexmb.scene.check.control import named
 from flexmb.scene.control import Controller, TimeSensor
@@ -48,7 +49,8 @@ def _later(scene: Scene) -> Counterpart:
         events=tuple(map(event_later, shifted.events)),
         controllers=tuple(map(controller_later, shifted.controllers)),
     )
-    return Counterpart(other, lambda times, channels: channels, starts_s=START_S)
+    linear = relation(scene, other)
+    return Counterpart(other, lambda times, channels: channels, starts_s=START_S, linear=linear)
 
 
 def _coordinates_as_their_profiles_begin(item: Item) -> Item:

@@ -20,8 +20,9 @@ from crosscheck.biting.invariances.counterpart import (
     without_events,
     without_feedback,
 )
+from crosscheck.biting.invariances.linearised import Item, by_freedom, relation
 from crosscheck.library.time_functions import scaled
-from flexmb.scene.bodies import ModalBody, ModalNode, SidBody
+from flexmb.scene.bodies import BeamStation, ModalBody, ModalNode, SidBody
 from flexmb.scene.connectors import BetweenNodes, Bushing
 from flexmb.scene.freedoms import Coordinate, ScalarFreedom
 from flexmb.scene.functions import Function
@@ -32,6 +33,7 @@ from flexmb.surrogate import modal_points
 from flexmb.typing import Real
 
 M = TypeVar("M", bound=Hinge | PointMass | Wheel)
+S = TypeVar("S", bound=Bushing | BeamStation)
 POLAR_SIGNS = (1.0, 1.0, -1.0)
 AXIAL_SIGNS = (-1.0, -1.0, 1.0)
 QUATERNION_SIGNS = (1.0, *AXIAL_SIGNS)
@@ -39,7 +41,7 @@ POLAR_KEYS = (
     "gravity_m_s2", "com_m", "position_m", "offset_m", "com_offset_m", "parent_position_m", "child_position_m",
     "position_a_m", "position_b_m", "velocity_m_s", "translation_modes", "second_translation",
 )  # fmt: skip
-AXIAL_KEYS = ("angular_velocity_rad_s", "rotation_modes", "second_rotation")
+AXIAL_KEYS = ("angular_velocity_rad_s", "rotation_modes", "second_rotation", "curvature_1_m")
 SCREW_KEYS = ("pitch_m_rad",)
 QUATERNION_KEYS = ("quaternion", "parent_quaternion", "child_quaternion", "quaternion_a", "quaternion_b")
 
@@ -69,7 +71,14 @@ def _mirrored(scene: Scene) -> Counterpart:
             for name, rows in found.items()
         }
 
-    return Counterpart(msgspec.structs.replace(_reflected(scene), couplings=_couplings(scene)), back)
+    other = msgspec.structs.replace(_reflected(scene), couplings=_couplings(scene))
+    return Counterpart(other, back, linear=relation(scene, other, _ratios))
+
+
+def _ratios(item: Item) -> list[float]:
+    """1 for each displacement of an item that counts on in the mirror, -1 for one that counts back."""
+    signs = _signs(item)
+    return by_freedom(item, lambda _, place: signs[place], AXIAL_SIGNS, POLAR_SIGNS)
 
 
 def _couplings(scene: Scene) -> tuple[Coupling, ...]:
@@ -110,13 +119,21 @@ def _reflected(item: Any) -> Any:
             force = tuple(_times(m, s) for m, s in zip(item.force_stiffness, POLAR_SIGNS, strict=False))
             return msgspec.structs.replace(item, force_stiffness=force)
         case Bushing():
-            both = np.outer(*(2 * (AXIAL_SIGNS + POLAR_SIGNS,)))
-            matrices = (np.array(item.stiffness) * both + 0.0, np.array(item.damping) * both + 0.0)
-            K, D = (tuple(map(tuple, each.tolist())) for each in matrices)
-            return msgspec.structs.replace(item, stiffness=K, damping=D)
+            return _with_matrices(item, AXIAL_SIGNS + POLAR_SIGNS, "stiffness", "damping")
+        case BeamStation():
+            y, z = item.reference_point_m
+            item = msgspec.structs.replace(item, reference_point_m=(y, -z + 0.0))
+            return _with_matrices(item, POLAR_SIGNS + AXIAL_SIGNS, "stiffness", "inertia")
         case Closure() if item.type in WITH_AXIS:  # which has no sense of rotation
             return msgspec.structs.replace(item, axis=_signed(item.axis, POLAR_SIGNS))
     return item
+
+
+def _with_matrices(item: S, signs: tuple[float, ...], *keys: str) -> S:
+    """An item with its matrices (6,6) under these keys as the mirror shows them, those that it has."""
+    given = {key: value for key in keys if (value := getattr(item, key)) is not None}
+    seen = {key: np.array(value) * np.outer(signs, signs) + 0.0 for key, value in given.items()}
+    return msgspec.structs.replace(item, **{key: tuple(map(tuple, each.tolist())) for key, each in seen.items()})
 
 
 def _with_axes(item: M) -> M:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, NotApplicable
+from crosscheck.biting.invariances.linearised import relation
 from flexmb.scene.schema import Scene
 
 COLLECTIONS = (
@@ -17,7 +18,8 @@ def _reordered(scene: Scene) -> Counterpart:
     changes = {name: getattr(scene, name)[::-1] for name in COLLECTIONS}
     if all(len(items) < 2 for items in changes.values()):
         raise NotApplicable("there is one of each thing only")
-    return Counterpart(msgspec.structs.replace(scene, **changes), lambda times, channels: channels)
+    other = msgspec.structs.replace(scene, **changes)
+    return Counterpart(other, lambda times, channels: channels, linear=relation(scene, other))
 
 
 REORDERED = Invariance("reordered", "bodies, hinges and all else declared in the opposite order", _reordered)

@@ -20,6 +20,7 @@ from crosscheck.biting.invariances.counterpart import (
     with_energy,
     without_feedback,
 )
+from crosscheck.biting.invariances.linearised import relation
 from flexmb.scene.bodies import IDENTITY, Quaternion, Vector
 from flexmb.scene.connectors import Connector
 from flexmb.scene.hinges import Closure
@@ -55,7 +56,7 @@ def _turned(scene: Scene) -> Counterpart:
     def back(times: Real, channels: Channels) -> Channels:
         return by_kind(channels, lambda rows: rows @ R, lambda rows: rows @ R, lambda q: product(TURN * CONJUGATE, q))
 
-    return Counterpart(other, back)
+    return Counterpart(other, back, linear=relation(scene, other))
 
 
 def _moved(scene: Scene) -> Counterpart:
@@ -72,7 +73,8 @@ def _moved(scene: Scene) -> Counterpart:
             found["momentum.angular"] = found["momentum.angular"] - np.cross(STEP_M, found["momentum.linear"])
         return {name: rows - STEP_M if name.endswith(".position") else rows for name, rows in found.items()}
 
-    return Counterpart(on_ground(scene, placed), back)
+    other = on_ground(scene, placed)
+    return Counterpart(other, back, linear=relation(scene, other))
 
 
 def on_ground(scene: Scene, placed: Placed) -> Scene:

@@ -14,8 +14,9 @@ from crosscheck.biting.invariances.counterpart import (
     without_events,
     without_feedback,
 )
+from crosscheck.biting.invariances.linearised import Item, by_freedom, has_beam_modes, relation
 from crosscheck.library.time_functions import scaled, slowed
-from flexmb.scene.bodies import ModalBody, SidBody
+from flexmb.scene.bodies import BeamStation, ModalBody, SidBody
 from flexmb.scene.connectors import (
     AlongHinge,
     AngularSpring,
@@ -57,9 +58,9 @@ Each = tuple[Any, ...]
 """The dimension of each number of a tuple, or of tuples within it."""
 
 
-def _blocks(turning: Dimension, mixed: Dimension, moving: Dimension) -> Each:
-    """The dimensions of a (6,6) matrix by [rotation; translation]."""
-    above, below = (turning,) * 3 + (mixed,) * 3, (mixed,) * 3 + (moving,) * 3
+def _blocks(first: Dimension, mixed: Dimension, last: Dimension) -> Each:
+    """The dimensions of a (6,6) matrix whose first and last three rows differ: rotation and translation, or reverse."""
+    above, below = (first,) * 3 + (mixed,) * 3, (mixed,) * 3 + (last,) * 3
     return (above,) * 3 + (below,) * 3
 
 
@@ -73,12 +74,18 @@ OF_UNIT = {
     "m/s²": Dimension(1, 0, -2), "rad/s": Dimension(time=-1), "kg/m": Dimension(-1, 1), "kg m": Dimension(1, 1),
     "kg m²": Dimension(2, 1), "N/m": Dimension(0, 1, -2), "N s/m": Dimension(0, 1, -1), "N m/rad": ENERGY,
     "N m s/rad": Dimension(2, 1, -1), "m/rad": Dimension(1), "s/rad": Dimension(time=1), "s/m": Dimension(-1, 0, 1),
+    "1/m": Dimension(-1),
 }  # fmt: skip
 QUATERNIONS = ("quaternion_a", "quaternion_b")
 # Of bushings: the first three rows and columns are of turns, the others of displacements.
 OF_BUSHING = {
     "stiffness": _blocks(ENERGY, FORCE, Dimension(0, 1, -2)),
     "damping": _blocks(Dimension(2, 1, -1), Dimension(1, 1, -1), Dimension(0, 1, -1)),
+}
+# Of sections of beams: the first three rows and columns are of forces and strains, the others of moments.
+OF_SECTION = {
+    "stiffness": _blocks(FORCE, ENERGY, Dimension(3, 1, -2)),
+    "inertia": _blocks(Dimension(-1, 1), Dimension(0, 1), Dimension(1, 1)),
 }
 # Of raw modal bodies, whose modal coordinates are numbers without unit.
 OF_MODES = {
@@ -106,7 +113,16 @@ def _rescaled(scene: Scene) -> Counterpart:
         return {name: rows / _factor(name, drives) for name, rows in channels.items() if name not in left_out}
 
     other = msgspec.structs.replace(_in_units(scene), couplings=_couplings(scene), allow=UNUSUAL)
-    return Counterpart(other, back, clock=TIME)
+    # modes that are made anew in other units round otherwise, and no engine tells by how much
+    linear = None if has_beam_modes(other) else relation(scene, other, _ratios, ENERGY.factor, TIME)
+    return Counterpart(other, back, clock=TIME, linear=linear)
+
+
+def _ratios(item: Item) -> list[float]:
+    """Of the displacements of an item in the other units to those in SI."""
+    return by_freedom(
+        item, lambda freedom, _: OF_COORDINATE[freedom.coordinate.ANGULAR].factor, (1.0,) * 3, (LENGTH,) * 3
+    )
 
 
 def _couplings(scene: Scene) -> tuple[Coupling, ...]:
@@ -170,6 +186,8 @@ def _dimension(item: msgspec.Struct, key: str) -> Dimension | Each:
             return FORCE if item.type == "force" else ENERGY
         case ModalState() if key == "rates":
             return Dimension(time=-1)
+        case BeamStation() if key in OF_SECTION:
+            return NUMBER if getattr(item, key) is None else OF_SECTION[key]
     if isinstance(item, Connector) and not split_unit(key)[1]:
         return _without_unit(item, key)
     return OF_MODES[key] if key in OF_MODES else OF_UNIT[split_unit(key)[1]]

@@ -25,9 +25,9 @@ from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.drake.actions import Drives, JointActions
 from crosscheck.engines.drake.tree import DrakeSlot, DrakeState, DrakeTree, ball_rotation, place
 from crosscheck.engines.linear.axes import OutboardAxes
-from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
+from crosscheck.engines.linear.coordinates import obstacle
 from crosscheck.engines.linear.matrices import LinearMatrices, exact, quaternion_transport
-from crosscheck.engines.linear.slots import slot_names
+from crosscheck.engines.linear.slots import slot_places
 from crosscheck.engines.links import Ball, Floating, Scalar, attachment
 from crosscheck.engines.rigid_tree import PointLoad
 from flexmb.scene.schema import Scene
@@ -63,21 +63,8 @@ class DrakeLinear:
         self._plain = tree.plant.CreateDefaultContext()
         self._plant = tree.plant.ToAutoDiffXd()
         self._context = self._plant.CreateDefaultContext()
-        own = [""] * tree.plant.num_velocities()
-        self._balls: list[DrakeSlot] = []
-        self._flying: list[DrakeSlot] = []
-        for slot, names in slot_names(scene, tree.slots):
-            own[slot.v : slot.v + len(names)] = names
-            match slot.freedom:
-                case Scalar():
-                    pass
-                case Ball():
-                    self._balls.append(slot)
-                case Floating():
-                    self._flying.append(slot)
-                case _:
-                    assert_never(slot.freedom)
-        self._places = places(coordinate_names(scene), own)
+        slots = slot_places(scene, tree.slots, tree.plant.num_velocities(), linear_first=False)
+        self._places, self._balls, self._flying = slots.places, slots.balls, slots.flying
 
     def at(self, t: float, state: DrakeState) -> LinearMatrices:
         """The derivatives at a state, in the order that all engines share."""

@@ -18,6 +18,7 @@ from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Planar, Revolute, Weld
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import BeamBody, Marker, Scene
+from flexmb.scene.sections import has_plain_sections
 from flexmb.scene.strains import polynomials
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
@@ -90,6 +91,12 @@ def _refusals(scene: Scene) -> Iterator[str]:
     if scene.gravity_m_s2[2]:
         yield "gravity pulls out of the plane"
     yield from _mode_refusals(beam)
+    if not has_plain_sections(beam):
+        yield (
+            "its elements have EA, EI and GA on the axis alone: a section that is a matrix, or stated off the axis, "
+            'couples them; compare with engine "exudyn" after the beam is made points and modes'
+        )
+        return
     if beam.theory == "timoshenko" and any(station.GAy_N is None for station in beam.stations):
         yield "a shear-flexible beam needs GAy_N at every station"
     if beam.level == "rigid":
@@ -103,12 +110,10 @@ def _mode_refusals(beam: BeamBody) -> Iterator[str]:
             yield f"it is planar, and the beam has polynomials of {', '.join(sorted(beyond))}"
         if is_curved(beam):
             yield f'its elements are straight, and beam "{beam.name}" is curved where it is not loaded'
-        if beam.modes.viscosity_s:
-            yield "it has no damping by the rate of strain"
     elif set(beam.modes.families) - {"bending_y", "axial"}:
         yield 'it is planar: the beam may want the families "bending_y" and "axial" only'
-    if np.any(beam.modes.damping_ratio):
-        yield "it has no modal damping"
+    if np.any(beam.modes.damping_ratio) or beam.modes.viscosity_s:
+        yield "it has no modal damping, and none by the rate of strain"
 
 
 def _hinge_refusals(beam: BeamBody, hinge: Hinge) -> Iterator[str]:

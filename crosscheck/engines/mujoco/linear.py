@@ -14,20 +14,18 @@ from __future__ import annotations
 
 from copy import copy
 from functools import cache
-from typing import assert_never
 
 import mujoco
 import numpy as np
 
 from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.linear.axes import OutboardAxes, swapped_transport
-from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
+from crosscheck.engines.linear.coordinates import obstacle
 from crosscheck.engines.linear.differences import fourth_order
 from crosscheck.engines.linear.matrices import EPS, Errors, LinearMatrices, norm, rounding
-from crosscheck.engines.linear.slots import slot_names
-from crosscheck.engines.links import Ball, Floating, Scalar
+from crosscheck.engines.linear.slots import slot_places
 from crosscheck.engines.mujoco.forces import Forces
-from crosscheck.engines.mujoco.tree import LEAST_INERTIA, MujocoSlot, MujocoTree
+from crosscheck.engines.mujoco.tree import LEAST_INERTIA, MujocoTree
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -46,22 +44,8 @@ class MujocoLinear:
         self._data = mujoco.MjData(model)
         moments = (np.linalg.eigvalsh(link.inertia.inertia)[0] for link in tree.links)
         self._raised = sum(bool(moment < LEAST_INERTIA) for moment in moments)
-        own = [""] * model.nv
-        self._turning: list[int] = []
-        self._flying: list[MujocoSlot] = []
-        for slot, names in slot_names(scene, tree.slots):
-            match slot.freedom:
-                case Scalar():
-                    own[slot.v : slot.v + len(names)] = names
-                case Ball():
-                    own[slot.v : slot.v + 3] = names
-                    self._turning.append(slot.v)
-                case Floating():
-                    own[slot.v : slot.v + 6] = [*names[3:], *names[:3]]
-                    self._flying.append(slot)
-                case _:
-                    assert_never(slot.freedom)
-        self._places = places(coordinate_names(scene), own)
+        self._slots = slot_places(scene, tree.slots, model.nv, linear_first=True)
+        self._places = self._slots.places
         self._square = np.ix_(self._places, self._places)
 
     def at(self, t: float, qpos: Real, qvel: Real) -> LinearMatrices:
@@ -75,19 +59,31 @@ class MujocoLinear:
             axes = self._axes(data.qacc)
             by_force = axes.by_force(inverse)[self._square]
             unit = rounding(by_force, nv)
-            noise = np.sqrt(nv) * (unit * norm(axes.udot[self._places]) + EPS * norm(axes.u))
+            parts = norm(axes.u) + norm(np.abs(by_force) @ self._weights()[self._places])
+            noise = np.sqrt(nv) * (unit * norm(axes.udot[self._places]) + EPS * parts)
             step = cache(self._step)
             by_q, apart = fourth_order(lambda eps: step(eps)[nv:, :nv], noise)
             by_v, asunder = fourth_order(lambda eps: step(eps)[nv:, nv:] - np.eye(nv), noise)
+        asunder += np.sqrt(nv) * EPS  # of the ones, which the derivatives by speeds are beside
         share = self._raised * LEAST_INERTIA * norm(by_force)
         errors = Errors(
             apart + asunder * axes.kept + share * (norm(by_q) + norm(axes.udot[self._places])),
             asunder + share * norm(by_v),
             (unit + share) * norm(by_force),
         )
-        transport = swapped_transport(axes.u, self._turning, [slot.v for slot in self._flying])
+        transport = swapped_transport(
+            axes.u, [slot.v for slot in self._slots.balls], [slot.v for slot in self._slots.flying]
+        )
         parts = (axes.by_displacement(by_q, by_v), axes.by_speed(by_v))
         return LinearMatrices(*(part[self._square] for part in parts), by_force, transport[self._square], errors)
+
+    def _weights(self) -> Real:
+        """(nv,) sums of the sizes of all bodies' weights along the speeds, which may cancel at rest."""
+        model, found, J = self._model, np.zeros(self._model.nv), np.empty((3, self._model.nv))
+        for body in range(1, model.nbody):
+            mujoco.mj_jacBodyCom(model, self._data, J, None, body)
+            found += model.body_mass[body] * norm(model.opt.gravity) * np.linalg.norm(J, axis=0)
+        return found
 
     def _step(self, eps: float) -> Real:
         """d [q; v] after a step by d [q; v] before it (2nv,2nv)."""
@@ -99,7 +95,7 @@ class MujocoLinear:
     def _axes(self, acceleration: Real) -> OutboardAxes:
         """The change to outboard axes of the shifts of free flights."""
         axes = OutboardAxes(self._data.qvel, acceleration)
-        for slot in self._flying:
+        for slot in self._slots.flying:
             quaternion = self._data.qpos[slot.q + 3 : slot.q + 7]
             R = rotation_matrix(quaternion / np.linalg.norm(quaternion))
             turning = slice(slot.v + 3, slot.v + 6)

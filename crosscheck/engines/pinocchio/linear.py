@@ -18,9 +18,9 @@ import pinocchio as pin
 
 from crosscheck.engines.conventions import rotation_vector, scalar_first
 from crosscheck.engines.linear.axes import swapped_transport
-from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
+from crosscheck.engines.linear.coordinates import obstacle
 from crosscheck.engines.linear.matrices import LinearMatrices, exact
-from crosscheck.engines.linear.slots import slot_names
+from crosscheck.engines.linear.slots import slot_places
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.dynamics import Acting, Dynamics, PinocchioState
 from flexmb.scene.schema import Scene
@@ -37,22 +37,9 @@ class PinocchioLinear:
         self._dynamics = dynamics
         self._model = dynamics.tree.model
         self._data = self._model.createData()
-        own = [""] * self._model.nv
-        self._turning: list[int] = []
-        self._moving: list[int] = []
-        for slot, names in slot_names(scene, dynamics.tree.slots):
-            match slot.freedom:
-                case Scalar():
-                    own[slot.v : slot.v + len(names)] = names
-                case Ball():
-                    own[slot.v : slot.v + 3] = names
-                    self._turning.append(slot.v)
-                case Floating():
-                    own[slot.v : slot.v + 6] = [*names[3:], *names[:3]]
-                    self._moving.append(slot.v)
-                case _:
-                    assert_never(slot.freedom)
-        self._places = places(coordinate_names(scene), own)
+        slots = slot_places(scene, dynamics.tree.slots, self._model.nv, linear_first=True)
+        self._places = slots.places
+        self._turning, self._moving = [slot.v for slot in slots.balls], [slot.v for slot in slots.flying]
         self._free = not dynamics.driven
 
     def at(self, t: float, state: PinocchioState) -> LinearMatrices:

@@ -6,13 +6,15 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
 import msgspec
+import numpy as np
 from msgspec.structs import replace
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.mutation import FACTOR, MutationTarget, SceneChange
-from flexmb.scene.bodies import BeamBody, BeamNode, Body, ModalNode, Node, Quaternion, SidBody, Vector
+from flexmb.scene.bodies import BeamBody, BeamNode, BeamStation, Body, ModalNode, Node, Quaternion, SidBody, Vector
 from flexmb.scene.hinges import Hinge
 from flexmb.scene.schema import Scene
+from flexmb.scene.sections import inertia_matrices, mass_centres, matrix
 from flexmb.scene.tree import Coordinate, coordinates, with_coordinates
 
 AnyNode = Node | BeamNode | ModalNode
@@ -132,9 +134,27 @@ def more(of_item: Callable[[Callable[[Any], Any]], SceneChange], *keys: str) -> 
     return of_item(lambda item: multiplied(item, keys, FACTOR))
 
 
-def scaled_stations(beam: BeamBody, keys: Iterable[str]) -> BeamBody:
-    """+1 % of the numbers under these keys at every station of a beam."""
-    return replace(beam, stations=tuple(multiplied(station, keys, FACTOR) for station in beam.stations))
+def scaled_stations(beam: BeamBody, keys: Iterable[str], change: Callable[[BeamStation], BeamStation]) -> BeamBody:
+    """+1 % of the numbers under these keys at every station of a beam, and `change` where it has a matrix instead."""
+    stations = tuple(change(multiplied(station, keys, FACTOR)) for station in beam.stations)
+    return replace(beam, stations=stations)
+
+
+def stiffer(station: BeamStation) -> BeamStation:
+    """+1 % of the stiffness, where that is a matrix."""
+    return station if station.stiffness is None else replace(station, stiffness=scaled(station.stiffness))
+
+
+def heavier(mass: float, inertia: float) -> Callable[[BeamStation], BeamStation]:
+    """Mass, and inertia about the mass centre, times factors, where they are a matrix."""
+
+    def change(station: BeamStation) -> BeamStation:
+        if station.inertia is None:
+            return station
+        m, com, J = mass_centres(np.array([station.inertia]))
+        return replace(station, inertia=matrix(inertia_matrices(mass * m, com, inertia * J)[0]))
+
+    return change
 
 
 def opposite(vector: Vector) -> Vector:

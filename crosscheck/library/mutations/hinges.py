@@ -22,6 +22,7 @@ from crosscheck.library.mutations.edits import (
     opposite,
     scaled,
     scaled_stations,
+    stiffer,
     wheels,
     with_each_coordinate,
 )
@@ -81,7 +82,7 @@ def _stiffness(scene: Scene, target: str) -> Scene:
 def _stiffer_body(body: Body) -> Body:
     match body:
         case BeamBody():
-            return scaled_stations(body, ("EA_N", "EIy_Nm2", "EIz_Nm2", "GJ_Nm2"))
+            return scaled_stations(body, ("EA_N", "EIy_Nm2", "EIz_Nm2", "GJ_Nm2"), stiffer)
         case ModalBody() if body.stiffness:
             return replace(body, stiffness=scaled(body.stiffness))
         case RigidBody() | ModalBody() | SidBody():

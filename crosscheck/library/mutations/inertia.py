@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import (
     bodies,
+    heavier,
     more,
     multiplied,
     of_body,
@@ -36,7 +37,7 @@ def _mass(body: Body) -> Body:
         case RigidBody():
             return replace(body, mass_kg=FACTOR * body.mass_kg)
         case BeamBody():
-            return scaled_stations(body, ("mass_per_length_kg_m",))
+            return scaled_stations(body, ("mass_per_length_kg_m",), heavier(FACTOR, 1.0))
         case ModalBody() if body.points:
             return replace(body, points=tuple(multiplied(point, ("mass_kg",), FACTOR) for point in body.points))
         case ModalBody() | SidBody():
@@ -52,7 +53,7 @@ def _inertia(body: Body) -> Body:
         case RigidBody():
             return _more_inertia(body)
         case BeamBody():
-            return scaled_stations(body, ("rotary_y_kg_m", "rotary_z_kg_m"))
+            return scaled_stations(body, ("rotary_y_kg_m", "rotary_z_kg_m"), heavier(1.0, FACTOR))
         case ModalBody() | SidBody():
             raise CaseError(f'control "inertia" changes rigid bodies and beams, not "{body.name}"')
         case _:

@@ -12,28 +12,42 @@ from crosscheck.library.mutations.edits import bodies, of_body, whole
 from crosscheck.library.mutations.mirror import along, mirrors, within
 from crosscheck.library.mutations.mutation import Mutation, SceneChange
 from crosscheck.library.mutations.resting import rests, twists_only
-from flexmb.scene.bodies import BeamBody, Body, ModalBody, ModalNode
+from flexmb.scene.bodies import BeamBody, BeamStation, Body, Level, ModalBody, ModalNode
+from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import Scene
+from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, matrix
+from flexmb.scene.strains import polynomials
 from flexmb.surrogate import modal_points
 
 ROUNDING = 1e-9  # of an eigenproblem and of sums over its modes
 
 
 def _unstiffened(scene: Scene, target: str) -> Scene:
-    """Level stiffened becomes full (of body `target`, or of all)."""
+    """Levels stiffened and exact become full (of body `target`, or of all)."""
 
     def changed(body: Body) -> Body:
-        wanted = target in ("", body.name) and body.level == "stiffened"
-        return replace(body, level="full") if wanted else body
+        wanted = target in ("", body.name) and body.level in ("stiffened", "exact")
+        return _of_small_deflection(body, "full") if wanted else body
 
     return replace(scene, bodies=tuple(map(changed, scene.bodies)))
 
 
 @of_body
 def _undeformed(body: Body) -> Body:
-    """Level full or stiffened becomes ruthless: inertia of the undeformed body."""
-    wanted = body.level in ("full", "stiffened", "linear")
-    return replace(body, level="ruthless") if wanted else body
+    """Any level above ruthless becomes ruthless: inertia of the undeformed body."""
+    wanted = body.level in ("full", "stiffened", "linear", "exact")
+    return _of_small_deflection(body, "ruthless") if wanted else body
+
+
+def _of_small_deflection(body: Body, level: Level) -> Body:
+    """The body at a level of modes; a beam of level exact gets as many of them as it has polynomials of a strain."""
+    if not isinstance(body, BeamBody) or body.level != "exact":
+        return replace(body, level=level)
+    if is_curved(body):
+        raise CaseError(f'beam "{body.name}" is curved at rest, which only level "exact" can express')
+    count = max(polynomials(body).values())
+    modes = replace(body.modes, count=count, polynomials=None, pieces=1, points=None)
+    return replace(body, level=level, modes=modes, elements=max(body.elements, 2 * count))
 
 
 def _twists_in_place(scene: Scene, target: str) -> str:
@@ -60,6 +74,8 @@ def _of_modes(name: str, change: Callable[[ModalBody], ModalBody]) -> SceneChang
 def _in_modes(scene: Scene, target: str) -> Body | None:
     """The body called `target`, a beam as the points and modes that it stands for."""
     alone = next((body for body in scene.bodies if body.name == target), None)
+    if isinstance(alone, BeamBody) and alone.level == "exact":
+        raise CaseError(f'beam "{alone.name}" is of level "exact": it has strains, and its points have no modes')
     if isinstance(alone, BeamBody):
         return modal_points(replace(scene, bodies=(alone,))).bodies[0]
     return alone
@@ -126,23 +142,36 @@ def _no_rotation(body: ModalBody) -> ModalBody:
 def _section(body: Body) -> Body:
     if not isinstance(body, BeamBody):
         raise CaseError(f'control "section_axes" changes beams, not "{body.name}"')
-    stations = tuple(
-        replace(each, EIy_Nm2=each.EIz_Nm2, EIz_Nm2=each.EIy_Nm2) for each in body.stations
-    )
-    return replace(body, stations=stations)
+    return replace(body, stations=tuple(map(_bent_across, body.stations)))
+
+
+def _bent_across(station: BeamStation) -> BeamStation:
+    """The station with EIy and EIz exchanged."""
+    if station.stiffness is None:
+        return replace(station, EIy_Nm2=station.EIz_Nm2, EIz_Nm2=station.EIy_Nm2)
+    exchanged = np.array(station.stiffness)
+    exchanged[ABOUT_Y, ABOUT_Y], exchanged[ABOUT_Z, ABOUT_Z] = exchanged[ABOUT_Z, ABOUT_Z], exchanged[ABOUT_Y, ABOUT_Y]
+    return replace(station, stiffness=matrix(exchanged))
+
+
+@of_body
+def _on_the_axis(body: Body) -> Body:
+    if not isinstance(body, BeamBody) or not any(any(each.reference_point_m) for each in body.stations):
+        raise CaseError(f'control "section_point" changes beams with a reference point off the axis, not "{body.name}"')
+    return replace(body, stations=tuple(replace(each, reference_point_m=(0.0, 0.0)) for each in body.stations))
 
 
 MUTATIONS = (
     Mutation(
         "dropped_stiffening",
-        "level stiffened becomes full",
+        "level stiffened or exact becomes full",
         "geometric stiffening left out",
         whole,
         _unstiffened,
     ),
     Mutation(
         "dropped_deformation",
-        "level full or stiffened becomes ruthless",
+        "level full, stiffened or exact becomes ruthless",
         "Coriolis, centrifugal and inertia terms of the deformation left out",
         bodies,
         _undeformed,
@@ -170,6 +199,13 @@ MUTATIONS = (
         "slopes left out: what is mounted on the body does not turn with its bending",
         bodies,
         _of_modes("mode_rotation", _no_rotation),
+    ),
+    Mutation(
+        "section_point",
+        "sections stated on the axis, not at their reference point",
+        "neutral axis and mass centre taken for the axis",
+        bodies,
+        _on_the_axis,
     ),
     Mutation("section_axes", "EIy and EIz exchanged", "bending about y taken for bending along y", bodies, _section),
 )

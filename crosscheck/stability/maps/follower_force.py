@@ -12,7 +12,7 @@ from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap
 from crosscheck.stability.spectrum import growth_rate, states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant
-from flexmb.scene.schema import BeamStation, Modes, Scene, TipMass
+from flexmb.scene.schema import BeamStation, Level, Modes, Scene, TipMass
 from flexmb.system.compile import compile
 from flexmb.typing import Real
 
@@ -22,21 +22,17 @@ NEUTRAL = 1e-7  # 1/s; below is rounding
 KNOTS = 65
 
 
-def column(load: float, tip_mass: float = 0.0, damping: float = 0.0) -> Scene:
-    """A clamped beam, the force along its tip; `damping`: time (s) by which stiffness is multiplied (Kelvin, Voigt).
-
-    Modal damping ratios are half of it times the frequencies, which for a uniform beam are beta^2.
-    """
+def column(load: float, tip_mass: float = 0.0, damping: float = 0.0, level: Level = "stiffened") -> Scene:
+    """A clamped beam, the force along its tip; `damping`: time (s) by which stiffness is multiplied (Kelvin, Voigt)."""
     section = BeamStation(
         x_m=0.0, EA_N=1e6, EIy_Nm2=STIFFNESS, EIz_Nm2=STIFFNESS, GJ_Nm2=1.0, mass_per_length_kg_m=MASS
     )
-    ratios = tuple(0.5 * damping * omega for omega in undamped_frequencies(tip_mass)[:MODES])
     lumps = (TipMass(x_m=LENGTH, mass_kg=tip_mass * MASS * LENGTH),) if tip_mass else ()
     return (
         SceneBuilder("follower force")
         .beam(
-            "beam", length=LENGTH, elements=ELEMENTS, section=section, level="stiffened", points="line",
-            modes=Modes(count=MODES, families=("bending_y",), damping_ratio=ratios), tip_masses=lumps,
+            "beam", length=LENGTH, elements=ELEMENTS, section=section, level=level, points="line",
+            modes=Modes(count=MODES, families=("bending_y",), viscosity_s=damping), tip_masses=lumps,
         )  # fmt: skip
         .weld("clamp", "ground", "beam")
         .force("push", "beam", node="tip", direction=(-1, 0, 0), frame="node", function=Constant(value=load))
@@ -73,13 +69,6 @@ def matrices() -> tuple[Real, Real, Real, Real]:
     F[-2, -1] = 1.0  # a force -P slope on the tip's deflection
     free = slice(2, None)
     return M[free, free], K[free, free], G[free, free], F[free, free]
-
-
-@cache
-def undamped_frequencies(tip_mass: float) -> tuple[float, ...]:
-    """Of the unloaded column, rad/s."""
-    M, K, _, _ = matrices()
-    return tuple(np.sort(np.sqrt(eigvals(K, _with_tip(M, tip_mass)).real)))
 
 
 def _with_tip(M: Real, tip_mass: float) -> Real:
@@ -140,6 +129,23 @@ MAPS = (
             excess(TIP_MASS, lambda tip_mass: critical_load(tip_mass, 0.0)),
         ),
         shows="A force that follows the tip lets a column flutter; level stiffened has what static buckling needs too.",
+        depth=2,
+    ),
+    StabilityMap(
+        name="follower_force_exact",
+        title="Beck's and Pflueger's columns at level exact",
+        quantity="growth rate",
+        scene=lambda load, tip_mass: column(load, tip_mass=tip_mass, level="exact"),
+        measure=measure,
+        x=LOAD,
+        y=TIP_MASS,
+        thresholds=(NEUTRAL,),
+        overlay=Overlay(
+            "flutter of the undamped column, 20.05 without tip mass",
+            "Beck 1952, Pflueger 1955; computed with beam elements",
+            excess(TIP_MASS, lambda tip_mass: critical_load(tip_mass, 0.0)),
+        ),
+        shows="Strains in place of modes: the same boundary, with no geometric stiffness but that of the kinematics.",
         depth=2,
     ),
     StabilityMap(

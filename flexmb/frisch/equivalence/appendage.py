@@ -128,7 +128,7 @@ def appendage_of(scene: Scene, body: str, modes: int | None = None) -> Appendage
 def _with_modes(body: BeamBody, modes: int | None) -> BeamBody:
     """The beam with its lowest eigenmodes; damping does not matter here."""
     elements = beam_elements(body)
-    rotary = any(station.rotary_y_kg_m + station.rotary_z_kg_m > 0.0 for station in body.stations)
+    rotary = np.any(elements.table.inertia[:, 3, 3] > 0.0)
     idle = {"torsion"} if body.points == "line" or not rotary else set()
     moving = [field for family, field in elements.fields.items() if family not in idle]
     coordinates = sum(field.size - len(field.clamped_coordinates) for field in moving)

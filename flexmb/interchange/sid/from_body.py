@@ -24,8 +24,13 @@ def sid_of(body: BeamBody | ModalBody, folder: str | os.PathLike[str] | None = N
 
     `folder`: the folder of a modal body's file, if its name is relative. The geometric stiffness of a body of level
     "stiffened" is in Ct, Cr, Oe and the nodes. For a free-free body the node "origin" is omitted, because it is not
-    fixed to the material. Raises ValueError for inconsistent data.
+    fixed to the material. Raises ValueError for inconsistent data, and for a beam of level "exact".
     """
+    if body.level == "exact":
+        raise ValueError(
+            f'beam "{body.name}" has level "exact", whose strains are no modes of Standard Input Data: write it with '
+            'level "stiffened", which has the same geometric stiffness'
+        )
     model = flexible_model(body, None if folder is None else Path(folder))
     m = model.mode_count
     sums, second = first_order(model), _second(model)

@@ -31,6 +31,60 @@ def subtract_applied(c, w, d):
 
 @sweep
 def _by_duals(c, w, d):
+    differentiate_forces(c, w, d)
+    e, nu = d.duals, w.u.shape[0]
+    for j in range(nu):
+        place = d.place[j]
+        if c.speed[j].coordinate >= 0:
+            d.matrix[place, place] -= rate(e.speed[j].applied, COORDINATES)
+        d.matrix[place, nu + place] -= rate(e.speed[j].applied, SPEEDS)
+    if has(c, BALL_SPRINGS):
+        for k in range(c.body.shape[0]):
+            if c.body[k].ball_spring != 0.0:
+                for n in range(3):
+                    place = d.places[k].hinge + n
+                    for m in range(3):
+                        change = rate(e.speed[c.body[k].u_index + n].applied, ROTATIONS + m)
+                        d.matrix[place, d.places[k].hinge + m] -= change
+
+
+@helper
+def pull_applied(c, w, d, virtual, row):
+    """Subtract virtual speeds (nu,) times the derivatives of w.speed.applied from a row (2nu,) in order of places."""
+    nu = w.u.shape[0]
+    if has(c, BALL_SPRINGS) or has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS):
+        _pull_by_duals(c, w, d, virtual, row)
+        return
+    for j in range(nu):
+        place = d.place[j]
+        if has(c, SPRINGS) and c.speed[j].coordinate >= 0:
+            row[place] += virtual[j] * c.speed[j].stiffness
+        if has(c, DAMPERS):
+            row[nu + place] += virtual[j] * c.speed[j].damping
+
+
+@sweep
+def _pull_by_duals(c, w, d, virtual, row):
+    differentiate_forces(c, w, d)
+    e, nu = d.duals, w.u.shape[0]
+    for j in range(nu):
+        place = d.place[j]
+        if c.speed[j].coordinate >= 0:
+            row[place] -= virtual[j] * rate(e.speed[j].applied, COORDINATES)
+        row[nu + place] -= virtual[j] * rate(e.speed[j].applied, SPEEDS)
+    if has(c, BALL_SPRINGS):
+        for k in range(c.body.shape[0]):
+            if c.body[k].ball_spring != 0.0:
+                for n in range(3):
+                    j = c.body[k].u_index + n
+                    for m in range(3):
+                        change = rate(e.speed[j].applied, ROTATIONS + m)
+                        row[d.places[k].hinge + m] -= virtual[j] * change
+
+
+@helper
+def differentiate_forces(c, w, d):
+    """w.speed.applied in dual numbers, as the lanes say, to the dual workspace."""
     e, nu = d.duals, w.u.shape[0]
     for i in range(w.q.shape[0]):
         e.q[i] = w.q[i]
@@ -45,19 +99,6 @@ def _by_duals(c, w, d):
         e.u[j] = w.u[j]
         e.u[j] = seeded(e.u[j], SPEEDS)
     hinge_forces(c, e)
-    for j in range(nu):
-        place = d.place[j]
-        if c.speed[j].coordinate >= 0:
-            d.matrix[place, place] -= rate(e.speed[j].applied, COORDINATES)
-        d.matrix[place, nu + place] -= rate(e.speed[j].applied, SPEEDS)
-    if has(c, BALL_SPRINGS):
-        for k in range(c.body.shape[0]):
-            if c.body[k].ball_spring != 0.0:
-                for n in range(3):
-                    place = d.places[k].hinge + n
-                    for m in range(3):
-                        change = rate(e.speed[c.body[k].u_index + n].applied, ROTATIONS + m)
-                        d.matrix[place, d.places[k].hinge + m] -= change
 
 
 @helper

@@ -1,5 +1,6 @@
 """Blocks of columns: four strips as one value, and six of them as the spatial vectors of all these columns."""
 
+from flexmb.jain.derivatives.columns import zero
 from flexmb.jit.kernel import helper
 from flexmb.jit.strips import put, strip, width
 
@@ -96,7 +97,8 @@ def plus6(J, x, V):
 @helper
 def no_block6(d, row):
     """Six blocks of zeros, of the type of those in a row."""
-    x = scaled(0.0, block(d, row, 0))
+    nothing = zero(d, row)
+    x = nothing, nothing, nothing, nothing
     return x, x, x, x, x, x
 
 

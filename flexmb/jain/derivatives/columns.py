@@ -5,7 +5,7 @@ from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.strips import after, put, strip, width
 from flexmb.spatial.rows import strips3
-from flexmb.spatial.spatial_vector import dot6, shift_force
+from flexmb.spatial.spatial_vector import dot6, shift_force, store6, vec6
 from flexmb.spatial.vector import dot, vec3
 from flexmb.tables.features import CONNECTORS, LOADS, MODES
 
@@ -44,6 +44,45 @@ def inboard_columns(c, d, place, path, answer, masses):
 
 
 @helper
+def inboard_columns_of_modes(c, d, k, nm, masses):
+    """The same for the rows of all modes of body k at once, whose l2, l1 and l0 are in `mode`: each strip of sources is
+    read once for all of them."""
+    first, run, end, nu = d.places[k].modes, d.places[k].run, d.places[k].end, d.speed.shape[0]
+    for i in range(nm):
+        for row in range(12):
+            d.answer[i, row] = d.mode[k, row, i]
+    while run >= 0:
+        offset = d.run[run].offset
+        n = d.run[run].start
+        while n < end:
+            J = strips3(d, d.seed, 0, n), strips3(d, d.seed, 3, n)
+            turn, speed = strips3(d, d.seed, TURN, n), strips3(d, d.seed, SPEED_BY_RATE, n)
+            s1, s2 = strips3(d, d.seed, BY_RATE, n), six_strips(d, BY_ACCELERATION, n)
+            s2_speed = six_strips(d, SPEED_BY_ACCELERATION, n)
+            for i in range(nm):
+                row, l2, l1 = d.matrix[first + i], vec6(d.answer[i], 0), vec3(d.answer[i], 6)
+                x = dot6(l2, s2) + dot(l1, s1)
+                if has(c, LOADS) or has(c, CONNECTORS):
+                    x += dot(vec3(d.answer[i], 9), turn)
+                put_until(d, row, n + offset, end - n, x)
+                put_until(d, row, nu + n + offset, end - n, dot6(l2, s2_speed) + dot(l1, speed))
+                if masses:
+                    put_until(d, row, 2 * nu + n + offset, end - n, dot6(l2, J))
+            n += width(d)
+        end = d.run[run].stop
+        if d.run[run].new_point:
+            step = vec3(d.body[d.run[run].body].step, 0)
+            for i in range(nm):
+                store6(d.answer[i], 0, at_inboard_point(vec6(d.answer[i], 0), step))
+        run = d.run[run].inboard
+
+
+@helper
+def six_strips(d, row, n):
+    return strips3(d, d.seed, row, n), strips3(d, d.seed, row + 3, n)
+
+
+@helper
 def at_inboard_point(l2, step):
     """l2, which is a force, about the base point inboard, at -step. l1 and l0 are angular and the same there."""
     return shift_force(l2, step)
@@ -70,3 +109,9 @@ def put_until(d, row, n, count, x):
         beyond = count - 1
         x = x - after(d, x, 0, beyond) + after(d, strip(d, row, n), 0, beyond)
     put(d, row, n, x)
+
+
+@helper
+def zero(d, row):
+    """A strip of zeros, of the type of those of a row."""
+    return after(d, strip(d, row, 0), 0, width(d))

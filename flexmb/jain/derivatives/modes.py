@@ -6,7 +6,7 @@ its own motion J_i on F. Where the modes move the body frame against O, the whol
 more thing that they move.
 """
 
-from flexmb.jain.derivatives.columns import inboard_columns, put_until
+from flexmb.jain.derivatives.columns import inboard_columns_of_modes, put_until
 from flexmb.jain.derivatives.rows import BY_RATES, BY_SPEED, by_angle, row_by_angle
 from flexmb.jain.derivatives.strips_of import put_strips, put_strips_until, six_of, strips_of
 from flexmb.jain.derivatives.tables import (
@@ -48,10 +48,7 @@ def mode_rows(c, d, k, masses):
             _move_frame(c, d, k, n)
         for n in range(0, nm, width(d)):
             _add_rows(c, d, mode, n, d.body[k], strips_of(d, d.frame_mode[k], MOTION, n))
-    for n in range(nm):
-        l1, l0 = column3(mode, MODE_BY_RATE, n), column3(mode, MODE_BY_TURN, n)
-        run, end = d.places[k].run, d.places[k].end
-        inboard_columns(c, d, first + n, (run, end), (six_of(mode, MODE_ROW, n), l1, l0), masses)
+    inboard_columns_of_modes(c, d, k, nm, masses)
 
 
 @helper

@@ -161,30 +161,57 @@ def _relative_acceleration(c, w, k, i):
 
 @helper
 def _change(c, w, d, k, i):
-    """Derivatives of V_r, A_r and the motions of port i to `change` and `bent`; its point moves along, too."""
+    """Derivatives of V_r, A_r and the motions of port i to `change` and `bent`; its point moves along, too.
+
+    One more direction, along the speeds of all modes, gives those of A_r by speeds: what A_r has of them is
+    sum_jk etad_j etad_k dJ_j/deta_k, with the motion J_j of mode j, so that its derivative by the speed of mode n is
+    sum_k etad_k (dJ_k/deta_n + dJ_n/deta_k). The first of these sums is the derivative of V_r by displacement n.
+    """
     if is_at_rest(c.body[k].level):
         return
     e, nm = d.duals, c.body[k].modes
     for n in range(nm):
         e.eta[k, n] = w.eta[k, n]
         e.etad[k, n] = w.etad[k, n]
-    for first in range(0, 2 * nm, LANES):
-        count = min(LANES, 2 * nm - first)
+    for first in range(0, nm + 1, LANES):
+        count = min(LANES, nm + 1 - first)
         for lane in range(count):
-            seed_mode(e, k, nm, first + lane, lane)
+            if first + lane < nm:
+                seed_mode(e, k, nm, first + lane, lane)
+            else:
+                _seed_along_speeds(w, e, k, nm, lane)
         if has(c, SECTIONS):
             move_sections(c, e, k)
         move_port(c, e, k, i)
         _store_relative(c, w, d, k, i)
         for lane in range(count):
-            n = first + lane
-            if n < nm:
-                _keep_displacement(c, d, k, i, n, lane)
-                e.eta[k, n] = w.eta[k, n]
+            if first + lane < nm:
+                _keep_displacement(c, d, k, i, first + lane, lane)
             else:
-                for row in range(6):
-                    d.change[12 + row, n - nm] = rate(e.body[k].accel[row], lane)
-                e.etad[k, n - nm] = w.etad[k, n - nm]
+                _keep_speeds(d, i, nm, lane)
+        for n in range(nm):
+            e.eta[k, n] = w.eta[k, n]
+
+
+@helper
+def _seed_along_speeds(w, e, k, nm, lane):
+    """A displacement of all modes by their speeds."""
+    for n in range(nm):
+        unit = seeded(e.eta[k, n], lane) - e.eta[k, n]
+        e.eta[k, n] += w.etad[k, n] * unit
+
+
+@helper
+def _keep_speeds(d, i, nm, lane):
+    """Derivatives of A_r by speeds from those of the motions along the speeds, about the port's point as it is now."""
+    e = d.duals
+    moved = (rate(e.port[i].r[0], lane), rate(e.port[i].r[1], lane), rate(e.port[i].r[2], lane))
+    for n in range(nm):
+        J = e.port_mode[i, 0, n].real, e.port_mode[i, 1, n].real, e.port_mode[i, 2, n].real
+        v = cross(moved, J)
+        for row in range(3):
+            d.change[12 + row, n] = d.change[row, n] + rate(e.port_mode[i, row, n], lane)
+            d.change[15 + row, n] = d.change[3 + row, n] + rate(e.port_mode[i, 3 + row, n], lane) + v[row]
 
 
 @helper

@@ -140,9 +140,7 @@ def _to_inboard_point(c, d, k, masses):
     shift_by_angle(d.body[k].by_rate, step)
     if has(c, LOADS) or has(c, CONNECTORS):
         shift_by_angle(d.body[k].by_turn, step)
-    start, stop = d.places[k].hinge, d.places[k].stop
-    for row in range(0, 18 if masses else 12, 6):
-        _shift_rows(d, step, row, start, stop)
+    shift_columns(d, step, d.places[k].hinge, d.places[k].stop, masses)
 
 
 @helper
@@ -154,6 +152,13 @@ def shift_by_angle(D, step):
         D[i] += y * c - z * b
         D[3 + i] += z * a - x * c
         D[6 + i] += x * b - y * a
+
+
+@helper
+def shift_columns(d, step, start, stop, masses):
+    """Refer columns start .. stop of `force` to another point; step leads from there to the present one."""
+    for row in range(0, 18 if masses else 12, 6):
+        _shift_rows(d, step, row, start, stop)
 
 
 @helper

@@ -1,40 +1,14 @@
 """M x = -T for many columns T at once, by the factors that `flexmb.jain.sweeps.inward` has left: (55), (56).
 
-The columns are solved in blocks of `BLOCK` strips. What passes from body to body is six numbers for each column, as in
-`flexmb.jain.innovations`; in World axes they are added without a rotation.
+The columns are solved in blocks of strips. What passes from body to body is six numbers for each column, as in
+`flexmb.jain.innovations`; in World axes they are added without a rotation. Bodies are visited depth first, so that
+along a stretch of the tree these numbers stay in registers; only where the tree forks they are stored.
 """
 
-from flexmb.jain.derivatives.blocks import (
-    along,
-    block,
-    block6,
-    less,
-    minus_sum,
-    no_block6,
-    plus,
-    plus6,
-    put_block,
-    put_block6,
-    scaled,
-    shift_forces,
-    shift_motions,
-    sum_block6,
-)
+from flexmb.jain.derivatives import solve_bodies, solve_single
 from flexmb.jain.derivatives.hinges import force_to_world
-from flexmb.jain.derivatives.solve_modes import (
-    answer_modes,
-    answer_wheels,
-    load_modes,
-    moved_by_modes,
-    release_modes,
-    release_wheels,
-)
-from flexmb.jain.derivatives.tables import BLOCK
-from flexmb.jain.hinge_solve import SINGLE
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
-from flexmb.jit.strips import width
-from flexmb.spatial.rows import column6
 from flexmb.spatial.spatial_vector import store6, vec6
 from flexmb.spatial.vector import mat3, vec3
 from flexmb.tables.features import MODES, SEVERAL, WHEELS
@@ -43,31 +17,64 @@ from flexmb.tables.features import MODES, SEVERAL, WHEELS
 @helper
 def solve(c, w, d, columns):
     """Replace the first `columns` columns of `matrix` by -M^-1 times them; rows of prescribed speeds vanish."""
+    _gains(c, w, d)
+    for at in range(0, columns, _size(c, d)):
+        _block(c, w, d, at, c.body.shape[0])
+
+
+@helper
+def solve_with_inverse(c, w, d):
+    """The same of all columns, of which the last third are those of -1; of the symmetric M^-1 the upper triangle.
+
+    A force on a speed acts on no innovation but its own and those inboard, whose places are before its own.
+    """
+    _gains(c, w, d)
+    nu, size = w.u.shape[0], _size(c, d)
+    for at in range(0, 3 * nu, size):
+        bodies = c.body.shape[0]
+        if at >= 2 * nu:
+            while d.places[d.order[bodies - 1]].hinge >= at + size - 2 * nu:
+                bodies -= 1
+        _block(c, w, d, at, bodies)
+
+
+@helper
+def _is_lean(c):
+    """Whether every hinge has a single axis, and no body has modes or wheels."""
+    return not (has(c, SEVERAL) or has(c, MODES) or has(c, WHEELS))
+
+
+@helper
+def _size(c, d):
+    """Number of columns of a block."""
+    return solve_single.size(d) if _is_lean(c) else solve_bodies.size(d)
+
+
+@helper
+def _block(c, w, d, at, bodies):
+    """The columns from `at` on, in the rows of the first bodies of the order."""
+    if _is_lean(c):
+        solve_single.solve_block(c, d, at, bodies)
+    else:
+        solve_bodies.solve_block(c, w, d, at, bodies)
+
+
+@helper
+def _gains(c, w, d):
     for k in range(c.body.shape[0]):
-        _gains(c, w, d, k)
+        _gains_of_hinge(c, w, d, k)
         if has(c, MODES):
+            R, r = mat3(d.body[k].rotation, 0), vec3(d.body[k].position, 0)
             for n in range(c.body[k].modes):
-                R, r = mat3(d.body[k].rotation, 0), vec3(d.body[k].position, 0)
                 store6(d.gain[d.places[k].modes + n], 0, force_to_world(R, r, vec6(w.pfr[k, n], 0)))
-    for at in range(0, columns, BLOCK * width(d)):
-        for k in range(c.body.shape[0] - 1, -1, -1):
-            _inward(c, w, d, k, at)
-        for k in range(c.body.shape[0]):
-            _outward(c, w, d, k, at)
 
 
 @helper
-def is_single(c, w, k):
-    """Whether hinge k was eliminated by its single free axis."""
-    return not has(c, SEVERAL) or w.body[k].free_count == SINGLE
-
-
-@helper
-def _gains(c, w, d, k):
+def _gains_of_hinge(c, w, d, k):
     """G of single axes, and G L of other hinges, in World axes about the base point; pivots of single axes."""
     R, r = mat3(d.body[k].rotation, 0), vec3(d.body[k].position, 0)
     first = d.places[k].hinge
-    if is_single(c, w, k):
+    if solve_bodies.is_single(c, w, k):
         store6(d.gain[first], 0, force_to_world(R, r, vec6(w.body[k].gain, 0)))
         d.factor[first] = 1.0 / w.body[k].inertia_along
     else:
@@ -75,91 +82,3 @@ def _gains(c, w, d, k):
             place = first + w.hinge[k].free_speed[a]
             store6(d.gain[place], 0, force_to_world(R, r, vec6(w.hinge[k].gain[a], 0)))
             d.factor[place] = 1.0 / w.hinge[k].factor[a, a]
-
-
-@helper
-def _inward(c, w, d, k, at):
-    """y = -T - J . z of the block of columns from `at` on, and z + G y to the parent, as `hinge_solve.innovate`."""
-    z = block6(d, d.passed[k]) if not d.places[k].tip else no_block6(d, d.passed[k, 0])
-    if has(c, WHEELS):
-        z = release_wheels(c, w, d, k, at, z)
-    if has(c, MODES):
-        z = release_modes(c, w, d, k, at, z)
-    first, slot = d.places[k].hinge, d.places[k].slot
-    if is_single(c, w, k):
-        y = along(column6(d.seed, slot), z)
-        y = minus_sum(block(d, d.matrix[first], at), y)
-        put_block(d, d.matrix[first], at, y)
-        z = plus6(vec6(d.gain[first], 0), y, z)
-    else:
-        z = _innovate(c, w, d, k, at, z)
-    p = c.body[k].parent
-    if p >= 0:
-        if has(c, MODES):
-            load_modes(c, d, k, at, z)
-        if d.places[k].new_point:
-            z = shift_forces(z, vec3(d.body[k].step, 0))
-        if not d.places[k].first:
-            z = sum_block6(z, block6(d, d.passed[p]))
-        put_block6(d, d.passed[p], z)
-
-
-@helper
-def _innovate(c, w, d, k, at, z):
-    """`_inward` for a hinge with any number of free speeds; returns z^+."""
-    first, slot, free = d.places[k].hinge, d.places[k].slot, w.body[k].free_count
-    for a in range(free):
-        n = w.hinge[k].free_speed[a]
-        y = minus_sum(block(d, d.matrix[first + n], at), along(column6(d.seed, slot + n), z))
-        for b in range(a):
-            y = plus(-w.hinge[k].factor[a, b], block(d, d.matrix[first + w.hinge[k].free_speed[b]], at), y)
-        put_block(d, d.matrix[first + n], at, scaled(d.factor[first + n], y))
-    for a in range(free):
-        place = first + w.hinge[k].free_speed[a]
-        z = plus6(vec6(d.gain[place], 0), block(d, d.matrix[place], at), z)
-    return z
-
-
-@helper
-def _outward(c, w, d, k, at):
-    """x = y / D - G . A of the same columns, and A + J x of the body, as `hinge_solve.solve`."""
-    p = c.body[k].parent
-    A = block6(d, d.passed[p]) if p >= 0 else no_block6(d, d.passed[k, 0])
-    if p >= 0 and d.places[k].new_point:
-        A = shift_motions(A, vec3(d.body[k].step, 0))
-    if has(c, MODES):
-        A = moved_by_modes(c, d, k, at, A)
-    first, slot = d.places[k].hinge, d.places[k].slot
-    if is_single(c, w, k):
-        x = along(vec6(d.gain[first], 0), A)
-        x = less(scaled(d.factor[first], block(d, d.matrix[first], at)), x)
-        put_block(d, d.matrix[first], at, x)
-        A = plus6(column6(d.seed, slot), x, A)
-    else:
-        A = _solve(c, w, d, k, at, A)
-    if has(c, MODES):
-        answer_modes(c, w, d, k, at, A)
-    if has(c, WHEELS):
-        answer_wheels(c, w, d, k, at, A)
-    if not d.places[k].tip:
-        put_block6(d, d.passed[k], A)
-
-
-@helper
-def _solve(c, w, d, k, at, A):
-    """`_outward` for a hinge with any number of free speeds; returns the body's A."""
-    first, slot, free = d.places[k].hinge, d.places[k].slot, w.body[k].free_count
-    for a in range(free - 1, -1, -1):
-        place = first + w.hinge[k].free_speed[a]
-        x = less(block(d, d.matrix[place], at), along(vec6(d.gain[place], 0), A))
-        for b in range(a + 1, free):
-            x = plus(-w.hinge[k].factor[b, a], block(d, d.matrix[first + w.hinge[k].free_speed[b]], at), x)
-        put_block(d, d.matrix[place], at, scaled(d.factor[place], x))
-    for a in range(free):
-        n = w.hinge[k].free_speed[a]
-        A = plus6(column6(d.seed, slot + n), block(d, d.matrix[first + n], at), A)
-    for n in range(c.body[k].nv):
-        if c.speed[c.body[k].u_index + n].prescribed >= 0:
-            x = block(d, d.matrix[first + n], at)
-            put_block(d, d.matrix[first + n], at, scaled(0.0, x))
-    return A

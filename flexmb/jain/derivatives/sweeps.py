@@ -7,8 +7,9 @@ from flexmb.jain.derivatives.connected import attach_connectors, link
 from flexmb.jain.derivatives.modes import mode_rows
 from flexmb.jain.derivatives.motion import move
 from flexmb.jain.derivatives.ports import clear_ports, move_ports
+from flexmb.jain.derivatives.rigid_trees import is_rigid_tree, rigid_tree
 from flexmb.jain.derivatives.rows import add_answer, inward
-from flexmb.jain.derivatives.solve import solve
+from flexmb.jain.derivatives.solve import solve, solve_with_inverse
 from flexmb.jain.derivatives.tables import BRANCHES
 from flexmb.jain.derivatives.work import differentiate_power
 from flexmb.jit.features import has
@@ -22,10 +23,33 @@ def inverse_dynamics(c, w, d, masses):
 
     Needs the velocity sweep in w, that of poses if there are connectors, and udot in w.speed.acceleration.
     """
+    if is_rigid_tree(c):
+        _begin(c, w, d, masses)
+        for k in range(c.body.shape[0]):
+            move(c, w, d, k)
+        rigid_tree(c, w, d, masses)
+    else:
+        forces_of_bodies(c, w, d, masses)
+        rows_of_speeds(c, w, d, masses)
+
+
+@helper
+def _begin(c, w, d, masses):
+    """Clear the matrix where it is not written, and copy the functions of time."""
     nu = d.speed.shape[0]
     if d.shape[BRANCHES] or has(c, WHEELS):  # else every element is written
         for place in range(nu):
             _clear(d.matrix[place], 0, 3 * nu if masses else 2 * nu)
+    for f in range(c.function.shape[0]):
+        for i in range(3):
+            d.duals.function[f, i] = w.function[f, i]
+
+
+@helper
+def forces_of_bodies(c, w, d, masses):
+    """Outward: motion and forces of the bodies and of what is attached to them. `masses`, and what it needs in w: see
+    `inverse_dynamics`."""
+    _begin(c, w, d, masses)
     for k in range(c.body.shape[0]):
         move(c, w, d, k)
         if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):
@@ -34,11 +58,13 @@ def inverse_dynamics(c, w, d, masses):
         own_force(c, w, d, k)
         if has(c, LOADS) or has(c, WHEELS):
             attach(c, w, d, k)
-    for f in range(c.function.shape[0]):
-        for i in range(3):
-            d.duals.function[f, i] = w.function[f, i]
     if has(c, CONNECTORS):
         attach_connectors(c, w, d)
+
+
+@helper
+def rows_of_speeds(c, w, d, masses):
+    """Inward, after `forces_of_bodies` and what else acts on the bodies: the matrix, from what they answer."""
     for k in range(c.body.shape[0] - 1, -1, -1):
         if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):
             _answer_of_ports(c, d, k)
@@ -74,7 +100,10 @@ def accelerations(c, w, d):
     for place in range(nu):
         _clear(d.matrix[place], 2 * nu, 3 * nu)
         d.matrix[place, 2 * nu + place] = -1.0
-    solve(c, w, d, 3 * nu)
+    solve_with_inverse(c, w, d)
+    for i in range(nu):
+        for j in range(i):
+            d.matrix[i, 2 * nu + j] = d.matrix[j, 2 * nu + i]
 
 
 @kernel

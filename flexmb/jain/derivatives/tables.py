@@ -20,11 +20,11 @@ from flexmb.jain.places import Matrices, matrices
 from flexmb.jit.bundle import bundle
 from flexmb.jit.duals import DUAL
 from flexmb.jit.lanes import LANES
-from flexmb.jit.strips import strip_zeros
+from flexmb.jit.strips import strip_zeros, whole
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.tables.arrays import ON_GROUND, Constants, Workspace
 from flexmb.tables.workspaces import workspace
-from flexmb.typing import Index, Real, Record
+from flexmb.typing import Flags, Index, Real, Record
 
 BODIES_A_POINT = 8
 """Moments about a point eight bodies away lose two digits at most."""
@@ -49,8 +49,16 @@ PLACES = np.dtype(
         ("end", _I),
         ("new_point", _I),  # whether its hinge point is a base point
         ("leaves_point", _I),  # whether no source inboard of its hinge is about its base point
-        ("first", _I),  # whether it is the first in the inward sweep to add to its parent's force
-        ("tip", _I),  # whether it carries nothing
+        ("branches", _I),  # whether it sits on a body that is not the one before it
+    ],
+    align=True,
+)
+STRETCH = np.dtype(
+    [
+        ("start", _I),  # first place in `order`
+        ("stop", _I),
+        ("ends", _I),  # whether the next body in `order` does not sit on its last one
+        ("forks", _I),  # whether any body that is not the next one sits on its last one
     ],
     align=True,
 )
@@ -133,13 +141,18 @@ class Derivatives:
     matrix: Real  # (nu,3nu) d(M udot + b) by displacement, by speed, and M or -1; then the solution
     gain: Real  # (nu,6) of the factors of M
     factor: Real  # (nu,)
-    passed: Real  # (N,6,block) forces, then accelerations, of one block of columns
+    order: Index  # (N,) bodies by their places
+    stretch: Record  # STRETCH: bodies in `order` about one base point, each of which carries the next and no other
+    fork: Index  # bodies at the ends of stretches that fork
+    carried: Real  # (N,28) in trees of rigid bodies on single axes: what branches answer where they meet
+    passed: Real  # (N,6,block) their forces, then accelerations, of one block of columns
     moved: Real  # (N,6,6,6) of hinges that are no single axis: derivatives of H in outboard axes by displacement
     turned: Real  # (3,6,6) of one such hinge: of V_r and A_r by displacement, of A_r by speed, in columns
     port: Record  # (P,) PORT
     port_mode: Real  # (P,MOVED_ROWS,m) what modes do to ports relative to the body
     frame_mode: Real  # (N,MOVED_ROWS,m) to the body frame relative to O; zero unless they move O in the body
     mode: Real  # (N,MODE_ROWS,m)
+    answer: Real  # (m,12) l2, l1 and l0 of the modes of one body
     bent: Real  # (P,m,6,m) derivatives of the motion of a port at unit speed of mode j by displacement n: [j, ., n]
     change: Real  # (18,m) of one port: of its V_r and A_r by displacements, of A_r by speeds, in body axes
     end: Real  # (2,END_ROWS,nu) what all sources do to the two ends of a connector
@@ -162,9 +175,10 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
     """Arrays of the right sizes."""
     order = matrices(c)
     places, runs, slots = _places_and_runs(c, order)
+    visited, stretch = _stretches(c, places)
     place = np.empty(nu, np.int64)
     place[order.speed] = np.arange(nu)
-    columns = 3 * nu + BLOCK * LANES  # room for the last block
+    columns = whole(3 * nu + BLOCK * LANES)  # room for the last block
     m = c.mfr.shape[2]
     return Derivatives(
         places=places,
@@ -178,6 +192,10 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
         matrix=strip_zeros((nu, columns)),
         gain=np.zeros((nu, 6)),
         factor=np.zeros(nu),
+        order=visited,
+        stretch=stretch,
+        fork=visited[stretch["stop"][stretch["forks"] != 0] - 1],
+        carried=np.zeros((len(c.body), 28)),
         passed=strip_zeros((len(c.body), 6, BLOCK * LANES)),
         moved=np.zeros((len(c.body) if np.any(c.body["axis"] < 0) else 1, 6, 6, 6)),
         turned=np.zeros((3, 6, 6)),
@@ -185,6 +203,7 @@ def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
         port_mode=strip_zeros((len(c.port), MOVED_ROWS, m)),
         frame_mode=strip_zeros((len(c.body), MOVED_ROWS, m)),
         mode=strip_zeros((len(c.body), MODE_ROWS, m)),
+        answer=np.zeros((m, 12)),
         bent=strip_zeros((len(c.port), m, 6, m)),
         change=strip_zeros((18, m)),
         end=strip_zeros((2, END_ROWS, (nu if len(c.connector) + len(c.load) else 0) + LANES)),
@@ -211,12 +230,19 @@ def _shape(c: Constants, place: Index, nq: int) -> Index:
     return np.array([len(set(body["parent"].tolist())) < len(body), in_order, alike], np.int64)
 
 
+def ports_in_use(c: Constants) -> Flags:
+    """(P,) which ports a body, wheel, load or connector is attached to."""
+    found = np.zeros(len(c.port), bool)
+    ends = c.end["port"][c.end["body"] != ON_GROUND]
+    for attached in (c.body["inboard_port"], c.wheel["port"], c.load["port"], ends):
+        found[attached[attached >= 0]] = True
+    return found
+
+
 def _ports(c: Constants) -> Record:
     """(P,) PORT with what is attached where."""
     port = np.zeros(len(c.port), PORT)
-    ends = c.end["port"][c.end["body"] != ON_GROUND]
-    for attached in (c.body["inboard_port"], c.wheel["port"], c.load["port"], ends):
-        port["used"][attached[attached >= 0]] = 1
+    port["used"] = ports_in_use(c)
     return port
 
 
@@ -243,13 +269,25 @@ def _places_and_runs(c: Constants, order: Matrices) -> tuple[Record, Record, int
         own["inboard_run"], own["inboard_end"] = path
         own["slot"] = paths.slots
         own["run"], own["end"] = paths.extended(path, k, int(own["hinge"]), count, new and not seen)
-    begun = set[int]()
-    for k in range(len(body) - 1, -1, -1):
-        p = int(body["parent"][k])
-        places["first"][k] = p not in begun
-        begun.add(p)
-    places["tip"] = [k not in begun for k in range(len(body))]
     return places, np.array(paths.runs or [(0, 0, -1, 0, 0, 0)], RUN), paths.slots
+
+
+def _stretches(c: Constants, places: Record) -> tuple[Index, Record]:
+    """Bodies in the order of the solution, and its stretches; writes to `places` which bodies branch off."""
+    order = np.argsort(places["hinge"], kind="stable")  # a weld has the place of what it carries
+    parent = c.body["parent"][order]
+    follows = parent == np.concatenate([[-1], order[:-1]])
+    branches = ~follows & (parent >= 0)
+    places["branches"][order] = branches
+    forks = np.isin(order, parent[branches])
+    begins = ~follows | (places["new_point"][order] != 0) | np.append(False, forks[:-1])
+    begins[:1] = True
+    start = np.flatnonzero(begins)
+    stretch = np.zeros(len(start), STRETCH)
+    stretch["start"], stretch["stop"] = start, np.append(start[1:], len(order))
+    stretch["ends"] = ~np.append(follows[1:], False)[stretch["stop"] - 1]
+    stretch["forks"] = forks[stretch["stop"] - 1]
+    return order, stretch
 
 
 class _Paths:

@@ -1,27 +1,19 @@
-"""Checks of beams: mesh, sections that cover the length, usual materials, and modes that the elements can represent."""
+"""Checks of beams: mesh, sections that cover the length, and modes that the elements can represent."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import sqrt
 
-from flexmb.scene.bodies import BeamBody, BeamStation
+from flexmb.scene.bodies import BeamBody
 from flexmb.scene.check import inertia
 from flexmb.scene.check.exact_beams import damping, exact_beam, without_strains
+from flexmb.scene.check.sections import stations
 from flexmb.scene.check.walk import sound
 from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.schema import Scene
+from flexmb.scene.sections import twists_with_inertia
 from flexmb.scene.sizes import MOST_BYTES, PER_MODE, PLENTY, beam_estimate
 from flexmb.scene.strains import strain_count
-
-# Axial wave speed sqrt(EA / mass per length): soft rubber has some 50 m/s, diamond 18 km/s. The limits are wider than
-# any structure that is built; the soft benchmark beams of the literature (100 m/s) are inside.
-WAVE_SPEED = (50.0, 20_000.0)  # m/s
-THICKEST = 0.5  # radius of gyration over length: beyond it nothing is slender
-# GJ / (EIy + EIz) and GA / EA are below 0.75 for isotropic materials; laminates reach a few times that.
-STIFFEST_SHEAR = 10.0
-STIFFNESS = ("EA_N", "EIy_Nm2", "EIz_Nm2", "GJ_Nm2")
-SHEAR = ("GAy_N", "GAz_N")
 
 
 def beams(scene: Scene) -> Iterator[Defect]:
@@ -75,45 +67,7 @@ def _stations(place: Place, body: BeamBody) -> Iterator[Defect]:
         covered = f"{positions[0]:g} m to {positions[-1]:g} m" if positions else "nothing"
         remedy = f"give the section at x_m = 0 and at x_m = {body.length_m!r}; a uniform beam has the same one twice"
         yield Defect(str(spot), f"the stations cover {covered}, the beam 0 m to {body.length_m:g} m", remedy)
-    for i, station in enumerate(body.stations):
-        for key in (*STIFFNESS, "mass_per_length_kg_m"):
-            if (value := getattr(station, key)) <= 0.0:
-                yield Defect(str(spot.key(i, key)), f"{key} is {value:g}", "give a positive value")
-        for key in ("rotary_y_kg_m", "rotary_z_kg_m"):
-            if (value := getattr(station, key)) < 0.0:
-                yield Defect(str(spot.key(i, key)), f"{key} is {value:g}", "give a rotary inertia of at least zero")
-        for key in SHEAR:
-            value = getattr(station, key)
-            if body.theory == "timoshenko" and value is None:
-                yield Defect(str(spot.key(i)), f"a Timoshenko beam needs {key}", f"add {key}, or use euler-bernoulli")
-            elif value is not None and value <= 0.0:
-                yield Defect(str(spot.key(i, key)), f"{key} is {value:g}", "give a positive value")
-        if all(getattr(station, key) > 0.0 for key in (*STIFFNESS, "mass_per_length_kg_m")):
-            yield from _plausible(spot.key(i), station, body.length_m)
-
-
-def _plausible(spot: Place, station: BeamStation, length: float) -> Iterator[Doubt]:
-    """Stiffnesses and masses that suggest an error of units."""
-    check = "check the units, a factor of 1000 for instance"
-    speed = sqrt(station.EA_N / station.mass_per_length_kg_m)
-    if not WAVE_SPEED[0] <= speed <= WAVE_SPEED[1]:
-        what = f"waves would run along the beam at {speed:.3g} m/s: no usual material does that"
-        window = f"sqrt(EA / mass per length) lies in {WAVE_SPEED[0]:g} to {WAVE_SPEED[1]:g} m/s"
-        yield Doubt(str(spot.key("EA_N")), what, f"{check}: {window}", "wave_speed")
-        return
-    for key in ("EIy_Nm2", "EIz_Nm2"):
-        gyration = sqrt(getattr(station, key) / station.EA_N)
-        if gyration > THICKEST * length > 0.0:
-            what = f"the section's radius of gyration would be {gyration:.3g} m in a beam of {length:.3g} m"
-            width = f"{check}: sqrt(EI / EA) is a fraction of the section's width"
-            yield Doubt(str(spot.key(key)), what, width, "thick_section")
-    for key, limit in (("GJ_Nm2", station.EIy_Nm2 + station.EIz_Nm2), ("GAy_N", station.EA_N), ("GAz_N", station.EA_N)):
-        value = getattr(station, key)
-        if value is not None and value > STIFFEST_SHEAR * limit:
-            counterpart = "EIy + EIz" if key == "GJ_Nm2" else "EA"
-            what = f"{key} is {value / limit:.3g} times {counterpart}"
-            isotropic = f"{check}: G is smaller than E in every isotropic material"
-            yield Doubt(str(spot.key(key)), what, isotropic, "shear_stiffness")
+    yield from stations(place, body)
 
 
 def _along(place: Place, body: BeamBody) -> Iterator[Defect]:
@@ -158,11 +112,11 @@ def available_modes(body: BeamBody) -> int:
 
 def twisting_points(body: BeamBody) -> int:
     """Coordinates of torsion with inertia: every element's, or without rotary inertia those of lumps off the axis."""
-    if _has_rotary(body):
+    if twists_with_inertia(body):
         return body.elements
     lumps = [lump for lump in body.tip_masses if lump.inertia_kg_m2[0][0] > 0.0 or any(lump.com_m[1:])]
     return min(len(lumps), body.elements)
 
 
 def _has_rotary(body: BeamBody) -> bool:
-    return body.points != "line" and any(s.rotary_y_kg_m > 0.0 or s.rotary_z_kg_m > 0.0 for s in body.stations)
+    return body.points != "line" and twists_with_inertia(body)

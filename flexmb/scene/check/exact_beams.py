@@ -35,7 +35,7 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
     elif points_of_piece(body) > MOST_POINTS:
         yield Defect(str(modes.key("points")), f"{points_of_piece(body)} points", f"use {MOST_POINTS} at most")
     for shear, key in (("shear_y", "GAy_N"), ("shear_z", "GAz_N")):
-        if shear in found and any(getattr(station, key) is None for station in body.stations):
+        if shear in found and any(each.stiffness is None and getattr(each, key) is None for each in body.stations):
             spot = str(place.key("stations"))
             yield Defect(spot, f"{shear} has polynomials, and a station no {key}", f"give {key} at every station")
     yield from damping(modes, body.modes, sum(found.values()) * max(body.modes.pieces, 1))

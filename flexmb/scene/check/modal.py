@@ -27,6 +27,11 @@ SPEED = (1e-3, 20_000.0)
 
 def modal_bodies(scene: Scene) -> Iterator[Defect]:
     """Problems of every raw modal body."""
+    given = [i for i, body in enumerate(scene.bodies) if isinstance(body, ModalBody | SidBody)]
+    for place, body in sound(scene, "bodies", given):
+        if body.level == "exact":
+            what = 'level "exact" is that of strains along a beam, which modes of a body do not have'
+            yield Defect(str(place.key("level")), what, 'use "full" or "stiffened", or give a beam by its sections')
     modal = [i for i, body in enumerate(scene.bodies) if isinstance(body, ModalBody)]
     for place, body in sound(scene, "bodies", modal):
         arrays = yield from _read(place, body)

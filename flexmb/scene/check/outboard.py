@@ -23,6 +23,7 @@ from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Defect
 from flexmb.scene.quaternions import rotation_by, rotation_matrix
 from flexmb.scene.schema import PointMass, Scene, Wheel
+from flexmb.scene.sections import inertia_on_axis, mass_centres
 from flexmb.scene.tree import GROUND, NodeFrame, ordered, rest_frames
 from flexmb.typing import Real
 
@@ -193,16 +194,15 @@ def _attached(item: Wheel | PointMass) -> Real:
 def _beam(body: BeamBody) -> Real:
     lumps = (_lump(t.mass_kg, np.add((t.x_m, 0.0, 0.0), t.com_m), t.inertia_kg_m2) for t in body.tip_masses)
     total: Real = sum(lumps, np.zeros((6, 6)))
-    keys = ("mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
     for left, right in zip(body.stations, body.stations[1:], strict=False):
         half = (right.x_m - left.x_m) / 2.0
-        for s, weight in zip(*GAUSS, strict=True):
-            share = (1.0 + s) / 2.0
-            mass, jy, jz = (
-                half * weight * ((1.0 - share) * getattr(left, key) + share * getattr(right, key)) for key in keys
-            )
-            section = np.zeros((3, 3)) if body.points == "line" else np.diag([jy + jz, jy, jz])
-            total = total + _lump(mass, (left.x_m + half * (1.0 + s), 0.0, 0.0), section)
+        share = ((1.0 + np.array(GAUSS[0])) / 2.0)[:, None, None]
+        weight = half * np.array(GAUSS[1])[:, None, None]
+        between = (1.0 - share) * inertia_on_axis(left) + share * inertia_on_axis(right)
+        mass, com, inertia = mass_centres(weight * between)
+        com[:, 0] = left.x_m + half * (1.0 + np.array(GAUSS[0]))
+        turning = np.zeros_like(inertia) if body.points == "line" else inertia
+        total = total + np.sum(_lumps(mass, com, turning), axis=0)
     return total
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 from rich.console import Console
 
@@ -78,13 +80,27 @@ def test_an_absent_engine_is_no_agreement(tmp_path: Path) -> None:
     assert print_invariances(Console(quiet=True), found) == 1
 
 
-def test_what_rests_says_nothing_and_nobody_asks_for_its_derivatives(tmp_path: Path) -> None:
-    """Derivatives depend on units and on the order of the coordinates: they would differ in every counterpart."""
+def of_a_pendulum_at_rest(out: Path, linear: bool) -> tuple[InvarianceVerdict, ...]:
+    """Verdicts on MuJoCo about a hanging pendulum, which does not move."""
     case = load_case(shipped_folder() / "linearised" / "hanging_pendulum")
+    if not linear:
+        variants = tuple(msgspec.structs.replace(each, linear=msgspec.UNSET) for each in case.run.variants)
+        case = replace(case, run=msgspec.structs.replace(case.run, variants=variants))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("crosscheck.biting.invariance_runs.run_planned", run_here)
-        found = run_invariances([case], tmp_path, engine="mujoco")
+        return run_invariances([case], out, engine="mujoco")
+
+
+def test_what_rests_says_nothing(tmp_path: Path) -> None:
+    found = of_a_pendulum_at_rest(tmp_path, linear=False)
     assert all(each.status == "not applicable" and each.ok for each in found)
     assert {each.invariance for each in found if each.reason == "nothing moves"} >= {"turned", "rescaled", "reordered"}
-    records = (tmp_path / "invariances.jsonl").read_text(encoding="utf-8")
-    assert "derivatives" not in records.partition('"record":"run"')[2]
+
+
+def test_what_rests_is_compared_by_its_linearised_motion(tmp_path: Path) -> None:
+    found = {each.invariance: each for each in of_a_pendulum_at_rest(tmp_path, linear=True)}
+    compared = [found[name] for name in ("turned", "moved", "rescaled", "reordered", "mirrored")]
+    assert {each.status for each in compared} == {"agree"}
+    assert {each.channels for each in compared} == {4}  # three derivatives, and the frequencies
+    assert all(each.channel.startswith(("derivatives.", "frequencies")) for each in compared)
+    assert found["boosted"].status == "not applicable"

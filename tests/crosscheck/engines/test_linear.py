@@ -12,12 +12,14 @@ from crosscheck.engines.contract import EngineMissing, Run, Trajectory
 from crosscheck.engines.linear.coordinates import coordinate_names, modes_of, obstacle, places
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.registry import engine
-from flexmb.linear.linearize import displacement_names
+from flexmb.linear.linearize import displacement_names, linearize
 from flexmb.linear.variations import Equations
 from flexmb.scene.build import SceneBuilder
+from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
 from tests.crosscheck.engines.random_scenes import KINDS, random_scene
+from tests.repo.project import ROOT
 from tests.trees import with_armatures
 
 TIMES = np.array([0.0, 1e-6])
@@ -122,3 +124,20 @@ def test_a_scene_without_shared_coordinates_has_no_derivatives(name: str) -> Non
     assert not run.derivatives
     if name == "native":
         assert run.frequencies[0] == pytest.approx([np.sqrt(9.81 * 0.5 / 0.35)], rel=1e-12)
+
+
+def test_exudyns_own_linearised_system_lacks_what_loads_of_joints_do():
+    """As docs/linearised.md says. Where joints bear no loads it is right: then a new version may have repaired it."""
+    assembly = pytest.importorskip("crosscheck.engines.exudyn.assembly")
+    shown = {}
+    for name in ("hanging_pendulum", "spring_chains"):
+        try:
+            mbs = assembly.assemble(load_scene(ROOT / "cases" / "linearised" / name / "scene.toml")).shop.mbs
+        except EngineMissing as missing:
+            pytest.skip(str(missing))
+        M, K, *_ = mbs.ComputeLinearizedSystem(projectIntoConstraintNullspace=True)
+        shown[name] = np.sort(np.linalg.eigvals(np.linalg.solve(M, K)).real)
+    chains = linearize(load_scene(ROOT / "cases" / "linearised" / "spring_chains" / "scene.toml"))
+    squares = np.sort(np.abs(chains.eigenvalues.imag))[::2] ** 2
+    assert shown["spring_chains"] == pytest.approx(squares, rel=1e-6, abs=1e-6)
+    assert shown["hanging_pendulum"] == pytest.approx([0.0, 0.0], abs=1e-6)

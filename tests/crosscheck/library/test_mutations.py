@@ -377,3 +377,21 @@ def test_a_half_turn_transposed_is_itself(quaternion: tuple[float, float, float,
     scene = msgspec.structs.replace(SCENE, hinges=(base, *SCENE.hinges[1:]))
     assert "half-turn" in CATALOGUE["hinge_rotation"].idle(scene, "base")
     assert CATALOGUE["hinge_rotation"].idle(SCENE, "base") == ""
+
+
+def test_strains_become_modes_of_small_deflection() -> None:
+    """A beam of level exact loses what its level adds; of one that is curved, no other level could say anything."""
+    boom = next(body for body in SCENE.bodies if isinstance(body, BeamBody))
+    bent = msgspec.structs.replace(boom, level="exact", modes=Modes(count=6, families=("bending_y",), pieces=2))
+    hub, _, tip = SCENE.bodies
+    scene = msgspec.structs.replace(SCENE, bodies=(hub, bent, tip))
+    for name, level in (("dropped_stiffening", "full"), ("dropped_deformation", "ruthless")):
+        changed = mutate(scene, name, "boom").bodies[1]
+        assert isinstance(changed, BeamBody) and changed.level == level
+        assert changed.modes == Modes(count=6, families=("bending_y",)) and changed.elements == 12
+        check_scene(mutate(scene, name, "boom"))
+    stations = tuple(msgspec.structs.replace(each, curvature_1_m=(0.0, 0.5, 0.0)) for each in bent.stations)
+    arc = msgspec.structs.replace(SCENE, bodies=(hub, msgspec.structs.replace(bent, stations=stations), tip))
+    for name in ("dropped_stiffening", "dropped_deformation", "mode_sign"):
+        with pytest.raises(CaseError):
+            mutate(arc, name, "boom")

@@ -22,7 +22,8 @@ from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan, variant_scene
 from crosscheck.running.sweep import PROVIDER
 from flexmb.interchange.sid import sid_of, write_sid
-from flexmb.scene.bodies import SidBody
+from flexmb.scene.bodies import BeamStation, Modes, SidBody
+from flexmb.scene.build import SceneBuilder
 from flexmb.scene.connectors import HingeFriction
 from flexmb.typing import Real
 from tests.crosscheck.sessions import CASE, shipped
@@ -198,3 +199,26 @@ def test_a_film_climbs_no_ladder_and_is_found_all_the_same() -> None:
     execute(film_job, lambda each: records.append(each) if isinstance(each, RunRecord) else None)
     (results,) = collect(records).cases  # type: ignore[arg-type]
     assert results.get("segments", "native", FILM).status == "finished"
+
+
+def test_a_beam_curved_to_a_ring_is_drawn_along_its_axis() -> None:
+    """Its tip is nearer to its root than its middle is; tangents are those of the circle."""
+    section = BeamStation(
+        x_m=0.0, EA_N=1e6, EIy_Nm2=1.0, EIz_Nm2=1.0, GJ_Nm2=1.0, mass_per_length_kg_m=1.0,
+        curvature_1_m=(0.0, 0.0, 1.8 * np.pi),
+    )  # fmt: skip
+    modes = Modes(count=3, families=("bending_y",))
+    builder = SceneBuilder("ring").beam("ring", length=1.0, elements=1, section=section, modes=modes, level="exact")
+    filmed = film(builder.weld("clamp", "ground", "ring").marker("end", "ring", node="tip").scene())
+    assert filmed is not None
+    (line,) = filmed[1].lines
+    seen = NativeEngine().compile(filmed[0]).evaluate().markers
+    _, *inner, tip = (point for point in line.points if point.marker)  # the frame's origin is the root
+    assert tip.marker == "end" and len(inner) == 12
+    radius = 1.0 / (1.8 * np.pi)
+    for i, point in enumerate((*inner, tip)):
+        marker, angle = seen[point.marker], 1.8 * np.pi * i / 12
+        expected = radius * np.array([np.sin(angle), 1.0 - np.cos(angle), 0.0])
+        np.testing.assert_allclose(marker.position, expected, atol=1e-12)
+        turn = Rotation.from_quat(marker.quaternion, scalar_first=True)
+        np.testing.assert_allclose(turn.apply(point.tangent), [np.cos(angle), np.sin(angle), 0.0], atol=1e-12)

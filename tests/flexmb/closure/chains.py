@@ -28,8 +28,10 @@ NOWHERE = FlexibleNode(np.zeros(3), np.eye(3), np.zeros((3, 0)), np.zeros((3, 0)
 def seat(dense: DenseSystem, body: str, node: str, position: Array, quaternion: Array) -> tuple[int, Seat]:
     """A frame of a closure in the dense route's terms: member and seat."""
     k = dense.tree.index(body)
-    at = NOWHERE if k < 0 else dense.tree.members[k].model.nodes[node]
-    return k, Seat(at, np.array(position, float), Rotation.from_quat(quaternion, scalar_first=True).as_matrix())
+    model = None if k < 0 else dense.tree.members[k].model
+    at, field = (NOWHERE, None) if model is None else (model.nodes[node], model.field)
+    turn = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    return k, Seat(at, np.array(position, float), turn, field)
 
 
 def relative_frame(dense: DenseSystem, closure: s.Closure, motion: Motions) -> MovingFrame:

@@ -20,7 +20,7 @@ RECIPES = {
     "rigid": replace(trees.RIGID, prescribed=False), "full": replace(trees.FULL, prescribed=False),
     "linear": replace(trees.LINEAR, prescribed=False, deformation=0.01), "free-flying": trees.FREE_FLYING,
     "ruthless": replace(trees.RUTHLESS, prescribed=False), "every level": replace(trees.EVERY_LEVEL, deformation=0.01),
-    "stiffened": replace(trees.STIFFENED, prescribed=False),
+    "stiffened": replace(trees.STIFFENED, prescribed=False), "exact": replace(trees.EXACT, prescribed=False),
     "armatures": replace(trees.ARMED, prescribed=False, deformation=0.01),
 }  # fmt: skip
 PAIRS = [("weld", "spherical"), ("revolute", "universal"), ("prismatic", "planar"), ("cylindrical", "revolute")]

@@ -68,3 +68,15 @@ def of_two(t: float, inputs: Any) -> None:
 def uncompilable(t: Any, inputs: Any, state: Any, parameters: Any, outputs: Any, change: Any) -> None:
     """Uses what numba does not know."""
     outputs[0] = len({}.fromkeys("nothing"))
+
+
+@fm.user_function
+def swinging(t: Any, inputs: Any, state: Any, parameters: Any, outputs: Any, change: Any) -> None:
+    """A gain that swings with time, cubic in the input; its state follows the time."""
+    outputs[0] = -parameters[0] * np.sin(2.0 * t) * inputs[0] ** 3 + state[0]
+    change[0] = t * t - state[0]
+
+
+def kinked(t: float, inputs: Any, state: Any, parameters: Any, outputs: Any, change: Any) -> None:
+    """Another gain beyond 0.3."""
+    outputs[0] = -inputs[0] if inputs[0] < parameters[0] else -5.0 * inputs[0] + 4.0 * parameters[0]

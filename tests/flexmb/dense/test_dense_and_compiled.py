@@ -22,7 +22,7 @@ RECIPES = {
     "rigid": trees.RIGID, "full": trees.FULL, "ruthless": trees.RUTHLESS, "mixed": trees.MIXED,
     "linear": trees.LINEAR, "stiffened": trees.STIFFENED, "every level": trees.EVERY_LEVEL,
     "free-flying": trees.FREE_FLYING, "conservative": trees.CONSERVATIVE, "later kinds": trees.LATER,
-    "armatures": trees.ARMED,
+    "armatures": trees.ARMED, "exact": trees.EXACT, "coupled sections": trees.BLADES,
 }  # fmt: skip
 CASES = [*((name, 0) for name in RECIPES), *(pytest.param((name, 1), marks=pytest.mark.slow) for name in RECIPES)]
 

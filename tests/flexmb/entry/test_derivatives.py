@@ -11,6 +11,7 @@ import pytest
 import flexmb
 from flexmb.dense import DenseSystem
 from flexmb.entry import derivatives, tangent
+from flexmb.jain.derivatives.rigid_trees import is_rigid_tree
 from flexmb.scene.schema import Scene
 from flexmb.tables.status import Status
 from tests import trees
@@ -23,7 +24,7 @@ T = 0.3  # s: no function of the trees is at rest there
 RECIPES = {
     "armed rigid": trees.ARMED_RIGID, "full": trees.FULL, "ruthless": trees.RUTHLESS, "linear": trees.LINEAR,
     "stiffened": trees.STIFFENED, "armed": trees.ARMED, "mixed": trees.MIXED, "flying": trees.FREE_FLYING,
-    "later kinds": trees.LATER, "every level": trees.EVERY_LEVEL,
+    "later kinds": trees.LATER, "every level": trees.EVERY_LEVEL, "exact": trees.EXACT,
 }  # fmt: skip
 
 
@@ -128,6 +129,27 @@ def test_by_displacement_and_by_force(seed):
     assert np.max(np.abs(identity - np.eye(len(identity)))) <= bound(found.system)
     for matrix in (by_displacement, by_speed, by_force):
         assert not matrix[~free].any() and not matrix[:, ~free].any()
+
+
+@pytest.mark.parametrize("seed", [0, 5])  # with long branches
+def test_special_kernels_of_rigid_trees_on_single_axes(seed):
+    """They have sweeps of their own; M times the derivatives by forces is 1, in the lower triangle too."""
+    scene = trees.random_scene(seed, trees.SINGLE)
+    found = both(scene)
+    assert found is not None
+    system = flexmb.compile(scene, kernels="special")
+    c, nq, nu = system.constants, system.nq, system.nu
+    parent = c.body["parent"].tolist()
+    assert is_rigid_tree.py_func(c) and len(set(parent)) < len(parent)
+    w = derivatives.derivative_workspace(c, nq, nu)
+    assert len(w.tables.fork) and np.any(w.tables.places["new_point"][np.array(parent) >= 0])
+    matrices = np.full((3, nu, nu), np.nan)
+    assert derivatives.acceleration_derivatives(T, found.y, *matrices, c, w) == Status.OK
+    rows = found.by_duals[nq : nq + nu]
+    limit = bound(found.system)
+    for matrix, expected in zip(matrices, (rows[:, :nq], rows[:, nq : nq + nu]), strict=False):
+        assert np.max(np.abs(matrix - expected)) <= limit * np.max(np.abs(expected))
+    assert np.max(np.abs(mass(found.system) @ matrices[2] - np.eye(nu))) <= limit
 
 
 @pytest.mark.parametrize(("recipe", "seed"), [("armed rigid", 0), ("full", 0), ("ruthless", 0), ("mixed", 1)])

@@ -18,6 +18,7 @@ RECIPES = {
     "linear": trees.LINEAR,
     "ruthless": trees.RUTHLESS,
     "stiffened": trees.STIFFENED,
+    "exact": trees.EXACT,
     "later kinds": trees.LATER,
 }
 SHIFTS = {"real": (0.02, 4e-4), "complex": (0.02 - 0.01j, (0.02 - 0.01j) ** 2)}

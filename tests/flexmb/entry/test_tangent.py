@@ -117,7 +117,9 @@ def extrapolated(f, h: float, levels: int = 6) -> tuple[np.ndarray, np.ndarray]:
     return table[-1][-1], np.abs(table[-1][-1] - table[-1][-2])
 
 
-@pytest.mark.parametrize(("recipe", "seed"), [(trees.EVERY_LEVEL, 0), (trees.EVERY_LEVEL, 1), (trees.STIFFENED, 2)])
+@pytest.mark.parametrize(
+    ("recipe", "seed"), [(trees.EVERY_LEVEL, 0), (trees.EVERY_LEVEL, 1), (trees.STIFFENED, 2), (trees.EXACT, 0)]
+)
 def test_every_level_hinge_and_row_against_differences(recipe, seed):
     """Whole columns, also of qdot and of the work's rate, up to what rounding of the right side leaves of differences.
 

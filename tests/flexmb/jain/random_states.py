@@ -16,7 +16,7 @@ from tests.bounds import algebra
 LEVELS = {
     "rigid": trees.RIGID, "ruthless": trees.RUTHLESS, "linear": replace(trees.LINEAR, deformation=0.02),
     "full": trees.FULL, "every level": replace(trees.EVERY_LEVEL, deformation=0.02),
-    "armatures": replace(trees.ARMED, deformation=0.02),
+    "armatures": replace(trees.ARMED, deformation=0.02), "exact": trees.EXACT,
 }  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from tests.unlocked import unlocked
 
 RECIPES = {
     "rigid": trees.RIGID, "full": trees.FULL, "mixed": trees.MIXED, "free-flying": trees.FREE_FLYING,
-    "linear": trees.LINEAR, "every level": trees.EVERY_LEVEL,
+    "linear": trees.LINEAR, "every level": trees.EVERY_LEVEL, "exact": trees.EXACT,
 }  # fmt: skip
 CASES = [(name, seed) for name in RECIPES for seed in (10, 11)]
 POINTS = 15  # most inertia points of a body in the random trees: three elements, five sections

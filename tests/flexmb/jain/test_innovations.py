@@ -29,7 +29,7 @@ LONG = [pytest.param((level, 200), marks=[] if level == "every level" else pytes
 def found(request) -> RandomState:
     """Trees, and at 200 bodies chains; wheels and prescribed speeds among them."""
     level, bodies = request.param
-    carriers = {} if level == "rigid" else {"carriers": CARRIERS}
+    carriers = {} if level in ("rigid", "exact") else {"carriers": CARRIERS}
     return random_state(bodies, level, bodies, branching=bodies < 200, **carriers)
 
 

@@ -20,7 +20,8 @@ CARRIERS = ("rigid", "modal", "floating", "beam")
 @pytest.fixture(scope="module", params=[(level, n) for level in FLEXIBLE for n in (1, 8, 60)], ids=str)
 def found(request) -> RandomState:
     level, bodies = request.param
-    return random_state(bodies + 1, level, bodies, branching=bodies < 60, carriers=CARRIERS[1:] + CARRIERS[:1])
+    carriers = {} if level == "exact" else {"carriers": CARRIERS[1:] + CARRIERS[:1]}
+    return random_state(bodies + 1, level, bodies, branching=bodies < 60, **carriers)
 
 
 def largest(residual: dict[str, np.ndarray]) -> float:
@@ -42,10 +43,11 @@ def test_inconsistent_accelerations_are_reported(found):
     system, state = found.system, found.state
     rates = system.accelerations(state)
     mode = int(np.flatnonzero(found.modal)[0])
-    rates[mode] += 1.0
+    push = max(1.0, 1e-3 * float(np.max(np.abs(rates))))  # fast modes of strains accelerate by far more than others
+    rates[mode] += push
     residual = np.concatenate(list(system.modal_residual(state, rates).values()))
     size = gamma(system.nu) * found.inertia(rates)
-    expected = found.M[mode, mode]
+    expected = push * found.M[mode, mode]
     assert expected > 1e3 * size
     assert np.max(np.abs(residual)) >= expected - size
 

@@ -29,6 +29,7 @@ EVERY_LEVEL = replace(trees.EVERY_LEVEL, deformation=0.03)
 MIXED = "every level"
 LEVELS = {
     "rigid": trees.RIGID, "ruthless": trees.RUTHLESS, "linear": LINEAR, "full": trees.FULL, MIXED: EVERY_LEVEL,
+    "exact": trees.EXACT,
 }  # fmt: skip
 SHAPES = {"chain": False, "tree": True}
 

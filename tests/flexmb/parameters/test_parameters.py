@@ -192,7 +192,7 @@ def same(path: str, name: str, scene: flexmb.Scene) -> bool:
 
 RECIPES = {
     "rigid": trees.ARMED_RIGID, "full": trees.FULL, "ruthless": trees.RUTHLESS, "stiffened": trees.STIFFENED,
-    "every level": trees.ARMED, "later hinges": trees.LATER,
+    "every level": trees.ARMED, "later hinges": trees.LATER, "exact": trees.EXACT,
 }  # fmt: skip
 # Numbers at which the random scenes have no derivative, see test_refusals: places of stations are ends of a beam.
 NO_DERIVATIVE = (".x_m",)

@@ -18,7 +18,8 @@ FINER = 1e-12  # what is left of a momentum is the sum of some hundred step erro
 RIGID = replace(trees.CONSERVATIVE, carriers=("rigid",), bodies=6)
 FULL = replace(trees.CONSERVATIVE, carriers=("modal", "rigid", "floating"), bodies=4)
 STIFFENED = replace(FULL, carriers=("modal", "beam", "floating", "rigid"), levels=("stiffened",))
-CONSERVATIVE = {"rigid": RIGID, "full": FULL, "stiffened": STIFFENED}
+EXACT = replace(FULL, carriers=trees.EXACT.carriers, levels=("exact",))
+CONSERVATIVE = {"rigid": RIGID, "full": FULL, "stiffened": STIFFENED, "exact": EXACT}
 FREE_FLYING = {name: replace(recipe, grounded=False) for name, recipe in CONSERVATIVE.items()}
 # Without three-axis gimbals: a tumbling tree would run into their singular angle.
 SAFE = tuple(kind for kind in trees.KINDS if kind != "gimbal")

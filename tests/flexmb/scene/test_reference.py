@@ -29,5 +29,5 @@ def test_every_struct_has_a_section_and_links_lead_to_one():
 def test_units_are_read_from_the_keys():
     text = reference.reference()
     assert "| `stiffness_Nm_rad` | number | N m/rad | `0.0` |" in text
-    assert "| `mass_per_length_kg_m` | number | kg/m | required |" in text
+    assert "| `mass_per_length_kg_m` | number | kg/m | none |" in text
     assert "| `rotary_y_kg_m` | number | kg m | `0.0` |" in text

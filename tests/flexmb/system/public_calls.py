@@ -21,6 +21,7 @@ from flexmb.jain.operators import Operators
 from flexmb.scene import schema
 from flexmb.system.closed import ClosedSystem
 from flexmb.system.factors import MassMatrixFactors
+from tests.flexmb.control.scenes import rotor
 from tests.flexmb.system.argument_kinds import (
     ALGORITHM,
     NO_NUMBER,
@@ -230,6 +231,9 @@ def calls() -> dict[str, Call]:
         system=systems,
         state=but_none(states),
     )
+    add("ControlledMotion", lambda system, state: fm.ControlledMotion(system).acceleration_derivatives(state).motion,
+        {"system": tree, "state": state}, system=systems, state=states)  # fmt: skip
+    add("ControlledMotion, states", _under_a_controller, {"x": np.array([0.5, -1.0])}, x=but_none(vectors))
     add(
         "equilibrium",
         lambda system, guess: fm.equilibrium(system, guess),
@@ -322,6 +326,10 @@ def calls() -> dict[str, Call]:
     by = {"t_end": 0.01, "by": ["gravity_m_s2.0"], "of": ["elbow.rotation"], "samples": 3}
     add("sensitivities", lambda **given: fm.sensitivities(W.scene, **given).derivatives, by,
         by=chosen(None, 5, "elbow", [], ["nobody"], [None]), of=outputs, samples=SAMPLES, **RUN)  # fmt: skip
+    scalar = {"t_end": 0.01, "by": ["gravity_m_s2.0"], "of": fm.FinalValue("elbow.rotation")}
+    add("gradient", lambda **given: fm.gradient(W.scene, **given).derivatives, scalar,
+        by=chosen(None, 5, "elbow", [], ["nobody"], [None]),
+        of=chosen(5, [], None, fm.FinalValue("nobody")), **RUN)  # fmt: skip
     doubt = {"given": {"gravity_m_s2.0": 0.1}, "of": ["elbow.rotation"]}
     add("uncertainty", lambda given, of: fm.uncertainty(W.scene, 0.01, given, of, samples=3).sigma, doubt,
         given=chosen(None, 5, {}, {"nobody": 0.1}, {"gravity_m_s2.0": -1.0}, {"gravity_m_s2.0": np.nan}),
@@ -374,7 +382,7 @@ EXEMPT = {
     "Trajectory.to_pandas", "Trajectory.to_xarray", "Trajectory.error_estimate",  # nothing
     "Trajectory.section_loads", "Trajectory.loads_in",  # the system's
     "Trajectory.state_at", "Trajectory.values_at", "Trajectory.then",  # a place in a list; a trajectory
-    "RunStage", "Restart", "EventRecord",  # what runs are given, or give
+    "ControlledDerivatives", "RunStage", "Restart", "EventRecord",  # what runs are given, or give
     "open_loop", "user_function", "no_user_code",  # a scene; a function; nothing
     "ClosedSystem.section_loads", "ClosedSystem.section_load_derivatives",  # the closed chain here has no beam
     "LinearModel.save", "Campbell.plot", "Campbell.to_csv",  # a path
@@ -406,6 +414,14 @@ CLASSES = (
     fm.Batch,
     fm.BatchTrajectory,
 )
+
+
+def _under_a_controller(x: Any) -> Any:
+    """Derivatives at states (2,) of a controller."""
+    law = fm.Pid(name="law", inputs=("angle",), kp=4.0, ki=2.0, kd=1.0, filter_s=0.1)
+    scene = rotor(law)
+    found = fm.ControlledMotion(scene).acceleration_derivatives(fm.compile(scene).initial_state, x)
+    return found.accelerations, found.rates, found.of_accelerations.by_states
 
 
 def public() -> set[str]:

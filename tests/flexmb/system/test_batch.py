@@ -19,7 +19,7 @@ RECIPES = {
     "full": trees.FULL,
     "ruthless": trees.RUTHLESS,
     "linear": trees.LINEAR,
-    "stiffened": trees.STIFFENED,
+    "stiffened": trees.STIFFENED, "exact": trees.EXACT,
     "every level": trees.EVERY_LEVEL,
     "conservative": trees.CONSERVATIVE,
     "free": trees.FREE_FLYING,

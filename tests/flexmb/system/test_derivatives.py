@@ -21,6 +21,7 @@ from tests.flexmb.entry.test_tangent import RECIPES, H, extrapolated, terms
 SCENES = {
     "every level": lambda: trees.random_scene(0, trees.EVERY_LEVEL),
     "stiffened": lambda: trees.random_scene(2, trees.STIFFENED),
+    "exact": lambda: trees.random_scene(0, trees.EXACT),
     "armatures": lambda: trees.random_scene(1, trees.ARMED),
     "free-flying": lambda: trees.random_scene(3, trees.FREE_FLYING),
     "connectors": everything,

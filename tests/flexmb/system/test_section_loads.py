@@ -10,10 +10,14 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.modal.strain_field import StrainField
+from flexmb.scene.sections import transport
 from flexmb.scene.shapes import beam_section
 from flexmb.system.frames import hinge_frames, node_pose
+from flexmb.system.moved_sections import moved_sections
 from flexmb.system.turning_points import turning
 from tests.bounds import UNIT_ROUNDOFF
+from tests.flexmb.modal.coupled_references import coupled_stiffness, section_mass, station
 
 ROUNDING = 2.0**12 * UNIT_ROUNDOFF
 LENGTH, E, RHO, AREA, IZ = 2.0, 7e10, 2700.0, 2e-4, 3e-9
@@ -22,13 +26,14 @@ SECTION = beam_section(E=E, G=2.7e10, A=AREA, Iy=2e-9, Iz=IZ, rho=RHO)
 
 def everything(closed: bool = False, connected: bool = False, node: str = "origin", **beam: Any) -> fm.Scene:
     """A beam with all that can act on one: tip mass, outboard body, wheel, slosh mass, loads, a closure, connectors."""
+    section = beam.pop("section", SECTION)
     lump = fm.TipMass(x_m=1.3, mass_kg=0.4, com_m=(0.0, 0.05, 0.02),
                       inertia_kg_m2=((2e-3, 0.0, 0.0), (0.0, 1e-3, 0.0), (0.0, 0.0, 1.5e-3)))  # fmt: skip
     modes = beam.pop("modes", fm.Modes(count=5, static=True))
     builder = (
         fm.SceneBuilder("everything", gravity=(0.3, -9.81, 1.0))
         .rigid_body("hub", mass=3.0, inertia=(1.0, 1.0, 1.0))
-        .beam("beam", length=LENGTH, elements=4, section=SECTION, modes=modes, nodes={"middle": 0.7},
+        .beam("beam", length=LENGTH, elements=4, section=section, modes=modes, nodes={"middle": 0.7},
               tip_masses=[lump], **beam)
         .rigid_body("hand", mass=0.5, inertia=(1e-3, 2e-3, 2e-3), com=(0.1, 0.0, 0.0))
         .free("base", "ground", "hub")
@@ -71,11 +76,16 @@ def at_root(system: fm.System, state: fm.State, load: np.ndarray) -> tuple[np.nd
     return np.concatenate([about, force]), system.hinge_loads(state)["root"]
 
 
+COUPLED = station(0.0, 1e-3 * coupled_stiffness(), 0.2 * section_mass(), (0.01, 0.02))
+BLADE: Mapping[str, Any] = {"section": COUPLED, "theory": "timoshenko"}
 VARIANTS: Mapping[str, dict[str, Any]] = {
     "full": {}, "line": {"points": "line"}, "rotary": {"points": "rotary"}, "lumped": {"mass": "lumped"},
     "rigid": {"level": "rigid"}, "ruthless": {"level": "ruthless"}, "closed": {"closed": True},
     "connected": {"connected": True},
-    "timoshenko": {"theory": "timoshenko"},
+    "timoshenko": {"theory": "timoshenko"}, "coupled": BLADE, "coupled rotary": {"points": "rotary", **BLADE},
+    "coupled line": {"points": "line", **BLADE},
+    "exact": {"level": "exact"}, "exact, closed": {"level": "exact", "closed": True},
+    "exact, in pieces": {"level": "exact", "modes": fm.Modes(count=2, pieces=3)},
 }  # fmt: skip
 
 
@@ -85,11 +95,21 @@ def test_the_root_transmits_what_the_hinge_does(variant: str) -> None:
     """To rounding; rotating tensors are no polynomials, and the cuts refine their integrals: to quadrature."""
     system = fm.compile(everything(**VARIANTS[variant]))
     state = somewhere(system)
-    found = system.section_loads(state, "beam", [0.0, 0.5, 0.7, 1.3, 2.0])
+    # turning mass centres off the axis are farther from polynomials yet, and are summed over the points of the motion
+    cuts = [0.0] if variant == "coupled rotary" else [0.0, 0.5, 0.7, 1.3, 2.0]
+    found = system.section_loads(state, "beam", cuts)
     section, hinge = at_root(system, state, found.load[0])
     allowed = 1e-10 if variant == "rotary" else 64 * ROUNDING
+    cancelling = what_cancels(system, state) if "exact" in variant else 0.0
     for part in (slice(0, 3), slice(3, 6)):
-        assert np.linalg.norm(section[part] - hinge[part]) < allowed * np.linalg.norm(hinge[part])
+        assert np.linalg.norm(section[part] - hinge[part]) < allowed * (np.linalg.norm(hinge[part]) + cancelling)
+
+
+def what_cancels(system: fm.System, state: fm.State) -> float:
+    """Size of the inertia forces of single strain modes: the fast ones accelerate by far more than the beam does."""
+    model = next(link.model for link in system.links if link.name == "beam")
+    rates = np.abs(system.accelerations(state)[system.speed("beam.modes")])
+    return float(model.mass @ np.linalg.norm(np.abs(model.translation) @ rates, axis=1))
 
 
 def test_levels_that_are_cut_off_are_off_by_what_they_neglect() -> None:
@@ -110,9 +130,63 @@ def test_levels_that_are_cut_off_are_off_by_what_they_neglect() -> None:
 def test_a_free_root_transmits_nothing(node: str, boundary: str) -> None:
     """The beam hangs on another node: beyond x = 0 is all of it, hinge included."""
     modes = fm.Modes(count=5, boundary=boundary)  # type: ignore[arg-type]
-    system = fm.compile(everything(node=node, modes=modes))
+    transmits_nothing(everything(node=node, modes=modes))
+
+
+@pytest.mark.parametrize("node", ["middle", "tip"])
+def test_a_free_root_of_strains_transmits_nothing(node: str) -> None:
+    """Likewise at level exact."""
+    transmits_nothing(everything(node=node, level="exact", modes=fm.Modes(count=3)))
+
+
+def transmits_nothing(scene: fm.Scene) -> None:
+    """The free root of a bent beam that moves."""
+    system = fm.compile(scene)
     found = system.section_loads(somewhere(system), "beam", [0.0, 0.3, 0.7, 1.99])
     assert np.max(np.abs(found.load[0])) < 64 * ROUNDING * np.max(np.abs(found.load))
+
+
+def test_statics_of_a_beam_bent_by_its_length() -> None:
+    """A tip force and the weight of a curved beam of level exact, bent by more than a radian: its moment across any
+    section is that of the force and of the weight beyond, about the deformed section; the beam bends by moment / EI."""
+    soft = [fm.BeamStation(x_m=x, EA_N=1e3, EIy_Nm2=1.0, EIz_Nm2=1.0, GJ_Nm2=1.0, mass_per_length_kg_m=0.5,
+                           rotary_y_kg_m=1e-3, rotary_z_kg_m=1e-3, curvature_1_m=(0.0, 0.0, 0.4)) for x in (0.0, 1.0)]
+    x = np.array([0.0, 0.25, 0.6])
+    scene = (
+        fm.SceneBuilder("cantilever", gravity=(0.0, -9.81, 0.0))
+        .beam("beam", length=1.0, elements=6, section=soft, level="exact", nodes={"a": 0.25, "b": 0.6},
+              modes=fm.Modes(count=12, families=("bending_y",)))
+        .weld("clamp", "ground", "beam")
+        .force("pull", "beam", node="tip", direction=(0.0, 1.0, 0.0), function=fm.Constant(value=9.0))
+        .marker("a", "beam", node="a").marker("b", "beam", node="b").marker("tip", "beam", node="tip")
+        .marker("root", "beam").scene()
+    )  # fmt: skip
+    system = fm.compile(scene)
+    rest = fm.equilibrium(system)
+    found = system.section_loads(rest, "beam", x)
+    seen = system.evaluate(0.0, rest.q, rest.u).markers
+    assert np.arctan2(*seen["tip"].rotation[[1, 0], 0]) > 1.0
+    field = system.links[0].model.field
+    moved = moved_sections(field, rest.q, 0.0 * rest.q, 0.0 * rest.q)
+    points, weight = moved.r[field.gauss], np.polynomial.legendre.leggauss(len(field.gauss))[1] / 2.0
+    for i, name in enumerate(("root", "a", "b")):
+        R, at = seen[name].rotation, seen[name].position
+        curvature = 0.4 + field_curvature(field, rest.q, x[i])
+        assert found.bending[i, 1] == pytest.approx(curvature - 0.4, abs=1e-6)
+        inward = R.T @ [0.0, 9.0 - 0.5 * 9.81 * (1.0 - x[i]), 0.0]
+        np.testing.assert_allclose([found.axial[i], *found.shear[i]], inward, atol=1e-10)
+        if name == "root":
+            weigh = np.cross(points - at, [0.0, -0.5 * 9.81, 0.0]).T @ weight
+            moment = R.T @ (np.cross(seen["tip"].position - at, [0.0, 9.0, 0.0]) + weigh)
+            np.testing.assert_allclose([found.torsion[i], *found.bending[i]], moment, atol=1e-10)
+
+
+def field_curvature(field: StrainField, eta: np.ndarray, x: float) -> float:
+    """The elastic curvature about z at x: the polynomial through its values where the field has them."""
+    left = np.where(field.before >= 0, field.x[field.before], 0.0)
+    places = left + (field.x - left) * (0.5 - np.sqrt(3.0) / 6.0)
+    values = field.rows[:, 0, 2] @ eta
+    return float(np.polynomial.legendre.Legendre.fit(places, values, field.mode_count - 1, domain=[0.0, 1.0])(x))
 
 
 def test_a_cut_through_a_rigid_beam_is_a_weld() -> None:
@@ -182,6 +256,37 @@ def test_stresses_of_a_bent_pulled_and_twisted_beam() -> None:
         np.testing.assert_allclose(found.normal_stress(E, y=y, z=0.0), expected, rtol=bent)
     GJ = scene.bodies[0].stations[0].GJ_Nm2
     np.testing.assert_allclose(found.torsion_stress(2.7e10, 0.02), 2.7e10 * 0.02 * twist / GJ, rtol=bent)
+
+
+@pytest.mark.parametrize("theory", ["timoshenko", "euler-bernoulli"])
+def test_strains_and_stresses_of_a_coupled_section(theory: Any) -> None:
+    """A tip load on a uniform cantilever: compliance times the load of the section, and the strain of a fibre."""
+    laminate = {(0, 3): 0.1, (0, 4): -0.1, (0, 5): 0.15, (3, 4): 0.3, (3, 5): -0.2, (4, 5): 0.25}
+    K = coupled_stiffness(laminate)
+    force, torque = np.array([2e-2, 3e-4, -2e-4]), np.array([4e-4, 1e-4, 2e-4])
+    x, point = np.array([0.0, 0.7]), (0.01, 0.02) if theory == "timoshenko" else (0.0, 0.0)
+    builder = fm.SceneBuilder("cantilever").beam(
+        "beam", length=LENGTH, elements=4, section=station(0.0, K, section_mass(), point), theory=theory,
+        modes=fm.Modes(count=0, static=True),
+    ).weld("clamp", "ground", "beam")  # fmt: skip
+    for i, direction in enumerate(np.eye(3).tolist()):
+        builder.force(f"f{i}", "beam", node="tip", direction=direction, function=fm.Constant(value=force[i]))
+        builder.torque(f"t{i}", "beam", node="tip", direction=direction, function=fm.Constant(value=torque[i]))
+    system = fm.compile(builder.scene())
+    found = system.section_loads(fm.equilibrium(system), "beam", x)
+    T = transport(point)
+    S = np.linalg.inv(T.T @ K @ T)
+    if theory == "euler-bernoulli":
+        S[1:3] = S[:, 1:3] = 0.0
+    arms = (LENGTH - x)[:, None] * [1.0, 0.0, 0.0]
+    loads = np.hstack([np.tile(force, (2, 1)), torque + np.cross(arms, force)])
+    expected = loads @ S
+    bent = 1e-5 * np.max(np.abs(expected))  # what the deflection of a tenth of a micrometre turns and shifts
+    np.testing.assert_allclose(found.strain, expected, atol=bent)
+    fibre = expected[:, 0] + 0.01 * expected[:, 4] - 0.03 * expected[:, 5]
+    np.testing.assert_allclose(found.normal_stress(E, y=0.03, z=0.01), E * fibre, atol=E * bent)
+    sheared = found.torsion_stress(2.7e10, 0.02)
+    np.testing.assert_allclose(sheared, 2.7e10 * 0.02 * expected[:, 3], atol=2.7e10 * 0.02 * bent)
 
 
 def strip(width: float, x: float, height: float = 0.005) -> fm.BeamStation:

@@ -1,0 +1,163 @@
+"""Derivatives of continuous control laws at one state: of what they drive, and of the rates of their states.
+
+The laws are evaluated in dual numbers (`flexmb.control.tables.LoopVariation`), and those of users by differences whose
+error is checked (`flexmb.control.foreign_laws`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import NamedTuple, assert_never
+
+import numpy as np
+
+from flexmb.control import loop
+from flexmb.control.feedback import Feedback
+from flexmb.control.foreign_laws import ATTEMPTS, ROUNDING, SHORTER, SMOOTH, STEP
+from flexmb.control.laws import FILTERED, INTEGRAL
+from flexmb.control.tables import ADDRESSES, Loop, LoopVariation
+from flexmb.control.variation import plain_laws
+from flexmb.jit.lanes import LANES
+from flexmb.jit.wide_arrays import as_duals
+from flexmb.scene.control import Controller, GainTable, Pid, Saturation, StateSpace, UserLaw
+from flexmb.system.kinks import NotDifferentiableError, meets
+from flexmb.tables.state import DynamicsError
+from flexmb.tables.status import OK, Status
+from flexmb.typing import Index, Real, Record
+
+
+class LawDerivatives(NamedTuple):
+    """Values (D+X,) of the D drives, then the rates of the X states of continuous controllers, with their derivatives:
+    by the signals (D+X,S) of sensors, the states (D+X,X), and time (D+X,) with both held."""
+
+    values: Real
+    by_signal: Real
+    by_state: Real
+    by_time: Real
+
+
+def law_derivatives(feedback: Feedback, t: float, y: Real, one_sided: bool = False) -> LawDerivatives:
+    """At y = [q, u, x, work] in a run that has begun; the drives have their values there afterwards.
+
+    DynamicsError where accelerations do not exist that sensors read, `NotDifferentiableError` where a law has a corner;
+    `one_sided`: not at limits and points of tables, where the derivatives are those on one side.
+    """
+    made = feedback.running
+    _raise(feedback, loop.look(t, y, made.signal.copy(), made))
+    values = _respond(feedback, t)
+    if not one_sided:
+        _refuse_corners(feedback)
+    sensors, states = int(np.sum(made.sensor["width"])), np.array(feedback.continuous_states, np.int64)
+    found = _by_duals(feedback, t, sensors, states)
+    called = any(isinstance(each, UserLaw) for each in feedback.controllers)
+    by_time = _by_time(feedback, t, values) if called else np.zeros(len(values))
+    _raise(feedback, loop.look(t, y, made.signal.copy(), made))  # leaves drives and outputs as they are at t
+    _refuse_open(feedback, np.column_stack([found, by_time]))
+    return LawDerivatives(values, found[:, :sensors], found[:, sensors:], by_time)
+
+
+def _by_duals(feedback: Feedback, t: float, sensors: int, states: Index) -> Real:
+    """(D+X,S+X), eight columns at a time."""
+    made = feedback.running
+    arrays = {
+        each.name: as_duals(getattr(made, each.name))
+        for each in fields(LoopVariation)
+        if each.name not in ("plain", "address")
+    }
+    dual = LoopVariation(plain=plain_laws(made), address=np.zeros(ADDRESSES, np.int64), **arrays)
+    read = [(dual.signal, i) for i in range(sensors)] + [(dual.state, int(i)) for i in states]
+    columns = []
+    for first in range(0, len(read), LANES):
+        block = read[first : first + LANES]
+        for lane, (array, i) in enumerate(block):
+            array[i, 1 + lane] = 1.0
+        _raise(feedback, loop.respond(t, dual))
+        driven = dual.function["data"][feedback.driven, 0, 1:]
+        columns.append(np.vstack([driven, dual.change[states, 1:]])[:, : len(block)])
+        for lane, (array, i) in enumerate(block):
+            array[i, 1 + lane] = 0.0
+    return np.hstack(columns) if columns else np.zeros((len(feedback.driven) + len(states), 0))
+
+
+def _respond(feedback: Feedback, t: float) -> Real:
+    """Drive values, then the rates of x, for the present signals of sensors."""
+    made = feedback.running
+    _raise(feedback, loop.respond(t, made))
+    return np.r_[made.function["data"][feedback.driven, 0], made.change[feedback.continuous_states]]
+
+
+def _by_time(feedback: Feedback, t: float, values: Real) -> Real:
+    """By the time that laws of users are given, by differences as `flexmb.control.foreign_laws` has them."""
+    step = STEP * max(1.0, abs(t))
+    for _ in range(ATTEMPTS):
+        (coarse, bend), (fine, less_bend) = (_around(feedback, t, h, values) for h in (step, 0.5 * step))
+        limit = SMOOTH * (np.abs(fine) + np.abs(coarse)) + ROUNDING * np.abs(values) / step
+        smooth = np.abs(fine - coarse) <= limit
+        if np.all(smooth & (np.abs(less_bend - 0.5 * bend) <= SMOOTH * np.abs(bend) + limit)):
+            return np.asarray(fine + (fine - coarse) / 3.0)
+        step *= SHORTER
+    return np.full(len(values), np.nan)
+
+
+def _around(feedback: Feedback, t: float, h: float, values: Real) -> tuple[Real, Real]:
+    """Central differences over h, and by how much those after t exceed those before it."""
+    ahead, behind = _respond(feedback, t + h) - values, values - _respond(feedback, t - h)
+    return (ahead + behind) / (2.0 * h), (ahead - behind) / h
+
+
+def _raise(feedback: Feedback, status: int) -> None:
+    feedback.raise_trouble()
+    if status != OK:
+        raise DynamicsError(Status(status).advice.format(body="at this state"))
+
+
+def _refuse_corners(feedback: Feedback) -> None:
+    """NotDifferentiableError where a limit or a point of a table is just met, by what the laws have just read."""
+    made = feedback.running
+    for row, controller in zip(made.controller, feedback.controllers, strict=True):
+        if not row["sampled"] and _at_corner(controller, row, made):
+            raise _no_derivative(controller.name, "what it reads is exactly at a limit, or a point of a table")
+
+
+def _at_corner(controller: Controller, row: Record, made: Loop) -> bool:
+    read = made.input[row["input"] : row["input"] + row["inputs"]]
+    match controller:
+        case Saturation(lower=lower, upper=upper):
+            return any(meets(x, limit, abs(limit)) for x in read for limit in (lower, upper))
+        case Pid(lower=lower, upper=upper):
+            asked = _asked(controller, row, made)
+            return any(meets(asked, limit, abs(limit)) for limit in (lower, upper) if limit is not None)
+        case GainTable(points=points, values=values):
+            slopes = [0.0, *np.diff(values) / np.diff(points), 0.0]
+            return any(
+                meets(read[0], point, abs(point)) and slopes[i] != slopes[i + 1] for i, point in enumerate(points)
+            )
+        case StateSpace() | UserLaw():
+            return False
+        case _:
+            assert_never(controller)
+
+
+def _asked(pid: Pid, row: Record, made: Loop) -> float:
+    """The output of a continuous PID controller before it is limited."""
+    read, state = made.input[row["input"] :], made.state[row["state"] :]
+    error = (read[1] if row["inputs"] == 2 else pid.setpoint) - read[0]
+    slope = (error - state[FILTERED]) / pid.filter_s if pid.filter_s > 0.0 else 0.0
+    return float(pid.kp * error + state[INTEGRAL] + pid.kd * slope)
+
+
+def _refuse_open(feedback: Feedback, found: Real) -> None:
+    """NotDifferentiableError for a law whose differences do not converge, and are NaN."""
+    made, drives = feedback.running, len(feedback.driven)
+    for row, controller in zip(made.controller, feedback.controllers, strict=True):
+        mine = (made.drive["signal"] >= row["signal"]) & (made.drive["signal"] < row["signal"] + row["outputs"])
+        states = np.arange(row["states"]) + drives + row["x"]
+        if not row["sampled"] and not np.isfinite(found[np.r_[np.flatnonzero(mine), states]]).all():
+            raise _no_derivative(controller.name, "it, or one that it reads, is no smooth function of what it reads")
+
+
+def _no_derivative(name: str, why: str) -> NotDifferentiableError:
+    return NotDifferentiableError(
+        f'controller "{name}" has no derivative at this state: {why}. Derivatives exist on either side: move the state '
+        "by a small amount"
+    )

@@ -1,0 +1,184 @@
+"""A run of a closed loop: the problem for the integrators, instants at its end, and its signals afterwards."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from flexmb.control import leaping, loop
+from flexmb.control import tables as a
+from flexmb.control.loop_tables import LoopTables
+from flexmb.control.memory import LoopMemory
+from flexmb.control.power import powers
+from flexmb.control.schedule import instants, slack, with_instants
+from flexmb.control.tangent import jacobian
+from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, StiffProblem, problem, stiff_problem
+from flexmb.integrate.watch import Watch
+from flexmb.jit.pointer import REAL, STATUS, VECTOR, pointer
+from flexmb.tables.state import State
+from flexmb.typing import Real, Record
+
+
+class Begun(NamedTuple):
+    """The initial value problem of a closed loop: y = [q, u, x, work] instead of [q, u, work]."""
+
+    problem: Problem | StiffProblem
+    y: Real
+    clock: Clock
+    accuracy: Accuracy
+
+
+class Starting(Protocol):
+    """Start of a run. state: of the motion, with its time; y: [q, u, work], or [q, u, x, work] with the memory of
+    controllers."""
+
+    @property
+    def state(self) -> State: ...
+    @property
+    def y(self) -> Real: ...
+    @property
+    def controllers(self) -> LoopMemory | None: ...
+
+
+class FreshStart(NamedTuple):
+    """A state of the motion at which controllers start without a memory."""
+
+    state: State
+    controllers: None = None
+
+    @property
+    def y(self) -> Real:
+        return np.concatenate([self.state.q, self.state.u, [0.0]])
+
+
+class LoopRun(LoopTables):
+    """A closed loop, one run after the other."""
+
+    def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: Linear | None) -> Begun:
+        """Begin a run. Controllers start from their initial states in the scene, or from those at the end of a run.
+
+        linear: Jacobian of the motion alone, for methods that linearise. Sampling instants before the start are not
+        executed again: their outputs are taken from the memory, or zero.
+        """
+        start, t_end, known = begin.state.t, float(clock.times[-1]), begin.controllers
+        ends, apart = clock.segment_ends, slack(start, t_end)
+        table = instants(self._plant.scene.controllers, start, t_end, ends[np.isfinite(ends)])
+        happened = 0 if known is None else int(known.instants[0])
+        self._instants, self._end = table, t_end
+        due = table[: max(happened, np.searchsorted(table["time"], t_end))]  # instants at t_end act after the run
+        held = self._rows_for(due)
+        for values in self._held.values():
+            values[:] = 0.0
+        self._run = made = self._loop(due, held, apart)
+        if known is None:
+            made.following[0] = np.searchsorted(due["time"], start)
+            self._held["state"][:] = self._wiring.initial
+            y = np.concatenate([begin.y[:-1], self._wiring.continuous, begin.y[-1:]])
+            loop.start(start, y, made)
+            if np.any(due["time"] == start) and len(self._wiring.continuous):
+                self._start_after_samples(start, y, made)
+        else:
+            y, made.following[0] = begin.y, happened
+            self._held["state"][:], self._held["signal"][:] = known.state, known.signal
+            held[: len(known.held)] = known.held[: len(held)]
+        kernels = loop.rhs, loop.project, made, made
+        of_motion = self._leaping
+        leaps = of_motion and of_motion._replace(back=leaping.back, leap=leaping.leap)
+        if linear is not None:
+            if made.continuous[0]:
+                tangent = self._tangent(linear, len(y))  # and no stiff part: it knows no states of controllers
+                linear = linear._replace(jacobian=jacobian, exact=made, tangent=tangent, stiff=None)
+            posed: Any = stiff_problem(*kernels, linear._replace(move=loop.move), leaps)
+        else:
+            posed = problem(*kernels, leaps)
+        controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
+        ends = with_instants(ends, table["time"][table["time"] > start], t_end)
+        farthest = clock.farthest if len(table) == 0 else t_end  # a leap crosses no instant
+        return Begun(posed, y, Clock(clock.times, ends, farthest), controlled)
+
+    def _start_after_samples(self, t: float, y: Real, made: a.Loop) -> None:
+        """Start continuous controllers after the first outputs of sampled controllers are known."""
+        loop.project(t, y, made)
+        loop.hold(t, y, made)
+        loop.start(t, y, made)
+        self.raise_trouble()
+
+    def conclude(self, t: float, y: Real, anew: bool = False) -> bool:
+        """Execute the sampled controllers that are due at the end of a run, at y (n,); returns whether there are any.
+
+        Integrators do not evaluate instants at the end unless the run continues. anew: a new integration would start
+        there, after an event.
+        """
+        before, table = self.running, self._instants
+        if t != self._end or not np.any(table["time"][before.following[0] :] == t):
+            return False
+        held, there = self._rows_for(table), y.copy()
+        held[: len(before.held)] = before.held
+        self._run = made = self._loop(table, held, float(before.slack[0]))
+        made.following[0] = before.following[0]
+        loop.project(t, there, made)  # also sets the state of the closures
+        loop.hold(t, there if anew else y, made)
+        self.raise_trouble()
+        return True
+
+    @property
+    def schedule(self) -> Record:
+        """INSTANT records of the last run, those at its end included."""
+        return self._instants
+
+    @property
+    def samples(self) -> int:
+        """Number of rows of held outputs that the schedule needs."""
+        return int(np.sum(self._instants["kind"] == a.SAMPLE))
+
+    def remember(self) -> LoopMemory:
+        """The memory of the controllers at the end of a run, before it is replayed."""
+        s = self.running
+        return LoopMemory(s.signal.copy(), s.state.copy(), s.held.copy(), s.following.astype(float))
+
+    def watching(self, watch: Watch) -> Watch:
+        """The same watch with access to the signals of this run, which must have begun."""
+        look = pointer(loop.look, STATUS, REAL, VECTOR, VECTOR, self.running)
+        return watch._replace(signal=np.zeros(len(self.running.signal)), look=look)
+
+    @property
+    def motion(self) -> tuple[Any, a.Loop, a.Loop]:
+        """The closed loop's right-hand side, with its tables."""
+        return loop.rhs, self.running, self.running
+
+    observing = loop.observe
+    """The kernel that observes the motion where the loop was evaluated, for algorithms that have a compiled one."""
+
+    def replay(self) -> None:
+        """Replay the finished run from now on: outputs of sampled controllers are read back, not computed."""
+        self.running.replaying[0] = 1
+        self.running.now[0] = np.inf
+
+    def course(self, times: Real, states: Real) -> tuple[dict[str, Real], dict[str, Real]]:
+        """Signals by sensor and controller, (T,k), and likewise the power of controllers' outputs (W).
+
+        They are evaluated at the states (T,n) of the replayed run.
+        """
+        times, found = times[: len(states)], np.empty((len(states), len(self.running.signal)))
+        done = loop.retrace(times, states, self.running, found)
+        self.raise_trouble()
+        found[done:] = np.nan
+        power = powers(self._plant, times, states, self._wiring.drive, found)
+        named = self._wiring.names
+        controllers = [controller.name for controller in self._plant.scene.controllers]
+        return (
+            {name: found[:, place].copy() for name, place in named.items()},
+            {name: power[:, named[name]].copy() for name in controllers},
+        )
+
+    @property
+    def observation(self) -> Any:
+        """The observation of the system: names are the same."""
+        return self._plant.observation
+
+    def observe_row(self, t: float, y: Real, algorithm: Any, row: Real) -> None:
+        """Observe one row as the system does, with the controller outputs at t."""
+        loop.hold(t, y, self.running)
+        self.raise_trouble()
+        self._plant.observe_row(t, self.running.y.copy(), algorithm, row)

@@ -1,0 +1,88 @@
+"""Derivatives of the tables by many numbers at once: those that concern different entries are changed together.
+
+A scene is compiled four times or more for each derivative (`flexmb.parameters.spectral`). Numbers of different bodies
+change different entries of the tables. So each number is changed once to see which entries it concerns; then numbers
+with no entry in common are changed together, each by the same share of its scale, as one takes the columns of a sparse
+Jacobian together (Curtis, Powell & Reid 1974). A group in which anything is unexpected is differentiated one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from flexmb.parameters.numbers import Number
+from flexmb.parameters.spectral import WIDTHS, Derivative, NotSmooth, derivative
+from flexmb.typing import Flags, Real
+
+Tables = Callable[[Mapping[str, float]], Real]
+"""All floats (n,) of the tables with other values, by name of the number; ValueError where there are none."""
+
+
+def derivatives_together(
+    tables: Tables, chosen: Sequence[Number], parts: Sequence[slice], by: Callable[[Number], Derivative]
+) -> list[Derivative]:
+    """d tables/dp (n,) for each of these numbers; `by` finds it for one number, or says what is wrong with it."""
+    if len(chosen) < 2:
+        return [by(each) for each in chosen]
+    concerned = [_concerned(tables, each) for each in chosen]
+    found = dict[int, Derivative]()
+    for group in _groups(concerned):
+        if len(group) > 1:
+            found |= _of_group(tables, chosen, concerned, group, parts)
+    return [found[k] if k in found else by(each) for k, each in enumerate(chosen)]
+
+
+def _concerned(tables: Tables, number: Number) -> Flags | None:
+    """(n,) which entries change with a number; None where its value cannot change as far."""
+    try:
+        return np.asarray(tables({number.name: number.value + WIDTHS[0] * number.scale}) != tables({}))
+    except ValueError:
+        return None
+
+
+def _groups(concerned: Sequence[Flags | None]) -> list[list[int]]:
+    """Numbers with no entry in common, each added to the first group that it fits in."""
+    found = list[list[int]]()
+    taken = list[Flags]()
+    for k, own in enumerate(concerned):
+        if own is None:
+            continue
+        place = next((i for i, other in enumerate(taken) if not np.any(own & other)), None)
+        if place is None:
+            found.append([k])
+            taken.append(own)
+        else:
+            found[place].append(k)
+            taken[place] = taken[place] | own
+    return found
+
+
+def _of_group(
+    tables: Tables, chosen: Sequence[Number], concerned: Sequence[Flags | None], group: Sequence[int],
+    parts: Sequence[slice],
+) -> dict[int, Derivative]:  # fmt: skip
+    """Derivatives by the numbers of a group, nothing where they are not found together.
+
+    Errors are those of each number alone: relative to the largest derivative by it in each part of the tables.
+    """
+    own = {k: mask for k, mask in enumerate(concerned) if k in group and mask is not None}
+    places = [np.flatnonzero(_within(mask, part)) for mask in own.values() for part in parts]
+
+    def at(share: float) -> Real:
+        return tables({chosen[k].name: chosen[k].value + share * chosen[k].scale for k in group} if share else {})
+
+    try:
+        rates = derivative(at, 0.0, 1.0, [each for each in places if len(each)])
+    except (NotSmooth, ValueError):
+        return {}
+    if np.any(rates.values[~np.any(list(own.values()), axis=0)]):
+        return {}
+    return {k: Derivative(np.where(mask, rates.values / chosen[k].scale, 0.0), rates.error) for k, mask in own.items()}
+
+
+def _within(mask: Flags, part: slice) -> Flags:
+    found = np.zeros(len(mask), bool)
+    found[part] = mask[part]
+    return found

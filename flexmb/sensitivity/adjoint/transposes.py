@@ -1,0 +1,163 @@
+"""Makes the transposed equations of one part of a run, and reads the gradient by parameters from their tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from flexmb.entry.pulled import pull_workspace
+from flexmb.jain.derivatives.pull_tables import ARMATURE, DAMPING, REST, STIFFNESS
+from flexmb.jain.derivatives.tables import ports_in_use
+from flexmb.jit.bundle import broaden
+from flexmb.jit.direct import addresses
+from flexmb.jit.duals import DualType
+from flexmb.jit.lanes import LANES
+from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
+from flexmb.parameters.tables import DualConstants
+from flexmb.sensitivity.adjoint import transposed
+from flexmb.sensitivity.adjoint.sampling import Held
+from flexmb.sensitivity.blocks import Blocks, DualTables, array_parts, dual_parts
+from flexmb.system.tree_system import System
+from flexmb.tables.arrays import Constants
+from flexmb.typing import Flags, Index, Real
+
+_SPRING = {"stiffness": STIFFNESS, "damping": DAMPING, "rest": REST, "armature": ARMATURE}
+
+
+class Transposes:
+    """The transposed equations of one part of a run.
+
+    transpose, unproject: kernels; tables: theirs; held: what controllers drive.
+    """
+
+    def __init__(self, blocks: Blocks, count: int, functions: Sequence[int], of_power: bool) -> None:
+        """blocks: the constants in dual numbers, whose first `count` directions are those of parameters and of values
+        at which coordinates are held. functions (F,): those that controllers drive. of_power: whether the scalar
+        depends on the work done."""
+        self._blocks, self._count, plant = blocks, count, blocks.system
+        c = plant.constants
+        self._x = None if of_power else pull_workspace(c, plant.nq, plant.nu)
+        acts = [_acting(each, c, not of_power, functions) for each in blocks.duals[: -(-count // LANES)]]
+        self._chosen = np.flatnonzero(np.concatenate(acts)[:count])
+        self._driven = len(functions)
+        lanes = len(self._chosen) + self._driven
+        self._lanes = Blocks(plant, _gathered(blocks, self._chosen, functions), lanes) if lanes else None
+        table = self._lanes_table(plant)
+        self._gradient = table.gradient
+        self.unproject, self.transpose = transposed.unproject, transposed.pull_back
+        of_lanes = [] if self._lanes is None else [each.constants for each in self._lanes.duals]
+        if self._x is not None:
+            self.tables: Any = transposed.ByRecursion(c, self._x, table)
+            self.held = Held(np.array(functions, np.int64), [c, *of_lanes])
+            return
+        route = plant.route("articulated", 0.0)
+        assert route.linear is not None  # of every tree
+        self._linear = route.linear(*route.tables())
+        exact, n = self._linear.exact, plant.nq + plant.nu + 1
+        where = addresses(self._linear.jacobian, STATUS, REAL, VECTOR, MATRIX, exact, self._linear.tangent)
+        self.transpose = transposed.transpose
+        self.tables = transposed.ByJacobian(np.array(where), np.zeros((n, n)), c, table)
+        self.held = Held(np.array(functions, np.int64), [exact, *of_lanes])
+
+    def _lanes_table(self, plant: System) -> transposed.Lanes:
+        if self._lanes is None:
+            nothing = np.zeros((0, plant.nq + plant.nu + 1, DualType.width))
+            return transposed.Lanes(np.zeros(2, np.int64), np.zeros(0, np.int64), nothing, nothing, np.zeros(0))
+        return transposed.Lanes(
+            np.array([self._lanes.motion, self._lanes.manifold]), np.array(self._lanes.where, np.int64),
+            self._lanes.state, self._lanes.slope, np.zeros(LANES * len(self._lanes)),
+        )  # fmt: skip
+
+    def by_driven(self) -> Real:
+        """(F,) by what controllers drive, since the last call."""
+        place = slice(len(self._chosen), len(self._chosen) + self._driven)
+        found = self._gradient[place].copy()
+        self._gradient[place] = 0.0
+        return found
+
+    def by_parameters(self) -> Real:
+        """The gradient (count,) by the first directions that the steps passed so far have left."""
+        found = np.zeros(self._count)
+        found[self._chosen] = self._gradient[: len(self._chosen)]
+        if self._x is not None:
+            p, c = self._x.p, self._blocks.system.constants
+            for b, each in enumerate(self._blocks.duals[: -(-self._count // LANES)]):
+                own = by_constants(p, c, each.constants)
+                count = min(LANES, self._count - LANES * b)
+                chosen = np.isin(np.arange(LANES * b, LANES * b + count), self._chosen)
+                found[LANES * b : LANES * b + count] += np.where(chosen, 0.0, own[:count])
+        return found
+
+
+def by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
+    """(LANES,) by the parameters of a block, from the derivatives by the constants that `Pulled` has."""
+    found = np.einsum("ki,kil->l", p.rigid, duals.body["rigid"][..., 1:])
+    found = found + np.einsum("ki,kil->l", p.placement[:, :3], duals.body["placement_position"][..., 1:])
+    R = c.body["placement_rotation"].reshape(-1, 3, 3)
+    dR = duals.body["placement_rotation"][..., 1:].reshape(len(R), 3, 3, LANES)
+    turn = np.einsum("kijl,kmj->kiml", dR, R)  # of the axes against themselves: a skew matrix
+    turn = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
+    found = found + np.einsum("ki,kil->l", p.placement[:, 3:], turn)
+    for name, column in _SPRING.items():
+        found = found + p.spring[:, column] @ duals.speed[name][..., 1:]
+    return np.asarray(found + p.gravity @ duals.gravity[..., 1:])
+
+
+def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequence[int]) -> Flags:
+    """(LANES,) which parameters of a block the motion depends on; by recursion, but for constants that `Pulled` has.
+
+    What controllers drive has directions of its own.
+    """
+    known = dict[tuple[str, str | None], Flags | bool]()
+    known["function", "data"] = ~np.isin(np.arange(len(c.function)), driven)
+    if by_recursion:
+        modes, on_ports = c.body["modes"] > 0, c.body["inboard_port"] >= 0
+        simple = not (np.any(c.body["ball_spring"]) or len(c.hinge_spring) or len(c.coordinate_law))
+        known |= {("body", "rigid"): modes, ("gravity", None): False}
+        known |= {("body", f"placement_{name}"): on_ports for name in ("position", "rotation")}
+        known |= {("speed", "armature"): False, ("port", None): ports_in_use(c)}
+        known |= {("speed", name): False for name in ("stiffness", "damping", "rest")} if simple else {}
+    found = np.zeros(LANES, bool)
+    for table in (duals.constants, duals.closures):
+        for name, field, part in dual_parts(table) if table is not None else ():
+            rates = part[..., 1:] != 0.0
+            kept = known.get((name, field), known.get((name, None), True))
+            if kept is False:
+                continue
+            if kept is not True:
+                rates = rates[kept]
+            found |= np.any(rates.reshape(-1, LANES), axis=0)
+    return found
+
+
+def _gathered(blocks: Blocks, chosen: Index, functions: Sequence[int]) -> list[DualTables]:
+    """Blocks of the chosen directions, then of the values of functions of time."""
+    found, sources = list[DualTables](), [each.constants for each in blocks.duals]
+    count = len(chosen) + len(functions)
+    for first in range(0, count, LANES):
+        arrays = _lanes_of(sources, chosen[first : first + LANES])
+        arrays["function"]["data"][functions, 0, 1:] = 0.0
+        for lane in range(min(LANES, count - first)):
+            if first + lane >= len(chosen):
+                arrays["function"]["data"][functions[first + lane - len(chosen)], 0, 1 + lane] = 1.0
+        found.append(DualTables(DualConstants(**arrays), None))
+    broaden([each.constants for each in found])
+    return found
+
+
+def _lanes_of(tables: Sequence[Any], chosen: Index) -> dict[str, Any]:
+    """The arrays of a table in duals with the lanes of the chosen directions."""
+    found = {}
+    for each in fields(tables[0]):
+        arrays = [getattr(table, each.name) for table in tables]
+        wide = arrays[0].copy()
+        sources = [[part for _, part in array_parts(array)] for array in arrays]
+        for i, (_, part) in enumerate(array_parts(wide)):
+            part[..., 1:] = 0.0
+            for lane, k in enumerate(chosen):
+                part[..., 1 + lane] = sources[k // LANES][i][..., 1 + k % LANES]
+        found[each.name] = wide
+    return found

@@ -1,0 +1,169 @@
+"""A whole run backwards: its smooth parts, and between them what events and sampled controllers do, transposed.
+
+The gradient that is carried backwards belongs to an extended state: the values at which events hold coordinates, y, and
+the signals and states of sampled controllers. What is left on the way belongs to the parameters. Directions are in the
+order of `Places`. Events, instants of controllers, and channels at the instants of the scalar are differentiated along
+all of them by the dual numbers of `flexmb.sensitivity.passage`: they are few, beside the stages of steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.control import loop
+from flexmb.integrate.control import ACCEPTED
+from flexmb.integrate.problem import Clock
+from flexmb.integrate.settings import Settings
+from flexmb.jit.direct import addresses
+from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID
+from flexmb.parameters.numbers import Number
+from flexmb.run.driver import Leg
+from flexmb.run.propagate import Integration, integration
+from flexmb.scene.events import Latch
+from flexmb.scene.schema import Scene
+from flexmb.sensitivity.adjoint.arc import Arc, Cost, Motion, Plain
+from flexmb.sensitivity.adjoint.part import Part, Places
+from flexmb.sensitivity.adjoint.sampling import Sampling
+from flexmb.sensitivity.adjoint.seeing import Seeing
+from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
+from flexmb.sensitivity.passage import Passage, is_mechanical
+from flexmb.sensitivity.scalars import Probe, ScalarTerm, TimeIntegral
+from flexmb.typing import Index, Real
+
+
+class Left(NamedTuple):
+    """What is known at the end of a part: how its end moves (D,), and the integrands there."""
+
+    dt: Real
+    integrands: list[float]
+
+
+class Adjoint:
+    """The gradient of a scalar by many numbers.
+
+    value: of the scalar; cost: of the steps; both are known after the call.
+    """
+
+    def __init__(self, scene: Scene, found: Sequence[Number], terms: Sequence[ScalarTerm], settings: Settings) -> None:
+        self._order = np.argsort([not is_mechanical(scene, each) for each in found], kind="stable")
+        self._numbers, self._terms = [found[k] for k in self._order], terms
+        self._scene, self._settings = scene, settings
+        self.value = 0.0
+        self.cost = Cost(0, 0, 0, 0)
+
+    def __call__(self, course: Sequence[Leg]) -> Real:
+        """The gradient (P,)."""
+        latches = [action for event in self._scene.events for action in event.actions if isinstance(action, Latch)]
+        with integration(course[0].system, "articulated", 0.0, self._settings.integrator) as solve:
+            y, _ = self._begun(solve, course[0])
+            made = None if solve.feedback is None else solve.feedback.running
+            memory = 0 if made is None else len(made.signal) + len(made.state)
+        self._places = Places(
+            len(self._numbers), tuple(dict.fromkeys(each.coordinate for each in latches)), len(y), memory
+        )
+        gradient, rows = np.zeros(self._places.size), dict[int, Real]()
+        for part in reversed(self._forwards(course)):
+            gradient = part.passed(gradient, rows)
+            if part.arc is not None:
+                self.cost = self.cost.plus(part.arc.cost)
+        return gradient[: len(self._numbers)][np.argsort(self._order)]
+
+    def _forwards(self, course: Sequence[Leg]) -> list[Part]:
+        """Record all parts, with what the scalar adds in them, and what events and controllers do."""
+        places, t_end = self._places, course[-1].raw.t
+        numbers = [*self._numbers, *[None] * (places.size - len(self._numbers))]
+        length = t_end - course[0].begin.state.t
+        passage = Passage(self._scene, numbers, np.ones(places.size), self._settings, length)
+        probes = self._probes(course, t_end)
+        found, left, loops = list[Part](), None, None
+        for i, leg in enumerate(course):
+            held = {} if passage.after is None else passage.after.held
+            if passage.after is not None:
+                passage.after = passage.after._replace(held={name: places.held(name) for name in held})
+            blocks, start, stop, is_last = passage.blocks(leg), leg.begin.state.t, leg.raw.t, i + 1 == len(course)
+            with integration(leg.system, "articulated", 0.0, self._settings.integrator) as solve:
+                y, clock = self._begun(solve, leg)
+                loops = passage.loops(solve, loops, is_last and bool(i) and start == stop)
+                variation = Variation(leg, blocks, loops)
+                sampling = None if loops is None else Sampling(variation, loops, places.memory, places.size)
+                at = passage.begun(variation, y)
+                own = {t: each for t, each in probes.items() if start <= t and (t < stop or is_last)}
+                due = [] if sampling is None else sampling.times(start, stop, is_last)
+                ends = sorted({start, *own, *due, stop})
+                plain = Plain(blocks.system)
+                arc = None
+                if stop > start:
+                    motion = Motion(plain.addresses, True) if loops is None else self._controlled(solve, leg)
+                    steps = int(leg.raw.counts[ACCEPTED])
+                    arc = Arc(plain, motion, (y, clock), ends, self._settings, steps)
+                part = Part(places, blocks, arc, start, at.Y, held)
+                states = [y] * len(ends) if arc is None else arc.states_at(ends)
+                seeing = Seeing(variation, places.along, self._names, solve.feedback)
+                self._see(part, seeing, sampling, own, due, dict(zip(ends, states, strict=True)))
+                if left is not None:
+                    jumps = np.subtract(left.integrands, self._integrands(seeing, start, y))
+                    part.moved = np.asarray(np.sum(jumps) * left.dt)
+                found.append(part)
+                after = passage.ended(variation, Course(leg.raw.y, places.along))
+                moves = bool(np.any(after.dt))
+                left = Left(after.dt, self._integrands(seeing, stop, leg.raw.y)) if moves else None
+        return found
+
+    def _see(
+        self, part: Part, seeing: Seeing, sampling: Sampling | None, probes: dict[float, list[Probe]],
+        due: Sequence[float], states: dict[float, Real],
+    ) -> None:  # fmt: skip
+        """The instants of controllers and of the scalar in a part of the run, in order of time."""
+        if sampling is not None and part.begin not in due:
+            part.instants[part.begin] = sampling.held(part.begin)
+        for t in sorted({*probes, *due}):
+            if sampling is not None and t in due:
+                part.instants[t] = sampling.acted(t, Course(states[t], self._places.along))
+            if t in probes:
+                part.added[t] = self._added(seeing, t, states[t], probes[t])
+
+    def _begun(self, solve: Integration, leg: Leg) -> tuple[Real, Clock]:
+        start = leg.begin.state.t
+        return clock_of_leg(solve, leg, np.array([start, max(leg.raw.t, start)]), self._settings)
+
+    def _controlled(self, solve: Integration, leg: Leg) -> Motion:
+        """The motion with its controllers."""
+
+        def begin() -> Index:
+            self._begun(solve, leg)
+            assert solve.feedback is not None
+            rhs, made, _ = solve.feedback.motion
+            moving = addresses(rhs, STATUS, REAL, VECTOR, VECTOR, made, made)
+            return np.array([moving[0], addresses(loop.project, VOID, REAL, VECTOR, made)[0], *moving[1:]])
+
+        return Motion(begin, False)
+
+    @property
+    def _names(self) -> list[str]:
+        return [name for term in self._terms for name in term.channels]
+
+    def _probes(self, course: Sequence[Leg], t_end: float) -> dict[float, list[Probe]]:
+        """The instants of all terms, by time."""
+        ends, found = [leg.raw.t for leg in course], dict[float, list[Probe]]()
+        for term in self._terms:
+            for probe in term.probes(t_end, ends):
+                found.setdefault(probe.t, []).append(probe)
+        return found
+
+    def _added(self, seeing: Seeing, t: float, y: Real, probes: Sequence[Probe]) -> Real:
+        """The gradient (D,) that the scalar adds at one instant; its value there is added to `value`."""
+        values, rates = seeing.at(t, y)
+        total = np.zeros(self._places.size)
+        for each in probes:
+            self.value += each.value(values[each.channel])
+            total += each.slope(values[each.channel]) * rates[each.channel]
+        return total
+
+    def _integrands(self, seeing: Seeing, t: float, y: Real) -> list[float]:
+        """The values of all integrands."""
+        integrals = [term for term in self._terms if isinstance(term, TimeIntegral)]
+        values = seeing.at(t, y)[0] if integrals else {}
+        return [term.at(t).value(values[term.channel]) for term in integrals]
