@@ -482,6 +482,41 @@ def test_derivatives_by_numbers_of_the_beam():
         assert relative(own, (ahead - behind) / (2.0 * h)) <= 1e-6, name
 
 
+def test_derivatives_of_a_run_by_numbers_of_the_beam():
+    """A pendulum that bends: by differences of runs. A longer beam has its last station further out, too."""
+    soft = beam(s.Modes(count=3, families=("bending_z",)), gravity=(0.0, 0.0, -9.81))
+    scene = soft.revolute("base", "ground", "rod", axis=(0, 1, 0)).marker("tip", "rod", node="tip").scene()
+    found = flexmb.sensitivities(
+        scene, 0.5, ["rod.stations.0.EIy_Nm2", "rod.length_m"], ["tip.position.z"], rtol=1e-10, samples=2
+    )
+    for j, paths in enumerate((["rod.stations.0.EIy_Nm2"], ["rod.length_m", "rod.stations.1.x_m"])):
+        heights, h = [], 1e-4
+        for step in (h, -h):
+            moved = scene
+            for path in paths:
+                moved = changed_at(moved, path, lambda value, step=step: value + step)
+            run = flexmb.simulate(moved, 0.5, rtol=1e-12, atol=1e-14, samples=2)
+            heights.append(run.markers["tip"].position[-1, 2])
+        assert found.derivatives[-1, 0, j] == pytest.approx((heights[0] - heights[1]) / (2.0 * h), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", BEAMS)
+def test_mass_properties_of_a_bent_beam(name):
+    """Mass, mass centre and inertia are those of its points where they are."""
+    system = flexmb.compile(beam(**BEAMS[name]).weld("clamp", "ground", "rod").scene())
+    model = system.links[0].model
+    eta, none = bent(model.field)[0], np.zeros(model.mode_count)
+    moved, at = moved_sections(model.field, eta, none, none), model.section
+    R, r = moved.R[at], moved.r[at] + np.einsum("nab,nb->na", moved.R[at], model.com_offset)
+    centre = model.mass @ r / model.mass.sum()
+    arm = cross_matrix(r - centre)
+    inertia = np.sum(R @ model.inertia @ np.swapaxes(R, 1, 2) - model.mass[:, None, None] * arm @ arm, axis=0)
+    found = system.mass_properties(system.state(eta, none), "rod")
+    assert found.mass == pytest.approx(model.mass.sum(), rel=1e-14)
+    np.testing.assert_allclose(found.centre, centre, atol=ROUNDING)
+    np.testing.assert_allclose(found.inertia, inertia, atol=ROUNDING * np.max(inertia))
+
+
 def test_out_of_its_plane_a_beam_has_no_derivative():
     """Curvature that would bend a beam of one plane out of it changes what kernels do; the message names the table."""
     system = flexmb.compile(beam(s.Modes(count=3, families=PLANE)).weld("clamp", "ground", "rod").scene())
