@@ -54,7 +54,6 @@ def _pulses(scene: Scene) -> list[tuple[float, float]]:
 def refuse_beyond_adjoint(scene: Scene) -> None:
     """NotImplementedError for scenes whose runs are not passed backwards."""
     for has, what in (
-        (scene.constraints, "closures or couplings"),
         (any(each.period_s is None for each in scene.controllers), "continuous controllers"),
         (watches_signals(scene), "events that watch signals"),
     ):

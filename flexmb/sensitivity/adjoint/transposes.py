@@ -16,7 +16,7 @@ from flexmb.jit.direct import addresses
 from flexmb.jit.duals import DualType
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
-from flexmb.parameters.tables import DualConstants
+from flexmb.parameters.tables import DualClosureConstants, DualConstants
 from flexmb.sensitivity.adjoint import transposed
 from flexmb.sensitivity.adjoint.sampling import DrivenFunctions
 from flexmb.sensitivity.blocks import Blocks, DualTables, array_parts, dual_parts
@@ -38,9 +38,9 @@ class Transposes:
         at which coordinates are held. functions (F,): those that controllers drive. of_power: whether the scalar
         depends on the work done."""
         self._blocks, self._count, plant = blocks, count, blocks.system
-        c = plant.constants
-        self._x = None if of_power else pull_workspace(c, plant.nq, plant.nu)
-        acts = [_acting(each, c, not of_power, functions) for each in blocks.duals[: -(-count // LANES)]]
+        c, by_recursion = plant.constants, not of_power and plant.closures is None
+        self._x = pull_workspace(c, plant.nq, plant.nu) if by_recursion else None
+        acts = [_acting(each, c, by_recursion, functions) for each in blocks.duals[: -(-count // LANES)]]
         self._chosen = np.flatnonzero(np.concatenate(acts)[:count])
         self._driven = len(functions)
         lanes = len(self._chosen) + self._driven
@@ -54,7 +54,7 @@ class Transposes:
             self.held = DrivenFunctions(np.array(functions, np.int64), [c, *of_lanes])
             return
         route = plant.route("articulated", 0.0)
-        assert route.linear is not None  # of every tree
+        assert route.linear is not None  # of trees and closed chains
         self._linear = route.linear(*route.tables())
         exact, n = self._linear.exact, plant.nq + plant.nu + 1
         where = addresses(self._linear.jacobian, STATUS, REAL, VECTOR, MATRIX, exact, self._linear.tangent)
@@ -136,6 +136,7 @@ def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequenc
 def _gathered(blocks: Blocks, chosen: Index, functions: Sequence[int]) -> list[DualTables]:
     """Blocks of the chosen directions, then of the values of functions of time."""
     found, sources = list[DualTables](), [each.constants for each in blocks.duals]
+    closures = [each.closures for each in blocks.duals if each.closures is not None]
     count = len(chosen) + len(functions)
     for first in range(0, count, LANES):
         arrays = _lanes_of(sources, chosen[first : first + LANES])
@@ -143,8 +144,11 @@ def _gathered(blocks: Blocks, chosen: Index, functions: Sequence[int]) -> list[D
         for lane in range(min(LANES, count - first)):
             if first + lane >= len(chosen):
                 arrays["function"]["data"][functions[first + lane - len(chosen)], 0, 1 + lane] = 1.0
-        found.append(DualTables(DualConstants(**arrays), None))
+        of_closures = _lanes_of(closures, chosen[first : first + LANES]) if closures else None
+        own = None if of_closures is None else DualClosureConstants(**of_closures)
+        found.append(DualTables(DualConstants(**arrays), own))
     broaden([each.constants for each in found])
+    broaden([each.closures for each in found if each.closures is not None])
     return found
 
 
