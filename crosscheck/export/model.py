@@ -26,7 +26,7 @@ from flexmb.surrogate.lumping import rigid_equivalent
 
 FORMAT = "crosscheck export 1"
 AS_IN_THE_SCENE = ("closures", "connectors", "sensors", "controllers", "events")
-"""Parts whose keys are those of the scene file: `schemas/scene.schema.json` explains them."""
+"""Parts whose keys are those of the scene file, as those of `beams` are: `schemas/scene.schema.json` explains them."""
 
 Data = dict[str, Any]
 
@@ -61,6 +61,7 @@ def model_data(scene: Scene) -> tuple[Data, dict[str, Data]]:
         "modal_states": {
             state.body: {"coordinates": state.coordinates, "rates": state.rates} for state in scene.modal_states
         },
+        "beams": _plain([each for each in scene.bodies if isinstance(each, BeamBody) and each.level == "exact"]),
         "loads": _plain(scene.loads),
         "markers": _plain(scene.markers),
     }
@@ -73,6 +74,8 @@ def _deforms(body: BeamBody | ModalBody) -> bool:
             return False
         case "full" | "stiffened":
             return True
+        case "exact":
+            return False  # it has no modes: its strains and sections are as in the scene
         case "linear" | "ruthless":
             what = f'body "{body.name}" is of level "{body.level}"'
             raise CaseError(f'{what}, whose truncated mass matrix an export cannot say: take level "full"')
@@ -90,6 +93,8 @@ def _body(body: Body, modal: dict[str, Data]) -> Data:
         raise CaseError(f'body "{body.name}" is described by a SID file: convert it by `flexmb import`')
     if body.name in modal:
         return {"name": body.name, "kind": "modal", "file": modal_file(body.name)}
+    if isinstance(body, BeamBody) and body.level == "exact":
+        return {"name": body.name, "kind": "beam"}
     rest = {name: (frame.position, frame.quaternion) for name, frame in rest_frames(body).items()}
     if isinstance(body, RigidBody):
         return _rigid(body.name, body.mass_kg, body.com_m, np.array(body.inertia_kg_m2), rest)

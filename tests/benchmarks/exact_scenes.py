@@ -51,7 +51,7 @@ def tip_at_rest(scene: fm.Scene, *loads: float) -> np.ndarray:
 
 
 def welded(scene: fm.Scene, bodies: int, polynomials: s.StrainPolynomials) -> fm.Scene:
-    """The one uniform beam of a scene as so many bodies of level exact, welded to one another."""
+    """The one uniform beam of a scene as so many bodies of level exact, an even number, welded to one another."""
     (beam,), (root,) = scene.bodies, scene.hinges
     assert isinstance(beam, s.BeamBody)
     length, first = beam.length_m / bodies, beam.stations[0]

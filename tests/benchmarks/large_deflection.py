@@ -1,8 +1,8 @@
 """What a digit costs in large deflection: python -m tests.benchmarks.large_deflection
 
-Spin-up of beam K and the first seconds of the flying spaghetti: error against the time of a run, for flexible pieces of
-both levels and rigid segments in native code, and nonlinear beam elements in Exudyn; and the time of one evaluation
-against the number of pieces.
+Spin-up of beam K and the first seconds of the flying spaghetti: error against the time of a run, for bodies of level
+exact, flexible pieces of both levels and rigid segments in native code, and nonlinear beam elements in Exudyn; and the
+time of one evaluation against the number of pieces.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ import flexmb as fm
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
 from flexmb.integrate.integrator import Method
-from flexmb.scene.schema import Level
+from flexmb.scene.schema import Level, StrainPolynomials
 from flexmb.surrogate import finite_segments, substructured
+from tests.benchmarks.exact_scenes import bending, welded
 from tests.benchmarks.rivals import interleaved
 from tests.benchmarks.routes import articulated
 from tests.cases.test_spinning_beam import FAMILY, TRUTHS, minimum, rotating_frame
@@ -43,6 +44,12 @@ THROWN_PIECES: tuple[tuple[str, Level, int], ...] = (
     ("pieces, stiffened", "stiffened", 2), ("pieces, full", "full", 2), ("pieces, no eigenmodes", "stiffened", 0),
 )  # fmt: skip
 COUNTS = (4, 8, 16, 32)
+EXACT_MODES = (2, 3, 4, 5, 6, 8)
+EXACT_STEP = 0.0125  # s
+EXACT_BODIES = {
+    "exact bodies": (StrainPolynomials(bending_y=4), (2, 4, 8)),
+    "exact bodies, stretch and shear": (StrainPolynomials(bending_y=4, axial=1, shear_y=2), (4, 8, 12, 16)),
+}
 LONG_CHAINS = (4, 8, 16, 32, 64)
 
 
@@ -78,6 +85,7 @@ def spin_up() -> dict[str, dict[int, Point]]:
         return timed(native(chain, "radau5", 1e-7, SPIN_UP), error)
 
     return {
+        "one exact body, modes": {n: run(bending(scene, n)) for n in EXACT_MODES},
         "pieces, stiffened": {n: run(substructured(scene, None, n, level="stiffened")) for n in (1, 2, *COUNTS)},
         "pieces, full": {n: run(substructured(scene, None, n, level="full")) for n in COUNTS},
         "rigid segments": {n: run(finite_segments(scene, None, n)) for n in COUNTS},
@@ -99,20 +107,25 @@ def flight() -> dict[str, dict[int, Point]]:
         chain = substructured(scene, None, count, level=level, eigenmodes=eigenmodes)
         return timed(native(chain, "dop853", 1e-4, FLIGHT), error)
 
+    def implicit(bodies: int, strains: StrainPolynomials) -> Point:
+        return timed(native(welded(scene, bodies, strains), "generalised_alpha", 1e-4, FLIGHT, EXACT_STEP), error)
+
     return {
+        **{name: {n: implicit(n, strains) for n in counts} for name, (strains, counts) in EXACT_BODIES.items()},
         **{name: {n: run(n, level, modes) for n in COUNTS[1:]} for name, level, modes in THROWN_PIECES},
         "exact elements, Exudyn": {n: timed(elements(scene, n, 0.01, FLIGHT), error) for n in COUNTS},
     }
 
 
 def native(
-    scene: fm.Scene, method: Method, tolerance: float, times: np.ndarray
+    scene: fm.Scene, method: Method, tolerance: float, times: np.ndarray, step: float | None = None
 ) -> Callable[[], tuple[Positions, float]]:
     """A run in native code: positions of the markers and its seconds."""
     system = fm.compile(scene)
+    fixed = {} if step is None else {"step": step}
 
     def run() -> tuple[Positions, float]:
-        done = fm.simulate(system, times[-1], method, rtol=tolerance, atol=0.01 * tolerance, samples=times)
+        done = fm.simulate(system, times[-1], method, rtol=tolerance, atol=0.01 * tolerance, samples=times, **fixed)
         return _positions(done), done.statistics.run_s
 
     return run

@@ -17,7 +17,7 @@ class RebuiltCase:
     def __init__(self, folder):
         self.folder = Path(folder)
         data = json.loads((self.folder / "model.json").read_text(encoding="utf-8"))
-        for part in ("closures", "connectors", "controllers", "events"):
+        for part in ("beams", "closures", "connectors", "controllers", "events"):
             if data[part]:
                 raise SystemExit(f"{self.folder}: it has {part}, which this program does not rebuild")
         self.data, self.gravity = data, np.array(data["gravity_m_s2"])

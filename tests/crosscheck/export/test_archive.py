@@ -119,6 +119,14 @@ def test_levels_that_the_data_cannot_say_are_refused() -> None:
         model_data(replace(scene, bodies=bodies))
 
 
+def test_beams_of_level_exact_are_as_in_the_scene() -> None:
+    data, modal = model_data(scene_of("frames/right_angle"))
+    assert not modal
+    assert [(body["name"], body["kind"]) for body in data["bodies"]] == [("leg", "beam"), ("arm", "beam")]
+    assert [beam["level"] for beam in data["beams"]] == ["exact", "exact"]
+    assert data["beams"][0]["stations"][1]["x_m"] == 0.24
+
+
 def test_the_page_in_docs_has_the_keys_that_every_release_has() -> None:
     from importlib.resources import files
 
@@ -128,7 +136,7 @@ def test_the_page_in_docs_has_the_keys_that_every_release_has() -> None:
     assert keys in (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
 
 
-OF_SCENES = ("closures", "connectors", "sensors", "controllers", "events")  # their keys are in the schema of a scene
+OF_SCENES = ("beams", "closures", "connectors", "sensors", "controllers", "events")  # their keys are a scene's
 BY_NAME = ("nodes", "modal_states")  # their keys are names
 
 
