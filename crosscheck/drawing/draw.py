@@ -38,7 +38,9 @@ def draw(scene: Scene, trails: Sequence[str] | None = None) -> Drawing:
         match body:
             case RigidBody():
                 lines += _rigid(scene, body, markers[0])
-            case BeamBody() | ModalBody() | SidBody():
+            case BeamBody():
+                lines.append(_beam(scene, body, markers))
+            case ModalBody() | SidBody():
                 lines.append(_flexible(scene, body, markers))
             case _:
                 assert_never(body)
@@ -110,22 +112,34 @@ def _carried(scene: Scene, body: str, node: str, offset: Vector) -> CarriedPoint
     return CarriedPoint(marker.name, _vector(rotation.inv().apply(_node_point(own, node, offset) - position)))
 
 
-def _flexible(scene: Scene, body: Body, markers: list[Marker]) -> Line:
-    """A line through the body's nodes with markers in their order along a beam, otherwise in that of their distance
-    from the origin; it begins at the inboard hinge if a marker carries that."""
-    nodes = {marker.node: marker for marker in reversed(markers)}
-    along_beam = nodes_along(body) if isinstance(body, BeamBody) else {}
-    placed = sorted(
-        nodes.values(),
-        key=lambda marker: along_beam.get(marker.node, float(np.linalg.norm(_node_point(body, marker.node, ZERO)))),
-    )
+def _beam(scene: Scene, body: BeamBody, markers: list[Marker]) -> Line:
+    """A line through the beam's nodes with markers in their order along it, with the tangents of its axis."""
+    nodes, along = _by_node(markers), nodes_along(body)
+    placed = sorted(nodes.values(), key=lambda marker: along[marker.node])
+    tangents = rest_sections(body, np.array([along[marker.node] for marker in placed]))[1][:, :, 0]
+    return _bent(scene, body, placed, tangents)
+
+
+def _flexible(scene: Scene, body: ModalBody | SidBody, markers: list[Marker]) -> Line:
+    """A line through the body's nodes with markers in the order of their distance from its origin."""
+    nodes = _by_node(markers)
+    placed = sorted(nodes.values(), key=lambda marker: float(np.linalg.norm(_node_point(body, marker.node, ZERO))))
     rest = np.array([_node_point(body, marker.node, ZERO) for marker in placed])
-    root = _root_point(scene, body)
-    from_root = root is not None and float(np.linalg.norm(rest[0])) > 0.0
+    from_root = _root_point(scene, body) is not None and float(np.linalg.norm(rest[0])) > 0.0
     along = np.vstack([np.zeros(3), rest]) if from_root else rest
-    tangents = _directions(along)[-len(placed) :]
-    if isinstance(body, BeamBody):
-        tangents = rest_sections(body, np.array([along_beam[marker.node] for marker in placed]))[1][:, :, 0]
+    return _bent(scene, body, placed, _directions(along)[-len(placed) :])
+
+
+def _by_node(markers: list[Marker]) -> dict[str, Marker]:
+    """The first marker of each node."""
+    return {marker.node: marker for marker in reversed(markers)}
+
+
+def _bent(scene: Scene, body: Body, placed: list[Marker], tangents: Real) -> Line:
+    """The line through markers, with tangents (n,3) in the body frame at rest; it begins at the inboard hinge if a
+    marker carries that and no node is there."""
+    root = _root_point(scene, body)
+    from_root = float(np.linalg.norm(_node_point(body, placed[0].node, ZERO))) > 0.0
     points = [
         CarriedPoint(marker.name, _vector(-np.array(marker.offset_m)), _vector(_pose(body, marker)[1].inv().apply(way)))
         for marker, way in zip(placed, tangents, strict=True)

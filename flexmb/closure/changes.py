@@ -26,7 +26,7 @@ from flexmb.closure.end_changes import (
     motion_of,
     place_of,
 )
-from flexmb.closure.row_changes import Ends, forms, load_of_rows, torque_by_turn
+from flexmb.closure.row_changes import EndMotions, forms, load_of_rows, torque_by_turn
 from flexmb.closure.rows import pose
 from flexmb.closure.tables import COUPLINGS, ON_GROUND, ClosureConstants
 from flexmb.jain.derivatives.applied import subtract_applied
@@ -87,17 +87,21 @@ def differentiate(c, w, d, cc, cw, x, masses, rates):
     x.rate if `rates`.
     """
     forces_of_bodies(c, w, d, masses)
+    filled = -1
     for i in range(cc.closure.shape[0]):
         if has(cc, COUPLINGS) and is_coupling(cc, i):
             _couple(c, d, cc, cw, x, i)
         else:
+            _fill_ends(c, w, d, cc, x, i)
             _close(c, w, d, cc, cw, x, i, rates)
+            filled = i
     rows_of_speeds(c, w, d, masses)
     subtract_applied(c, w, d)
-    for i in range(cc.closure.shape[0]):
+    for i in range(cc.closure.shape[0] - 1, -1, -1):
         if not (has(cc, COUPLINGS) and is_coupling(cc, i)):
-            ends = _fill_ends(c, w, d, cc, x, i)
-            _turn_loads(d, cc, cw, x, i, ends)
+            if i != filled:
+                _fill_ends(c, w, d, cc, x, i)
+            _turn_loads(d, cc, cw, x, i, _motions(c, w, d, cc, i))
 
 
 @helper
@@ -116,7 +120,7 @@ def _couple(c, d, cc, cw, x, i):
 @helper
 def _close(c, w, d, cc, cw, x, i, rates):
     """The rows of closure i, and its loads on the bodies of both ends."""
-    ends = _fill_ends(c, w, d, cc, x, i)
+    ends = _motions(c, w, d, cc, i)
     for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
         form = forms(cc, r, ends)
         _row(d, cw, x, r, form)
@@ -140,15 +144,20 @@ def _places(c, w, d, cc, i):
 
 @helper
 def _fill_ends(c, w, d, cc, x, i):
-    """Write `end` for closure i; returns its `Ends`."""
+    """Write `end` for closure i."""
     r_A, r_B = _places(c, w, d, cc, i)
     fill(c, d, x.end[A], cc.side[i, A], r_A)
     fill(c, d, x.end[B], cc.side[i, B], r_B)
     difference(d, x.end)
+
+
+@helper
+def _motions(c, w, d, cc, i):
+    r_A, r_B = _places(c, w, d, cc, i)
     R_WA, R_WB = pose(w, cc.side[i, A])[1], pose(w, cc.side[i, B])[1]
     V_A, A_A = motion_of(c, w, d, cc.side[i, A], r_A)
     V_B, A_B = motion_of(c, w, d, cc.side[i, B], r_B)
-    return Ends(R_WA, matmul(transpose(R_WA), R_WB), V_A, A_A, V_B, A_B)
+    return EndMotions(R_WA, matmul(transpose(R_WA), R_WB), V_A, A_A, V_B, A_B)
 
 
 @helper

@@ -24,6 +24,8 @@ from flexmb.motion.coordinates import load_state
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 
+RATES, JACOBIAN, ACCELERATIONS, BY_SPEED = range(4)  # of the rows, in `change_by_state`
+
 
 class Changes(NamedTuple):
     """Of m numbers by displacements along the speeds (m,nu), by speeds (m,nu), and by time (m,)."""
@@ -57,13 +59,15 @@ class ConstantLoads:
     def changes(self, t: float, y: Real, load: Real) -> AtConstantLoads:
         """At y = [q, u, work] with loads (G,) of the rows."""
         c, nu, G = self._chain.c, len(self._chain.c.speed), len(load)
-        parts = [np.empty((rows, nu)) for rows in (nu, nu, G, G, G, G)]
-        self._check(change_by_state(t, y, load, *parts, self._chain, self._x), int(self._chain.fault[0]))
+        of_rates, of_rows = np.empty((2, nu, nu)), np.empty((4, G, nu))
+        self._check(change_by_state(t, y, load, of_rates, of_rows, self._chain, self._x), int(self._chain.fault[0]))
         prescribed = c.speed["prescribed"] >= 0
-        for part in (*parts[:2], parts[2], *parts[4:]):
-            part[:, prescribed] = 0.0
-        pairs = zip(parts[::2], parts[1::2], self._by_time(t, y, load), strict=True)
-        return AtConstantLoads(*(Changes(*each) for each in pairs))
+        of_rates[:, :, prescribed] = 0.0
+        for kind in (RATES, ACCELERATIONS, BY_SPEED):
+            of_rows[kind][:, prescribed] = 0.0
+        pairs = of_rates, of_rows[[RATES, JACOBIAN]], of_rows[[ACCELERATIONS, BY_SPEED]]
+        by_time = self._by_time(t, y, load)
+        return AtConstantLoads(*(Changes(*pair, time) for pair, time in zip(pairs, by_time, strict=True)))
 
     def _by_time(self, t: float, y: Real, load: Real) -> tuple[Real, Real, Real]:
         c, G = self._chain.c, len(load)
@@ -76,8 +80,11 @@ class ConstantLoads:
 
 
 @kernel
-def change_by_state(t, y, load, by_displacement, by_speed, rates, J, rows, rows_by_speed, s, x):
-    """Changes (nu,nu) of udot by displacement and speed, (G,nu) of the rows' rates and accelerations; a status code."""
+def change_by_state(t, y, load, of_rates, of_rows, s, x):
+    """Changes (2,nu,nu) of udot by displacement and by speed, and (4,G,nu) of the rows; returns a status code.
+
+    Of the rows: RATES by displacement, JACOBIAN, ACCELERATIONS by displacement and, of these, BY_SPEED.
+    """
     load_state(t, y, s.c, s.w)
     status = free_tree(s.route, s)
     if status != OK:
@@ -85,7 +92,7 @@ def change_by_state(t, y, load, by_displacement, by_speed, rates, J, rows, rows_
     for r in range(load.shape[0]):
         s.cw.row[r].load = load[r]
     accelerate(s.route, s)
-    c, w, d, nu = s.c, x.tree.sweeps, x.tree.tables, by_speed.shape[0]
+    c, w, d, nu = s.c, x.tree.sweeps, x.tree.tables, of_rates.shape[1]
     status = factors(s.route, t, y, s, w)
     if status != OK:
         return status
@@ -94,14 +101,14 @@ def change_by_state(t, y, load, by_displacement, by_speed, rates, J, rows, rows_
     for i in range(nu):
         row = d.matrix[d.place[i]]
         for j in range(nu):
-            by_displacement[i, j], by_speed[i, j] = row[d.place[j]], row[nu + d.place[j]]
-    _in_order(d, x.changes.rate, rates)
-    _in_order(d, x.changes.jacobian, J)
-    _in_order(d, x.changes.by_displacement, rows)
-    _in_order(d, x.changes.by_speed, rows_by_speed)
+            of_rates[0, i, j], of_rates[1, i, j] = row[d.place[j]], row[nu + d.place[j]]
+    _in_order(d, x.changes.rate, of_rows[RATES])
+    _in_order(d, x.changes.jacobian, of_rows[JACOBIAN])
+    _in_order(d, x.changes.by_displacement, of_rows[ACCELERATIONS])
+    _in_order(d, x.changes.by_speed, of_rows[BY_SPEED])
     for r in range(load.shape[0]):
-        _add_accelerations(J[r], by_displacement, rows[r])
-        _add_accelerations(J[r], by_speed, rows_by_speed[r])
+        _add_accelerations(of_rows[JACOBIAN, r], of_rates[0], of_rows[ACCELERATIONS, r])
+        _add_accelerations(of_rows[JACOBIAN, r], of_rates[1], of_rows[BY_SPEED, r])
     return OK
 
 

@@ -20,7 +20,7 @@ from flexmb.spatial.vector import add, axpy, cross, dot, scale, sub, times
 ZERO = (0.0, 0.0, 0.0)
 
 
-class Ends(NamedTuple):
+class EndMotions(NamedTuple):
     """Rotation R_WA and R_AB; velocity and acceleration [angular; of the origin of B] of A and of B."""
 
     R_WA: tuple

@@ -35,6 +35,9 @@ from flexmb.tables.state import State, finite_result
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 
+MANY = 16
+"""Numbers whose derivatives are found together, where they concern different entries of the tables."""
+
 
 class ParameterError(ValueError):
     """A number of a scene by which motions have no derivative; the message names it, the reason and the remedy."""
@@ -217,7 +220,9 @@ class _Differentiation:
             ) from None
 
     def by_all(self, chosen: Sequence[Number]) -> list[Any]:
-        """The same for many numbers."""
+        """The same for many numbers. Of few, to see which entries each concerns costs more than it saves."""
+        if len(chosen) < MANY:
+            return [self.by(each) for each in chosen]
 
         def tables(values: Mapping[str, float]) -> Real:
             return self._at(with_values(self._plant.scene, values)) if values else self._middle

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from flexmb.typing import Index, Real
 INTERVALS = (2, 4, 8, 16)  # of the points cos(pi k / n), each set of which contains the one before
 WIDTHS = (2.0**-3, 2.0**-5, 2.0**-8, 2.0**-11, 2.0**-14)  # half-widths that are tried, relative to the scale
 ENOUGH = 1e-11  # relative error at which no smaller width is tried
+HOPELESS = 1e-5  # an error with half of the points that all of them will not bring down to ENOUGH
 LARGEST = 1e-9  # relative error that is accepted
 # Shares of values over scale, and of values over width, that count as rounding. That of an eigenproblem is some hundred
 # eps, and is magnified by the inverse of the width.
@@ -47,9 +49,9 @@ def derivative(
     """
     middle = function(x)
     best, trouble = Derivative(np.zeros_like(middle), np.inf), ""
-    for width in WIDTHS:
+    for is_hasty, width in product((True, False), WIDTHS):
         try:
-            found = _on_interval(function, x, width * scale, middle, scale, parts, width == WIDTHS[-1])
+            found = _on_interval(function, x, width * scale, middle, scale, parts, is_hasty)
         except ValueError as error:  # that the value is outside of its range: a smaller interval may not be
             trouble = str(error)
             continue
@@ -67,12 +69,12 @@ def derivative(
 
 def _on_interval(
     function: Callable[[float], Real], x: float, width: float, middle: Real, scale: float,
-    parts: Sequence[slice | Index], is_last: bool,
+    parts: Sequence[slice | Index], is_hasty: bool,
 ) -> Derivative:  # fmt: skip
     """By interpolation on [x - width, x + width]: points are added until the derivative does not change.
 
-    They are not added where the errors so far, which fall as powers of the number of points, say that all of them would
-    not do: a smaller interval needs fewer. The smallest one, `is_last`, is not left before half of them are there.
+    If `is_hasty`, no points are added where the errors, if they fall as a power of the number of points, would not come
+    down to ENOUGH: a smaller interval needs fewer.
     """
     odd, even = dict[float, Real](), dict[float, Real]()  # f(x + d) -+ f(x - d) by d / width
     size = np.abs(middle)
@@ -90,8 +92,8 @@ def _on_interval(
             jump = sum(weight * even[place] for place, weight in zip(places, _rest(intervals), strict=True)) / width
             rounding = size * (ROUNDING / scale + MAGNIFIED / width)
             error = max(_relative(each, now, rounding, parts) for each in (now - before, jump))
-            is_hopeless = error ** (INTERVALS[-1] / intervals) > ENOUGH
-            if error <= ENOUGH or is_hopeless and not (is_last and intervals < INTERVALS[-2]):
+            is_slow = is_hasty and error ** (INTERVALS[-1] / intervals) > ENOUGH
+            if error <= ENOUGH or is_slow or intervals == INTERVALS[-2] and error > HOPELESS:
                 break
         before = now
     return Derivative(now, error)

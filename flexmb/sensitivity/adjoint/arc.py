@@ -49,7 +49,7 @@ SCHEMES = {
 }  # fmt: skip
 
 
-class Cost(NamedTuple):
+class StepCost(NamedTuple):
     """Evaluations of the right-hand side to record the steps, steps, states that are kept, and transposed stages."""
 
     evaluations: int
@@ -57,14 +57,14 @@ class Cost(NamedTuple):
     checkpoints: int
     transposed: int
 
-    def plus(self, other: Cost) -> Cost:
+    def plus(self, other: StepCost) -> StepCost:
         """Of two parts of a run."""
-        return Cost(*(a + b for a, b in zip(self, other, strict=True)))
+        return StepCost(*(a + b for a, b in zip(self, other, strict=True)))
 
 
-class Motion(NamedTuple):
+class IntegratedMotion(NamedTuple):
     """What is integrated. begin: prepares its tables for a run from their start, and returns the addresses of kernels
-    and tables as in `Recorded`. is_plain: whether it is the motion of the mechanics alone."""
+    and tables as in `RecordedSteps`. is_plain: whether it is the motion of the mechanics alone."""
 
     begin: Callable[[], Index]
     is_plain: bool
@@ -93,7 +93,7 @@ class Plain:
         self.constants, self._workspace = self._route.tables()
 
     def addresses(self) -> Index:
-        """Of kernels and tables, as in `Recorded`."""
+        """Of kernels and tables, as in `RecordedSteps`."""
         given = self.constants, self._workspace
         moving = addresses(self._route.rhs, STATUS, REAL, VECTOR, VECTOR, *given)
         putting = addresses(self._route.project, VOID, REAL, VECTOR, self.constants)
@@ -112,8 +112,8 @@ class Arc:
     """
 
     def __init__(
-        self, plain: Plain, motion: Motion, start: tuple[Real, Clock], ends: Sequence[float], settings: Settings,
-        steps: int,
+        self, plain: Plain, motion: IntegratedMotion, start: tuple[Real, Clock], ends: Sequence[float],
+        settings: Settings, steps: int,
     ) -> None:  # fmt: skip
         """Integrate from a state y (n,) by a clock. A step ends at each of `ends`, which increase from the start to the
         end. plain: the mechanics alone; motion: what is integrated; steps: how many are expected. DynamicsError where
@@ -129,7 +129,7 @@ class Arc:
         room = steps + len(ends) * AT_END + ROOM
         while True:
             every = max(1, -(-room * len(y) * 8 // MEMORY)) if motion.is_plain else 1
-            record = recorded.Recorded(
+            record = recorded.RecordedSteps(
                 address=motion.begin(), every=np.array([every]), count=np.zeros(1, np.int64), time=np.zeros(room),
                 state=np.zeros((-(-room // every), len(y))),
             )  # fmt: skip
@@ -150,7 +150,7 @@ class Arc:
         self.t, self.y, self._record = record.time[:count].copy(), out[-1], record
         self._limit = np.isin(self.t, limits).astype(np.int64)
         per_step = SCHEMES[settings.method].a.shape[1]
-        self.cost = Cost(int(counts[EVALUATIONS]), count - 1, -(-count // every), (count - 1) * per_step)
+        self.cost = StepCost(int(counts[EVALUATIONS]), count - 1, -(-count // every), (count - 1) * per_step)
 
     def _check(self, status: int, t: float) -> None:
         if status != OK:

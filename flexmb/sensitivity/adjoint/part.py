@@ -10,14 +10,14 @@ import numpy as np
 
 from flexmb.control.wiring import wired
 from flexmb.sensitivity.adjoint.arc import Arc
-from flexmb.sensitivity.adjoint.sampling import Instant
+from flexmb.sensitivity.adjoint.sampling import ActedInstant
 from flexmb.sensitivity.adjoint.transposes import Transposes
 from flexmb.sensitivity.blocks import Blocks
 from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
-class Places:
+class StateDirections:
     """Where the directions are: parameters, first those on which the tables of the mechanics may depend; values at
     which coordinates are held, by `slots`; entries of y; signals, then states, of controllers."""
 
@@ -61,7 +61,7 @@ class Places:
 
 
 @dataclass
-class Part:
+class PassedPart:
     """One part of a run.
 
     arc: its steps, None where it has no duration. begin (s); start (n,D): how the state there changes along the
@@ -70,7 +70,7 @@ class Part:
     sampled controllers, by time, and what they hold at the start.
     """
 
-    places: Places
+    places: StateDirections
     blocks: Blocks
     arc: Arc | None
     begin: float
@@ -78,7 +78,7 @@ class Part:
     held: dict[str, Real]
     moved: Real | None = None
     added: dict[float, Real] = field(default_factory=dict)
-    instants: dict[float, Instant] = field(default_factory=dict)
+    instants: dict[float, ActedInstant] = field(default_factory=dict)
 
     def passed(self, gradient: Real, rows: dict[int, Real]) -> Real:
         """The gradient (D,) before the events at its start, from that at its end; rows: of outputs that wait, by number
@@ -106,7 +106,7 @@ class Part:
 class _Sweep:
     """The gradient (D,) while a part is passed, and that of outputs that wait."""
 
-    def __init__(self, part: Part, gradient: Real, rows: dict[int, Real]) -> None:
+    def __init__(self, part: PassedPart, gradient: Real, rows: dict[int, Real]) -> None:
         self._part, self.gradient, self._rows = part, gradient.copy(), rows
         self._switches = sorted(part.instants)
         self._transposes: Transposes | None = None

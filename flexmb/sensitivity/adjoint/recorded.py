@@ -11,13 +11,13 @@ from flexmb.jit.direct import nothing_at, status_at
 from flexmb.jit.kernel import kernel
 from flexmb.typing import Index, Real
 
-# Indices in `Recorded.address` and in that of `flexmb.sensitivity.adjoint.stages.Stages`.
+# Indices in `RecordedSteps.address` and in that of `flexmb.sensitivity.adjoint.stages.Stages`.
 RHS, PROJECT, CONSTANTS, WORKSPACE = range(4)
 ADDRESSES = 4
 
 
 @bundle
-class Recorded:
+class RecordedSteps:
     """The steps of one part of a run; `count` goes on where `time` is full."""
 
     address: Index  # (ADDRESSES,) of the kernels and tables of the motion

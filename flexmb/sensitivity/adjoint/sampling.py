@@ -22,7 +22,7 @@ from flexmb.sensitivity.loops import Loops
 from flexmb.typing import Index, Real
 
 
-class Instant(NamedTuple):
+class ActedInstant(NamedTuple):
     """What happens at one time (s) along the directions before it.
 
     memory (M,D): how the signals and then the states of all controllers change; rows: likewise outputs that wait, by
@@ -38,7 +38,7 @@ class Instant(NamedTuple):
     values: Real
 
 
-class Sampling:
+class SampledLoop:
     """The instants of one part of a run. Directions of signals, then of states of controllers, begin at `first`."""
 
     def __init__(self, variation: Variation, loops: Loops, first: int, directions: int) -> None:
@@ -60,7 +60,7 @@ class Sampling:
         t = np.unique(table.instant["time"][table.following[0] :, 0])
         return [time for time in t.tolist() if start <= time and (time < stop or ends and time <= stop)]
 
-    def acted(self, t: float, at: Course) -> Instant:
+    def acted(self, t: float, at: Course) -> ActedInstant:
         """The controllers that are due at t (s) act at the state `at`."""
         tables, schedule = self._loops.tables, self._loops.tables[0].instant
         begun = int(tables[0].following[0])
@@ -80,11 +80,11 @@ class Sampling:
         memory = np.vstack([self._joined("signal"), self._joined("state")])
         self._waiting = [int(row["row"]) for row in due]
         self._set_lanes()
-        return Instant(t, memory, rows, applied, *self._driven())
+        return ActedInstant(t, memory, rows, applied, *self._driven())
 
-    def held(self, t: float) -> Instant:
+    def held(self, t: float) -> ActedInstant:
         """Nothing happens at t: what is driven there."""
-        return Instant(t, self._along, {}, [], *self._driven())
+        return ActedInstant(t, self._along, {}, [], *self._driven())
 
     def _driven(self) -> tuple[Real, Real]:
         """Derivatives (F,D) and values (F,) of what controllers drive."""
@@ -106,7 +106,7 @@ class Sampling:
             each.held[self._waiting, :, 1:] = 0.0
 
 
-class Held(NamedTuple):
+class DrivenFunctions(NamedTuple):
     """Functions of time (F,) that controllers drive, and all constants that have them."""
 
     functions: Index

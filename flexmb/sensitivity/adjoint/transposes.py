@@ -18,7 +18,7 @@ from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
 from flexmb.parameters.tables import DualConstants
 from flexmb.sensitivity.adjoint import transposed
-from flexmb.sensitivity.adjoint.sampling import Held
+from flexmb.sensitivity.adjoint.sampling import DrivenFunctions
 from flexmb.sensitivity.blocks import Blocks, DualTables, array_parts, dual_parts
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
@@ -51,7 +51,7 @@ class Transposes:
         of_lanes = [] if self._lanes is None else [each.constants for each in self._lanes.duals]
         if self._x is not None:
             self.tables: Any = transposed.ByRecursion(c, self._x, table)
-            self.held = Held(np.array(functions, np.int64), [c, *of_lanes])
+            self.held = DrivenFunctions(np.array(functions, np.int64), [c, *of_lanes])
             return
         route = plant.route("articulated", 0.0)
         assert route.linear is not None  # of every tree
@@ -60,7 +60,7 @@ class Transposes:
         where = addresses(self._linear.jacobian, STATUS, REAL, VECTOR, MATRIX, exact, self._linear.tangent)
         self.transpose = transposed.transpose
         self.tables = transposed.ByJacobian(np.array(where), np.zeros((n, n)), c, table)
-        self.held = Held(np.array(functions, np.int64), [exact, *of_lanes])
+        self.held = DrivenFunctions(np.array(functions, np.int64), [exact, *of_lanes])
 
     def _lanes_table(self, plant: System) -> transposed.Lanes:
         if self._lanes is None:

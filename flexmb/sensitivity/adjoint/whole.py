@@ -2,8 +2,9 @@
 
 The gradient that is carried backwards belongs to an extended state: the values at which events hold coordinates, y, and
 the signals and states of sampled controllers. What is left on the way belongs to the parameters. Directions are in the
-order of `Places`. Events, instants of controllers, and channels at the instants of the scalar are differentiated along
-all of them by the dual numbers of `flexmb.sensitivity.passage`: they are few, beside the stages of steps.
+order of `StateDirections`. Events, instants of controllers, and channels at the instants of the scalar are
+differentiated along all of them by the dual numbers of `flexmb.sensitivity.passage`: they are few, beside the stages of
+steps.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from flexmb.run.driver import Leg
 from flexmb.run.propagate import Integration, integration
 from flexmb.scene.events import Latch
 from flexmb.scene.schema import Scene
-from flexmb.sensitivity.adjoint.arc import Arc, Cost, Motion, Plain
-from flexmb.sensitivity.adjoint.part import Part, Places
-from flexmb.sensitivity.adjoint.sampling import Sampling
+from flexmb.sensitivity.adjoint.arc import Arc, IntegratedMotion, Plain, StepCost
+from flexmb.sensitivity.adjoint.part import PassedPart, StateDirections
+from flexmb.sensitivity.adjoint.sampling import SampledLoop
 from flexmb.sensitivity.adjoint.seeing import Seeing
 from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
 from flexmb.sensitivity.passage import Passage, is_mechanical
@@ -52,7 +53,7 @@ class Adjoint:
         self._numbers, self._terms = [found[k] for k in self._order], terms
         self._scene, self._settings = scene, settings
         self.value = 0.0
-        self.cost = Cost(0, 0, 0, 0)
+        self.cost = StepCost(0, 0, 0, 0)
 
     def __call__(self, course: Sequence[Leg]) -> Real:
         """The gradient (P,)."""
@@ -61,7 +62,7 @@ class Adjoint:
             y, _ = self._begun(solve, course[0])
             made = None if solve.feedback is None else solve.feedback.running
             memory = 0 if made is None else len(made.signal) + len(made.state)
-        self._places = Places(
+        self._places = StateDirections(
             len(self._numbers), tuple(dict.fromkeys(each.coordinate for each in latches)), len(y), memory
         )
         gradient, rows = np.zeros(self._places.size), dict[int, Real]()
@@ -71,14 +72,14 @@ class Adjoint:
                 self.cost = self.cost.plus(part.arc.cost)
         return gradient[: len(self._numbers)][np.argsort(self._order)]
 
-    def _forwards(self, course: Sequence[Leg]) -> list[Part]:
+    def _forwards(self, course: Sequence[Leg]) -> list[PassedPart]:
         """Record all parts, with what the scalar adds in them, and what events and controllers do."""
         places, t_end = self._places, course[-1].raw.t
         numbers = [*self._numbers, *[None] * (places.size - len(self._numbers))]
         length = t_end - course[0].begin.state.t
         passage = Passage(self._scene, numbers, np.ones(places.size), self._settings, length)
         probes = self._probes(course, t_end)
-        found, left, loops = list[Part](), None, None
+        found, left, loops = list[PassedPart](), None, None
         for i, leg in enumerate(course):
             held = {} if passage.after is None else passage.after.held
             if passage.after is not None:
@@ -88,7 +89,7 @@ class Adjoint:
                 y, clock = self._begun(solve, leg)
                 loops = passage.loops(solve, loops, is_last and bool(i) and start == stop)
                 variation = Variation(leg, blocks, loops)
-                sampling = None if loops is None else Sampling(variation, loops, places.memory, places.size)
+                sampling = None if loops is None else SampledLoop(variation, loops, places.memory, places.size)
                 at = passage.begun(variation, y)
                 own = {t: each for t, each in probes.items() if start <= t and (t < stop or is_last)}
                 due = [] if sampling is None else sampling.times(start, stop, is_last)
@@ -96,10 +97,10 @@ class Adjoint:
                 plain = Plain(blocks.system)
                 arc = None
                 if stop > start:
-                    motion = Motion(plain.addresses, True) if loops is None else self._controlled(solve, leg)
+                    motion = IntegratedMotion(plain.addresses, True) if loops is None else self._controlled(solve, leg)
                     steps = int(leg.raw.counts[ACCEPTED])
                     arc = Arc(plain, motion, (y, clock), ends, self._settings, steps)
-                part = Part(places, blocks, arc, start, at.Y, held)
+                part = PassedPart(places, blocks, arc, start, at.Y, held)
                 states = [y] * len(ends) if arc is None else arc.states_at(ends)
                 seeing = Seeing(variation, places.along, self._names, solve.feedback)
                 self._see(part, seeing, sampling, own, due, dict(zip(ends, states, strict=True)))
@@ -113,7 +114,7 @@ class Adjoint:
         return found
 
     def _see(
-        self, part: Part, seeing: Seeing, sampling: Sampling | None, probes: dict[float, list[Probe]],
+        self, part: PassedPart, seeing: Seeing, sampling: SampledLoop | None, probes: dict[float, list[Probe]],
         due: Sequence[float], states: dict[float, Real],
     ) -> None:  # fmt: skip
         """The instants of controllers and of the scalar in a part of the run, in order of time."""
@@ -129,7 +130,7 @@ class Adjoint:
         start = leg.begin.state.t
         return clock_of_leg(solve, leg, np.array([start, max(leg.raw.t, start)]), self._settings)
 
-    def _controlled(self, solve: Integration, leg: Leg) -> Motion:
+    def _controlled(self, solve: Integration, leg: Leg) -> IntegratedMotion:
         """The motion with its controllers."""
 
         def begin() -> Index:
@@ -139,7 +140,7 @@ class Adjoint:
             moving = addresses(rhs, STATUS, REAL, VECTOR, VECTOR, made, made)
             return np.array([moving[0], addresses(loop.project, VOID, REAL, VECTOR, made)[0], *moving[1:]])
 
-        return Motion(begin, False)
+        return IntegratedMotion(begin, False)
 
     @property
     def _names(self) -> list[str]:

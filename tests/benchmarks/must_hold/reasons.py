@@ -14,23 +14,6 @@ class Reason(NamedTuple):
 
 REASONS = (
     Reason(
-        ("derivatives_10", "derivatives_35", "derivatives_100"),
-        "of 11.4 µs at 35 bodies the accelerations take 1.9, the sweep of the derivatives 4.3 and the solution of "
-        "105 columns 4.6, in four blocks of 32 columns, so that 18 % of its work is on columns that do not exist. "
-        "The rival is Pinocchio's C++ in a compiled loop; called from Python it takes 33 µs. A block of the right "
-        "width at the end and rigid inertias of ten numbers instead of 21 are not tried.",
-    ),
-    Reason(
-        ("jacobian_5_modes",),
-        "short samples take 7.4 to 7.7 evaluations, long ones 8.7: probably because the tables of the derivatives "
-        "(100 to 400 kB) do not stay in the first cache, as those of an evaluation do.",
-    ),
-    Reason(
-        ("sensitivity",),
-        "most of it are evaluations for dual numbers in two blocks of eight directions, for twelve numbers; a fifth "
-        "or less are the tables of the numbers: beams are meshed and reduced anew at four to eight values of each.",
-    ),
-    Reason(
         ("dop853_1e-06", "equal_error_cpp_1e-06"),
         "a run at 1e-7 (42 steps) takes 0.60 ms, and one of a microsecond 0.26 ms: `simulate` checks its arguments, "
         "starts a thread and observes two samples, where the rival is a bare call. At 1e-10 it counts less.",

@@ -138,6 +138,7 @@ def test_refusals_name_their_reason():
     assert len(engine.efforts(scene)) >= 3
     every_family = replace(scene.bodies[0], modes=s.Modes(count=3))
     tilted = replace(scene.hinges[0], axis=(0.0, 1.0, 0.0))
+    off_axis = tuple(replace(each, reference_point_m=(0.02, 0.0)) for each in scene.bodies[0].stations)
     push = s.Load(name="push", body="beam", node="tip", type="force", direction=(0.0, 0.0, 1.0),
                   function=s.Constant(value=1.0))  # fmt: skip
     sprung = s.Planar(name="hub", parent="ground", child="beam", x=s.LinearCoordinate(stiffness_N_m=1.0))
@@ -148,6 +149,7 @@ def test_refusals_name_their_reason():
         (replace(scene, hinges=(sprung,)), "without spring"),
         (replace(scene, gravity_m_s2=(0.0, 0.0, -9.8)), "gravity"),
         (replace(scene, bodies=(every_family,)), "planar"),
+        (replace(scene, bodies=(replace(scene.bodies[0], stations=off_axis),)), "on the axis alone"),
         (replace(scene, hinges=(tilted,)), "World z"),
         (replace(scene, bodies=(s.RigidBody(name="beam", mass_kg=1.0, inertia_kg_m2=np.eye(3).tolist()),)), "one beam"),
     ):

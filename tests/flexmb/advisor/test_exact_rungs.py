@@ -8,10 +8,10 @@ from msgspec.structs import replace
 
 import flexmb as fm
 from flexmb.advisor.advice import advise, prepare
-from flexmb.advisor.ladder import highest_frequency, references, rungs
+from flexmb.advisor.ladder import highest_frequency, references, rungs, softest
 from flexmb.advisor.models import EXACT, LEVELS, BodyModel, built, levels
 from flexmb.modal import flexible_model
-from tests.flexmb.advisor.scenes import LENGTH, SECTION, beam, loaded, turned
+from tests.flexmb.advisor.scenes import LENGTH, SECTION, beam, loaded, stiff_and_soft, turned
 
 EI = 12.0
 STRAINS = BodyModel("strains", level=EXACT, pieces=1, polynomials=3)
@@ -124,3 +124,11 @@ def test_a_stiffened_beam_that_starts_bent_is_compared_at_its_own_points() -> No
     scene = replace(base, bodies=(arm,), modal_states=(fm.ModalState(body="arm", coordinates=(1e-3, 0.0, 0.0)),))
     first = prepare(scene, 1e-3, None, 0.5).known["arm"]
     assert first.deflection > 0.0
+
+
+def test_without_predictions_the_softest_beams_are_taken_to_bend_far() -> None:
+    """The whip's tip yields 85 times as much to a force as the arm's."""
+    scene = stiff_and_soft(0.5, 0.4)
+    assert softest(scene) == {"whip"}
+    first = dict(references(scene, softest(scene))[0][1])
+    assert first["whip"].kind == "strains" and first["arm"].kind == "modes"

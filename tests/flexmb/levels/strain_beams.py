@@ -12,6 +12,7 @@ from flexmb.modal.strain_field import MEAN, STRETCH, StrainField
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.typing import Real
+from tests.bounds import UNIT_ROUNDOFF
 
 PLANE, SPACE = ("bending_y",), ("torsion", "bending_z", "bending_y")
 SIX = s.StrainPolynomials(axial=2, shear_y=1, shear_z=2, torsion=2, bending_y=3, bending_z=3)
@@ -37,6 +38,22 @@ def beam(modes: s.Modes, length: float = 1.0, section: list[s.BeamStation] | Non
     builder = SceneBuilder("exact", gravity=more.pop("gravity", (0.0, 0.0, 0.0)))
     return builder.beam(name, length=length, elements=4, section=section or stations(length), modes=modes,
                         **{"level": "exact", "points": "section"} | more)  # fmt: skip
+
+
+ROUNDING = 2.0**8 * UNIT_ROUNDOFF
+BEAMS: dict[str, dict[str, Any]] = {
+    "plane": {"modes": s.Modes(count=4, families=PLANE)},
+    "space": {"modes": s.Modes(count=3, families=SPACE)},
+    "six strains": {"modes": s.Modes(count=3, polynomials=SIX), "section": stations(1.0, (0.4, -0.5, 0.9), taper=0.6)},
+    "pieces": {"modes": s.Modes(count=2, pieces=3, families=SPACE),
+               "section": stations(1.0, (0.0, 0.7, 0.0), (1.0, 0.0, 1.0))},
+}  # fmt: skip
+
+
+def bent(field: Any, seed: int = 0, size: float = 1.0) -> tuple[Real, Real, Real]:
+    """Coordinates of strains of some `size` in all modes, with two rates."""
+    scale = size / np.max(np.abs(field.rows), axis=(0, 1, 2))
+    return tuple(np.random.default_rng(seed).normal(size=(3, field.mode_count)) * scale)
 
 
 def body_of(builder: SceneBuilder, name: str = "rod") -> s.BeamBody:

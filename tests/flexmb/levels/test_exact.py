@@ -14,41 +14,30 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 import flexmb
 from flexmb.dense.jets import Jet
 from flexmb.dense.section_frames import section_frames
-from flexmb.interchange.sid import sid_of
 from flexmb.modal.beam import beam_elements
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.exact import exact_model
 from flexmb.modal.second_order import beam_second_order
-from flexmb.parameters.parameters import ParameterError
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
-from flexmb.scene.check import SceneError
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.strains import points_of_piece
-from flexmb.scene.values import changed_at
-from flexmb.system.frames import node_pose
 from flexmb.system.moved_sections import MovedSections, moved_sections
-from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
-from tests import trees
-from tests.bounds import UNIT_ROUNDOFF, observed_order, relative
-from tests.flexmb.levels.strain_beams import PLANE, SIX, SPACE, beam, body_of, curve, field_of, stations, strained
-
-ROUNDING = 2.0**8 * UNIT_ROUNDOFF
-BEAMS: dict[str, dict[str, Any]] = {
-    "plane": {"modes": s.Modes(count=4, families=PLANE)},
-    "space": {"modes": s.Modes(count=3, families=SPACE)},
-    "six strains": {"modes": s.Modes(count=3, polynomials=SIX), "section": stations(1.0, (0.4, -0.5, 0.9), taper=0.6)},
-    "pieces": {"modes": s.Modes(count=2, pieces=3, families=SPACE),
-               "section": stations(1.0, (0.0, 0.7, 0.0), (1.0, 0.0, 1.0))},
-}  # fmt: skip
-
-
-def bent(field: Any, seed: int = 0, size: float = 1.0) -> tuple[Real, Real, Real]:
-    """Coordinates of strains of some `size` in all modes, with two rates."""
-    scale = size / np.max(np.abs(field.rows), axis=(0, 1, 2))
-    return tuple(np.random.default_rng(seed).normal(size=(3, field.mode_count)) * scale)
+from tests.bounds import observed_order, relative
+from tests.flexmb.levels.strain_beams import (
+    BEAMS,
+    ROUNDING,
+    SPACE,
+    beam,
+    bent,
+    body_of,
+    curve,
+    field_of,
+    stations,
+    strained,
+)
 
 
 @pytest.mark.parametrize("name", BEAMS)
@@ -392,136 +381,6 @@ def test_hung_by_its_tip_it_moves_alike():
         np.testing.assert_allclose(a.position, b.position, atol=ROUNDING)
         np.testing.assert_allclose(a.velocity, b.velocity, atol=64 * ROUNDING)
         np.testing.assert_allclose(a.acceleration, b.acceleration, atol=64 * ROUNDING * size)
-
-
-def test_viscosity():
-    """Kelvin and Voigt's material: damping is viscosity times stiffness, on top of modal damping."""
-    viscous, modal, both = (
-        exact_model(body_of(beam(s.Modes(count=2, families=SPACE, **damping))))
-        for damping in ({"viscosity_s": 0.1}, {"damping_ratio": 0.02}, {"viscosity_s": 0.1, "damping_ratio": 0.02})
-    )
-    np.testing.assert_allclose(viscous.damping, 0.1 * viscous.stiffness, rtol=1e-15)
-    np.testing.assert_allclose(both.damping, viscous.damping + modal.damping, rtol=1e-15)
-
-
-@pytest.mark.parametrize("elimination", ["woodbury", "condensed"])
-def test_modes_are_eliminated_explicitly(elimination):
-    """Modal masses change with the shape: other forms of the elimination are not for this level."""
-    scene = beam(**BEAMS["six strains"]).weld("clamp", "ground", "rod").scene()
-    assert list(flexmb.compile(scene, elimination).elimination.values()) == ["explicit"]
-
-
-def refused(text: str, **more: Any) -> None:
-    with pytest.raises(SceneError, match=text):
-        beam(**more).weld("clamp", "ground", "rod").scene()
-
-
-def test_refusals():
-    """What the level does not have, or has too little of, is said before anything runs."""
-    four = s.Modes(count=4, families=PLANE)
-    refused("boundary conditions", modes=s.Modes(count=4, boundary="free-free"))
-    refused("without inertia", modes=s.Modes(count=4, families=PLANE, points=4))
-    refused("no strain", modes=s.Modes(count=0))
-    refused("consistent", modes=four, mass="lumped")
-    refused("straight beams only", modes=four, level="full", section=stations(1.0, (0.0, 0.0, 1.0)))
-    refused('leave it out, or make the level "exact"', modes=s.Modes(count=2, pieces=2), level="full")
-    unsheared = [_without_shear(each) for each in stations()]
-    refused("GAy_N", modes=s.Modes(count=1, polynomials=s.StrainPolynomials(shear_y=1, bending_y=2)), section=unsheared)
-    points = inertia_points([1.0, 1.0], np.eye(3)[:2], np.ones((2, 3, 1)))
-    raw = SceneBuilder("raw").modal_body("raw", points=points, stiffness=[[1.0]], level="exact")
-    with pytest.raises(SceneError, match="strains along a beam"):
-        raw.weld("w", "ground", "raw").scene()
-
-
-def _without_shear(station: s.BeamStation) -> s.BeamStation:
-    return msgspec.structs.replace(station, GAy_N=None, GAz_N=None)
-
-
-def test_torsion_without_inertia_is_refused():
-    """A line that twists has no inertia while it is straight: its modes would be infinitely fast."""
-    modes = s.Modes(count=2, polynomials=s.StrainPolynomials(torsion=1, bending_y=2))
-    scene = beam(modes, points="line").weld("clamp", "ground", "rod").scene()
-    with pytest.raises(ValueError, match="move no inertia"):
-        flexmb.compile(scene)
-
-
-def test_frisch_and_regressor_refuse_it():
-    """Routes that expand in powers of the deformation say what to use."""
-    system = flexmb.compile(beam(s.Modes(count=2, families=PLANE)).weld("clamp", "ground", "rod").scene())
-    with pytest.raises(ValueError, match="no finite order"):
-        system.accelerations(system.initial_state, algorithm="frisch")
-    with pytest.raises(NotImplementedError, match='"exact"'):
-        system.inertia_regressor()
-
-
-NUMBERS = (
-    "rod.length_m", "rod.stations.0.EIy_Nm2", "rod.stations.1.GJ_Nm2", "rod.stations.0.mass_per_length_kg_m",
-    "rod.stations.1.rotary_z_kg_m", "rod.stations.0.curvature_1_m.1", "rod.stations.1.curvature_1_m.2",
-    "rod.tip_masses.0.mass_kg", "rod.tip_masses.0.x_m", "rod.modes.viscosity_s", "rod.nodes.0.x_m",
-)  # fmt: skip
-
-
-def test_derivatives_by_numbers_of_the_beam():
-    """Of accelerations, against differences of recompiled systems over a millionth, as far as these round."""
-    tensor = trees.matrix(np.diag([2e-2, 1e-2, 2e-2]))
-    lump = s.TipMass(x_m=0.6, mass_kg=0.3, com_m=(0.02, 0.1, -0.05), inertia_kg_m2=tensor)
-    modes = s.Modes(count=2, families=SPACE, viscosity_s=0.01)
-    builder = beam(modes, section=stations(1.0, (0.4, -0.5, 0.9)), tip_masses=[lump], nodes={"middle": 0.45})
-    builder.rigid_body("hub", mass=1.0, inertia=(0.1, 0.1, 0.1)).revolute("joint", "rod", "hub", parent_node="tip")
-    scene = builder.revolute("base", "ground", "rod", axis=(0.0, 0.6, 0.8), child_node="middle").scene()
-    system = flexmb.compile(scene)
-    model = next(link.model for link in system.links if link.name == "rod")
-    state, rng = system.initial_state, np.random.default_rng(0)
-    state.q[system.coordinate("rod.modes")] = 0.3 * rng.normal(size=6) / np.sqrt(np.diag(model.stiffness))
-    state.u[:] = rng.normal(size=system.nu)
-    found = system.parameters(list(NUMBERS)).accelerations(state)
-    for name, own in zip(NUMBERS, found.T, strict=True):
-        h = 2.0**-20
-        moved = [changed_at(scene, name, lambda value, step=step: value + step) for step in (h, -h)]
-        ahead, behind = (flexmb.System(each).accelerations(state) for each in moved)
-        assert relative(own, (ahead - behind) / (2.0 * h)) <= 1e-6, name
-
-
-def test_out_of_its_plane_a_beam_has_no_derivative():
-    """Curvature that would bend a beam of one plane out of it changes what kernels do; the message names the table."""
-    system = flexmb.compile(beam(s.Modes(count=3, families=PLANE)).weld("clamp", "ground", "rod").scene())
-    with pytest.raises(ParameterError, match="planar"):
-        system.parameters(["rod.stations.0.curvature_1_m.0"])
-
-
-@pytest.mark.parametrize("name", BEAMS)
-def test_poses_of_nodes(name):
-    """As markers have them, also of a beam that hangs on its tip."""
-    builder = beam(**BEAMS[name], nodes={"a": 0.37})
-    builder.revolute("hinge", "ground", "rod", child_node="tip", axis=(0, 0.6, 0.8))
-    system = flexmb.compile(builder.marker("a", "rod", node="a").scene())
-    state = system.initial_state
-    state.q[system.coordinate("rod.modes")] = bent(system.links[0].model.field)[0]
-    seen = system.evaluate(0.0, state.q, state.u).markers["a"]
-    pose = node_pose(system, system.all_loads(state).motion, "rod", "a")
-    np.testing.assert_allclose(pose.position, seen.position, atol=ROUNDING)
-    np.testing.assert_allclose(pose.rotation, seen.rotation, atol=ROUNDING)
-
-
-def test_diverged():
-    """Four turns of even curvature are within the range of the level, five are beyond it."""
-    rod = beam(s.Modes(count=1, families=PLANE), section=stations(1.0, rotary=1e-6))
-    system = flexmb.compile(rod.weld("clamp", "ground", "rod").scene())
-    field = system.links[0].model.field
-    per_unit = np.abs(field.rows[0, 0, 2, 0])
-    for turns, is_within in ((4.0, True), (5.0, False)):
-        state = system.state([2.0 * np.pi * turns / per_unit], [0.0])
-        if is_within:
-            assert np.isfinite(system.accelerations(state)).all()
-        else:
-            with pytest.raises(DynamicsError):
-                system.accelerations(state)
-
-
-def test_standard_input_data_refuses_it():
-    """Strains are no modes of that format; the message says what is."""
-    with pytest.raises(ValueError, match="stiffened"):
-        sid_of(body_of(beam(s.Modes(count=2, families=PLANE))))
 
 
 def test_roll_up_closes():

@@ -211,6 +211,21 @@ def test_without_shear_a_beam_is_the_limit_of_slender_ones() -> None:
     np.testing.assert_allclose(np.log2(np.divide(differences[:-1], differences[1:])), 2.0, atol=0.1)
 
 
+def test_without_shear_a_shear_centre_off_the_axis_loses_its_twist() -> None:
+    """Why such sections are refused: a force on the axis, d off the shear centre, twists the tip by F d L / GJ.
+
+    The beam without shear, whose stiffness is that without shear force, does not twist, however slender it is."""
+    d, force = 0.02, np.array([0.0, 0.0, 10.0])
+    for length in (2.0, 20.0):
+        twist = []
+        for theory in ("timoshenko", "euler-bernoulli"):
+            ends = tuple(station(x, np.diag(DIAGONAL), section_mass(), (d, 0.0)) for x in (0.0, length))
+            body = replace(coupled(*ends, theory=theory, modes=Modes(count=0, static=True)), length_m=length)
+            twist.append(statics(beam_model(body), force, np.zeros(3))[1][0])
+        np.testing.assert_allclose(twist[0], -force[2] * d * length / DIAGONAL[3], rtol=1e-8)  # of statics
+        assert abs(twist[1]) < 1e-9 * abs(twist[0])
+
+
 def test_a_beam_beside_its_axis_is_the_same_beam() -> None:
     """With shear the finite elements contain the motion of every parallel axis: frequencies of the free beam agree.
 

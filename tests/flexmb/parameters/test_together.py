@@ -16,6 +16,12 @@ BY = [
 ]  # fmt: skip
 
 
+@pytest.fixture(autouse=True)
+def even_few(monkeypatch):
+    """Also two numbers are changed together."""
+    monkeypatch.setattr(parameters, "MANY", 2)
+
+
 def arm() -> fm.System:
     builder = fm.SceneBuilder("arm", gravity=(0.0, -9.81, 0.0))
     builder.rigid_body("upper", mass=2.0, com=(0.4, 0.1, 0.0), inertia=(0.1, 0.2, 0.2))

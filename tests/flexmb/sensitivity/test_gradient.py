@@ -9,7 +9,7 @@ import flexmb as fm
 from flexmb.parameters.numbers import Number
 from flexmb.ready import scenes
 from flexmb.sensitivity.adjoint import arc, part
-from flexmb.sensitivity.adjoint.sampling import Sampling
+from flexmb.sensitivity.adjoint.sampling import SampledLoop
 from tests.flexmb.sensitivity.test_sensitivities import EVENTS, NUMBERS, arm
 from tests.repo.project import ROOT
 
@@ -183,12 +183,12 @@ def test_the_satellite_agrees_with_forward_sensitivities():
 
 def test_outputs_that_wait_are_not_forgotten(monkeypatch):
     """Negative control: without them, gradients of runs with delays are wrong."""
-    plain = Sampling.acted
+    plain = SampledLoop.acted
 
     def forgetting(self, t, at):
         return plain(self, t, at)._replace(rows={})
 
-    monkeypatch.setattr(Sampling, "acted", forgetting)
+    monkeypatch.setattr(SampledLoop, "acted", forgetting)
     assert disagreement(controlled(period=0.05, delay=0.01).scene(), 0.97, CONTROLLED, ["pivot.rotation"]) > 1e-4
 
 
@@ -196,14 +196,14 @@ def test_outputs_that_wait_are_not_forgotten(monkeypatch):
 def test_a_planted_fault_is_noticed(monkeypatch, left_out):
     """Negative control of the comparisons."""
     if left_out == "the instant of the event":
-        plain = part.Part._before
+        plain = part.PassedPart._before
 
         def without(self, gradient):
             kept = np.where(self.start == 1.0, 1.0, 0.0)
             monkeypatch.setattr(self, "start", kept)
             return plain(self, gradient)
 
-        monkeypatch.setattr(part.Part, "_before", without)
+        monkeypatch.setattr(part.PassedPart, "_before", without)
         scene = arm().event("stop", "elbow.rotation", 0.1, *EVENTS["impact"]).scene()
         assert disagreement(scene, 0.9, [*NUMBERS, "stop.level"], ["elbow.rotation"]) > 1e-3
         return

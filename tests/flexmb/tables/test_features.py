@@ -19,11 +19,13 @@ from flexmb.typing import Real
 from tests.bounds import gamma
 from tests.flexmb.connectors.connected_scenes import everything as connected
 from tests.flexmb.connectors.connected_scenes import free_flying
-from tests.trees import RIGID, Recipe, random_scene
+from tests.trees import EXACT, RIGID, Recipe, random_scene
 
 FEW = {"conservative": True, "wheels": 0, "point_masses": 0}
 AXES = Recipe(bodies=4, carriers=("rigid",), hinges=("revolute", "prismatic"), **FEW)
 RUTHLESS_CHAIN = Recipe(bodies=3, carriers=("beam",), levels=("ruthless",), hinges=("revolute",), **FEW)
+STRAINS_IN_A_PLANE = Recipe(bodies=1, carriers=("beam",), levels=("exact",), hinges=("revolute",), **FEW)
+STRAINS = Recipe(bodies=4, carriers=("beam",), levels=("exact",), hinges=("revolute",), **FEW)
 EVERYTHING = Recipe(bodies=8, levels=("full", "ruthless", "linear", "stiffened"))
 
 
@@ -52,7 +54,8 @@ def test_each_thing_has_its_name(exact):
     assert features.DAMPERS in fm.compile(chain(damping=2.0).scene()).constants.features()
     armed = chain(armature=2.0).scene()
     assert features.ARMATURES in fm.compile(armed).constants.features()
-    scenes = random_scene(0, EVERYTHING), random_scene(0, Recipe(levels=("stiffened",))), connected(), armed
+    drawn = (random_scene(0, recipe) for recipe in (EVERYTHING, Recipe(levels=("stiffened",)), EXACT))
+    scenes = *drawn, connected(), armed
     found = frozenset.union(*(fm.compile(scene).constants.features() for scene in scenes))
     named = {name: value for name, value in vars(features).items() if not name.startswith("_") and name.isupper()}
     names = {value for value in named.values() if isinstance(value, str)}
@@ -134,8 +137,10 @@ def slope(scene: fm.System, scale: float) -> Real:
         RUTHLESS_CHAIN,
         pytest.param(RIGID, marks=pytest.mark.slow),
         pytest.param(EVERYTHING, marks=pytest.mark.slow),
+        pytest.param(STRAINS_IN_A_PLANE, marks=pytest.mark.slow),
+        pytest.param(STRAINS, marks=pytest.mark.slow),
     ],
-    ids=["axes", "ruthless", "rigid", "everything"],
+    ids=["axes", "ruthless", "rigid", "everything", "strains in a plane", "strains"],
 )
 def test_exact_kernels_compute_what_general_ones_do(recipe, monkeypatch):
     compare_kernels(random_scene(5, recipe), monkeypatch)
