@@ -187,6 +187,8 @@ def test_flexible_cases_at_random_states(path):
     scene = shipped(path)
     if all(isinstance(body, s.RigidBody) for body in scene.bodies):
         pytest.skip("no flexible body")
+    if any(body.level == "exact" for body in scene.bodies):
+        pytest.skip("no code but this has beams of strain modes")
     scene = randomise(modal_points(scene), np.random.default_rng(1))
     theirs = peer("exudyn", scene).compile(scene).evaluate()
     compare_accelerations(engine("native").compile(scene).evaluate().markers, theirs.markers, FLEXIBLE)

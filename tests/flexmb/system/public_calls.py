@@ -394,7 +394,8 @@ EXEMPT = {
     "ClosedSystem.workspace", "ClosedSystem.recursion_workspace", "ClosedSystem.composite_workspace",
     "load_scene", "save_scene", "SceneBuilder",  # files and data, checked where they are compiled
     "AccelerationDerivatives", "EvaluationDerivatives", "InverseDynamicsDerivatives",  # results
-    "EventSensitivity", "Fit", "Sensitivities", "Uncertainties",  # results
+    "EventSensitivity", "Fit", "Gradient", "Sensitivities", "Uncertainties",  # results
+    "FinalValue", "Misfit", "TimeIntegral",  # data, checked by the call of `gradient` and in tests of it
     "Advice", "Campbell", "Evaluation", "LinearModel", "SteadySpin", "System", "Trajectory", "Status",  # results
     "Batch.initial_states", "Batch.tables", "Batch.constants",  # nothing; of those who fill lanes
     "BatchTrajectory",  # a result
