@@ -77,7 +77,7 @@ def test_modes_against_fox_and_kapoor(key):
 
     m = len(by_square)
     found = derivative(numbers, value, value, [slice(0, m), slice(m, None)]).values
-    # A number of little influence is found less exactly: the rounding errors of omega^2 at the points of the interval, the
+    # A number of little influence is found less exactly: rounding errors of omega^2 at the points of the interval, the
     # second one for functions as smooth as these. The weights of the derivative at its five points are 0, 2^0.5, -1/2.
     magnified = 2.0 * (np.sqrt(2.0) + 0.5) * MAGNIFIED / WIDTHS[1]
     rounding = magnified * np.max(np.diag(beam_model(body).stiffness)) / value
