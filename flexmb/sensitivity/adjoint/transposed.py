@@ -1,9 +1,9 @@
 """Transposes of the derivatives of a right-hand side and of a projection: by recursion, or by the Jacobian.
 
 m = F'l for a row l, with F = df/dy, and l . df/dp. The motion of a tree is pulled in O(N) without a matrix, by
-`flexmb.entry.pulled`, which also adds up the derivatives by many constants of the tree. Only where the scalar depends
-on the work done, F is the matrix that implicit methods use. What is left are parameters on which other constants
-depend: their lanes are those of the constants of the equations of motion in dual numbers, eight in a block
+`flexmb.entry.pulled`, which also adds up the derivatives by many constants of the tree. In closed chains, and where the
+scalar depends on the work done, F is the matrix that implicit methods use. What is left are parameters on which other
+constants depend: their lanes are those of the constants of the equations of motion in dual numbers, eight in a block
 (`flexmb.sensitivity.blocks`).
 """
 
