@@ -131,7 +131,8 @@ def test_named_values_of_a_run_are_kept_and_others_follow():
     with warnings.catch_warnings():
         warnings.simplefilter("error", flexmb.SceneWarning)
         run = flexmb.simulate(system, 0.01, samples=2, state={"drive.rotation": 1.01, "drive.rotation.rate": 1.5})
-    assert (run.q[0, 0], run.u[0, 0]) == (1.01, 1.5)
+    # Kept but for rounding: sums in the least squares of the others may depend on where arrays lie in memory.
+    np.testing.assert_allclose([run.q[0, 0], run.u[0, 0]], [1.01, 1.5], rtol=16 * 2.0**-53)
     with pytest.warns(flexmb.SceneWarning, match='"pivot.rotation.rate" from 1 to'):
         flexmb.simulate(system, 0.01, samples=2, state={"drive.rotation.rate": 1.5, "pivot.rotation.rate": 1.0})
 
