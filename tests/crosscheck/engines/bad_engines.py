@@ -413,7 +413,7 @@ MODULES = {
     "module_missing": ("did not run", "No module named 'not_there'", "import not_there"),
     "raises_at_import": ("failed", "plug-in \"raises_at_import\" (raises_at_import:make) cannot be loaded", "1 / 0"),
     "not_python": ("failed", "SyntaxError", "def make(:"),
-    "not_text": ("failed", "SyntaxError", "\0"),
+    "not_text": ("failed", "cannot contain null bytes", "\0"),  # SyntaxError, before Python 3.11.4 ValueError
     "exits_at_import": ("failed", "SystemExit: 0", "import sys; sys.exit(0)"),
     "makes_nothing": ("failed", "a NoneType without name, version", "def make(): pass"),
     "makes_half_an_engine": ("failed", "without efforts, compile", "class make:\n name = ''\n version = supports = 1"),
