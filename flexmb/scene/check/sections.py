@@ -41,6 +41,7 @@ FAMILY_OF_STRAIN = ("axial", "bending_y", "bending_z", "torsion", "bending_z", "
 
 def stations(place: Place, body: BeamBody) -> Iterator[Defect]:
     """Problems of the stations of a beam, each by itself and with what the beam's modes can show of them."""
+    sound = 0
     for i, station in enumerate(body.stations):
         spot = place.key("stations", i)
         found = [*_complete(spot, station, body.theory == "timoshenko")]
@@ -49,10 +50,11 @@ def stations(place: Place, body: BeamBody) -> Iterator[Defect]:
         yield from found
         if not found:
             yield from _plausible(spot, station, body.length_m)
-            if body.level == "exact":
-                yield from _strained(place, station, body)
-            elif not is_plain(station):
+            sound += 1
+            if body.level != "exact" and not is_plain(station):
                 yield from _shown(place, spot, station, body)
+    if body.level == "exact" and sound == len(body.stations):
+        yield from _strained(place, body)
 
 
 def _complete(spot: Place, station: BeamStation, sheared: bool) -> Iterator[Defect]:
@@ -199,17 +201,20 @@ def _plausible_numbers(spot: Place, given: dict[str, float | None], length: floa
             yield Doubt(str(spot.key(key)), what, isotropic, "shear_stiffness")
 
 
-def _strained(place: Place, station: BeamStation, body: BeamBody) -> Iterator[Defect]:
+def _strained(place: Place, body: BeamBody) -> Iterator[Defect]:
     """Strains that a beam of level exact leaves out are coupled with none that it has: their forces would act on it."""
-    K, own = stiffness_on_axis(station), polynomials(body)
+    own = polynomials(body)
     chosen = np.array([strain in own for strain in POLYNOMIALS])
-    size = np.sqrt(np.diag(K))
-    coupling = np.abs(K / np.outer(size, size)) * np.outer(chosen, ~chosen)
-    if np.max(coupling, initial=0.0) > PRINTED:
-        a, b = np.unravel_index(int(np.argmax(coupling)), coupling.shape)
-        what = f"the section couples {STRAINS[a]} with {STRAINS[b]}, for which the beam has no polynomials"
-        remedy = f"give {POLYNOMIALS[b]} some in modes.polynomials, or lay the axis where nothing couples them"
-        yield Defect(str(place.key("modes", "polynomials")), what, remedy)
+    for station in body.stations:
+        K = stiffness_on_axis(station)
+        size = np.sqrt(np.diag(K))
+        coupling = np.abs(K / np.outer(size, size)) * np.outer(chosen, ~chosen)
+        if np.max(coupling, initial=0.0) > PRINTED:
+            a, b = np.unravel_index(int(np.argmax(coupling)), coupling.shape)
+            what = f"the section couples {STRAINS[a]} with {STRAINS[b]}, for which the beam has no polynomials"
+            remedy = f"give {POLYNOMIALS[b]} some in modes.polynomials, or lay the axis where nothing couples them"
+            yield Defect(str(place.key("modes", "polynomials")), what, remedy)
+            return  # the other stations are most often the same section
 
 
 def _shown(place: Place, spot: Place, station: BeamStation, body: BeamBody) -> Iterator[Defect]:

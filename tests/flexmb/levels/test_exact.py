@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import flexmb
@@ -18,6 +19,7 @@ from flexmb.modal.beam import beam_elements
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.exact import exact_model
 from flexmb.modal.second_order import beam_second_order
+from flexmb.modal.strain_field import FIRST, MEAN, SECOND, strain_field
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
@@ -394,3 +396,37 @@ def test_roll_up_closes():
     assert np.linalg.norm(tip.position) < 1e-10
     np.testing.assert_allclose(tip.rotation, np.eye(3), atol=1e-10)
     np.testing.assert_allclose(rotation_matrix(tip.quaternion), tip.rotation, atol=ROUNDING)
+
+
+def test_points_that_strong_twist_and_bending_need():
+    """What docs/exact.md says of rotations: 5 rad of curvature in all, of three polynomials about each axis."""
+    rng, off = np.random.default_rng(0), []
+    degrees = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, 400), 2)
+    for _ in range(20):
+        eta = rng.normal(size=9)
+        curvature = degrees @ eta.reshape(3, 3).T
+        eta *= 5.0 / np.mean(np.linalg.norm(curvature, axis=1))
+        back = _rotation_of_tip(120, eta).T
+        off.append([Rotation.from_matrix(back @ _rotation_of_tip(n, eta)).magnitude() for n in (6, 12)])
+    default, more = np.median(off, axis=0)
+    assert 2e-3 < default < 4e-3 and 1e-4 < more < 3e-4
+
+
+def _rotation_of_tip(points, eta):
+    """By strains of Legendre's polynomials on a straight beam of length 1."""
+    families = ("torsion", "bending_z", "bending_y")
+    section = {
+        "EA_N": 1.0, "EIy_Nm2": 1.0, "EIz_Nm2": 1.0, "GJ_Nm2": 1.0, "mass_per_length_kg_m": 1.0, "rotary_y_kg_m": 0.1,
+        "rotary_z_kg_m": 0.1,
+    }  # fmt: skip
+    body = s.BeamBody(
+        name="rod", length_m=1.0, elements=1, stations=tuple(s.BeamStation(x_m=x, **section) for x in (0.0, 1.0)),
+        level="exact", modes=s.Modes(count=3, points=points, families=families),
+    )  # fmt: skip
+    field = strain_field(body, np.array([1.0]))
+    R = []
+    for j, before in enumerate(field.before):
+        k1, k2, mean = (field.rows[j, row] @ eta for row in (FIRST, SECOND, MEAN))
+        step = Rotation.from_rotvec(mean + field.commutator[j] * np.cross(k1, k2)).as_matrix()
+        R.append(step if before < 0 else R[before] @ step)
+    return R[-1]
