@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from flexmb.scene.bodies import BeamBody, Modes
 from flexmb.scene.problems import Defect, Doubt, Place
-from flexmb.scene.strains import MORE_POINTS, STRAINS, points_of_piece, polynomials
+from flexmb.scene.sizes import MOST_MODES
+from flexmb.scene.strains import FEWEST_POINTS, MORE_POINTS, STRAINS, points_of_piece, polynomials
 
 MOST_PIECES, MOST_POLYNOMIALS, MOST_POINTS = 1000, 40, 200
 """Beyond these a number is taken for a slip. The fastest frequency grows with the fourth power of the polynomials: with
@@ -32,7 +33,7 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
         return
     if body.modes.points is not None and (points := body.modes.points) <= (most := max(found.values())):
         what = f"{points} points for {most} polynomials of one strain leave motions without inertia"
-        remedy = f"use {most + 1} points at least; {most + MORE_POINTS} are the default"
+        remedy = f"use {most + 1} points at least; {max(FEWEST_POINTS, most + MORE_POINTS)} are the default"
         yield Defect(str(modes.key("points")), what, remedy)
     elif points_of_piece(body) > MOST_POINTS:
         yield Defect(str(modes.key("points")), f"{points_of_piece(body)} points", f"use {MOST_POINTS} at most")
@@ -40,7 +41,11 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
         if shear in found and any(each.stiffness is None and getattr(each, key) is None for each in body.stations):
             spot = str(place.key("stations"))
             yield Defect(spot, f"{shear} has polynomials, and a station no {key}", f"give {key} at every station")
-    yield from damping(modes, body.modes, sum(found.values()) * max(body.modes.pieces, 1))
+    if (count := sum(found.values()) * max(body.modes.pieces, 1)) > MOST_MODES:
+        what = f"{count} polynomials in all its pieces: one body with so many takes minutes and gigabytes to make"
+        remedy = f"give {MOST_MODES} at most; several bodies that are welded together cost O(N)"
+        yield Defect(str(modes.key("pieces")), what, remedy)
+    yield from damping(modes, body.modes, count)
 
 
 def _numbers(place: Place, body: BeamBody) -> Iterator[Defect]:

@@ -57,6 +57,7 @@ def test_refusals():
     refused("consistent", modes=four, mass="lumped")
     refused("straight beams only", modes=four, level="full", section=stations(1.0, (0.0, 0.0, 1.0)))
     refused('leave it out, or make the level "exact"', modes=s.Modes(count=2, pieces=2), level="full")
+    refused("give 2000 at most", modes=s.Modes(count=40, pieces=1000))
     unsheared = [_without_shear(each) for each in stations()]
     refused("GAy_N", modes=s.Modes(count=1, polynomials=s.StrainPolynomials(shear_y=1, bending_y=2)), section=unsheared)
     points = inertia_points([1.0, 1.0], np.eye(3)[:2], np.ones((2, 3, 1)))
