@@ -25,11 +25,6 @@ from flexmb.scene.tree import nodes_along, rest_frames
 from flexmb.surrogate.lumping import Inertia, combine
 from flexmb.typing import Real
 
-SHEAR_RIGID = 1e5
-"""Shear stiffness of beams without shear, in units of the larger EI over the square of the length, at least: of what a
-force at the tip of a cantilever does, shear is 3 parts of this number."""
-
-
 @dataclass(frozen=True)
 class BeamElement:
     """One element between two carriers whose axes are its axes: length (m), diagonal (6,) of the stiffness."""
@@ -142,11 +137,11 @@ def _interpolated(body: BeamBody, matrices: list[Real], x: Real) -> Real:
 
 
 def _stiffness(body: BeamBody, x: Real) -> Real:
-    """Diagonals (n,6) of the stiffness; a beam without shear gets a shear stiffness that hardly yields."""
+    """Diagonals (n,6) of the stiffness. A beam without shear yields to shear as little as to stretch: stiffer springs
+    would stop Newton's method at steps that follow the bending."""
     found = np.array([np.diag(each) for each in _interpolated(body, [*map(stiffness_on_axis, body.stations)], x)])
     if not shears(body):
-        rigid = SHEAR_RIGID * found[:, 4:].max(axis=1) / body.length_m**2
-        found[:, 1:3] = np.maximum(rigid, found[:, 0])[:, None]
+        found[:, 1:3] = found[:, :1]
     return found
 
 

@@ -39,7 +39,7 @@ def reason(scene: Scene) -> str:
     """What is another model in it than the scene's."""
     words = "beams of finite deflection, stretch and twist instead of modes"
     stiff = [beam.name for beam in bending(scene) if not shears(beam)]
-    return f'{words}; shear of {", ".join(stiff)} by a stiffness that hardly yields' if stiff else words
+    return f'{words}; {", ".join(stiff)}: shear as stiff as stretch' if stiff else words
 
 
 def fastest_bending(scene: Scene) -> float:
