@@ -25,9 +25,11 @@ COLUMNS = 4
 def main(names: list[str]) -> None:
     """Run the named problems, or all of them and draw."""
     asked = [problem for problem in problems() if not names or problem.name in names]
-    fronts = [{family: front(problem.points(family)) for family in problem.families} for problem in map(_announced, asked)]
-    for problem, found in zip(asked, fronts, strict=True):
-        _print(problem, found)
+    fronts = []
+    for problem in asked:
+        print(problem.title, file=sys.stderr, flush=True)
+        fronts.append({family: front(problem.points(family)) for family in problem.families})
+        _print(problem, fronts[-1])
     if not names:
         draw(asked, fronts)
 
@@ -58,11 +60,6 @@ def _panel(axes: Axes, problem: Problem, found: dict[str, list[Point]]) -> None:
     axes.set_title(problem.title, fontsize=9)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=6)
-
-
-def _announced(problem: Problem) -> Problem:
-    print(problem.title, file=sys.stderr, flush=True)
-    return problem
 
 
 def _print(problem: Problem, found: dict[str, list[Point]]) -> None:

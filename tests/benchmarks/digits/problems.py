@@ -1,4 +1,4 @@
-"""The problems of the chart: beams that bend by their length, at rest and in motion, as the library's cases state them."""
+"""The problems of the chart: beams that bend by their length, at rest and in motion, as the cases state them."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from flexmb.scene.functions import Ramp
 from flexmb.surrogate import substructured
 from tests.benchmarks import exact_scenes as scenes
 from tests.benchmarks.digits import elements, native
-from tests.benchmarks.digits.problem import Ladder, Paths, Problem
-from tests.benchmarks.must_hold.exact import BEND_TIP, LOAD, elastica
+from tests.benchmarks.digits.problem import Ladder, Problem
+from tests.benchmarks.must_hold.exact import LOAD, elastica
 from tests.repo.project import ROOT
 
 EXACT, PIECES, ELEMENTS = "exact: polynomials", "stiffened: pieces", "Exudyn: elements"
@@ -74,12 +74,11 @@ def curved(scene: fm.Scene) -> Callable[[int], fm.Scene]:
 def _with_polynomials(body: s.Body, n: int) -> s.Body:
     if not isinstance(body, s.BeamBody) or body.level != "exact":
         return body
-    shears = body.modes.polynomials
-    if shears is None:
+    strains = body.modes.polynomials
+    if strains is None:
         return replace(body, modes=replace(body.modes, count=n))
-    given = {name: getattr(shears, name) for name in shears.__struct_fields__}
-    more = {name: n if name in ("torsion", "bending_y", "bending_z") and number else number for name, number in given.items()}
-    return replace(body, modes=replace(body.modes, polynomials=s.StrainPolynomials(**more)))
+    changed = {name: n for name in ("torsion", "bending_y", "bending_z") if getattr(strains, name)}
+    return replace(body, modes=replace(body.modes, polynomials=replace(strains, **changed)))
 
 
 def _rolled_up() -> Problem:
@@ -185,7 +184,7 @@ def _pendulum() -> Problem:
     scene, times = scene_of("large_deflection/flexible_pendulum"), np.linspace(0.0, 2.0, 101)
 
     def exact(n: int) -> fm.Scene:
-        return scenes.strained(scene, s.StrainPolynomials(bending_y=n, axial=max(1, n // 4)))
+        return scenes.strained(scene, s.StrainPolynomials(bending_y=n, axial=n // 2))
 
     return Problem(
         "pendulum", "Flexible pendulum, 2 s", 1.0, native.converged(exact(14), times), OWN,
