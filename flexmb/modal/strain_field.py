@@ -90,14 +90,45 @@ STRAIGHT = 64.0 * np.finfo(float).eps
 """Relative size below which the part of curvatures across a common axis is a rounding error of the frames."""
 
 
-def strain_field(body: BeamBody, places: Real) -> StrainField:
+@dataclass(frozen=True, eq=False)
+class Hung:
+    """The sections of a beam from which its places turn: before (n,), and the intervals (n,) that the places lie in."""
+
+    before: Index
+    interval: Index
+
+    def following(self, like: Hung) -> Index:
+        """The sections (n,) of `like`, except for places in another interval than there, whose strains are others.
+
+        A place at a Gauss point then has one section on both sides of the point, and a smooth motion as a function of
+        where it is. In an interval the strains are polynomials, so that it may lie on either side of its section.
+        """
+        return np.where(self.interval == like.interval, like.before, self.before)
+
+
+def hung(body: BeamBody, places: Real) -> Hung:
+    """How sections at `places` (n,) m turn: from the last Gauss point, or end of an interval, at or before them."""
+    _, gauss, breaks = _grid(body)
+    before = np.searchsorted(_main(gauss, breaks), places, side="right") - 1
+    return Hung(before, np.searchsorted(breaks[1:-1], places, side="right"))
+
+
+def _main(gauss: Real, breaks: Real) -> Real:
+    """The Gauss points, and the ends of the intervals that they lie in."""
+    return np.unique(np.concatenate([gauss, breaks[1:-1]]))
+
+
+def strain_field(body: BeamBody, places: Real, hung_from: Index | None = None) -> StrainField:
     """The sections of a beam at the Gauss points, then at `places` (n,) m; the modes are Legendre's polynomials.
 
     Strain by strain in the order of `flexmb.scene.strains.polynomials`, in each piece by piece, by ascending degree.
+    hung_from (n,): the sections from which the places turn, those of `hung` if left out.
     """
     grid, gauss, breaks = _grid(body)
-    main = np.unique(np.concatenate([gauss, breaks[1:-1]]))
-    before = np.concatenate([np.arange(-1, len(main) - 1), np.searchsorted(main, places, side="right") - 1])
+    main = _main(gauss, breaks)
+    if hung_from is None:
+        hung_from = hung(body, places).before
+    before = np.concatenate([np.arange(-1, len(main) - 1), hung_from])
     x = np.concatenate([main, places])
     left = np.where(before >= 0, x[before], 0.0)
     h = x - left

@@ -152,9 +152,9 @@ def test_mass_properties_of_a_bent_beam(name):
 
 
 def test_out_of_its_plane_a_beam_has_no_derivative():
-    """Curvature that would bend a beam of one plane out of it changes what kernels do; the message names the table."""
+    """Curvature that would bend a beam of one plane out of it changes what kernels do; the message has the remedy."""
     system = flexmb.compile(beam(s.Modes(count=3, families=PLANE)).weld("clamp", "ground", "rod").scene())
-    with pytest.raises(ParameterError, match="planar"):
+    with pytest.raises(ParameterError, match="out of that plane; give the beam torsion"):
         system.parameters(["rod.stations.0.curvature_1_m.0"])
 
 
