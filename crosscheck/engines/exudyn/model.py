@@ -86,7 +86,7 @@ class ExudynModel:
         return body_mass_matrix(self.assembly, body or bending[0])
 
     def _located(self, item: Marker, paths: dict[int, CarrierPath]) -> tuple[CarrierPath, NodeShape]:
-        placed = self.assembly.bodies[item.body]
+        placed = self.assembly.bodies[item.body].at(item.node)
         return paths[placed.carrier.key], placed.shape(item.node)
 
     def _paths(self, states: States) -> dict[int, CarrierPath]:
@@ -95,6 +95,8 @@ class ExudynModel:
         for link in self.assembly.links.values():
             carriers += [carrier for stage in link.stages for carrier in (stage.inboard, stage.outboard)]
             carriers += list(link.spherical[1:]) if link.spherical else []
+        for element in self.assembly.elements:
+            carriers += [element.left, element.right]
         return {key: carrier_path(self.assembly, c, states) for key, c in {c.key: c for c in carriers}.items()}
 
     def _loads_and_balance(
