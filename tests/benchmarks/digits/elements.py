@@ -10,6 +10,7 @@ import numpy as np
 from msgspec.structs import replace
 
 import flexmb as fm
+from flexmb.scene.schema import BeamBody
 from flexmb.scene.tree import node_frame
 from tests.benchmarks.digits.problem import Ladder, Paths
 from tests.benchmarks.exudyn_runs import Newton, sections, solved
@@ -21,18 +22,38 @@ HALVINGS = 9
 LOAD_STEPS = 5
 
 
-def in_motion(scene: fm.Scene, count: int, times: np.ndarray) -> Iterator[Ladder]:
+def in_plane(scene: fm.Scene, count: int, times: np.ndarray) -> Iterator[Ladder]:
     """A plane beam as so many elements, by each method and Newton over steps of the time between samples."""
-    beam = meshed(scene, count)
-    for method in METHODS:
-        for newton in (Newton(tolerance, True, count >= SPARSE) for tolerance in TOLERANCES):
-            steps = [float(times[1]) / 2.0**k for k in range(HALVINGS)]
-            yield Ladder(f"{count}, {method}, {newton}", [partial(run, beam, times, method, newton, h) for h in steps])
+    beam = planar(scene, count)
+    yield from _ladders(beam, count, times, METHODS, partial(plane_paths, beam))
 
 
-def run(beam: Any, times: np.ndarray, method: str, newton: Newton, step: float) -> Paths:
-    """Paths (M,T,3) of the markers, in the order of their names; fewer times where Exudyn gave up."""
-    states = solved(beam, times, method, newton, step)
+def in_space(scene: fm.Scene, count: int, times: np.ndarray) -> Iterator[Ladder]:
+    """Beams of a scene as so many elements each, in space."""
+    from crosscheck.engines.exudyn.model import ExudynModel
+
+    model = ExudynModel(meshed(scene, count))
+
+    def read(states: Any) -> Paths:
+        found = model.markers(states)
+        return np.array([found[name].position for name in sorted(found)])
+
+    yield from _ladders(model.assembly, count, times, METHODS, read)
+
+
+def _ladders(
+    assembly: Any, count: int, times: np.ndarray, methods: tuple[str, ...], read: Callable[[Any], Paths]
+) -> Iterator[Ladder]:
+    steps = [float(times[1]) / 2.0**k for k in range(HALVINGS)]
+    for method in methods:
+        for tolerance in TOLERANCES:
+            newton = Newton(tolerance, True, count >= SPARSE)
+            rungs = [partial(solved, assembly, times, method, newton, step) for step in steps]
+            yield Ladder(f"{count}, {method}, {newton}", rungs, read)
+
+
+def plane_paths(beam: Any, states: Any) -> Paths:
+    """Of the markers, in the order of their names; fewer times where Exudyn gave up."""
     markers = sorted(beam.scene.markers, key=lambda marker: marker.name)
     places = [node_frame(beam.scene.bodies[0], marker.node).position[0] for marker in markers]
     found = sections(beam, states, np.array(places))
@@ -41,12 +62,33 @@ def run(beam: Any, times: np.ndarray, method: str, newton: Newton, step: float) 
 
 def at_rest(scene: fm.Scene, count: int, load: float) -> Iterator[Ladder]:
     """The equilibrium of a plane beam of so many elements under a load that is time, in equal steps of it."""
-    yield Ladder(str(count), [partial(rest, meshed(scene, count), load, count >= SPARSE)])
+    beam = planar(scene, count)
+
+    def read(states: None) -> Paths:
+        place = beam.shop.mbs.GetNodeOutput(beam.nodes[-1], beam.shop.exu.OutputVariableType.Position)
+        return np.array(place)[None, None, :]
+
+    yield Ladder(str(count), [partial(rest, beam, load, count >= SPARSE)], read)
 
 
-def rest(beam: Any, load: float, sparse: bool) -> Paths:
-    """Place (1,1,3) of the tip."""
-    shop = beam.shop
+def at_rest_in_space(scene: fm.Scene, count: int, load: float) -> Iterator[Ladder]:
+    """The same in space."""
+    from crosscheck.engines.exudyn.model import ExudynModel
+    from crosscheck.engines.exudyn.solve import Recorder
+
+    model = ExudynModel(meshed(scene, count))
+
+    def read(states: None) -> Paths:
+        recorder = Recorder(model.assembly)
+        recorder.take(load)
+        return model.markers(recorder.states())["tip"].position[None]
+
+    yield Ladder(str(count), [partial(rest, model.assembly, load, count >= SPARSE)], read)
+
+
+def rest(assembly: Any, load: float, sparse: bool) -> None:
+    """Leaves the equilibrium in the system as its state."""
+    shop = assembly.shop
     settings = shop.exu.SimulationSettings()
     settings.solution.file.write = False
     solvers = shop.exu.LinearSolverType
@@ -55,22 +97,30 @@ def rest(beam: Any, load: float, sparse: bool) -> Paths:
     static.verboseMode, static.numberOfLoadSteps, static.loadStepDuration = 0, LOAD_STEPS, load
     static.newton.relativeTolerance = 1e-9
     shop.mbs.SolveStatic(settings, updateInitialValues=False, showHints=False)
-    return np.array(shop.mbs.GetNodeOutput(beam.nodes[-1], shop.exu.OutputVariableType.Position))[None, None, :]
 
 
-def meshed(scene: fm.Scene, count: int) -> Any:
+def planar(scene: fm.Scene, count: int) -> Any:
     """The one plane beam of a scene, assembled as so many elements."""
     from crosscheck.engines.exudyn.beams import assemble_beam
 
-    return assemble_beam(replace(scene, bodies=(replace(scene.bodies[0], elements=count),)), count)
+    return assemble_beam(meshed(scene, count), count)
+
+
+def meshed(scene: fm.Scene, count: int) -> fm.Scene:
+    """The scene with so many elements in each beam that is not rigid."""
+    bodies = (
+        replace(body, elements=count) if isinstance(body, BeamBody) and body.level != "rigid" else body
+        for body in scene.bodies
+    )
+    return replace(scene, bodies=tuple(bodies))
 
 
 def extrapolated(scene: fm.Scene, count: int, times: np.ndarray, steps: tuple[float, float]) -> Callable[[], Paths]:
-    """Paths of many elements, extrapolated in the step of a method of second order."""
+    """Paths of many plane elements, extrapolated in the step of a method of second order."""
 
     def truth() -> Paths:
-        beam = meshed(scene, count)
-        coarse, fine = (run(beam, times, "GeneralizedAlpha", Newton(1e-8, True, True), step) for step in steps)
+        beam, newton = planar(scene, count), Newton(1e-8, True, True)
+        coarse, fine = (plane_paths(beam, solved(beam, times, "GeneralizedAlpha", newton, step)) for step in steps)
         return fine + (fine - coarse) / 3.0
 
     return truth

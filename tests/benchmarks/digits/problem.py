@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from time import process_time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,11 +22,13 @@ GAIN = 0.7  # smaller steps that leave more of the error than this part have sho
 class Ladder(NamedTuple):
     """So many parts by one method: `rungs` solve the problem with ever smaller steps or tolerances.
 
-    Paths of another shape than the truth's, or not finite, are those of a failed run.
+    `read` makes paths of what they return, which takes no part in their time. Paths of another shape than the truth's,
+    or not finite, are those of a failed run.
     """
 
     label: str
-    rungs: Iterable[Callable[[], Paths]]
+    rungs: Iterable[Callable[[], Any]]
+    read: Callable[[Any], Paths]
 
 
 class Point(NamedTuple):
@@ -60,11 +62,11 @@ class Problem:
 
     def points(self, family: str) -> Iterator[Point]:
         """All runs of a family that came to their end."""
-        for label, rungs in self.families[family]():
+        for label, rungs, read in self.families[family]():
             best = np.inf
             for run in rungs:
                 found, seconds = timed(run)
-                error = self.error(found)
+                error = self.error(read(found))
                 if seconds < SHORT_S:
                     seconds = min(seconds, *(timed(run)[1] for _ in range(REPEATS)))
                 if np.isfinite(error):
@@ -74,8 +76,8 @@ class Problem:
                 best = error
 
 
-def timed(run: Callable[[], Paths]) -> tuple[Paths, float]:
-    """What a run found, and its seconds: of the processor, as other work on the machine does not count."""
+def timed(run: Callable[[], Any]) -> tuple[Any, float]:
+    """What a run returned, and its seconds: of the processor, as other work on the machine does not count."""
     start = process_time()
     found = run()
     return found, process_time() - start

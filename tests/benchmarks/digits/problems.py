@@ -136,6 +136,7 @@ def _princeton() -> Problem:
         {
             EXACT: resting(exact, (2, 3, 4, 5, 6), load),
             PIECES: resting(cut(replace(bar, bodies=(beam,)), eigenmodes=4), (2, 4, 8, 16), load),
+            ELEMENTS: over((4, 8, 16, 32, 64), lambda n: elements.at_rest_in_space(exact(4), n, load)),
         },
     )  # fmt: skip
 
@@ -149,7 +150,10 @@ def _bend() -> Problem:
     return Problem(
         "bend", "45-degree bend under 600, at rest", 0.25 * np.pi * scenes.RADIUS,
         native.converged_rest(scenes.bend_45(8, 6), load), "level exact with more polynomials",
-        {EXACT: resting(exact, (2, 3, 4, 5, 6), load)},
+        {
+            EXACT: resting(exact, (2, 3, 4, 5, 6), load),
+            ELEMENTS: over((4, 8, 16, 32, 64), lambda n: elements.at_rest_in_space(exact(4), n, load)),
+        },
     )  # fmt: skip
 
 
@@ -161,7 +165,7 @@ def _elastica() -> Problem:
         {
             EXACT: moving(exact, (2, 3, 4, 5, 6, 8), times),
             PIECES: moving(cut(scene), (4, 8, 16, 32), times),
-            ELEMENTS: over((8, 16, 32, 64), lambda n: elements.in_motion(scene, n, times)),
+            ELEMENTS: over((8, 16, 32, 64), lambda n: elements.in_plane(scene, n, times)),
         },
     )  # fmt: skip
 
@@ -175,7 +179,7 @@ def _spun() -> Problem:
         {
             EXACT: moving(exact, (2, 3, 4, 5, 6), times),
             PIECES: moving(cut(scene), (1, 2, 4, 8, 16), times),
-            ELEMENTS: over((4, 8, 16, 32), lambda n: elements.in_motion(scene, n, times)),
+            ELEMENTS: over((4, 8, 16, 32), lambda n: elements.in_plane(scene, n, times)),
         },
     )  # fmt: skip
 
@@ -191,7 +195,7 @@ def _pendulum() -> Problem:
         {
             EXACT: moving(exact, (4, 5, 6, 8, 10), times),
             PIECES: moving(cut(scene), (4, 8, 16), times),
-            ELEMENTS: over((8, 16, 32, 64), lambda n: elements.in_motion(scene, n, times)),
+            ELEMENTS: over((8, 16, 32, 64), lambda n: elements.in_plane(scene, n, times)),
         },
     )  # fmt: skip
 
@@ -217,7 +221,7 @@ def _spaghetti() -> Problem:
         {
             EXACT: both,
             PIECES: moving(cut(scene, eigenmodes=2), (8, 16, 32), times, ("dop853",)),
-            ELEMENTS: over((4, 8, 16, 32, 64), lambda n: elements.in_motion(scene, n, times)),
+            ELEMENTS: over((4, 8, 16, 32, 64), lambda n: elements.in_plane(scene, n, times)),
         },
     )  # fmt: skip
 
@@ -227,7 +231,11 @@ def _elbow() -> Problem:
     exact = curved(scene)
     return Problem(
         "elbow", "Elbow frame, 4 s", 10.0, native.converged(exact(7), times), OWN,
-        {EXACT: moving(exact, (2, 3, 4, 5), times), PIECES: moving(cut(scene), (2, 4, 8), times)},
+        {
+            EXACT: moving(exact, (2, 3, 4, 5), times),
+            PIECES: moving(cut(scene), (2, 4, 8), times),
+            ELEMENTS: over((4, 8, 16, 32), lambda n: elements.in_space(scene, n, times)),
+        },
     )  # fmt: skip
 
 
@@ -237,7 +245,11 @@ def _frame() -> Problem:
     methods: tuple[Method, ...] = ("radau5", "generalised_alpha")
     return Problem(
         "frame", "Right-angle frame, 6 s", 0.24, native.converged(exact(7), times, rtol=1e-8), OWN,
-        {EXACT: moving(exact, (3, 4, 5), times, methods), PIECES: moving(cut(scene, 3), (4, 8), times, methods)},
+        {
+            EXACT: moving(exact, (3, 4, 5), times, methods),
+            PIECES: moving(cut(scene, 3), (4, 8), times, methods),
+            ELEMENTS: over((4, 8, 16, 32), lambda n: elements.in_space(scene, n, times)),
+        },
     )  # fmt: skip
 
 
@@ -246,7 +258,11 @@ def _crank() -> Problem:
     exact = curved(scene)
     return Problem(
         "crank", "Driven crank, 0.4 s", 1.0, native.converged(exact(9), times, rtol=1e-8), OWN,
-        {EXACT: moving(exact, (3, 4, 5, 6), times), PIECES: moving(cut(scene, 2, "beam"), (2, 4, 8), times)},
+        {
+            EXACT: moving(exact, (3, 4, 5, 6), times),
+            PIECES: moving(cut(scene, 2, "beam"), (2, 4, 8), times),
+            ELEMENTS: over((4, 8, 16, 32), lambda n: elements.in_space(scene, n, times)),
+        },
     )  # fmt: skip
 
 
@@ -255,5 +271,9 @@ def _blade() -> Problem:
     exact = curved(scene)
     return Problem(
         "blade", "Coned blade, spun up, 3 s", 5.0, native.converged(exact(9), times), OWN,
-        {EXACT: moving(exact, (3, 4, 5, 6), times), PIECES: moving(cut(scene), (2, 4, 8), times)},
+        {
+            EXACT: moving(exact, (3, 4, 5, 6), times),
+            PIECES: moving(cut(scene), (2, 4, 8), times),
+            ELEMENTS: over((4, 8, 16, 32), lambda n: elements.in_space(scene, n, times)),
+        },
     )  # fmt: skip
