@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.advisor.methods import RunMethod, operations, simulated, steps_within
+from flexmb.advisor.methods import RunMethod, operations, simulated_within
 from flexmb.advisor.models import Model, built
 from flexmb.advisor.quantity import Quantity, Signals, measured
 from flexmb.closure import dynamics as closed
@@ -24,7 +24,6 @@ from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables.state import pack
-from flexmb.tables.status import Status
 
 SAMPLES = 401
 MAX_STEPS = 400_000
@@ -37,7 +36,7 @@ _OVERHEAD = 4e8
 @dataclass(frozen=True)
 class BenchRun:
     """One run: its `signals` up to its end; `message`: why it stopped early, or ""; counted `operations` and measured
-    `seconds` of the integration alone. `cut`: it was stopped at the allowed number of operations."""
+    `seconds` of the integration alone. `cut`: it was stopped at the allowed number of operations; `reached`: the part of the output that it made."""
 
     signals: Signals
     message: str
@@ -45,6 +44,7 @@ class BenchRun:
     operations: float
     seconds: float
     cut: bool = False
+    reached: float = 0.0
 
     @property
     def finished(self) -> bool:
@@ -60,6 +60,7 @@ class Bench:
         self.spent = 0.0  # operations of all runs, compilation and output included
         self._systems: dict[Model, System | str] = {}
         self._outcomes: dict[tuple[Model, RunMethod], BenchRun] = {}
+        self._allowed: dict[tuple[Model, RunMethod], float] = {}
         self._operations: dict[tuple[Model, Algorithm], int] = {}
 
     def system(self, model: Model) -> System | str:
@@ -89,8 +90,9 @@ class Bench:
     def run(self, model: Model, method: RunMethod, most: float = np.inf) -> BenchRun:
         """The run, made at the first call and stopped after about `most` operations."""
         found = self._outcomes.get((model, method))
-        if found is None or (found.cut and most > found.operations):
+        if found is None or (found.cut and most > self._allowed[model, method]):
             found = self._outcomes[model, method] = self._run(model, method, most)
+            self._allowed[model, method] = most
             self.spent += found.operations + _OVERHEAD
         return found
 
@@ -99,11 +101,12 @@ class Bench:
         if isinstance(system, str):
             return BenchRun({}, system, 0, 0.0, 0.0)
         each = self.operations(model, method.algorithm)
-        steps = steps_within(method, each, most)
         try:
-            done = simulated(system, self.times, method, min(steps, MAX_STEPS))
+            done, cut = simulated_within(system, self.times, method, each, most, MAX_STEPS)
         except ClosureError as error:  # for example a mechanism that is locked
             return BenchRun({}, str(error), 0, 0.0, 0.0)
+        if done is None:
+            return BenchRun({}, "its equal steps would cost too much", 0, 0.0, 0.0, cut)
         cost = done.statistics
         return BenchRun(
             signals=measured(self.wanted, done) if len(done.t) else {},
@@ -111,7 +114,8 @@ class Bench:
             evaluations=cost.evaluations,
             operations=operations(method, each, system.nq + system.nu + 1, cost),
             seconds=cost.run_s,
-            cut=done.status is Status.MAX_STEPS and steps < MAX_STEPS,
+            cut=cut,
+            reached=len(done.t) / len(self.times),
         )
 
 

@@ -34,6 +34,8 @@ LEAP, LEAPS, MANY = 0.75, 15, 20_000
 """LEAP: choices with at most this fraction of the predicted cost are tried first; LEAPS: at most so many of them; MANY:
 with more combinations than this, only pairs of bodies change.
 """
+SPARE = 2.0
+"""Runs of models that are to be cheaper than an adequate one end at so many times the operations of its run."""
 FINALISTS = 3
 """Number of adequate models, the cheapest by their fine runs, for which the best method is determined."""
 
@@ -85,8 +87,8 @@ class _Walk:
         self.hopeless = HOPELESS * confirmation.tolerance
         self.predicted = any(step.error > 0.0 for steps in self.ladders.values() for step in steps)
 
-    def fits(self, choice: Choice) -> bool:
-        return self.confirmation.adequate(model_of(choice))
+    def fits(self, choice: Choice, most: float = np.inf) -> bool:
+        return self.confirmation.adequate(model_of(choice), most)
 
     @property
     def exhausted(self) -> bool:
@@ -151,7 +153,8 @@ class _Walk:
         if not self.predicted:  # nothing says that they are adequate, and they may cost more
             most = self.confirmation.run_cost(model_of(choice))
             simpler = (other for other in simpler if self.expected(other) <= most)
-        choice = next(filter(self.fits, simpler), choice)
+        most = SPARE * self.confirmation.run_cost(model_of(choice))
+        choice = next((other for other in simpler if self.fits(other, most)), choice)
         choice = self.first_cheaper(choice, sorted(self.alike(choice), key=self.expected)) or choice
         while True:
             while (other := self.leap(choice)) is not None:
@@ -180,10 +183,10 @@ class _Walk:
         for other in sorted(others, key=self.expected):
             if self.exhausted or self.expected(other) > slack * enough:
                 break
-            if self.fits(other) and self.confirmation.run_cost(model_of(other)) < least:
+            if self.fits(other, SPARE * least) and self.confirmation.run_cost(model_of(other)) < least:
                 best, least = other, self.confirmation.run_cost(model_of(other))
                 enough = self.expected(other)
-            if self.confirmation.error(model_of(other)) > MISSED * self.confirmation.tolerance:
+            if self.confirmation.error(model_of(other), SPARE * least) > MISSED * self.confirmation.tolerance:
                 self.missed[name].add(other[name].rung)
         return best
 
@@ -200,7 +203,7 @@ class _Walk:
         for other in others:
             if self.exhausted:
                 return None
-            if self.fits(other) and self.confirmation.run_cost(model_of(other)) < least:
+            if self.fits(other, SPARE * least) and self.confirmation.run_cost(model_of(other)) < least:
                 return other
         return None
 
