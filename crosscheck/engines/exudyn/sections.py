@@ -25,6 +25,7 @@ from flexmb.scene.tree import nodes_along, rest_frames
 from flexmb.surrogate.lumping import Inertia, combine
 from flexmb.typing import Real
 
+
 @dataclass(frozen=True)
 class BeamElement:
     """One element between two carriers whose axes are its axes: length (m), diagonal (6,) of the stiffness."""
