@@ -103,8 +103,8 @@ class Confirmation:
         return self.reference.model != before.model
 
     def run(self, model: Model, most: float = np.inf) -> BenchRun:
-        """The run of the model with an integration error that is negligible beside the error of the model; it ends after
-        about `most` operations."""
+        """The run of the model, of at most about `most` operations, with an integration error that is negligible beside
+        the error of the model."""
         return self.bench.run(model, self.finely(model, most), most)
 
     def finely(self, model: Model, most: float = np.inf) -> RunMethod:

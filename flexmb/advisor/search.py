@@ -97,18 +97,18 @@ class _Walk:
     def up(self) -> Choice | None:
         """The first choice on the way up that is adequate.
 
-        If none is, the choices with a large predicted error are tried, and then every rung of every body. Without
-        predictions, the references come first, which have run, the cheapest at the head.
+        If none is, every rung of every body is tried. Of all these the ones with a large predicted error come last.
+        Without predictions, the references come first, which have run, the cheapest at the head.
         """
         if not self.predicted:
             known = [choice for model in self.confirmation.references if (choice := self.choice_of(model)) is not None]
             for choice in sorted(known, key=lambda each: self.confirmation.run_cost(model_of(each))):
                 if self.fits(choice):
                     return choice
-        way = list(self.way())
-        hopeful = [choice for choice in way if _error(choice) <= self.hopeless]
-        others = [choice for choice in way if _error(choice) > self.hopeless]
-        return next(filter(self.fits, (*hopeful, *others, *self.finest())), None)
+        every = (*self.way(), *self.finest())
+        hopeful = [choice for choice in every if _error(choice) <= self.hopeless]
+        others = [choice for choice in every if _error(choice) > self.hopeless]
+        return next(filter(self.fits, (*hopeful, *others)), None)
 
     def choice_of(self, model: Model) -> Choice | None:
         """The steps of a model, or None if one of its rungs is not among them."""
