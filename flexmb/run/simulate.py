@@ -84,13 +84,13 @@ def simulate(
     all its coordinates, followed by ".speeds" for all its speeds; closed chains take the nearest state that closes
     their closures. Or state is a `Restart`, from which a run of the same scene and method is resumed bit-identically.
 
-    Warns (`SceneWarning`) of doubtful input. Raises SceneError for an invalid scene or one whose profiles end before
-    t_end, NotImplementedError for one that is not supported yet, ValueError or TypeError for invalid settings, and
-    ClosureError if no initial state closes the closures, if they leave no motion, or if the given state is far from
-    closing them. A run that fails raises nothing: `status` and `message` of the trajectory say why it stopped, and the
-    samples up to there are kept. Ctrl-C ends a run at its next step and raises `Interrupted`, a KeyboardInterrupt,
-    whose `trajectory` holds the samples up to there; a second Ctrl-C while outputs are evaluated keeps those that are
-    finished.
+    Warns (`SceneWarning`) of doubtful input, and of beams of level exact that bent more than their points can follow.
+    Raises SceneError for an invalid scene or one whose profiles end before t_end, NotImplementedError for one that is
+    not supported yet, ValueError or TypeError for invalid settings, and ClosureError if no initial state closes the
+    closures, if they leave no motion, or if the given state is far from closing them. A run that fails raises nothing:
+    `status` and `message` of the trajectory say why it stopped, and the samples up to there are kept. Ctrl-C ends a run
+    at its next step and raises `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up to there; a
+    second Ctrl-C while outputs are evaluated keeps those that are finished.
     """
     refuse_unknown("simulate", settings)
     t_end, t = _end(t_end), start_time(t_start, state)
@@ -172,7 +172,19 @@ def _run(
     if start is not None and start.is_low:
         warned.append(PrecisionWarning(start.warning))
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
+    for doubt in _beyond_points(system, trajectory):
+        warned.append(SceneWarning(f'scene "{system.scene.name}": {doubt}'))
+        trajectory = replace(trajectory, message=f"{trajectory.message}; {doubt}")
     return trajectory, warned, driver.was_interrupted
+
+
+def _beyond_points(system: System, trajectory: Trajectory) -> list[str]:
+    """What there is to say of beams of level exact that a finished run bent more than their points can follow."""
+    if not len(system.constants.section) or not trajectory.finished:
+        return []
+    from flexmb.system.enough_points import unfollowed  # imported here because few scenes have such beams
+
+    return [str(each) for each in unfollowed(system, trajectory.t, trajectory.q)]
 
 
 def _again(stage: RunPart, state: Given, algorithm: Algorithm, stabilise: float, settings: Settings) -> Trajectory:

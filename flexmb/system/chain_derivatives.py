@@ -50,13 +50,13 @@ class ChainDerivatives(DifferentiableMotion):
 
     @per_thread
     def _constant_loads(self) -> ConstantLoads:
-        return ConstantLoads(self.closures, self._tangent)
+        return ConstantLoads(self.closures, self.own_tangent)
 
     @per_thread
     def _pushforward(self) -> Pushforward:
         own = self.closures.constants[1]
         x, out = motion_tangent(self.nq, self.nu), outputs_tangent(self.observation.out)
-        tables, rows = (x, self.constants, self._tangent, out), rows_tangent(own, self.constants)
+        tables, rows = (x, self.constants, self.own_tangent, out), rows_tangent(own, self.constants)
         observe = direct(observe_given, STATUS, *tables[:3], own, rows, out)
         return Pushforward(tables, rows, observe, self.check_status)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from msgspec.structs import replace
 from scipy.optimize import brentq
@@ -18,6 +20,7 @@ THROWN = LARGE / "flying_spaghetti" / "scene.toml"
 PRINCETON = LARGE / "princeton_beam" / "scene.toml"
 SPUN = ROOT / "cases" / "spinning_beam" / "beam_k_supercritical" / "scene.toml"
 RADIUS = 100.0  # of the 45-degree bend
+ARC = {0.0: 1.0 / RADIUS, 0.25 * np.pi * RADIUS: 1.0 / RADIUS}  # its curvature at its ends
 
 
 def bending(scene: fm.Scene, count: int, pieces: int = 1) -> fm.Scene:
@@ -78,31 +81,38 @@ def welded(scene: fm.Scene, bodies: int, polynomials: s.StrainPolynomials) -> fm
     )  # fmt: skip
 
 
-def bend_45(count: int, others: int, points: int | None = None) -> fm.Scene:
+def all_strains(count: int, others: int) -> s.StrainPolynomials:
+    """`count` polynomials of twist and of each curvature, and `others` of stretch and of each shear."""
+    curvatures = {"torsion": count, "bending_y": count, "bending_z": count}
+    return s.StrainPolynomials(**curvatures, axial=others, shear_y=others, shear_z=others)
+
+
+def bend_45(
+    count: int, others: int, points: int | None = None, curvatures: Mapping[float, float] = ARC
+) -> fm.Scene:
     """An eighth of a circle under a force on its tip across its plane: `count` polynomials of each curvature, and
-    `others` of stretch and shears. The section of Bathe and Bolourchi with GJ = EI and GA = 5/6 of G A, E = 1e7."""
+    `others` of stretch and shears. The section of Bathe and Bolourchi with GJ = EI and GA = 5/6 of G A, E = 1e7.
+    `curvatures` (1/m) at places along it (m) make it another bend."""
     EI, EA = 1e7 / 12.0, 1e7
     GA = 5.0 / 12.0 * EA
-    length = 0.25 * np.pi * RADIUS
-    ends = [
+    length = max(curvatures)
+    stations = [
         s.BeamStation(
             x_m=x, EA_N=EA, EIy_Nm2=EI, EIz_Nm2=EI, GJ_Nm2=EI, GAy_N=GA, GAz_N=GA, mass_per_length_kg_m=1.0,
-            rotary_y_kg_m=1.0 / 12.0, rotary_z_kg_m=1.0 / 12.0, curvature_1_m=(0.0, 0.0, 1.0 / RADIUS),
+            rotary_y_kg_m=1.0 / 12.0, rotary_z_kg_m=1.0 / 12.0, curvature_1_m=(0.0, 0.0, curvature),
         )
-        for x in (0.0, length)
+        for x, curvature in curvatures.items()
     ]  # fmt: skip
-    curvatures = {"torsion": count, "bending_y": count, "bending_z": count}
-    polynomials = s.StrainPolynomials(**curvatures, axial=others, shear_y=others, shear_z=others)
     scene = fm.SceneBuilder("45-degree bend", gravity=(0.0, 0.0, 0.0))
-    modes = s.Modes(count=0, polynomials=polynomials, points=points)
-    scene.beam("bend", length=length, elements=8, section=ends, modes=modes, level="exact")
+    modes = s.Modes(count=0, polynomials=all_strains(count, others), points=points)
+    scene.beam("bend", length=length, elements=8, section=stations, modes=modes, level="exact")
     scene.weld("clamp", "ground", "bend")
     scene.force("lift", "bend", node="tip", direction=(0.0, 0.0, 1.0), function=Ramp(rate=1.0))
     scene.marker("tip", "bend", node="tip")
     return scene.scene()
 
 
-def princeton(polynomials: s.StrainPolynomials, degrees: float, points: int) -> fm.Scene:
+def princeton(polynomials: s.StrainPolynomials, degrees: float, points: int | None = None) -> fm.Scene:
     """The Princeton beam under a tip force of t newton at time t, at an angle to its stiff direction."""
     angle = np.deg2rad(degrees)
     scene = at_rest_under(load_scene(PRINCETON), 0.0, float(np.cos(angle)), float(np.sin(angle)))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import runpy
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
 import flexmb as fm
 from flexmb.scene import schema as s
@@ -16,7 +19,9 @@ from flexmb.scene.functions import Ramp
 from tests.benchmarks import exact_scenes as scenes
 from tests.cases.test_large_deflection import ELASTICA, exact_in_space
 
-FRAME = Path(__file__).parents[2] / "cases" / "frames" / "right_angle" / "scene.toml"
+CASES = Path(__file__).parents[2] / "cases"
+FRAME = CASES / "frames" / "right_angle" / "scene.toml"
+BEAMS = CASES / "beams"
 
 
 def strip(count: int) -> fm.Scene:
@@ -80,6 +85,72 @@ def test_the_princeton_beam_deflects_as_exudyns_elements_in_space() -> None:
         for each in (s.StrainPolynomials(**curvatures, **others), s.StrainPolynomials(**curvatures))
     ]
     assert errors[0] < 1e-7 < 2e-6 < errors[1] < 1e-5
+
+
+INCH = 0.0254  # m
+ONE_ELEMENT = {  # displacement of the tip by a spectral element of 18 nodes, BeamDyn and Kynema: m, of the bend in
+    "composite": INCH * np.array([-9.02726627566296e-2, -6.47488486259039e-2, 1.22973648292371]),
+    "twisted": np.array([-1.14152599954047, -1.71805334646493, -3.59321324027199]),
+    "bend": np.array([-23.6459716009048, 13.7208006040058, 53.5776450626989]),
+}
+
+
+@pytest.mark.parametrize(("name", "bound"), [("composite", 1e-12), ("twisted", 1e-11)])
+def test_equations_of_rods_at_rest_are_where_spectral_elements_are(name: str, bound: float) -> None:
+    """`equations.py` of both cases by shooting: of 18 nodes and 15 the published tips differ by 3e-12 m at most."""
+    scene = load_scene(BEAMS / name / "slow.toml")
+    (load,) = scene.loads
+    exact = runpy.run_path(str(BEAMS / name / "equations.py"))["exact"]
+    tip = exact(np.array([load.function.duration_s]))["marker:tip.position"][0]
+    assert tip - [scene.bodies[0].length_m, 0.0, 0.0] == pytest.approx(ONE_ELEMENT[name], abs=bound)
+
+
+@pytest.mark.parametrize(
+    ("name", "strains", "points", "bound"),
+    [("composite", (4, 3), 8, 5e-8), ("composite", (8, 6), 20, 1e-9), ("twisted", (6, 4), 10, 1e-5),
+     ("twisted", (8, 6), 24, 5e-7)],
+)  # fmt: skip
+def test_rods_of_strain_modes_are_where_spectral_elements_are(
+    name: str, strains: tuple[int, int], points: int, bound: float
+) -> None:
+    """Coupled sections, and a section that turns by 90 degrees along the beam. Bounds are twice what was measured."""
+    scene = load_scene(BEAMS / name / "slow.toml")
+    (load,), length = scene.loads, scene.bodies[0].length_m
+    scene = replace(scene, loads=(replace(load, function=Ramp(rate=load.function.end_value)),))
+    scene = scenes.strained(scene, scenes.all_strains(*strains), points=points)
+    tip = scenes.tip_at_rest(scene, 0.25, 0.5, 0.75, 1.0) - [length, 0.0, 0.0]
+    assert np.linalg.norm(tip - ONE_ELEMENT[name]) < bound
+
+
+def test_a_bend_of_varying_curvature_is_where_spectral_elements_are() -> None:
+    """Of the 45-degree bend BeamDyn and Kynema take the parabola through three of its points: at the root it leaves by
+    3.2 degrees more than the arc, so that the tip is 0.18 in from the arc's. Its curvature is linear between stations,
+    which leaves an error with the square of their distance."""
+    (x_1, y_1), (x_2, y_2) = (38.2683, -7.61205), (70.7107, -29.2893)
+    square = (y_2 / x_2 - y_1 / x_1) / (x_2 - x_1)
+    slope = y_1 / x_1 - square * x_1
+    root_turn = np.arctan(slope)
+    bending = dict.fromkeys(("EIy_Nm2", "EIz_Nm2", "GJ_Nm2"), 8.333e5)
+    shear = dict.fromkeys(("GAy_N", "GAz_N"), 41.6667e5)
+
+    def length(x: float) -> float:
+        return float(quad(lambda each: np.hypot(1.0, slope + 2.0 * square * each), 0.0, x, epsabs=1e-12)[0])
+
+    def moved(stations: int) -> np.ndarray:
+        places = np.linspace(0.0, length(x_2), stations)
+        along = [brentq(lambda x, s=s: length(x) - s, -1.0, x_2 + 1.0, xtol=1e-12) for s in places]
+        curvatures = 2.0 * square / np.hypot(1.0, slope + 2.0 * square * np.array(along)) ** 3
+        scene = scenes.bend_45(6, 5, points=16, curvatures=dict(zip(places, curvatures, strict=True)))
+        (bend,) = scene.bodies
+        cut = tuple(replace(each, **bending, **shear) for each in bend.stations)
+        scene = replace(scene, bodies=(replace(bend, stations=cut),))
+        straight, lifted = (scenes.tip_at_rest(scene, *loads) for loads in ((0.0,), (150.0, 300.0, 450.0, 600.0)))
+        c, s = np.cos(root_turn), np.sin(root_turn)
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ (lifted - straight)
+
+    coarse, fine = moved(17), moved(33)
+    assert np.linalg.norm(fine - ONE_ELEMENT["bend"]) < 5e-3
+    assert np.linalg.norm(fine + (fine - coarse) / 3.0 - ONE_ELEMENT["bend"]) < 2e-5
 
 
 @cache

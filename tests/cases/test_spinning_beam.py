@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
+from msgspec.structs import asdict, replace
 from scipy.interpolate import CubicSpline
 from scipy.linalg import eigh
 
@@ -17,7 +17,7 @@ from crosscheck.engines.registry import engine
 from crosscheck.library.find import load_case
 from flexmb.run.simulate import simulate
 from flexmb.scene.files import load_scene
-from flexmb.scene.schema import AngularCoordinate, Ramp, Scene
+from flexmb.scene.schema import AngularCoordinate, Ramp, Scene, StrainPolynomials
 from flexmb.surrogate import finite_segments, substructured
 from flexmb.system.compile import compile
 
@@ -222,6 +222,42 @@ def test_stiffened_is_stable_above_the_first_clamped_frequency(case: str) -> Non
     assert minimum(times, motion[:, 1])[1] == pytest.approx(truth.tip_minimum, rel=5e-3)
     assert np.max(np.abs(motion[times > 14.5, 1])) < 0.02 * abs(truth.tip_minimum)
     assert np.max(np.abs(done.energy_drift)) <= 1e-7 * done.energy_scale
+
+
+@cache
+def exact_minimum(case: str, more: int) -> tuple[float, float]:
+    """Tip minimum (s, m) of one body of level exact, with `more` polynomials of each strain than the case has."""
+    scene = load_scene(FAMILY / case / "exact.toml")
+    (beam,) = scene.bodies
+    strains = {name: count + more for name, count in asdict(beam.modes.polynomials).items() if count}
+    beam = replace(beam, modes=replace(beam.modes, polynomials=StrainPolynomials(**strains)))
+    times = np.linspace(0.0, PAST_MINIMUM_S, 161)
+    done = simulate(compile(replace(scene, bodies=(beam,))), PAST_MINIMUM_S, "radau5", rtol=1e-8, samples=times)
+    assert done.finished
+    return minimum(times, rotating_frame(TRUTHS[case].rate, times, done.markers["tip"].position)[:, 1])
+
+
+@pytest.mark.parametrize("case", TRUTHS)
+def test_exact_reaches_the_published_tip_minimum(case: str) -> None:
+    """The linear beam to a fraction (w/L)^2, and the published beam of finite rotation by what that still moves. The
+    case's polynomials are 1e-5 of the deflection from two more of each, and those 1e-7 from another two."""
+    truth, length = TRUTHS[case], load_scene(FAMILY / case / "scene.toml").bodies[0].length_m
+    (_, few), (time, tip), (_, many) = (exact_minimum(case, more) for more in (0, 2, 4))
+    assert abs(few - tip) < 1e-5 * abs(tip)
+    assert abs(many - tip) < 1e-7 * abs(tip)
+    assert tip == pytest.approx(truth.tip_minimum, rel=(truth.tip_minimum / length) ** 2)
+    assert time == pytest.approx(truth.minimum_time, abs=2e-3)
+    if case == "beam_s_supercritical":
+        assert abs(tip - EXACT_S) < STILL_MOVES_S
+
+
+@pytest.mark.parametrize("case", TRUTHS)
+def test_exact_and_nonlinear_beam_have_one_tip_minimum(case: str) -> None:
+    """Both have stretch, and beam S shear; what is left is the mesh of the elements, whose error in the length of an
+    element is of second order or better: 16 of them are less than (1/16)^2 of the deflection off."""
+    pytest.importorskip("exudyn")
+    beam, (_, tip) = nonlinear_beam(case), exact_minimum(case, 2)
+    assert abs(tip - beam.minima[-1]) < abs(tip) / 16**2 + beam.doubt
 
 
 @pytest.mark.parametrize("case", CASES)
