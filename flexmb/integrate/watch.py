@@ -40,8 +40,8 @@ _NOWHERE, _PASSES, _TURNS = range(3)  # relation of a quantity to its level in a
 
 @bundle
 class Watch:
-    """What a run watches. As a tuple, its seventeen arrays were copied and counted in every call: short steps took twice
-    as long (`rk4`, measured), and an integrator had half as much code again.
+    """What a run watches. As a tuple, its seventeen arrays were copied and counted in every call: short steps of `rk4`
+    took twice as long (measured), and an integrator had half as much code again.
 
     entry (k,) of y, or -1 - j for signal j; level (k,); direction (k,): 1 rising, -1 falling, 0 either.
 

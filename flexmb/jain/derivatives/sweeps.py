@@ -54,7 +54,7 @@ def _copy_functions(c, w, d):
 @kernel
 def forces_of_bodies(c, w, d):
     """Outward: motion and forces of the bodies and of what is attached to them. What it needs in w: see
-    `inverse_dynamics`. It is a kernel because the derivatives of trees, of closed chains and of single rows share it."""
+    `inverse_dynamics`. A kernel, because the derivatives of trees, of closed chains and of single rows share it."""
     _copy_functions(c, w, d)
     for k in range(c.body.shape[0]):
         move(c, w, d, k)
