@@ -26,7 +26,7 @@ SECOND_ORDER = 0.25
 """Lower limit of the ratio r of successive differences, that of convergence of order 2 under halving."""
 MOST = 0.5
 """With an uncertainty above this fraction of the tolerance no candidate can be judged."""
-FINE, TIGHTER, LOOSEST = 1e-3, 0.1, 1e-5
+FINE, TIGHTER, LOOSEST = 1e-2, 0.1, 1e-5
 """Relative tolerance of a fine run: FINE times the tolerance, at most LOOSEST, tightened by the factor TIGHTER."""
 EASED = 10.0
 """Fine runs of Radau 5 have so many times this tolerance: it bounds an error estimate of order 3 for a method of order
@@ -123,7 +123,7 @@ class Confirmation:
         if these exceed the budget and Radau 5 is within it."""
         if model in self._integrators:
             return self._integrators[model]
-        chosen, enough = EXPLICIT, np.inf
+        chosen, enough = EXPLICIT, 0.0
         expected = self._expected(model)
         strains = any(rung.kind == "strains" for _, rung in model)
         if strains and expected > CHEAP and not isinstance(self.bench.system(model), str):
@@ -178,18 +178,19 @@ class Confirmation:
         done = self.bench.run(model, method)
         return error(done.signals, self.run(model).signals, self.reference.scale) if done.finished else np.inf
 
-    def cheapest_method(self, model: Model) -> RunMethod:
-        """The method with the fewest operations whose error plus that of the model is within the tolerance.
+    def cheapest_method(self, model: Model, most: float = np.inf) -> RunMethod:
+        """The method with the fewest operations whose error plus that of the model is within the tolerance; if it takes
+        `most` or more, any that does.
 
         In the ladder of every integrator, from loose to tight, it takes the first method that is accurate enough and
         whose successor is, too; a single small error may be accidental. A ladder ends at a method that costs more than
         the best one found, because tighter ones cost even more. The integrator of the fine run comes first, because it
         is likely to be cheap, and then ends the runs of the others early.
         """
-        room = self.tolerance - self.error(model)
+        room, fine = self.tolerance - self.error(model), self.finely(model)
         scene, algorithm = self.bench.scene, self.bench.algorithm(model)
         highest, slow = highest_frequency(scene, model), self.cost.slow / (STAGES * self.bench.t_end)
-        best, least = self.finely(model), self.run(model).operations
+        best, least = fine, min(most, self.run(model).operations)
         short = self.run(model).evaluations < _FEW_EVALUATIONS
         chosen = ladders(highest, slow, algorithm, not scene.constraints, float(self.bench.times[1]))
         if scene.constraints and best.integrator == IMPLICIT:
@@ -199,7 +200,9 @@ class Confirmation:
                 continue
             before: RunMethod | None = None
             for method in ladder:
-                if method.adaptive and method.value <= self.finely(model).value:
+                if method.adaptive and method.value <= fine.value:
+                    if before is not None and method.integrator == fine.integrator:  # the fine run is its successor
+                        best, least = before, self.bench.run(model, before).operations
                     break
                 done = self.bench.run(model, method, least if before is None else DEARER * least)
                 if done.cut:

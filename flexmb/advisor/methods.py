@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.settings import Settings
 from flexmb.run.run_arrays import Statistics
-from flexmb.run.simulate import simulate
+from flexmb.run.simulate import run_of_many
 from flexmb.run.trajectory import Trajectory
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
@@ -68,8 +69,10 @@ class RunMethod:
 
 
 def simulated(system: System, times: NDArray[np.float64], method: RunMethod, max_steps: int = 1_000_000) -> Trajectory:
-    """A run with output at `times` (s)."""
-    return simulate(system, float(times[-1]), samples=times, max_steps=max_steps, **method.options())
+    """A run with output at `times` (s), from 0."""
+    options = method.options()
+    algorithm, settings = options.pop("algorithm"), Settings(**options, max_steps=max_steps)
+    return run_of_many(system, times, settings.checked(float(times[-1])), algorithm)
 
 
 def simulated_within(

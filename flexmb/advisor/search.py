@@ -66,9 +66,14 @@ def search(ladders: dict[str, tuple[Step, ...]], confirmation: Confirmation, bud
     walk.down(choice)
     adequate = [model for model in confirmation.measured if confirmation.adequate(model)]
     finalists = sorted(adequate, key=confirmation.run_cost)[:FINALISTS]
-    methods = {each: confirmation.cheapest_method(each) for each in finalists}
-    model = min(finalists, key=lambda each: confirmation.bench.run(each, methods[each]).operations)
-    return Found(model, methods[model], walk.exhausted)
+    best, least = finalists[0], np.inf
+    methods: dict[Model, RunMethod] = {}
+    for each in finalists:
+        methods[each] = confirmation.cheapest_method(each, least)
+        operations = confirmation.bench.run(each, methods[each]).operations
+        if operations < least:
+            best, least = each, operations
+    return Found(best, methods[best], walk.exhausted)
 
 
 def model_of(choice: Choice) -> Model:

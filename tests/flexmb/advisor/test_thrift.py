@@ -125,6 +125,19 @@ def test_where_nothing_is_adequate_the_reference_is_refined(monkeypatch: pytest.
     assert len(asked) == 1 and advice.accepted and advice.measured <= 2e-3
 
 
+def test_runs_of_candidates_are_those_of_simulate_without_its_warnings(recwarn: pytest.WarningsRecorder) -> None:
+    """A candidate with few points is measured, and not talked of; whoever runs it is told."""
+    rise = fm.SmoothStep(start_value=0.0, end_value=1000.0 / LENGTH**2, start_s=0.0, duration_s=0.2)
+    system, method = fm.compile(built(loaded(rise, (0.0, 1.0, 0.0)), strains(6))), RunMethod("dop853", 1e-4)
+    times = np.linspace(0.0, 0.25, 26)
+    candidate = simulated(system, times, method)
+    assert not recwarn.list
+    with pytest.warns(fm.SceneWarning, match="more than its points can follow"):
+        run = fm.simulate(system, 0.25, samples=times, **method.options())
+    np.testing.assert_array_equal(candidate.markers["tip"].position, run.markers["tip"].position)
+    assert candidate.finished and candidate.message in run.message
+
+
 @pytest.mark.parametrize(
     "rung",
     [
