@@ -45,7 +45,7 @@ from flexmb.tables.state import State, finite_result
 from flexmb.typing import Flags, Index, Real
 
 _Four = TypeVar("_Four", OfFreeMotion, OfGivenMotion)
-_INSTEAD = "have the controllers chained through by flexmb.ControlledMotion(scene)"
+INSTEAD = "have the controllers chained through by flexmb.ControlledMotion(scene)"
 
 
 class DifferentiableMotion(FreeMotion):
@@ -72,9 +72,9 @@ class DifferentiableMotion(FreeMotion):
         """`acceleration_derivatives` for a loop: `udot = evaluator(t, q, u)` writes derivatives into its arrays.
 
         A call costs 0.1 us in addition to the kernel. The kernel is compiled here, not at the first call.
-        NotImplementedError for closed chains, and scenes with controllers.
+        NotImplementedError for scenes with controllers, and closures on bodies of level `ruthless`.
         """
-        refuse_feedback(self.scene, "system.derivative_evaluator", _INSTEAD)
+        refuse_feedback(self.scene, "system.derivative_evaluator", INSTEAD)
         return fresh_derivative_evaluator(self)
 
     def inverse_dynamics_derivatives(self, state: State, accelerations: Real) -> InverseDynamicsDerivatives:
@@ -247,7 +247,7 @@ class DifferentiableMotion(FreeMotion):
 
     def _differentiable(self, state: State, what: str) -> tuple[float, Real]:
         """Time and y of a state at which derivatives exist; NotImplementedError for scenes with controllers."""
-        refuse_feedback(self.scene, what, _INSTEAD)
+        refuse_feedback(self.scene, what, INSTEAD)
         return self._without_kinks(state, what)
 
     def _without_kinks(self, state: State, what: str) -> tuple[float, Real]:

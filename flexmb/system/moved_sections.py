@@ -31,9 +31,11 @@ class MovedSections(NamedTuple):
 
 def moved_sections(field: StrainField, eta: Real, etad: Real, etadd: Real) -> MovedSections:
     """The sections at modal coordinates (m,) with their first two rates."""
-    whole, linear, square, (g, g_rate, g_again) = (
-        tuple(field.rows[:, row] @ x for x in (eta, etad, etadd)) for row in (WHOLE, LINEAR, SQUARE, STRETCH)
-    )
+
+    def sums(row: int) -> _Rates:
+        return field.rows[:, row] @ eta, field.rows[:, row] @ etad, field.rows[:, row] @ etadd
+
+    whole, linear, square, (g, g_rate, g_again) = (sums(row) for row in (WHOLE, LINEAR, SQUARE, STRETCH))
     step, spin, spin_rate = turning(*_magnus(whole, linear, square))
     R, omega, alpha = np.empty_like(step), np.empty_like(spin), np.empty_like(spin)
     for j, i in enumerate(field.before):

@@ -1,23 +1,23 @@
 """A beam in space: Exudyn's geometrically exact elements, massless springs of six strains, between rigid sections.
 
-An element (ObjectBeamGeometricallyExact) keeps its strains constant: its axis is a helix, and its strain is the
-logarithm of the relative motion of its ends, so that the stiffest shear does not lock it. It is straight at rest, takes
-the diagonal of the stiffness alone, and its own weight is not implemented (Exudyn 1.13.6). A section that is curved at
-rest is therefore two ends of elements that are welded at an angle, and mass is on the sections. That is where Exudyn
-lumps the mass of an element too, half at each end, but as bodies they have weight, mass centres and any inertia.
+An element (ObjectBeamGeometricallyExact of Exudyn 1.13.6) keeps its strains constant: its axis is a helix, its strains
+are the logarithm of the relative motion of its ends less that at rest, over its length, and the stiffest shear does not
+lock it. It takes the diagonal of the stiffness alone. Exudyn lumps its mass at the ends, half at each; here the lumps
+are bodies at the same places, which may have mass centres off the axis, any inertia and the beam's own lumps.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import repeat
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from crosscheck.engines.conventions import cross, rotation_matrix
+from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
 from crosscheck.engines.exudyn.motion import FrameMotion
-from flexmb.scene.rest_curve import is_curved, rest_sections
+from crosscheck.engines.exudyn.rotations import logarithm
+from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.schema import BeamBody
 from flexmb.scene.sections import inertia_on_axis, mass_centres, stiffness_on_axis
 from flexmb.scene.strains import polynomials
@@ -28,12 +28,14 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class BeamElement:
-    """One element between two carriers whose axes are its axes: length (m), diagonal (6,) of the stiffness."""
+    """One element between two sections: length (m), diagonal (6,) of the stiffness, and the logarithm (6,) of the
+    motion from one end to the other at rest, [translation; rotation]."""
 
     left: Carrier
     right: Carrier
     length: float
     stiffness: Real
+    rest: Real
 
 
 @dataclass(frozen=True)
@@ -58,30 +60,19 @@ def spatial_beam(shop: Workshop, body: BeamBody, motion: FrameMotion) -> Spatial
     """The beam at rest in its own frame, which moves by `motion` at t = 0."""
     x = _stations(body)
     position, rotation = rest_sections(body, x)
-    ends = _element_frames(position, rotation)
-    lumps = _lumps(body, x, rotation)
-    carriers: list[Carrier] = []
-    elements: list[BeamElement] = []
-    starts: list[Carrier] = []
-    curved = is_curved(body)
-    for k, turn in enumerate((ends[0], *ends)):  # the axes of section k are those of the element before it
-        carriers.append(shop.rigid(motion.offset(position[k], turn), np.eye(3), _turned(lumps[k], turn)))
-        last = k == len(x) - 1
-        starts.append(carriers[k])
-        if curved and k > 0 and not last:
-            starts[k] = _kink(shop, carriers[k], turn, motion.offset(position[k], ends[k]), ends[k])
+    motions = [motion.offset(*each) for each in zip(position, rotation, strict=True)]
+    carriers = [shop.rigid(*each) for each in zip(motions, repeat(np.eye(3)), _lumps(body, x))]
+    turn = np.swapaxes(rotation[:-1], 1, 2) @ rotation[1:]
+    apart = np.einsum("kji,kj->ki", rotation[:-1], np.diff(position, axis=0))
     stiffness = _stiffness(body, (x[1:] + x[:-1]) / 2.0)
-    for k, diagonal in enumerate(stiffness):
-        length = float(np.linalg.norm(position[k + 1] - position[k]))
-        elements.append(BeamElement(starts[k], carriers[k + 1], length, diagonal))
-        _add(shop, elements[k])
+    columns = carriers[:-1], carriers[1:], np.diff(x).tolist(), stiffness, logarithm(turn, apart)
+    elements = [BeamElement(*each) for each in zip(*columns, strict=True)]
+    for element in elements:
+        _add(shop, element)
     found = {}
     for name, rest in rest_frames(body).items():
         k = int(np.argmin(np.abs(x - nodes_along(body)[name])))
-        axes = ends[max(k - 1, 0)]
-        found[name] = BeamSection(
-            carriers[k], motion.offset(position[k], axes), axes.T @ rotation_matrix(rest.quaternion)
-        )
+        found[name] = BeamSection(carriers[k], motions[k], rotation[k].T @ rotation_matrix(rest.quaternion))
     return SpatialBeam(found, tuple(carriers), tuple(elements))
 
 
@@ -95,14 +86,6 @@ def _add(shop: Workshop, element: BeamElement) -> None:
     )
 
 
-def _kink(shop: Workshop, carrier: Carrier, axes: Real, motion: FrameMotion, next_axes: Real) -> Carrier:
-    """The massless start of an element, welded to the section where the one before it ends."""
-    start = shop.rigid(motion, np.eye(3), None)
-    markers = [shop.marker(carrier, np.zeros(3), axes.T @ next_axes), shop.marker(start, np.zeros(3))]
-    shop.mbs.AddObject(shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=[1] * 6))
-    return start
-
-
 def _stations(body: BeamBody) -> Real:
     """Ends of the elements: nodes, stations and tip masses, and between them as many as make the scene's number."""
     L = body.length_m
@@ -113,17 +96,6 @@ def _stations(body: BeamBody) -> Real:
         for left, right in zip(fixed, fixed[1:], strict=False)
     ]
     return np.concatenate([*parts, [L]])
-
-
-def _element_frames(position: Real, rotation: Real) -> Real:
-    """Axes (n-1,3,3) of straight elements between sections: x along the chord, turned as the section midway is."""
-    half = Rotation.from_matrix(np.swapaxes(rotation[:-1], 1, 2) @ rotation[1:]).as_rotvec() / 2.0
-    middle = rotation[:-1] @ Rotation.from_rotvec(half).as_matrix()
-    chord = np.diff(position, axis=0)
-    chord /= np.linalg.norm(chord, axis=1)[:, None]
-    y = middle[:, :, 1] - np.sum(middle[:, :, 1] * chord, axis=1)[:, None] * chord
-    y /= np.linalg.norm(y, axis=1)[:, None]
-    return np.stack([chord, y, cross(chord, y)], axis=2)
 
 
 def _interpolated(body: BeamBody, matrices: list[Real], x: Real) -> Real:
@@ -153,27 +125,16 @@ def shears(body: BeamBody) -> bool:
     return body.theory == "timoshenko"
 
 
-def _lumps(body: BeamBody, x: Real, rotation: Real) -> list[Inertia]:
-    """The inertia of every section in the axes of the body, about it: half of each element beside it, and tip
-    masses."""
+def _lumps(body: BeamBody, x: Real) -> list[Inertia]:
+    """The inertia of every section in its axes: half of each element beside it, and tip masses."""
     middles, lengths = (x[1:] + x[:-1]) / 2.0, np.diff(x)
     per_length = _interpolated(body, [*map(inertia_on_axis, body.stations)], middles)
     mass, com, inertia = mass_centres(per_length)
     parts: list[list[Inertia]] = [[] for _ in x]
-    for k, length in enumerate(lengths):
+    for k, half in enumerate(lengths / 2.0):
         for end in (k, k + 1):
-            R = rotation[end]
-            share = length / 2.0
-            parts[end].append(Inertia(share * mass[k], R @ com[k], share * R @ inertia[k] @ R.T))
+            parts[end].append(Inertia(half * mass[k], com[k], half * inertia[k]))
     for lump in body.tip_masses:
-        k = int(np.argmin(np.abs(x - lump.x_m)))
-        R = rotation[k]
-        parts[k].append(
-            Inertia(lump.mass_kg, R @ np.array(lump.com_m), R @ np.array(lump.inertia_kg_m2) @ R.T)
-        )
+        place = int(np.argmin(np.abs(x - lump.x_m)))
+        parts[place].append(Inertia(lump.mass_kg, np.array(lump.com_m), np.array(lump.inertia_kg_m2)))
     return [combine(each) for each in parts]
-
-
-def _turned(lump: Inertia, axes: Real) -> Inertia:
-    """An inertia in the axes `axes` of the body."""
-    return Inertia(lump.mass, axes.T @ lump.com, axes.T @ lump.inertia @ axes)

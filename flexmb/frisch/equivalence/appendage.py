@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import assert_never
 
 import msgspec
 import numpy as np
@@ -16,7 +17,7 @@ from flexmb.modal.beam import beam_elements
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
-from flexmb.scene.bodies import BeamBody, Level, RigidBody, SidBody
+from flexmb.scene.bodies import BeamBody, Level, ModalBody, RigidBody, SidBody
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -105,10 +106,11 @@ def with_modes(model: FlexibleModel, chosen: NDArray[np.intp]) -> FlexibleModel:
 def appendage_of(scene: Scene, body: str, modes: int | None = None) -> Appendage:
     """The body of that name as an appendage of its inboard body.
 
-    `modes` is the number of modes to use. Those of a beam are computed from its finite elements, whatever number the
-    scene gives; a modal body has only the modes it was given. Default: all modes of a modal body; of a beam the lower
-    half of the modes of its finite elements, which is accurate, up to `DEFAULT_MODES`. Raises ValueError if the body
-    does not exist, is not flexible or not clamped, or if anything is attached to it.
+    `modes` is the number of modes to use. Those of a beam are computed from its finite elements, at level exact from as
+    many polynomials, whatever number the scene gives; a modal body has only the modes it was given. Default: all modes
+    of a modal body; of a beam the lower half of the modes of its finite elements, which is accurate, up to
+    `DEFAULT_MODES`. Raises ValueError if the body does not exist, is not flexible or not clamped, or if anything is
+    attached to it.
     """
     found = next((candidate for candidate in scene.bodies if candidate.name == body), None)
     if found is None:
@@ -122,10 +124,13 @@ def appendage_of(scene: Scene, body: str, modes: int | None = None) -> Appendage
     name = f'body "{body}"'
     if modes is not None and modes < 1:
         raise ValueError(f"{name}: at least one mode is needed, got {modes}")
-    if isinstance(found, BeamBody):
-        chosen = appendage(flexible_model(_with_modes(found, modes)), name)
-    else:
-        chosen = _first(appendage(flexible_model(found), name), modes)
+    match found:
+        case BeamBody():
+            chosen = appendage(flexible_model(_with_modes(found, modes)), name)
+        case ModalBody():
+            chosen = _first(appendage(flexible_model(found), name), modes)
+        case _:
+            assert_never(found)
     return replace(chosen, level=found.level)
 
 

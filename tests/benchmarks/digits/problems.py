@@ -32,7 +32,7 @@ def problems() -> list[Problem]:
     """At rest first, then in motion."""
     return [
         _rolled_up(), _elastica_at_rest(), _princeton(), _bend(), _elastica(), _spun(), _pendulum(), _spaghetti(),
-        _elbow(), _frame(), _crank(), _blade(),
+        _elbow(), _frame(), _crank(), _blade(), _four_bar(), _shaft(),
     ]  # fmt: skip
 
 
@@ -257,7 +257,8 @@ def _crank() -> Problem:
     scene, times = scene_of("large_deflection/driven_crank", "exact.toml"), np.linspace(0.0, 0.4, 101)
     exact = curved(scene)
     return Problem(
-        "crank", "Driven crank, 0.4 s", 1.0, native.converged(exact(9), times, rtol=1e-8), OWN,
+        "crank", "Driven crank, 0.4 s", 1.0, native.converged(exact(9), times, rtol=1e-6),
+        "level exact with more polynomials, Radau IIA at rtol 1e-6",
         {
             EXACT: moving(exact, (3, 4, 5, 6), times),
             PIECES: moving(cut(scene, 2, "beam"), (2, 4, 8), times),
@@ -274,6 +275,34 @@ def _blade() -> Problem:
         {
             EXACT: moving(exact, (3, 4, 5, 6), times),
             PIECES: moving(cut(scene), (2, 4, 8), times),
+            ELEMENTS: over((4, 8, 16, 32), lambda n: elements.in_space(scene, n, times)),
+        },
+    )  # fmt: skip
+
+
+def _four_bar() -> Problem:
+    scene, times = scene_of("flexible_mechanisms/misaligned_four_bar", "exact.toml"), np.linspace(0.0, 4.0, 201)
+    pieces = scene_of("flexible_mechanisms/misaligned_four_bar")
+    exact = curved(scene)
+    implicit: tuple[Method, ...] = ("radau5",)
+    return Problem(
+        "four_bar", "Misaligned four-bar, 4 s", 0.24, native.converged(exact(6), times, rtol=1e-8), OWN,
+        {
+            EXACT: moving(exact, (1, 2, 3, 4), times, implicit),
+            PIECES: moving(cut(pieces), (1, 2, 4), times, implicit),
+        },
+    )  # fmt: skip
+
+
+def _shaft() -> Problem:
+    scene, times = scene_of("rotors/passing_critical_speed"), np.linspace(0.0, 2.5, 251)
+    pieces = scene_of("rotors/passing_critical_speed", "modes.toml")
+    exact = curved(scene)
+    return Problem(
+        "shaft", "Shaft through its critical speed, 2.5 s", 6.0, native.converged(exact(6), times), OWN,
+        {
+            EXACT: moving(exact, (2, 3, 4, 5), times),
+            PIECES: moving(cut(pieces), (1, 2, 4, 8), times),
             ELEMENTS: over((4, 8, 16, 32), lambda n: elements.in_space(scene, n, times)),
         },
     )  # fmt: skip
