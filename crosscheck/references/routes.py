@@ -6,7 +6,7 @@ which is executed only here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -18,7 +18,7 @@ import numpy as np
 from crosscheck.judging.results import Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
 from crosscheck.library import basis
-from crosscheck.library.case import CaseError, Variant
+from crosscheck.library.case import CaseError, Comparison, ComparisonSide, Variant
 from crosscheck.library.find import Case
 from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
 from crosscheck.records.archive import read
@@ -100,7 +100,7 @@ def _engine_results(
 ) -> dict[str, Result]:
     """The results of all routes that are engines, by name, each run as a variant of its own."""
     variants = tuple(
-        _as_variant(case.run.variant(route.variant or recipe.variant), _name(place), route, times)
+        _as_variant(case.run.variant(route.variant or recipe.variant), recipe.variant, _name(place), route, times)
         for place, route in enumerate(recipe.routes)
         if route.engine
     )
@@ -108,14 +108,24 @@ def _engine_results(
         return {}
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
-        record, jobs = plan(replace(case, run=case.run.alone(*variants)), (), provider, limits.time_s)
+        run = msgspec.structs.replace(case.run.alone(*variants), comparisons=_refining(variants))
+        record, jobs = plan(replace(case, run=run), (), provider, limits.time_s)
         planned = record, jobs_at(jobs, times)
         run_planned([planned], (), records, limits=limits, scheduler=scheduler, listener=listener)
         (results,) = collect(read(records)).cases
     return {each.name: results.get(each.name, each.engines[0], MAIN) for each in variants}
 
 
-def _as_variant(variant: Variant, name: str, route: ReferenceRoute, times: Real) -> Variant:
+def _refining(variants: Sequence[Variant]) -> tuple[Comparison, ...]:
+    """Comparisons across variants, for which alone refined runs are planned: of the first with those refined."""
+    first, *others = (ComparisonSide(variant=each.name, engine=each.engines[0]) for each in variants)
+    refined = {each.name for each in variants if each.refined is not None}
+    return tuple(Comparison(name=each.variant, a=first, b=each, goals={}) for each in others if each.variant in refined)
+
+
+def _as_variant(variant: Variant, given: str, name: str, route: ReferenceRoute, times: Real) -> Variant:
+    """A route as a variant of its own. A witness by another discretisation than the `given` one knows no more than that
+    says of its own error."""
     efforts = tuple(each for each in route.efforts or variant.efforts if each.engine == route.engine)
     return msgspec.structs.replace(
         variant,
@@ -123,7 +133,7 @@ def _as_variant(variant: Variant, name: str, route: ReferenceRoute, times: Real)
         engines=(route.engine,),
         also=(),
         efforts=efforts,
-        refined=None,
+        refined=variant.refined if route.witness and variant.name != given else None,
         duration_s=float(times[-1]),
         samples=len(times),
     )
@@ -142,7 +152,7 @@ def _of_engine(case: Case, route: ReferenceRoute, result: Result) -> RouteSignal
         made_with=_version(result.finest),
         times=result.times,
         channels={name: result.values(name) for name in result.channels if _given(route, name)},
-        uncertainties={name: result.uncertainty(name) for name in result.channels if _given(route, name)},
+        uncertainties={name: result.doubt(name, across=True) for name in result.channels if _given(route, name)},
         witness=route.witness,
     )
 

@@ -112,6 +112,8 @@ def advise(
         return replace(advice, refusal=str(problem))
     known, ladders, bench, notes = asked.known, asked.ladders, asked.bench, asked.notes
     found = search(ladders, confirmation, BUDGET)
+    if found is None and confirmation.refine():  # with a smaller uncertainty some may be adequate
+        found = search(ladders, confirmation, BUDGET)
     steps = {(name, step.rung): step for name, each in ladders.items() for step in each}
     trials = tuple(_trial(model, steps, confirmation) for model in confirmation.measured)
     if found is None:

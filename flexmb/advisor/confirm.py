@@ -26,8 +26,11 @@ SECOND_ORDER = 0.25
 """Lower limit of the ratio r of successive differences, that of convergence of order 2 under halving."""
 MOST = 0.5
 """With an uncertainty above this fraction of the tolerance no candidate can be judged."""
-FINE, TIGHTER, LOOSEST = 1e-3, 0.1, 1e-5
+FINE, TIGHTER, LOOSEST = 1e-2, 0.1, 1e-5
 """Relative tolerance of a fine run: FINE times the tolerance, at most LOOSEST, tightened by the factor TIGHTER."""
+EASED = 10.0
+"""Fine runs of Radau 5 have so many times this tolerance: it bounds an error estimate of order 3 for a method of order
+5. What ten times tighter runs change is measured for it as for DOP853."""
 INTEGRATION, ROOM = 0.1, 0.05
 """Fractions of the tolerance: largest integration error of a reference; part that is reserved for the integrator."""
 _FEW_EVALUATIONS = 1000
@@ -40,6 +43,13 @@ CHEAP = 1e9
 OVERCOUNTED = 4.0
 """Runs of Radau 5 may have so many times the budget, because their Jacobians are counted column by column, as they are
 not computed."""
+GLIMPSE, SLOW = 0.125, 4.0
+"""Radau 5 first gets the fraction GLIMPSE of the operations that it may take. If it comes SLOW times less far than this
+part of the horizon, it is not run on."""
+DEAR = 3e9
+"""With an uncertainty of at most MOST, references that are predicted to take more operations are left out at first."""
+DEARER = 4.0
+"""The run that confirms a method by a tighter tolerance or step may take so many times what the best one takes."""
 References = tuple[tuple[str, Model], ...]
 
 
@@ -69,46 +79,81 @@ class Confirmation:
         predicted number of operations of one reference; `known`: the references, from coarse to fine.
         """
         self.bench, self.tolerance, self.cost, self.budget = bench, tolerance, cost, budget
-        self.references: list[Model] = []  # those that ran, from coarse to fine
+        self._hidden, self._known = hidden, known
         self._integrators: dict[Model, str] = {}
-        self.fine, self.drift = min(FINE * tolerance, LOOSEST), 0.0
+        first = min(FINE * tolerance, LOOSEST)
+        self._fine, self._drifts = {EXPLICIT: first, IMPLICIT: EASED * first}, dict[str, float]()
         self.measured: dict[Model, float] = {}
-        self.reference = self._reference(hidden, known)
+        self.references: list[Model] = []  # those that ran, from coarse to fine
+        self.may_refine = False
+        self.reference = self._reference(DEAR)
 
-    def run(self, model: Model) -> BenchRun:
-        """The run of the model with an integration error that is negligible beside the error of the model."""
-        return self.bench.run(model, self.finely(model))
+    @property
+    def drift(self) -> float:
+        """What ten times tighter integration changes in a reference."""
+        return max(self._drifts.values(), default=0.0)
 
-    def finely(self, model: Model) -> RunMethod:
-        """The method of fine runs."""
-        return self._method(model, self._integrator(model), max(FINEST, self.fine))
+    def refine(self) -> bool:
+        """Determine finer references if some were left out because they are dear; whether there are any. Errors are
+        measured anew."""
+        before = self.reference
+        if self.may_refine:
+            self.reference = self._reference(np.inf)
+            self.measured = {}
+        return self.reference.model != before.model
+
+    def run(self, model: Model, most: float = np.inf) -> BenchRun:
+        """The run of the model, of at most about `most` operations, with an integration error that is negligible beside
+        the error of the model."""
+        return self.bench.run(model, self.finely(model, most), most)
+
+    def finely(self, model: Model, most: float = np.inf) -> RunMethod:
+        """The method of fine runs, found by runs of at most `most` operations."""
+        return self._finely(model, self._integrator(model, most))
+
+    def _finely(self, model: Model, integrator: str) -> RunMethod:
+        return self._method(model, integrator, max(FINEST, self._fine[integrator]))
 
     def _method(self, model: Model, integrator: str, rtol: float) -> RunMethod:
         """Only the recursion has the derivatives that Radau 5 needs."""
         return RunMethod(integrator, rtol, "articulated" if integrator == IMPLICIT else self.bench.algorithm(model))
 
-    def _integrator(self, model: Model) -> str:
-        """DOP853, or Radau 5 for strains if it takes fewer operations than the highest frequency demands of DOP853."""
-        if model not in self._integrators:
-            chosen = EXPLICIT
-            expected = model_cost(self.bench.scene, model, self.cost)
-            strains = any(rung.kind == "strains" for _, rung in model)
-            if strains and expected > CHEAP and not isinstance(self.bench.system(model), str):
-                most = min(expected, OVERCOUNTED * self.budget)
-                done = self.bench.run(model, self._method(model, IMPLICIT, LOOSEST), most)
-                chosen = IMPLICIT if done.finished and done.operations < most else EXPLICIT
+    def _integrator(self, model: Model, most: float = np.inf) -> str:
+        """DOP853, or Radau 5 for strains if it takes fewer operations than the highest frequency demands of DOP853, or
+        if these exceed the budget and Radau 5 is within it."""
+        if model in self._integrators:
+            return self._integrators[model]
+        chosen, enough = EXPLICIT, 0.0
+        expected = self._expected(model)
+        strains = any(rung.kind == "strains" for _, rung in model)
+        if strains and expected > CHEAP and not isinstance(self.bench.system(model), str):
+            enough = expected if expected <= self.budget else OVERCOUNTED * self.budget
+            done = self.bench.run(model, self._finely(model, IMPLICIT), min(most, GLIMPSE * enough))
+            if done.cut and done.reached > GLIMPSE / SLOW:
+                done = self.bench.run(model, self._finely(model, IMPLICIT), min(most, enough))
+            chosen = IMPLICIT if done.finished else EXPLICIT
+        if chosen == IMPLICIT or enough <= most:  # otherwise a longer run may still decide for Radau 5
             self._integrators[model] = chosen
-        return self._integrators[model]
+        return chosen
 
     def _too_costly(self, model: Model) -> bool:
-        return self._integrator(model) == EXPLICIT and model_cost(self.bench.scene, model, self.cost) > self.budget
+        return self._integrator(model) == EXPLICIT and self._expected(model) > self.budget
 
-    def error(self, model: Model) -> float:
-        """Error of a model, U included; infinite if it cannot be compiled or does not finish."""
+    def _expected(self, model: Model) -> float:
+        """Predicted operations of its run by DOP853."""
+        return model_cost(self.bench.scene, model, self.cost)
+
+    def error(self, model: Model, most: float = np.inf) -> float:
+        """Error of a model, U included; infinite if it cannot be compiled or does not finish. Nothing is known of it,
+        and it is infinite as well, if its run takes more than about `most` operations."""
         if model not in self.measured:
-            self.measured[model] = np.inf
-            if not isinstance(self.bench.system(model), str) and self.run(model).finished:
-                self.measured[model] = self._distance(self.run(model)) + self.reference.uncertainty
+            found = np.inf
+            if not isinstance(self.bench.system(model), str):
+                done = self.run(model, most)
+                if done.cut:
+                    return np.inf
+                found = self._distance(done) + self.reference.uncertainty if done.finished else np.inf
+            self.measured[model] = found
         return self.measured[model]
 
     def total_error(self, model: Model, method: RunMethod) -> float:
@@ -123,38 +168,43 @@ class Confirmation:
     def _distance(self, done: BenchRun) -> float:
         return error(done.signals, self.reference.signals, self.reference.scale)
 
-    def adequate(self, model: Model) -> bool:
-        """Whether the error of the model leaves the fraction ROOM of the tolerance to the integrator."""
-        return self.error(model) <= (1.0 - ROOM) * self.tolerance
+    def adequate(self, model: Model, most: float = np.inf) -> bool:
+        """Whether the error of the model leaves the fraction ROOM of the tolerance to the integrator; not if its run
+        takes more than about `most` operations."""
+        return self.error(model, most) <= (1.0 - ROOM) * self.tolerance
 
     def integration_error(self, model: Model, method: RunMethod) -> float:
         """Distance of a run from the fine run of the same model."""
         done = self.bench.run(model, method)
         return error(done.signals, self.run(model).signals, self.reference.scale) if done.finished else np.inf
 
-    def cheapest_method(self, model: Model) -> RunMethod:
-        """The method with the fewest operations whose error plus that of the model is within the tolerance.
+    def cheapest_method(self, model: Model, most: float = np.inf) -> RunMethod:
+        """The method with the fewest operations whose error plus that of the model is within the tolerance; if it takes
+        `most` or more, any that does.
 
         In the ladder of every integrator, from loose to tight, it takes the first method that is accurate enough and
         whose successor is, too; a single small error may be accidental. A ladder ends at a method that costs more than
-        the best one found, because tighter ones cost even more.
+        the best one found, because tighter ones cost even more. The integrator of the fine run comes first, because it
+        is likely to be cheap, and then ends the runs of the others early.
         """
-        room = self.tolerance - self.error(model)
+        room, fine = self.tolerance - self.error(model), self.finely(model)
         scene, algorithm = self.bench.scene, self.bench.algorithm(model)
         highest, slow = highest_frequency(scene, model), self.cost.slow / (STAGES * self.bench.t_end)
-        best, least = self.finely(model), self.run(model).operations
+        best, least = fine, min(most, self.run(model).operations)
         short = self.run(model).evaluations < _FEW_EVALUATIONS
-        chosen = ladders(highest, slow, algorithm, not scene.constraints)
-        if scene.constraints and self._integrator(model) == IMPLICIT:
+        chosen = ladders(highest, slow, algorithm, not scene.constraints, float(self.bench.times[1]))
+        if scene.constraints and best.integrator == IMPLICIT:
             chosen = (tuple(self._method(model, IMPLICIT, rtol) for rtol in TOLERANCES), *chosen)
-        for ladder in chosen:
+        for ladder in sorted(chosen, key=lambda each: each[0].integrator != best.integrator):
             if short and INTEGRATORS[ladder[0].integrator].linearises:
                 continue
             before: RunMethod | None = None
             for method in ladder:
-                if method.adaptive and method.value <= self.finely(model).value:
+                if method.adaptive and method.value <= fine.value:
+                    if before is not None and method.integrator == fine.integrator:  # the fine run is its successor
+                        best, least = before, self.bench.run(model, before).operations
                     break
-                done = self.bench.run(model, method, least if before is None else np.inf)
+                done = self.bench.run(model, method, least if before is None else DEARER * least)
                 if done.cut:
                     break
                 fits = self.integration_error(model, method) <= room
@@ -166,11 +216,18 @@ class Confirmation:
                 before = method if fits else None
         return best
 
-    def _reference(self, hidden: float, known: References) -> Reference:
+    def _reference(self, dear: float) -> Reference:
+        """The first reference that agrees with the one before; or one that is known well enough, if the next one is
+        predicted to take more than `dear` operations."""
+        hidden, known = self._hidden, self._known
         history: list[str] = []
         steps: list[float] = []
         last: Reference | None = None
+        self.references, self.may_refine = [], False
         for name, model in known:
+            if last is not None and last.uncertainty <= MOST * self.tolerance and self._expected(model) > dear:
+                self.may_refine = True
+                break
             if last is not None and self._too_costly(model):
                 history.append(f"{name}: would cost too much")
                 continue
@@ -180,9 +237,9 @@ class Confirmation:
                 history.append(f"{name}: {system if done is None else done.message}")
                 continue
             self.references.append(model)
+            self._refine(model)
+            done = self.run(model)
             if last is None:
-                self._refine(model)
-                done = self.run(model)
                 scale = scales(self.bench.wanted, done.signals)
                 last = Reference(name, model, done.signals, scale, np.inf, ())
                 continue
@@ -206,17 +263,21 @@ class Confirmation:
         return last
 
     def _refine(self, model: Model) -> None:
-        """Tighten fine runs until ten times tighter ones change the reference by less than INTEGRATION; set `drift`."""
-        while self.fine > FINEST:
+        """Tighten fine runs of its integrator, of the first reference that has it, until ten times tighter ones change
+        the reference by less than INTEGRATION."""
+        integrator = self._integrator(model)
+        if integrator in self._drifts:
+            return
+        while self._fine[integrator] > FINEST:
             coarse, method = self.run(model), self.finely(model)
-            tighter = self.bench.run(model, replace(method, value=max(FINEST, TIGHTER * self.fine)))
+            tighter = self.bench.run(model, replace(method, value=max(FINEST, TIGHTER * self._fine[integrator])))
             if not tighter.finished:
                 return
             scale = scales(self.bench.wanted, tighter.signals)
-            self.drift = error(coarse.signals, tighter.signals, scale)
-            if self.drift <= INTEGRATION * self.tolerance:
+            self._drifts[integrator] = error(coarse.signals, tighter.signals, scale)
+            if self._drifts[integrator] <= INTEGRATION * self.tolerance:
                 return
-            self.fine *= TIGHTER
+            self._fine[integrator] *= TIGHTER
 
     def _unresolved(self, hidden: float, history: list[str]) -> str:
         text = "; ".join(history)

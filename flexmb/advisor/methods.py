@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.settings import Settings
 from flexmb.run.run_arrays import Statistics
-from flexmb.run.simulate import simulate
+from flexmb.run.simulate import run_of_many
 from flexmb.run.trajectory import Trajectory
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
+from flexmb.tables.status import Status
 
 ABSOLUTE = 1e-2
 """Ratio of absolute and relative tolerance, SI: modal coordinates and small rates are of the order of hundredths."""
@@ -23,6 +25,8 @@ TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 FINEST = 1e-12
 STEPS = (2.5, 1.25, 0.6, 0.3, 0.15, 0.075)
 """Fixed steps times the highest frequency; RK4 is stable up to 2.83."""
+SOME_STEPS = 20
+"""Steps after which it is known what a step of an implicit method costs."""
 
 
 COMPLEX = 4
@@ -65,24 +69,51 @@ class RunMethod:
 
 
 def simulated(system: System, times: NDArray[np.float64], method: RunMethod, max_steps: int = 1_000_000) -> Trajectory:
-    """A run with output at `times` (s)."""
-    return simulate(system, float(times[-1]), samples=times, max_steps=max_steps, **method.options())
+    """A run with output at `times` (s), from 0."""
+    options = method.options()
+    algorithm, settings = options.pop("algorithm"), Settings(**options, max_steps=max_steps)
+    return run_of_many(system, times, settings.checked(float(times[-1])), algorithm)
 
 
-def steps_within(method: RunMethod, each: int, most: float) -> int:
-    """Number of steps after which a run has executed `most` operations, with `each` for an evaluation."""
+def simulated_within(
+    system: System, times: NDArray[np.float64], method: RunMethod, each: int, most: float, max_steps: int
+) -> tuple[Trajectory | None, bool]:
+    """A run that ends after about `most` operations or `max_steps` steps, and whether the operations ended it; `each`:
+    operations of an evaluation. No run if equal steps are certain to take more.
+
+    What a step of an implicit method takes is not known before: `SOME_STEPS` are made to measure it.
+    """
+    steps = _steps_within(method, each, most)
+    if not method.adaptive and steps < float(times[-1] - times[0]) / method.value:
+        return None, True
+    if INTEGRATORS[method.integrator].linearises and np.isfinite(most) and steps > SOME_STEPS:
+        first = simulated(system, times, method, SOME_STEPS)
+        if first.status is not Status.MAX_STEPS:
+            return first, False
+        size = system.nq + system.nu + 1
+        steps = max(SOME_STEPS, int(SOME_STEPS * most / operations(method, each, size, first.statistics)))
+    done = simulated(system, times, method, min(steps, max_steps))
+    return done, done.status is Status.MAX_STEPS and steps < max_steps
+
+
+def _steps_within(method: RunMethod, each: int, most: float) -> int:
+    """The most steps that a run can take until it has executed `most` operations, with `each` for an evaluation."""
     return int(min(most / (each * INTEGRATORS[method.integrator].evaluations), 1e9)) + 1
 
 
-def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tuple[tuple[RunMethod, ...], ...]:
+def ladders(
+    highest: float, slow: float, algorithm: Algorithm, tree: bool, longest: float
+) -> tuple[tuple[RunMethod, ...], ...]:
     """For each integrator its methods from loose to tight; integrators that linearise come first.
 
     Fixed steps are chosen by the frequency `highest` (rad/s), those of implicit methods by `slow`, the frequency of the
-    scene with all bodies rigid. Integrators that linearise are tried on trees only, with the recursion.
+    scene with all bodies rigid, and none is longer than `longest` (s), the interval of the output, in which any run
+    makes a step at least. Integrators that linearise are tried on trees only, with the recursion.
     """
     chosen = [each for each in INTEGRATORS.values() if tree or not each.linearises]
+    rates = {each.name: slow if each.linearises else max(highest, slow) for each in chosen}
     return tuple(
-        _ladder(each, slow if each.linearises else max(highest, slow), "articulated" if each.linearises else algorithm)
+        _ladder(each, max(rates[each.name], STEPS[0] / longest), "articulated" if each.linearises else algorithm)
         for each in sorted(chosen, key=lambda each: not each.linearises)
     )
 

@@ -34,6 +34,8 @@ LEAP, LEAPS, MANY = 0.75, 15, 20_000
 """LEAP: choices with at most this fraction of the predicted cost are tried first; LEAPS: at most so many of them; MANY:
 with more combinations than this, only pairs of bodies change.
 """
+SPARE = 2.0
+"""Runs of models that are to be cheaper than an adequate one end at so many times the operations of its run."""
 FINALISTS = 3
 """Number of adequate models, the cheapest by their fine runs, for which the best method is determined."""
 
@@ -64,9 +66,14 @@ def search(ladders: dict[str, tuple[Step, ...]], confirmation: Confirmation, bud
     walk.down(choice)
     adequate = [model for model in confirmation.measured if confirmation.adequate(model)]
     finalists = sorted(adequate, key=confirmation.run_cost)[:FINALISTS]
-    methods = {each: confirmation.cheapest_method(each) for each in finalists}
-    model = min(finalists, key=lambda each: confirmation.bench.run(each, methods[each]).operations)
-    return Found(model, methods[model], walk.exhausted)
+    best, least = finalists[0], np.inf
+    methods: dict[Model, RunMethod] = {}
+    for each in finalists:
+        methods[each] = confirmation.cheapest_method(each, least)
+        operations = confirmation.bench.run(each, methods[each]).operations
+        if operations < least:
+            best, least = each, operations
+    return Found(best, methods[best], walk.exhausted)
 
 
 def model_of(choice: Choice) -> Model:
@@ -85,8 +92,8 @@ class _Walk:
         self.hopeless = HOPELESS * confirmation.tolerance
         self.predicted = any(step.error > 0.0 for steps in self.ladders.values() for step in steps)
 
-    def fits(self, choice: Choice) -> bool:
-        return self.confirmation.adequate(model_of(choice))
+    def fits(self, choice: Choice, most: float = np.inf) -> bool:
+        return self.confirmation.adequate(model_of(choice), most)
 
     @property
     def exhausted(self) -> bool:
@@ -95,18 +102,18 @@ class _Walk:
     def up(self) -> Choice | None:
         """The first choice on the way up that is adequate.
 
-        If none is, the choices with a large predicted error are tried, and then every rung of every body. Without
-        predictions, the references come first, which have run, the cheapest at the head.
+        If none is, every rung of every body is tried. Of all these the ones with a large predicted error come last.
+        Without predictions, the references come first, which have run, the cheapest at the head.
         """
         if not self.predicted:
             known = [choice for model in self.confirmation.references if (choice := self.choice_of(model)) is not None]
             for choice in sorted(known, key=lambda each: self.confirmation.run_cost(model_of(each))):
                 if self.fits(choice):
                     return choice
-        way = list(self.way())
-        hopeful = [choice for choice in way if _error(choice) <= self.hopeless]
-        others = [choice for choice in way if _error(choice) > self.hopeless]
-        return next(filter(self.fits, (*hopeful, *others, *self.finest())), None)
+        every = (*self.way(), *self.finest())
+        hopeful = [choice for choice in every if _error(choice) <= self.hopeless]
+        others = [choice for choice in every if _error(choice) > self.hopeless]
+        return next(filter(self.fits, (*hopeful, *others)), None)
 
     def choice_of(self, model: Model) -> Choice | None:
         """The steps of a model, or None if one of its rungs is not among them."""
@@ -151,7 +158,8 @@ class _Walk:
         if not self.predicted:  # nothing says that they are adequate, and they may cost more
             most = self.confirmation.run_cost(model_of(choice))
             simpler = (other for other in simpler if self.expected(other) <= most)
-        choice = next(filter(self.fits, simpler), choice)
+        most = SPARE * self.confirmation.run_cost(model_of(choice))
+        choice = next((other for other in simpler if self.fits(other, most)), choice)
         choice = self.first_cheaper(choice, sorted(self.alike(choice), key=self.expected)) or choice
         while True:
             while (other := self.leap(choice)) is not None:
@@ -180,10 +188,10 @@ class _Walk:
         for other in sorted(others, key=self.expected):
             if self.exhausted or self.expected(other) > slack * enough:
                 break
-            if self.fits(other) and self.confirmation.run_cost(model_of(other)) < least:
+            if self.fits(other, SPARE * least) and self.confirmation.run_cost(model_of(other)) < least:
                 best, least = other, self.confirmation.run_cost(model_of(other))
                 enough = self.expected(other)
-            if self.confirmation.error(model_of(other)) > MISSED * self.confirmation.tolerance:
+            if self.confirmation.error(model_of(other), SPARE * least) > MISSED * self.confirmation.tolerance:
                 self.missed[name].add(other[name].rung)
         return best
 
@@ -200,7 +208,7 @@ class _Walk:
         for other in others:
             if self.exhausted:
                 return None
-            if self.fits(other) and self.confirmation.run_cost(model_of(other)) < least:
+            if self.fits(other, SPARE * least) and self.confirmation.run_cost(model_of(other)) < least:
                 return other
         return None
 

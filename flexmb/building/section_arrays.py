@@ -9,7 +9,7 @@ import numpy as np
 from flexmb.building.links import BodyLink, Port
 from flexmb.jit.strips import strip_zeros
 from flexmb.levels.section_motion import ANGLE
-from flexmb.modal.strain_field import FIRST, STRETCH, StrainField
+from flexmb.modal.strain_field import STRETCH, WHOLE, StrainField
 from flexmb.tables import arrays as a
 from flexmb.typing import Index, Real
 
@@ -72,7 +72,7 @@ def _tables(field: StrainField, number: Index, first: int, body: a.Record, m: in
     table["before"] = np.where(field.before[kept] < 0, -1, first + number[field.before[kept]])
     table["gauss"] = -1
     table["gauss"][number[field.gauss]] = np.arange(len(field.gauss))
-    for name in ("commutator", "position", "tangent"):
+    for name in ("position", "tangent"):
         table[name] = getattr(field, name)[kept]
     rows = np.zeros((len(kept), 12, m))
     rows[..., : field.mode_count] = field.rows[kept].reshape(len(kept), 12, -1)
@@ -83,6 +83,6 @@ def _tables(field: StrainField, number: Index, first: int, body: a.Record, m: in
     if axis is not None:
         body["bending_axis"] = axis
         turn, _ = field.shapes()
-        rows[:, 3 * FIRST : 3 * STRETCH] = 0.0
+        rows[:, 3 * WHOLE : 3 * STRETCH] = 0.0
         rows[:, ANGLE, : field.mode_count] = np.einsum("a,jam->jm", axis, turn[kept])
     return table, field.weight[kept], rows

@@ -89,8 +89,8 @@ def jacobian(t, y, J, s, x):
     c, w, d = s.c, x.tree.sweeps, x.tree.tables
     differentiate(c, w, d, s.cc, s.cw, x.changes, has(c, PRESCRIBED), False)
     differentiate_power(c, w, d)
-    solve(c, w, d, 2 * w.u.shape[0] + _put_rows(d, s.cc, s.cw, x.changes))
-    _hold_rows(d, s.cc, s.cw, x.changes)
+    solve(c, w, d, 2 * w.u.shape[0] + put_rows(d, s.cc, s.cw, x.changes))
+    hold_rows(d, s.cc, s.cw, x.changes)
     for r in range(x.load.shape[0]):
         s.cw.row[r].load = x.load[r]
     if has(c, PRESCRIBED):
@@ -100,7 +100,7 @@ def jacobian(t, y, J, s, x):
 
 
 @helper
-def _put_rows(d, cc, cw, x):
+def put_rows(d, cc, cw, x):
     """Put -J' of the chosen rows beside the columns by displacements and speeds; returns their number."""
     nu, count = d.speed.shape[0], 0
     for g in range(cc.group.shape[0]):
@@ -114,7 +114,7 @@ def _put_rows(d, cc, cw, x):
 
 
 @sweep
-def _hold_rows(d, cc, cw, x):
+def hold_rows(d, cc, cw, x):
     """Change the loads so that the rows keep their accelerations, and with them the accelerations; `solve` goes before.
     """
     nu = d.speed.shape[0]

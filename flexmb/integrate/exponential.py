@@ -19,10 +19,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.adaptive import adaptive, by_error
-from flexmb.integrate.control import FACTORISATIONS, copy, derivative, linearisation, scaled_norm
+from flexmb.integrate.adaptive import (
+    Method,
+    adaptive,
+    after_leap_by_error,
+    enter_afresh,
+    keep_nothing,
+    recall_nothing,
+    reject_by_error,
+)
+from flexmb.integrate.control import (
+    FACTORISATIONS,
+    copy,
+    derivative,
+    linearisation,
+    next_step,
+    scaled_norm,
+    step_factor,
+)
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
+from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP
 from flexmb.integrate.newton_matrix import NewtonMatrix, rate_blocks, unfactorised
 from flexmb.integrate.settling import prepare_settling, settle
 from flexmb.integrate.watch import Ends
@@ -40,6 +57,10 @@ _SWEEPS = 8  # maximum number of sweeps of the iteration
 _CONVERGED = 0.02  # error that the iteration may leave, in units of the tolerance
 RATE = 4.0  # rate per step of `settle`: stiff components displaced by a projection relax within the step
 _ERROR_EXPONENT = 5.0  # the error estimate is O(h^5)
+# Strongest growth of a step. While a body rests on a stop, its vibration is linear, hence exact at any step, and errors
+# vanish; a step that stayed within half a period is followed by one whose nodes are at most half a period apart, so
+# that one of them sees it leave the stop. Tenfold steps had all nodes in phase, and bodies stuck to stops.
+_GROW = 4.0
 
 
 class Collocation(NamedTuple):
@@ -163,7 +184,12 @@ def estimate(y, s, accuracy):
 
 @handed_in
 def attempt(problem, step, ends, s, known, accuracy, counts):
-    """See `flexmb.integrate.adaptive.Method`."""
+    """See `flexmb.integrate.adaptive.Method`.
+
+    The way from the step's end to its manifold counts as an error, which no smaller one has. In long steps `estimate`
+    misses it, by a factor of 200 on stiff four-bars: the middle node knows nothing of what all nodes leave unresolved.
+    The projection would leave stiff modes beside their place, and nothing damps their ringing.
+    """
     h = step.end - step.start
     if s.linearised_at[0] != step.start:
         status = linearisation(problem, step.start, ends.y, s.J, counts)
@@ -181,9 +207,19 @@ def attempt(problem, step, ends, s, known, accuracy, counts):
     error = estimate(ends.y, s, accuracy)
     if error < 1.0:
         prepare_settling(problem, RATE / h, s)
-        settle(problem, step.end, RATE / h, ends.y_new, s, accuracy)
+        error = max(error, settle(problem, step.end, RATE / h, ends.y_new, s, accuracy))
+    if error < 1.0:
         status = derivative(problem, min(step.end, step.last), ends.y_new, ends.dy_new, counts)
     return status, (error,)
+
+
+@handed_in
+def accept(step, cut, verdict, s, known, exponent):
+    """See `flexmb.integrate.adaptive.Method`: as by the error alone, with growth up to _GROW."""
+    length, error = step.end - step.start, verdict[0]
+    factor = min(_GROW, step_factor(error, known[ERROR_BEFORE], exponent, known[RETRIED] != 0.0))
+    known[STEP] = next_step(known[STEP], length, factor, cut)
+    known[ERROR_BEFORE], known[RETRIED] = error, 0.0
 
 
 @handed_on
@@ -221,7 +257,10 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
     """
     s = scratch(y.shape[0], accuracy.coordinates)
     ends = Ends(y, s.f, s.y_new, s.f_new)
-    method = by_error(attempt, state_at, _ERROR_EXPONENT)
+    method = Method(
+        attempt, accept, reject_by_error, after_leap_by_error, enter_afresh, recall_nothing, keep_nothing, state_at,
+        _ERROR_EXPONENT,
+    )  # fmt: skip
     return adaptive(method, problem, (s, ends), clock, out, (accuracy, counts), memory, watch)
 
 

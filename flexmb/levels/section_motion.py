@@ -6,12 +6,14 @@ r, so that the sum over the inertia points is the kinetic energy of a true motio
 
     w_j = w_i + R_i J_l(Omega) Omega'        alpha_j = alpha_i + w_i x (w_j - w_i) + R_i (J_l' Omega' + J_l Omega'')
 
-with section i before j, Omega'' at etaddot = 0. W and L are angular and linear velocity at unit modal speeds.
+with section i before j, Omega of `flexmb.spatial.magnus`, Omega'' at etaddot = 0. W and L are angular and linear
+velocity at unit modal speeds.
 """
 
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.strips import strip, total, width
+from flexmb.spatial.magnus import magnus, magnus_bend, magnus_change
 from flexmb.spatial.rotation import (
     exponential,
     exponential_coefficients,
@@ -41,7 +43,7 @@ from flexmb.tables.features import BENT_IN_PLANE, BENT_IN_SPACE
 
 ZERO3 = ZERO6[0]
 IDENTITY = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
-FIRST, SECOND, MEAN, STRETCH = 0, 3, 6, 9  # rows of `section_rows`; in the plane row ANGLE alone has the turn
+WHOLE, LINEAR, SQUARE, STRETCH = 0, 3, 6, 9  # rows of `section_rows`; in the plane row ANGLE alone has the turn
 ANGLE = 0
 
 
@@ -63,20 +65,19 @@ def _turn(c, w, k, j):
     """R, w, alpha and W of section j from those of the section before."""
     i = c.section[j].before
     rows = c.section_rows[j]
-    k1, k2, mean = ZERO3, ZERO3, ZERO3
-    d1, d2, mean_rate = ZERO3, ZERO3, ZERO3
+    whole, linear, square = ZERO3, ZERO3, ZERO3
+    whole_rate, linear_rate, square_rate = ZERO3, ZERO3, ZERO3
     for n in range(0, c.body[k].modes, width(w)):
         eta, etad = strip(w, w.eta[k], n), strip(w, w.etad[k], n)
-        first, second, whole = strips3(w, rows, FIRST, n), strips3(w, rows, SECOND, n), strips3(w, rows, MEAN, n)
-        k1, d1 = axpy(eta, first, k1), axpy(etad, first, d1)
-        k2, d2 = axpy(eta, second, k2), axpy(etad, second, d2)
-        mean, mean_rate = axpy(eta, whole, mean), axpy(etad, whole, mean_rate)
-    k1, k2, mean = total3(w, k1), total3(w, k2), total3(w, mean)
-    d1, d2, mean_rate = total3(w, d1), total3(w, d2), total3(w, mean_rate)
-    s = c.section[j].commutator
-    turn = axpy(s, cross(k1, k2), mean)
-    rate = axpy(s, add(cross(d1, k2), cross(k1, d2)), mean_rate)
-    bias = scale(2.0 * s, cross(d1, d2))
+        first, second, third = strips3(w, rows, WHOLE, n), strips3(w, rows, LINEAR, n), strips3(w, rows, SQUARE, n)
+        whole, whole_rate = axpy(eta, first, whole), axpy(etad, first, whole_rate)
+        linear, linear_rate = axpy(eta, second, linear), axpy(etad, second, linear_rate)
+        square, square_rate = axpy(eta, third, square), axpy(etad, third, square_rate)
+    whole, linear, square = total3(w, whole), total3(w, linear), total3(w, square)
+    whole_rate, linear_rate, square_rate = total3(w, whole_rate), total3(w, linear_rate), total3(w, square_rate)
+    turn, at = magnus(whole, linear, square)
+    rate = magnus_change(at, whole_rate, linear_rate, square_rate)
+    bias = magnus_bend(at, whole_rate, linear_rate, square_rate)
     p = exponential_coefficients(dot(turn, turn))
     R, omega, alpha = IDENTITY, ZERO3, ZERO3
     if i >= 0:
@@ -86,8 +87,8 @@ def _turn(c, w, k, j):
     bent = times(R, add(left_jacobian_rate(turn, p, rate), left_jacobian_times(turn, p, bias)))
     alpha = add(alpha, add(cross(omega, more), bent))
     for n in range(0, c.body[k].modes, width(w)):
-        first, second, whole = strips3(w, rows, FIRST, n), strips3(w, rows, SECOND, n), strips3(w, rows, MEAN, n)
-        W = times(J, axpy(s, sub(cross(k1, second), cross(k2, first)), whole))
+        first, second, third = strips3(w, rows, WHOLE, n), strips3(w, rows, LINEAR, n), strips3(w, rows, SQUARE, n)
+        W = times(J, magnus_change(at, first, second, third))
         if i >= 0:
             W = add(W, strips3(w, w.section_mode[i], 0, n))
         put3(w, w.section_mode[j], 0, n, W)

@@ -74,9 +74,12 @@ class Equations:
         self.free: Index = np.flatnonzero(self.constants.speed["prescribed"] < 0)
         wheels = self.constants.wheel["u_index"]
         self._indifferent: Index = wheels[self.constants.speed["stiffness"][wheels] == 0.0]
-        self._w = tangent_workspace(self.constants, system.nq, system.nu)
-        self._derivatives = derivative_workspace(self.constants, system.nq, system.nu)
-        self._real_w = workspace(self.constants, system.nq, system.nu)  # with a row for each of their functions
+        if _alike(self.constants, system.constants):
+            self._w, self._derivatives, self._real_w = system.own_tangent, system.own_derivatives, system.own_workspace
+        else:  # workspaces have a row for each function, and tables of which coordinates are driven
+            self._w = tangent_workspace(self.constants, system.nq, system.nu)
+            self._derivatives = derivative_workspace(self.constants, system.nq, system.nu)
+            self._real_w = workspace(self.constants, system.nq, system.nu)
 
     @property
     def freedom(self) -> int:
@@ -176,6 +179,11 @@ class Equations:
                     moving = slice(j + 3, j + 6)
                     out[moving, turning], out[moving, moving] = -_cross(u[moving]), -_cross(u[turning])
         return out[np.ix_(self.free, self.free)]
+
+
+def _alike(a: Constants, b: Constants) -> bool:
+    """Whether the same workspaces serve: as many functions, and the same coordinates are driven."""
+    return len(a.function) == len(b.function) and np.array_equal(a.speed["prescribed"], b.speed["prescribed"])
 
 
 def _cross(v: Real) -> Real:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 
+import msgspec
 import numpy as np
 
 from flexmb.modal.cross import cross_matrix
@@ -17,8 +18,8 @@ from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming
 from flexmb.modal.following import followed
 from flexmb.modal.reduce import BeamModes, damping_matrix, groups, tip_signs
 from flexmb.modal.section import section_table
-from flexmb.modal.stations import lumps, section_masses
-from flexmb.modal.strain_field import StrainField, gauss_weights, strain_field, strain_stiffness
+from flexmb.modal.stations import Lump, lumps, section_masses
+from flexmb.modal.strain_field import Hung, StrainField, gauss_weights, hung, strain_field, strain_stiffness
 from flexmb.scene.bodies import IDENTITY, BeamBody, Quaternion
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.rest_curve import rest_sections
@@ -37,7 +38,7 @@ def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
     `like`: see `flexmb.modal.flexible.flexible_model`. Raises ValueError for modes without inertia.
     """
     try:
-        field, points, M = _polynomial_beam(body, _nodes_at(body))
+        field, points, M = _polynomial_beam(body, _nodes_at(body), None if like is None else _hung(like))
         modes = _modes(body, field, _stiffness(body), M)
         if like is not None:
             modes = followed(modes, M, _reference(like))
@@ -70,6 +71,13 @@ def cut_beam(body: BeamBody, x: Real) -> tuple[StrainField, BeamPoints]:
     return field.with_modes(_modes(body, field, _stiffness(body), M).columns), points
 
 
+def field_of_points(body: BeamBody, points: int, x: Real) -> StrainField:
+    """The sections of the beam with another number of points along each of its pieces, of which those at x (n,) m are
+    the last, with the strain modes of `exact_model`."""
+    modes = msgspec.structs.replace(body.modes, points=points)
+    return strain_field(msgspec.structs.replace(body, modes=modes), x).with_modes(_reference(body).columns)
+
+
 class BeamPoints:
     """Inertia points: mass (n,), com_offset (n,3) and inertia (n,3,3) about it in the axes of the root, at rest; the
     number of the section that each is fixed to (n,). The first are those at the Gauss points."""
@@ -84,9 +92,18 @@ def _reference(body: BeamBody) -> BeamModes:
     return _modes(body, field, _stiffness(body), M)
 
 
-def _polynomial_beam(body: BeamBody, others: Real) -> tuple[StrainField, BeamPoints, Real]:
+def _hung(body: BeamBody) -> Hung:
+    """How the sections at lumps and nodes turn."""
+    return hung(body, np.concatenate([_lumps_at(lumps(body)), _nodes_at(body)]))
+
+
+def _lumps_at(found: tuple[Lump, ...]) -> Real:
+    return np.array([lump.x for lump in found])
+
+
+def _polynomial_beam(body: BeamBody, others: Real, like: Hung | None = None) -> tuple[StrainField, BeamPoints, Real]:
     """Sections at Gauss points, lumps, then at `others` (n,) m; inertia points; modal masses (m,m) of the polynomials
-    at rest."""
+    at rest. like: how the lumps and others of a beam with slightly other numbers turn."""
     rigid_lumps = lumps(body)
     most, points = max(polynomials(body).values(), default=0), points_of_piece(body)
     if points <= most:
@@ -94,14 +111,14 @@ def _polynomial_beam(body: BeamBody, others: Real) -> tuple[StrainField, BeamPoi
             f"{points} points for {most} polynomials of one strain along a piece leave motions without inertia: use "
             f"{most + 1} points at least, or fewer polynomials"
         )
-    places = np.concatenate([[lump.x for lump in rigid_lumps], others])
-    field = strain_field(body, places)
+    places = np.concatenate([_lumps_at(rigid_lumps), others])
+    field = strain_field(body, places, None if like is None else hung(body, places).following(like))
     x, weight = gauss_weights(body)
     table = section_table(body)
     own = section_masses(x, weight[:, None, None] * table.at(table.inertia, x), body, table.plain)
     _, rotation = rest_sections(body, x)
     at_lumps = len(field.x) - len(places) + np.arange(len(rigid_lumps))
-    _, turned = rest_sections(body, np.array([lump.x for lump in rigid_lumps]))
+    _, turned = rest_sections(body, _lumps_at(rigid_lumps))
     found = BeamPoints(
         np.concatenate([own.mass, [lump.mass for lump in rigid_lumps]]),
         np.concatenate(

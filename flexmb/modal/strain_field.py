@@ -6,12 +6,10 @@ of the unloaded section but written in the axes of the root, and the unloaded ta
 
     R' = R k~            r' = R (t0 + g)
 
-Between one section and the next, R advances by exp(Omega~) with Magnus' expansion to the fourth order,
-
-    Omega = int k ds + sqrt(3)/12 h^2 k1 x k2            k1, k2: k at the two Gauss points of the interval
-
-which is exact where k keeps its direction. Positions are collocated: r_i - r0_i = sum_j A_ij (R_j (t0_j + g_j) - t0_j),
-where A_ij is the integral up to section i of Lagrange's polynomials on the Gauss points j of the beam.
+Between one section and the next, R advances by exp(Omega~) with Magnus' expansion to the sixth order, from three
+integrals of k over the interval (`flexmb.spatial.magnus`): it is exact where k keeps its direction. Positions are
+collocated: r_i - r0_i = sum_j A_ij (R_j (t0_j + g_j) - t0_j), where A_ij is the integral up to section i of Lagrange's
+polynomials on the Gauss points j of the beam.
 """
 
 from __future__ import annotations
@@ -27,23 +25,23 @@ from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.strains import STRAINS, points_of_piece, polynomials
 from flexmb.typing import Index, Real
 
-FIRST, SECOND, MEAN, STRETCH = range(4)
-"""Tables of a section: k at the two Gauss points of the interval before it, int k over it, g at the section."""
+WHOLE, LINEAR, SQUARE, STRETCH = range(4)
+"""Tables of a section: int k, 6 int P_1 k and 30 int P_2 k over the interval before it, with Legendre's polynomials
+P_n; g at the section."""
 
 
 @dataclass(frozen=True, eq=False)
 class StrainField:
     """n sections of a beam with m strain modes, in the axes of a body frame that is fixed to the root.
 
-    x (n,) m along the beam; before (n,): the section from which R is advanced, -1 for the root; commutator (n,) m^2:
-    sqrt(3)/12 h^2 of that interval; position (n,3) m and tangent (n,3) at rest; rows (n,4,3,m): FIRST, SECOND (1/m),
-    MEAN, STRETCH for each mode; weight (n,q) m: A_ij, whose columns are the q Gauss points; gauss (q,): their numbers.
-    The first `steps` sections are these points and the ends of the intervals that they lie in; others turn from these.
+    x (n,) m along the beam; before (n,): the section from which R is advanced, -1 for the root; position (n,3) m and
+    tangent (n,3) at rest; rows (n,4,3,m): WHOLE, LINEAR, SQUARE, STRETCH for each mode; weight (n,q) m: A_ij, whose
+    columns are the q Gauss points; gauss (q,): their numbers. The first `steps` sections are these points and the ends
+    of the intervals that they lie in; others turn from these.
     """
 
     x: Real
     before: Index
-    commutator: Real
     position: Real
     tangent: Real
     rows: Real
@@ -70,9 +68,9 @@ class StrainField:
 
     def shapes(self) -> tuple[Real, Real]:
         """Mode shapes (n,3,m) at rest: rotations and translations of the sections."""
-        turn = np.zeros(self.rows[:, MEAN].shape)
+        turn = np.zeros(self.rows[:, WHOLE].shape)
         for j, i in enumerate(self.before):
-            turn[j] = self.rows[j, MEAN] + (turn[i] if i >= 0 else 0.0)
+            turn[j] = self.rows[j, WHOLE] + (turn[i] if i >= 0 else 0.0)
         rate = np.cross(turn, self.tangent[:, :, None], axis=1) + self.rows[:, STRETCH]
         return turn, np.einsum("ij,jam->iam", self.weight, rate[self.gauss])
 
@@ -92,32 +90,56 @@ STRAIGHT = 64.0 * np.finfo(float).eps
 """Relative size below which the part of curvatures across a common axis is a rounding error of the frames."""
 
 
-def strain_field(body: BeamBody, places: Real) -> StrainField:
+@dataclass(frozen=True, eq=False)
+class Hung:
+    """The sections of a beam from which its places turn: before (n,), and the intervals (n,) that the places lie in."""
+
+    before: Index
+    interval: Index
+
+    def following(self, like: Hung) -> Index:
+        """The sections (n,) of `like`, except for places in another interval than there, whose strains are others.
+
+        A place at a Gauss point then has one section on both sides of the point, and a smooth motion as a function of
+        where it is. In an interval the strains are polynomials, so that it may lie on either side of its section.
+        """
+        return np.where(self.interval == like.interval, like.before, self.before)
+
+
+def hung(body: BeamBody, places: Real) -> Hung:
+    """How sections at `places` (n,) m turn: from the last Gauss point, or end of an interval, at or before them."""
+    _, gauss, breaks = _grid(body)
+    before = np.searchsorted(_main(gauss, breaks), places, side="right") - 1
+    return Hung(before, np.searchsorted(breaks[1:-1], places, side="right"))
+
+
+def _main(gauss: Real, breaks: Real) -> Real:
+    """The Gauss points, and the ends of the intervals that they lie in."""
+    return np.unique(np.concatenate([gauss, breaks[1:-1]]))
+
+
+def strain_field(body: BeamBody, places: Real, hung_from: Index | None = None) -> StrainField:
     """The sections of a beam at the Gauss points, then at `places` (n,) m; the modes are Legendre's polynomials.
 
     Strain by strain in the order of `flexmb.scene.strains.polynomials`, in each piece by piece, by ascending degree.
+    hung_from (n,): the sections from which the places turn, those of `hung` if left out.
     """
     grid, gauss, breaks = _grid(body)
-    main = np.unique(np.concatenate([gauss, breaks[1:-1]]))
-    before = np.concatenate([np.arange(-1, len(main) - 1), np.searchsorted(main, places, side="right") - 1])
+    main = _main(gauss, breaks)
+    if hung_from is None:
+        hung_from = hung(body, places).before
+    before = np.concatenate([np.arange(-1, len(main) - 1), hung_from])
     x = np.concatenate([main, places])
     left = np.where(before >= 0, x[before], 0.0)
     h = x - left
-    s = np.sqrt(3.0) / 6.0
     position, rotation = rest_sections(body, x)
     shapes = _Polynomials(body)
     rows = np.stack(
-        [
-            *(_turned(body, left + h * (0.5 + at), shapes, 3, left) for at in (-s, s)),
-            _mean(body, left, h, shapes),
-            rotation @ shapes.at(x)[:, :3],
-        ],
-        axis=1,
+        [*_moments(body, left, h, shapes), rotation @ shapes.at(x)[:, :3]], axis=1
     )
     return StrainField(
         x=x,
         before=before,
-        commutator=np.sqrt(3.0) / 12.0 * h**2,
         position=position,
         tangent=rotation[:, :, 0],
         rows=rows,
@@ -151,23 +173,18 @@ class _Polynomials:
         return found
 
 
-def _turned(body: BeamBody, x: Real, shapes: _Polynomials, first: int, left: Real) -> Real:
-    """Three strains from row `first` at x (n,), in root axes; each x belongs to the piece that begins at or before
-    `left`."""
-    _, rotation = rest_sections(body, x)
-    return np.asarray(rotation @ shapes.at(x, within=left)[:, first : first + 3])
-
-
-def _mean(body: BeamBody, left: Real, h: Real, shapes: _Polynomials) -> Real:
-    """int k (n,3,m) over the intervals from `left` (n,) of length h (n,), by Gauss points enough for all digits."""
+def _moments(body: BeamBody, left: Real, h: Real, shapes: _Polynomials) -> Real:
+    """WHOLE, LINEAR and SQUARE (3,n,3,m) of the intervals from `left` (n,) of length h (n,), which lie in the piece
+    that begins at or before it, by Gauss points enough for all digits."""
     degree = max(polynomials(body).values())
     xi, w = np.polynomial.legendre.leggauss(degree + 12)
-    return np.asarray(
-        sum(
-            (0.5 * weight * h)[:, None, None] * _turned(body, left + 0.5 * h * (1.0 + at), shapes, 3, left)
-            for at, weight in zip(xi, w, strict=True)
-        )
-    )
+    factors = 0.5 * w * np.array([1.0, 6.0, 30.0])[:, None] * np.polynomial.legendre.legvander(xi, 2).T
+    found = np.zeros((3, *shapes.at(left)[:, 3:].shape))
+    for at, factor in zip(xi, factors.T, strict=True):
+        x = left + 0.5 * h * (1.0 + at)
+        _, rotation = rest_sections(body, x)
+        found += factor[:, None, None, None] * (h[:, None, None] * (rotation @ shapes.at(x, within=left)[:, 3:]))
+    return found
 
 
 def _grid(body: BeamBody) -> tuple[list[tuple[float, float, int]], Real, Real]:

@@ -195,6 +195,19 @@ class _Bound:
         return direct(kernels.inverse, VOID, REAL, VECTOR, VECTOR, *tables)
 
 
+_OF_TABLES = {
+    "tree.body.planar": (
+        'it bends a beam of level "exact", whose strains are in one plane, out of that plane; give the beam torsion '
+        "and both curvatures, in `families` or `polynomials`"
+    ),
+    "tree.section.before": (
+        'a node or tip mass of a beam of level "exact" passes the end of a piece or a station, where its strains or '
+        "section jump; move it away from there, or move the end with it"
+    ),
+}
+"""Tables whose contents change at some numbers, and what that means."""
+
+
 class _Differentiation:
     """The tables of a scene as functions of each of its numbers."""
 
@@ -233,7 +246,8 @@ class _Differentiation:
         tables = _tables(self._plant.with_numbers(scene))
         changed = [name for name, each in structure(tables).items() if each != self._structure.get(name)]
         if changed:
-            raise ValueError(f"what the tables contain depends on it: {changed[0]}")
+            what = _OF_TABLES.get(changed[0], f"what the tables contain depends on it: {changed[0]}")
+            raise ValueError(what)
         self.diagonal = np.minimum(self.diagonal, diagonal(tables))
         return numbers_of(tables)
 

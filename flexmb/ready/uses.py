@@ -170,6 +170,7 @@ def _single_states_of_a_loop(builder: Callable[[], SceneBuilder]) -> None:
     system.closure_operators(state)
     if not system.closures.at_rest:
         system.acceleration_derivatives(state)
+        system.derivative_evaluator()(state.t, state.q, state.u)
         system.evaluation_derivatives(state)
 
 

@@ -84,13 +84,13 @@ def simulate(
     all its coordinates, followed by ".speeds" for all its speeds; closed chains take the nearest state that closes
     their closures. Or state is a `Restart`, from which a run of the same scene and method is resumed bit-identically.
 
-    Warns (`SceneWarning`) of doubtful input. Raises SceneError for an invalid scene or one whose profiles end before
-    t_end, NotImplementedError for one that is not supported yet, ValueError or TypeError for invalid settings, and
-    ClosureError if no initial state closes the closures, if they leave no motion, or if the given state is far from
-    closing them. A run that fails raises nothing: `status` and `message` of the trajectory say why it stopped, and the
-    samples up to there are kept. Ctrl-C ends a run at its next step and raises `Interrupted`, a KeyboardInterrupt,
-    whose `trajectory` holds the samples up to there; a second Ctrl-C while outputs are evaluated keeps those that are
-    finished.
+    Warns (`SceneWarning`) of doubtful input, and of beams of level exact that bent more than their points can follow.
+    Raises SceneError for an invalid scene or one whose profiles end before t_end, NotImplementedError for one that is
+    not supported yet, ValueError or TypeError for invalid settings, and ClosureError if no initial state closes the
+    closures, if they leave no motion, or if the given state is far from closing them. A run that fails raises nothing:
+    `status` and `message` of the trajectory say why it stopped, and the samples up to there are kept. Ctrl-C ends a run
+    at its next step and raises `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up to there; a
+    second Ctrl-C while outputs are evaluated keeps those that are finished.
     """
     refuse_unknown("simulate", settings)
     t_end, t = _end(t_end), start_time(t_start, state)
@@ -126,7 +126,7 @@ def run_stages(
     whole: Trajectory | None = None
     for stage in stages:
         start = state if whole is None else whole.values_at(-1)
-        run, warned, was_interrupted = _run(stage, start, settings, algorithm, stabilise)
+        run, warned, was_interrupted = _looked_at(stage.system, *_run(stage, start, settings, algorithm, stabilise))
         for warning in warned:
             warnings.warn(warning, stacklevel=3)
         whole = run if whole is None else whole.then(run)
@@ -142,12 +142,25 @@ def run_with_course(system: System, times: Real, settings: Settings) -> tuple[Tr
     """The trajectory of a scene from its own initial state, as `simulate` makes it, and its parts between events."""
     refuse_too_many(len(times), system)
     course: list[Leg] = []
-    run, warned, was_interrupted = _run(RunPart(system, times), None, settings, "articulated", 0.0, course)
+    made = _run(RunPart(system, times), None, settings, "articulated", 0.0, course)
+    run, warned, was_interrupted = _looked_at(system, *made)
     for warning in warned:
         warnings.warn(warning, stacklevel=3)
     if was_interrupted or run.status is Status.INTERRUPTED:
         raise Interrupted(run)
     return run, course
+
+
+def run_of_many(system: System, times: Real, settings: Settings, algorithm: Algorithm) -> Trajectory:
+    """The trajectory of a scene from its own initial state, as `simulate` makes it, without its warnings: one of many
+    that are compared with one another. Whether beams bent more than their points can follow is not looked at."""
+    refuse_too_many(len(times), system)
+    if settings.integrator.linearises:
+        refuse_without_jacobian(system, algorithm, settings.method)
+    run, _, was_interrupted = _run(RunPart(system, times), None, settings, algorithm, 0.0)
+    if was_interrupted or run.status is Status.INTERRUPTED:
+        raise Interrupted(run)
+    return run
 
 
 def _run(
@@ -173,6 +186,25 @@ def _run(
         warned.append(PrecisionWarning(start.warning))
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
     return trajectory, warned, driver.was_interrupted
+
+
+def _looked_at(
+    system: System, trajectory: Trajectory, warned: list[Warning], was_interrupted: bool
+) -> tuple[Trajectory, list[Warning], bool]:
+    """The same, with what there is to say of beams of level exact that bent too far for their points."""
+    for doubt in _beyond_points(system, trajectory):
+        warned = [*warned, SceneWarning(f'scene "{system.scene.name}": {doubt}')]
+        trajectory = replace(trajectory, message=f"{trajectory.message}; {doubt}")
+    return trajectory, warned, was_interrupted
+
+
+def _beyond_points(system: System, trajectory: Trajectory) -> list[str]:
+    """What there is to say of beams of level exact that a finished run bent more than their points can follow."""
+    if not len(system.constants.section) or not trajectory.finished:
+        return []
+    from flexmb.system.enough_points import unfollowed  # imported here because few scenes have such beams
+
+    return [str(each) for each in unfollowed(system, trajectory.t, trajectory.q)]
 
 
 def _again(stage: RunPart, state: Given, algorithm: Algorithm, stabilise: float, settings: Settings) -> Trajectory:

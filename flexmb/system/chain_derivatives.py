@@ -6,18 +6,28 @@ import numpy as np
 
 from flexmb.closure.closures import Closures
 from flexmb.closure.constant_loads import ConstantLoads
+from flexmb.closure.derivative_call import ChainDerivativeCall, chain_derivative_call, differentiate_chain
 from flexmb.closure.given_motion import observe_given, rows_tangent
+from flexmb.closure.tables import Closed
 from flexmb.entry.given_motion import motion_tangent
 from flexmb.entry.observed_tangent import outputs_tangent
 from flexmb.entry.variation import FreeVariation
 from flexmb.jit.direct import direct
 from flexmb.jit.pointer import STATUS
-from flexmb.system.derivative_evaluator import DerivativeEvaluator
-from flexmb.system.derivatives import DifferentiableMotion
+from flexmb.scene.open_loop import refuse_feedback
+from flexmb.system.derivative_evaluator import DerivativeEvaluator, DerivativeRoute, fresh_derivative_evaluator
+from flexmb.system.derivatives import INSTEAD, DifferentiableMotion
 from flexmb.system.pushforward import Pushforward
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Real
+
+
+def _fresh(system: ChainDerivatives) -> tuple[Closed, ChainDerivativeCall]:
+    return chain_derivative_call(system.closures, system.nq, system.nu)
+
+
+_OF_CHAINS = DerivativeRoute("derivatives of closed chains", lambda: differentiate_chain, _fresh)
 
 
 class ChainDerivatives(DifferentiableMotion):
@@ -31,11 +41,10 @@ class ChainDerivatives(DifferentiableMotion):
         return self._closures.for_thread()
 
     def derivative_evaluator(self) -> DerivativeEvaluator:
-        """Raises NotImplementedError: evaluators are for trees only."""
-        raise NotImplementedError(
-            f'scene "{self.scene.name}" has closures or couplings, and evaluators are for trees only: '
-            "use acceleration_derivatives(state)"
-        )
+        """As of a tree, by the recursion of the tree; states that are given must fulfil the closures."""
+        refuse_feedback(self.scene, "system.derivative_evaluator", INSTEAD)
+        self._determine_rows("system.derivative_evaluator")
+        return fresh_derivative_evaluator(self, _OF_CHAINS)
 
     def _variation(self, t: float, y: Real) -> FreeVariation:
         from flexmb.closure.variation import variation  # imported here, because it imports SciPy, which is slow
@@ -50,13 +59,13 @@ class ChainDerivatives(DifferentiableMotion):
 
     @per_thread
     def _constant_loads(self) -> ConstantLoads:
-        return ConstantLoads(self.closures, self._tangent)
+        return ConstantLoads(self.closures, self.own_tangent)
 
     @per_thread
     def _pushforward(self) -> Pushforward:
         own = self.closures.constants[1]
         x, out = motion_tangent(self.nq, self.nu), outputs_tangent(self.observation.out)
-        tables, rows = (x, self.constants, self._tangent, out), rows_tangent(own, self.constants)
+        tables, rows = (x, self.constants, self.own_tangent, out), rows_tangent(own, self.constants)
         observe = direct(observe_given, STATUS, *tables[:3], own, rows, out)
         return Pushforward(tables, rows, observe, self.check_status)
 
@@ -66,13 +75,16 @@ class ChainDerivatives(DifferentiableMotion):
 
     def _without_kinks(self, state: State, what: str) -> tuple[float, Real]:
         """As of a tree; NotImplementedError for bodies whose inertia is not where closures join them."""
+        self._determine_rows(what)
+        return super()._without_kinks(state, what)
+
+    def _determine_rows(self, what: str) -> None:
         if self.closures.at_rest:
             raise NotImplementedError(
                 f'scene "{self.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
                 f'closures join them, and {what} does not support that: use level "linear" or a better one'
             )
         self.initial_state  # noqa: B018 - counts the independent rows, without which no position is seen to be singular
-        return super()._without_kinks(state, what)
 
     def _given(self, accelerations: Real) -> Real:
         raise NotImplementedError(

@@ -16,7 +16,8 @@ class DerivativeEvaluator(Evaluator):
     `System.derivative_evaluator` makes one. `by_displacement`, `by_speed` and `by_force`, as of
     `AccelerationDerivatives`, are read-only views of the arrays of the thread that asks for them: get them once, before
     the loop. What may be given, what is raised, and how threads share it, is as of an `Evaluator`. Where a law has a
-    corner, derivatives are those on one side.
+    corner, derivatives are those on one side. States of closed chains must fulfil the closures; where these are
+    singular, calls raise a DynamicsError.
     """
 
     @property
@@ -36,15 +37,20 @@ class DerivativeEvaluator(Evaluator):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy is a new evaluator of the copied system."""
-        return fresh_derivative_evaluator, (self._careful.system,)
+        return _another, (self._careful.system,)
 
 
-def fresh_derivative_evaluator(system: Mechanics) -> DerivativeEvaluator:
-    """An evaluator with tables of its own."""
-    return DerivativeEvaluator(system, _DERIVATIVES, _fresh(system))
+def _another(system: Any) -> Any:
+    return system.derivative_evaluator()
 
 
-class _DerivativeRoute(NamedTuple):
+def fresh_derivative_evaluator(system: Mechanics, route: DerivativeRoute | None = None) -> DerivativeEvaluator:
+    """An evaluator with tables of its own, by default of a tree."""
+    chosen = route or OF_TREES
+    return DerivativeEvaluator(system, chosen, chosen.fresh(system))
+
+
+class DerivativeRoute(NamedTuple):
     """In place of an algorithm."""
 
     name: str
@@ -56,7 +62,7 @@ def _fresh(system: Mechanics) -> tuple[Any, ...]:
     return system.constants, derivative_call(system.constants, system.nq, system.nu)
 
 
-_DERIVATIVES = _DerivativeRoute("derivatives", lambda: differentiate, _fresh)
+OF_TREES = DerivativeRoute("derivatives", lambda: differentiate, _fresh)
 
 
 def _shown(array: Real) -> Real:

@@ -45,7 +45,7 @@ from flexmb.tables.state import State, finite_result
 from flexmb.typing import Flags, Index, Real
 
 _Four = TypeVar("_Four", OfFreeMotion, OfGivenMotion)
-_INSTEAD = "have the controllers chained through by flexmb.ControlledMotion(scene)"
+INSTEAD = "have the controllers chained through by flexmb.ControlledMotion(scene)"
 
 
 class DifferentiableMotion(FreeMotion):
@@ -72,9 +72,9 @@ class DifferentiableMotion(FreeMotion):
         """`acceleration_derivatives` for a loop: `udot = evaluator(t, q, u)` writes derivatives into its arrays.
 
         A call costs 0.1 us in addition to the kernel. The kernel is compiled here, not at the first call.
-        NotImplementedError for closed chains, and scenes with controllers.
+        NotImplementedError for scenes with controllers, and closures on bodies of level `ruthless`.
         """
-        refuse_feedback(self.scene, "system.derivative_evaluator", _INSTEAD)
+        refuse_feedback(self.scene, "system.derivative_evaluator", INSTEAD)
         return fresh_derivative_evaluator(self)
 
     def inverse_dynamics_derivatives(self, state: State, accelerations: Real) -> InverseDynamicsDerivatives:
@@ -147,7 +147,7 @@ class DifferentiableMotion(FreeMotion):
 
     def _variation(self, t: float, y: Real) -> FreeVariation:
         """How the free motion changes."""
-        w, nu = self._derivative_workspace, self.nu
+        w, nu = self.own_derivatives, self.nu
         by_displacement, by_speed, by_force = (np.empty((nu, nu)) for _ in range(3))
         self.check_status(self._differentiate(t, y, by_displacement, by_speed, by_force), int(w.fault[0]))
         accelerations = finite_result(w.sweeps.speed["acceleration"].copy(), t)
@@ -168,7 +168,7 @@ class DifferentiableMotion(FreeMotion):
         if not len(self.constants.function):
             return np.zeros(self.nu)
         drift = np.empty_like(y)
-        self.check_status(self._differentiate_by_time(t, y, drift), int(self._tangent.fault[0]))
+        self.check_status(self._differentiate_by_time(t, y, drift), int(self.own_tangent.fault[0]))
         return finite_result(drift[self.nq : -1], t)
 
     def _inverse_by_time(self, t: float, y: Real, rates: Real) -> Real:
@@ -183,7 +183,7 @@ class DifferentiableMotion(FreeMotion):
     @per_thread
     def _pushforward(self) -> Pushforward:
         x, out = motion_tangent(self.nq, self.nu), outputs_tangent(self.observation.out)
-        tables = x, self.constants, self._tangent, out
+        tables = x, self.constants, self.own_tangent, out
         return Pushforward(tables, None, direct(observe_given, STATUS, *tables), self.check_status)
 
     @property
@@ -214,23 +214,23 @@ class DifferentiableMotion(FreeMotion):
     # Tables and kernels of derivatives
 
     @per_thread
-    def _tangent(self) -> TangentWorkspace:
+    def own_tangent(self) -> TangentWorkspace:
         return tangent_workspace(self.constants, self.nq, self.nu)
 
     @per_thread
-    def _derivative_workspace(self) -> DerivativeWorkspace:
+    def own_derivatives(self) -> DerivativeWorkspace:
         return derivative_workspace(self.constants, self.nq, self.nu)
 
     @per_thread
     def _differentiate(self) -> Direct:
         """(t, y, by_displacement, by_speed, by_force)."""
-        tables = self.constants, self._derivative_workspace
+        tables = self.constants, self.own_derivatives
         return direct(acceleration_derivatives, STATUS, REAL, VECTOR, MATRIX, MATRIX, MATRIX, *tables)
 
     @per_thread
     def _differentiate_inverse(self) -> Direct:
         """(t, y, rates, by_displacement, by_speed, by_acceleration)."""
-        tables = self.constants, self._derivative_workspace
+        tables = self.constants, self.own_derivatives
         return direct(inverse_dynamics_derivatives, VOID, REAL, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, *tables)
 
     @per_thread
@@ -241,13 +241,13 @@ class DifferentiableMotion(FreeMotion):
     @per_thread
     def _differentiate_by_time(self) -> Direct:
         """(t, y, out)."""
-        return direct(time_derivative, STATUS, REAL, VECTOR, VECTOR, self.constants, self._tangent)
+        return direct(time_derivative, STATUS, REAL, VECTOR, VECTOR, self.constants, self.own_tangent)
 
     # Directions
 
     def _differentiable(self, state: State, what: str) -> tuple[float, Real]:
         """Time and y of a state at which derivatives exist; NotImplementedError for scenes with controllers."""
-        refuse_feedback(self.scene, what, _INSTEAD)
+        refuse_feedback(self.scene, what, INSTEAD)
         return self._without_kinks(state, what)
 
     def _without_kinks(self, state: State, what: str) -> tuple[float, Real]:

@@ -9,9 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.modal.strain_field import FIRST, MEAN, SECOND, STRETCH, StrainField
+from flexmb.modal.strain_field import LINEAR, SQUARE, STRETCH, WHOLE, StrainField
 from flexmb.system.turning_points import turning
 from flexmb.typing import Real
+
+_Rates = tuple[Real, Real, Real]
+"""Vectors (n,3) with their first two rates."""
 
 
 class MovedSections(NamedTuple):
@@ -28,15 +31,12 @@ class MovedSections(NamedTuple):
 
 def moved_sections(field: StrainField, eta: Real, etad: Real, etadd: Real) -> MovedSections:
     """The sections at modal coordinates (m,) with their first two rates."""
-    (k1, k2, mean, g), (d1, d2, mean_rate, g_rate), (a1, a2, mean_again, g_again) = (
-        [field.rows[:, row] @ x for row in (FIRST, SECOND, MEAN, STRETCH)] for x in (eta, etad, etadd)
-    )
-    s = field.commutator[:, None]
-    step, spin, spin_rate = turning(
-        mean + s * np.cross(k1, k2),
-        mean_rate + s * (np.cross(d1, k2) + np.cross(k1, d2)),
-        mean_again + s * (np.cross(a1, k2) + 2.0 * np.cross(d1, d2) + np.cross(k1, a2)),
-    )
+
+    def sums(row: int) -> _Rates:
+        return field.rows[:, row] @ eta, field.rows[:, row] @ etad, field.rows[:, row] @ etadd
+
+    whole, linear, square, (g, g_rate, g_again) = (sums(row) for row in (WHOLE, LINEAR, SQUARE, STRETCH))
+    step, spin, spin_rate = turning(*_magnus(whole, linear, square))
     R, omega, alpha = np.empty_like(step), np.empty_like(spin), np.empty_like(spin)
     for j, i in enumerate(field.before):
         if i < 0:
@@ -59,4 +59,27 @@ def moved_sections(field: StrainField, eta: Real, etad: Real, etadd: Real) -> Mo
         R=R,
         omega=omega,
         alpha=alpha,
+    )
+
+
+def _magnus(whole: _Rates, linear: _Rates, square: _Rates) -> _Rates:
+    """Omega of `flexmb.spatial.magnus` (n,3) and its first two rates, from those of its arguments."""
+    a = _sum(whole, square, -1.0 / 12.0)
+    C = _cross(a, linear)
+    D = _cross(a, _sum(C, square, -2.0))
+    E = _sum(_sum(square, a, 20.0), C, 1.0)
+    return _sum(whole, _cross(E, _sum(linear, D, -1.0 / 60.0)), 1.0 / 240.0)
+
+
+def _sum(x: _Rates, y: _Rates, factor: float) -> _Rates:
+    """x + factor y."""
+    return x[0] + factor * y[0], x[1] + factor * y[1], x[2] + factor * y[2]
+
+
+def _cross(x: _Rates, y: _Rates) -> _Rates:
+    """x x y by Leibniz' rule."""
+    return (
+        np.cross(x[0], y[0]),
+        np.cross(x[1], y[0]) + np.cross(x[0], y[1]),
+        np.cross(x[2], y[0]) + 2.0 * np.cross(x[1], y[1]) + np.cross(x[0], y[2]),
     )

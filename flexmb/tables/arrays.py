@@ -107,7 +107,6 @@ PORT = _record(
 SECTION = _record(
     ("before", _I),  # the section from which it is turned, -1 for the root
     ("gauss", _I),  # its number among the Gauss points of its body, -1 for others
-    ("commutator", _F),  # sqrt(3)/12 h^2 of the interval in between
     ("position", _F, (3,)),  # at rest
     ("tangent", _F, (3,)),  # of the axis at rest
 )
@@ -202,8 +201,8 @@ class Constants:
     port_mode: Real  # (P,6,m) mode shapes [rotation; translation]
     second_shape: Record  # (their ports and summed points,m,m) SHAPE: the second-order field G_ni
     section: Record  # (sections,) SECTION
-    # (sections,12,m) elastic curvature at the two Gauss points of the interval, its integral, stretch and shears at the
-    # section; of bodies that bend about one axis the first row is the angle
+    # (sections,12,m) three integrals of the elastic curvature over the interval, stretch and shears at the section; of
+    # bodies that bend about one axis the first row is the angle
     section_rows: Real
     section_weight: Real  # (sections,Gauss points) integrals up to the section of Lagrange's polynomials
     wheel: Record  # (W,) WHEEL

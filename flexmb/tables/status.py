@@ -51,9 +51,9 @@ _ADVICE = {
         "singular angle, a flexible body beyond its range), or rtol and atol ask for more than double precision gives"
     ),
     Status.OUT_OF_RANGE: (
-        "the deflection of body {body} grew beyond ten times its size: its linear modal field means nothing there; "
-        "look for an instability (an unstiffened beam spun above its first frequency, equal steps that are too long), "
-        "or divide the body into segments"
+        "the deflection of body {body} grew beyond ten times its size: its modes mean nothing there (a beam of level "
+        '"exact" is wound up by some 25 radians); look for an instability (an unstiffened beam spun above its first '
+        "frequency, loads that grow, equal steps that are too long), or divide the body into segments"
     ),
     Status.CLOSURE_SINGULAR: (
         "closure {body} is singular: here the closures suppress fewer motions than at neighbouring places, and the "

@@ -25,9 +25,10 @@ import numpy as np
 
 from crosscheck.library.find import shipped_cases
 from flexmb.advisor.advice import Advice, advise, prepare
+from flexmb.advisor.bench import MAX_STEPS
 from flexmb.advisor.confirm import Confirmation
 from flexmb.advisor.ladder import STAGES, Step, highest_frequency
-from flexmb.advisor.methods import FINEST, RunMethod, ladders, operations, simulated, steps_within
+from flexmb.advisor.methods import FINEST, RunMethod, ladders, operations, simulated, simulated_within
 from flexmb.advisor.models import EXACT, LEVELS, BodyModel, Model, built, flexible_bodies, levels
 from flexmb.advisor.quantity import error, measured, scales
 from flexmb.integrate.catalogue import INTEGRATORS
@@ -35,7 +36,6 @@ from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
-from flexmb.tables.status import Status
 
 TOLERANCES = (1e-2, 1e-3)
 PAGE = Path(__file__).parents[2] / "docs" / "advice.md"
@@ -166,7 +166,7 @@ def cheapest_run(confirmation: Confirmation, model: Model, least: float) -> floa
         return least
     highest, slow = highest_frequency(bench.scene, model), confirmation.cost.slow / (STAGES * bench.t_end)
     linearising = len(model) < 2 and not bench.scene.closures
-    for ladder in ladders(highest, slow, bench.algorithm(model), linearising):
+    for ladder in ladders(highest, slow, bench.algorithm(model), linearising, float(bench.times[1])):
         for method, tighter in pairwise(ladder):
             cost, fits = capped(confirmation, model, method, least)
             if cost >= least:
@@ -181,11 +181,8 @@ def capped(confirmation: Confirmation, model: Model, method: RunMethod, most: fl
     """Operations of a run that ends where it has executed `most`, and whether it is within the tolerance."""
     bench, system = confirmation.bench, confirmation.bench.system(model)
     each = bench.operations(model, method.algorithm)
-    steps = steps_within(method, each, most)
-    if not method.adaptive and bench.t_end / method.value > steps:
-        return most, False
-    done = simulated(system, bench.times, method, steps)
-    if done.status is Status.MAX_STEPS:
+    done, cut = simulated_within(system, bench.times, method, each, most, MAX_STEPS)
+    if done is None or cut:
         return most, False
     if not done.finished:  # it may with tighter ones
         return 0.0, False

@@ -112,7 +112,7 @@ def bend_45(
     return scene.scene()
 
 
-def princeton(polynomials: s.StrainPolynomials, degrees: float, points: int) -> fm.Scene:
+def princeton(polynomials: s.StrainPolynomials, degrees: float, points: int | None = None) -> fm.Scene:
     """The Princeton beam under a tip force of t newton at time t, at an angle to its stiff direction."""
     angle = np.deg2rad(degrees)
     scene = at_rest_under(load_scene(PRINCETON), 0.0, float(np.cos(angle)), float(np.sin(angle)))

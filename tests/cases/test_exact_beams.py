@@ -13,6 +13,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import flexmb as fm
+from crosscheck.engines.contract import Effort, Run
+from crosscheck.engines.registry import engine
 from flexmb.scene import schema as s
 from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Ramp
@@ -191,3 +193,22 @@ def test_equal_steps_pass_over_the_waves_of_shear_and_stretch() -> None:
     assert fine.finished
     apart = np.linalg.norm(coarse.markers["tip"].position - fine.markers["tip"].position, axis=1).max()
     assert apart < 5e-3
+
+
+@pytest.mark.slow
+def test_the_right_angle_frame_moves_as_two_meshes_of_exudyns_elements_say() -> None:
+    """Through the loss of stability, at speeds of 5 m/s: extrapolated with order 2 they leave less than a quarter of
+    the correction."""
+    pytest.importorskip("exudyn")
+    scene, times = load_scene(FRAME), np.linspace(0.0, 6.0, 121)
+
+    def tip(name: str, effort: Effort, elements: int) -> np.ndarray:
+        meshed = replace(scene, bodies=tuple(replace(body, elements=elements) for body in scene.bodies))
+        done = engine(name).compile(meshed).simulate(Run(times), effort)
+        assert done.status == "finished"
+        return done.markers["tip"].position
+
+    exact = tip("native", Effort("tolerance", 1e-6, "radau5"), 8)
+    coarse, fine = (tip("exudyn-beam", Effort("step", 1.5625e-3, "GeneralizedAlpha"), count) for count in (16, 32))
+    correction = (fine - coarse) / 3.0
+    assert np.linalg.norm(fine + correction - exact, axis=1).max() < 0.25 * np.linalg.norm(correction, axis=1).max()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import assert_never
+from typing import TypeGuard, assert_never
 
 import numpy as np
 
@@ -16,13 +16,14 @@ from crosscheck.engines.exudyn.joints import ExudynLink, HingePort
 from crosscheck.engines.exudyn.loads import along_axis
 from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
 from crosscheck.engines.exudyn.motion import AT_REST, FrameMotion, across_quaternion
+from crosscheck.engines.exudyn.sections import BeamElement, BeamSection, SpatialBeam, spatial_beam
 from crosscheck.engines.functions_of_time import Profile, profile
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.ends import ends
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.hinges import Free, Hinge
 from flexmb.scene.modal_data import modal_arrays
-from flexmb.scene.schema import Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
+from flexmb.scene.schema import BeamBody, Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, node_frame, ordered
 from flexmb.surrogate.lumping import Inertia, inertia_of, rigid_equivalent
 from flexmb.typing import Real
@@ -38,6 +39,7 @@ class Placed:
     crosses.
 
     `reach` (m,): largest displacement of an inertia point for a unit modal coordinate, in units of the body's length.
+    A `beam` of elements has a carrier at every section; `at` is one of them, which is its `section`.
     """
 
     body: Body
@@ -47,9 +49,20 @@ class Placed:
     rate: Real = field(default_factory=lambda: np.zeros(0))
     crosses: dict[str, list[int]] = field(default_factory=dict)
     reach: Real = field(default_factory=lambda: np.zeros(0))
+    beam: SpatialBeam | None = None
+    section: BeamSection | None = None
+
+    def at(self, node: str) -> Placed:
+        """What carries a node: a section of a beam of elements, or the body itself."""
+        if self.beam is None:
+            return self
+        section = self.beam.sections[node]
+        return replace(self, carrier=section.carrier, motion=section.motion, beam=None, section=section)
 
     def shape(self, node: str) -> NodeShape:
         """A node in Exudyn axes."""
+        if self.section is not None:
+            return NodeShape(np.zeros(3), self.section.rotation, *np.zeros((2, 3, 0)))
         if self.carrier.flexible is not None:
             return node_shape(self.body, node, self.carrier.zero)
         rest = node_frame(self.body, node)
@@ -73,6 +86,12 @@ class Assembly:
     sampler: int
 
     @property
+    def elements(self) -> tuple[BeamElement, ...]:
+        """Those of all beams."""
+        beams = (placed.beam for placed in self.bodies.values())
+        return tuple(element for beam in beams if beam is not None for element in beam.elements)
+
+    @property
     def links(self) -> dict[str, ExudynLink]:
         return self.hinges | self.wheels | self.guides | self.closures
 
@@ -94,13 +113,18 @@ class Assembly:
 
 def unconstrained(scene: Scene) -> bool:
     """Whether the scene is one free-flying body, for which Exudyn's explicit integrators can be used."""
-    single = len(scene.bodies) == 1 and isinstance(scene.hinges[0], Free)
+    single = len(scene.bodies) == 1 and isinstance(scene.hinges[0], Free) and not bends(scene.bodies[0])
     return single and not scene.wheels and not scene.point_masses and not scene.connectors
 
 
 def flexible(body: Body) -> bool:
     """Whether the body has modal coordinates here."""
     return isinstance(body, ModalBody) and body.level != "rigid"
+
+
+def bends(body: Body) -> TypeGuard[BeamBody]:
+    """Whether the body is a beam of elements here."""
+    return isinstance(body, BeamBody) and body.level != "rigid"
 
 
 def deforming(body: Body, node: str) -> bool:
@@ -117,13 +141,14 @@ def assemble(scene: Scene) -> Assembly:
     carriers: list[Carrier] = []
     for body, hinge in ordered(scene):
         hinges[hinge.name], placed[body.name] = _attach(shop, scene, placed, body, hinge, held[body.name])
-        carriers.append(placed[body.name].carrier)
+        beam = placed[body.name].beam
+        carriers += [placed[body.name].carrier] if beam is None else beam.carriers
     wheels, guides = {}, {}
     for wheel in scene.wheels:
-        wheels[wheel.name], carrier = _wheel(shop, placed[wheel.body], wheel)
+        wheels[wheel.name], carrier = _wheel(shop, placed[wheel.body].at(wheel.node), wheel)
         carriers.append(carrier)
     for mass in scene.point_masses:
-        guides[mass.name], carrier = _point_mass(shop, placed[mass.body], mass)
+        guides[mass.name], carrier = _point_mass(shop, placed[mass.body].at(mass.node), mass)
         carriers.append(carrier)
     closures = {closure.name: _closure(shop, placed, closure) for closure in scene.closures}
     for connector in scene.connectors:
@@ -131,7 +156,7 @@ def assemble(scene: Scene) -> Assembly:
             _connect(shop, placed, connector)
     _connect_along(shop, scene, (hinges, wheels, guides))
     for load in scene.loads:
-        _load(shop, placed[load.body], load)
+        _load(shop, placed[load.body].at(load.node), load)
     sampler = shop.mbs.AddSensor(shop.items.SensorUserFunction(sensorUserFunction=_nothing, storeInternal=True))
     shop.mbs.Assemble()
     return Assembly(scene, shop, placed, hinges, wheels, guides, closures, tuple(carriers), sampler)
@@ -164,13 +189,15 @@ def _attach(
     port = _end(shop, placed, hinge.parent, hinge.parent_node, own)
     outboard = frame(*node_frame(body, hinge.child_node)) @ frame(hinge.child_position_m, hinge.child_quaternion)
     zero = port.zero @ outboard.rotation.T
+    point = np.zeros(3) if bends(body) else zero @ outboard.position  # a beam is held by its hub
     found: list[Placed] = []
 
     def make(hinge_motion: FrameMotion) -> Carrier:
+        if bends(body):
+            found.append(_beam(shop, body, hinge, hinge_motion))
+            return _hub(shop, found[0], hinge, hinge_motion, port.zero)
         found.append(_place(shop, scene, body, hinge, hinge_motion, zero, held))
         return found[0].carrier
-
-    point = zero @ outboard.position
     first = next(iter(hinge.freedoms), None)
     match first:
         case Floating():
@@ -212,6 +239,29 @@ def _place(
     rows = rows or _cross(NodeShape(np.zeros(3), np.eye(3), *np.zeros((2, 3, len(eta)))))
     carrier = shop.flexible(motion, zero, integrals(body, zero), eta, rate, rows)
     return Placed(body, carrier, motion, eta, rate, crosses, _reach(body))
+
+
+def _beam(shop: Workshop, body: BeamBody, hinge: Hinge, hinge_motion: FrameMotion) -> Placed:
+    """A beam of elements, unloaded, from the motion of its outboard hinge frame."""
+    fixed = frame(*node_frame(body, hinge.child_node)) @ frame(hinge.child_position_m, hinge.child_quaternion)
+    back = fixed.inverse()
+    motion = hinge_motion.offset(back.position, back.rotation)
+    beam = spatial_beam(shop, body, motion)
+    return Placed(body, beam.carriers[0], motion, beam=beam)
+
+
+def _hub(shop: Workshop, beam: Placed, hinge: Hinge, motion: FrameMotion, zero: Real) -> Carrier:
+    """The outboard hinge frame as a massless carrier, welded to the beam's section: angles of hinges are measured
+    between Exudyn axes, which are parallel where the coordinates vanish, and sections have axes of their own."""
+    hub = shop.rigid(motion, zero, None)
+    section = beam.at(hinge.child_node)
+    shape, own = section.shape(hinge.child_node), frame(hinge.child_position_m, hinge.child_quaternion)
+    markers = [
+        shop.marker(section.carrier, shape.rotation @ own.position, shape.rotation @ own.rotation),
+        shop.marker(hub, np.zeros(3), zero),
+    ]
+    shop.mbs.AddObject(shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=[1] * 6))
+    return hub
 
 
 def _reach(body: ModalBody) -> Real:
@@ -276,7 +326,7 @@ def _end(shop: Workshop, placed: dict[str, Placed], body: str, node: str, own: F
     """A frame `own` on the ground or at a node of a body."""
     if body == GROUND:
         return HingePort(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation))
-    return _port(shop, placed[body], node, own)
+    return _port(shop, placed[body].at(node), node, own)
 
 
 def _connect(shop: Workshop, placed: dict[str, Placed], connector: BetweenNodes) -> None:
@@ -288,7 +338,8 @@ def _connect(shop: Workshop, placed: dict[str, Placed], connector: BetweenNodes)
         if end.body == GROUND:
             held.append(springs.ConnectorEnd(shop.ground, still, own))
         else:
-            held.append(springs.ConnectorEnd(placed[end.body].carrier, placed[end.body].shape(end.node), own))
+            section = placed[end.body].at(end.node)
+            held.append(springs.ConnectorEnd(section.carrier, section.shape(end.node), own))
     springs.between(shop, connector, held)
 
 

@@ -11,6 +11,7 @@ from crosscheck.engines.exudyn.joints import Stage
 from crosscheck.engines.exudyn.motion import initial
 from crosscheck.engines.exudyn.rotations import local_rate_map
 from crosscheck.engines.exudyn.state import CarrierPath, States, set_state
+from crosscheck.engines.exudyn.strains import strain_energy
 from flexmb.typing import Real
 
 Paths = dict[int, CarrierPath]
@@ -31,6 +32,7 @@ def energy_and_momentum(assembly: Assembly, states: States, paths: Paths) -> tup
         momentum += np.hstack([angular + np.cross(path.position, linear), linear])
         if carrier.flexible is not None:
             energy["strain"] += 0.5 * np.einsum("ti,ij,tj->t", path.eta, carrier.data.stiffness, path.eta)
+    energy["strain"] += strain_energy(assembly.elements, paths)
     for link in assembly.links.values():
         for stage in link.stages:
             if stage.stiffness:

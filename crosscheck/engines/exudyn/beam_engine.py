@@ -1,4 +1,8 @@
-"""Exudyn's large-deflection planar beams as an engine of their own: the nonlinear reference for beam scenes."""
+"""Exudyn's beams of finite deflection as an engine of their own: the nonlinear reference for beam scenes.
+
+One beam in a plane has cheaper elements and a model of its own; all other scenes are trees and loops of rigid bodies
+and of beams in space.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,9 @@ from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Mode
 from crosscheck.engines.exudyn import library
 from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign, floats, root_frame
 from crosscheck.engines.exudyn.kkt import initial_state
+from crosscheck.engines.exudyn.model import ExudynModel
 from crosscheck.engines.exudyn.solve import integrate
+from crosscheck.engines.exudyn.spatial import fastest_bending, reason, spatial_refusals
 from crosscheck.engines.exudyn.state import States
 from crosscheck.engines.pace import pace
 from crosscheck.engines.steps import USUAL_S, ladder
@@ -30,16 +36,18 @@ are stepped over."""
 
 
 class ExudynBeamEngine:
-    """One beam in World's x-y plane, free, on a hinge about z, or clamped, as a planar beam of finite deflection."""
+    """Beams as elements of finite deflection: one in World's x-y plane, or any in space with rigid bodies."""
 
     name = "exudyn-beam"
-    summary = "one planar beam of finite deflection, by beam elements"
+    takes = ("connectors",)
+    summary = "beams of finite deflection, by beam elements"
     algorithm = "beam elements in redundant coordinates"
     settings = (
-        "As many planar cable elements (shear-flexible ones where the scene's beam is) as the scene's beam has, in "
-        "Exudyn's own C++ loop by generalised alpha, with a sensor in Python that takes the state at every sample. "
-        "Fixed steps follow the bending; the method damps the axial vibrations that they step over. It is another and "
-        "richer model than modes, so its error contains the distance of the models."
+        "As many elements as the scene's beams have: one beam in a plane by planar cable elements (shear-flexible ones "
+        "where the scene's beam is), all other scenes by geometrically exact elements in space. In Exudyn's own C++ "
+        "loop by generalised alpha, with a sensor in Python that takes the state at every sample. Fixed steps follow "
+        "the bending; the method damps the axial vibrations that they step over. It is another and richer model than "
+        "modes, so its error contains the distance of the models."
     )
 
     def version(self) -> str:
@@ -48,21 +56,30 @@ class ExudynBeamEngine:
 
     def supports(self, scene: Scene) -> Support:
         """"surrogate" for the scenes it takes: another model of the beam than its modes, and a richer one."""
-        for reason in _refusals(scene):
-            return Support("no", reason)
-        return Support("surrogate", "a planar beam of finite deflection instead of modes")
+        if _in_plane(scene):
+            return Support("surrogate", "a planar beam of finite deflection instead of modes")
+        for refused in spatial_refusals(scene):
+            return Support("no", refused)
+        return Support("surrogate", reason(scene))
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
         return self.efforts_for(scene, USUAL_S)
 
     def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
         """Three steps, with the scene's number of elements; generalised-alpha damps the axial vibrations it skips."""
-        bending = pace(scene, duration_s, _first_bending(scene))
-        return ladder("GeneralizedAlpha", bending, duration_s, RUNGS, USUAL)
+        fastest = _first_bending(scene) if _in_plane(scene) else fastest_bending(scene)
+        return ladder("GeneralizedAlpha", pace(scene, duration_s, fastest), duration_s, RUNGS, USUAL)
 
     def compile(self, scene: Scene) -> Model:
-        """Convert the scene; the mesh has as many elements as the scene's beam."""
-        return BeamModel(assemble_beam(scene, scene.bodies[0].elements))
+        """Convert the scene; the mesh has as many elements as the scene's beams."""
+        if _in_plane(scene):
+            return BeamModel(assemble_beam(scene, scene.bodies[0].elements))
+        return ExudynModel(scene)
+
+
+def _in_plane(scene: Scene) -> bool:
+    """Whether the planar elements can run the scene."""
+    return next(_refusals(scene), None) is None
 
 
 def _first_bending(scene: Scene) -> float:
@@ -75,6 +92,7 @@ def _first_bending(scene: Scene) -> float:
 
 
 def _refusals(scene: Scene) -> Iterator[str]:
+    """Why the scene is not one of a planar beam."""
     if len(scene.bodies) != 1 or not isinstance(scene.bodies[0], BeamBody):
         yield "it takes scenes with one beam and nothing else"
         return

@@ -67,7 +67,7 @@ def _moving(assembly: Assembly, end: EndFrame, paths: Paths, count: int) -> list
     own = frame(end.position_m, end.quaternion)
     if end.body == GROUND:
         return [Moving(own.position, own.rotation, np.zeros(3), np.zeros(3))] * count
-    placed = assembly.bodies[end.body]
+    placed = assembly.bodies[end.body].at(end.node)
     path = marker_path(paths[placed.carrier.key], placed.shape(end.node), own.position)
     turns: Real = Rotation.from_quat(path.quaternion, scalar_first=True).as_matrix() @ own.rotation
     motion = zip(path.position, turns, path.velocity[:, :3], path.velocity[:, 3:], strict=True)

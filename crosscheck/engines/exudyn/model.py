@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
+from crosscheck.engines.contract import Effort, MarkerPath, Run, Snapshot, Trajectory
 from crosscheck.engines.exudyn.assembly import assemble
 from crosscheck.engines.exudyn.balance import energy_and_momentum
 from crosscheck.engines.exudyn.connections import Connected, connected
@@ -57,16 +57,22 @@ class ExudynModel:
         linear = self._linearised(run, states)
         return Trajectory(
             status=solution.status, message=solution.message, times=run.times[: len(states.times)],
-            markers={
-                marker.name: marker_path(*self._located(marker, paths), np.array(marker.offset_m))
-                for marker in self.scene.markers
-            },
-            loads={name: loads[name] for name in self._loaded},
+            markers=self._markers(paths), loads={name: loads[name] for name in self._loaded},
             wheel_loads={name: loads[name] for name in self.assembly.wheels},
             drives=drives(self.assembly, states), energy=energy, momentum=momentum,
             connectors=held.between, hinge_forces=held.along,
             wall_s=solution.wall_s, evaluations=solution.evaluations, **linear.as_outputs,
         )  # fmt: skip
+
+    def markers(self, states: States) -> dict[str, MarkerPath]:
+        """Their motion in a run."""
+        return self._markers(self._paths(states))
+
+    def _markers(self, paths: dict[str, CarrierPath]) -> dict[str, MarkerPath]:
+        return {
+            marker.name: marker_path(*self._located(marker, paths), np.array(marker.offset_m))
+            for marker in self.scene.markers
+        }
 
     def _linearised(self, run: Run, states: States) -> LinearOutputs:
         if "frequencies" not in run.linear:
@@ -86,7 +92,7 @@ class ExudynModel:
         return body_mass_matrix(self.assembly, body or bending[0])
 
     def _located(self, item: Marker, paths: dict[int, CarrierPath]) -> tuple[CarrierPath, NodeShape]:
-        placed = self.assembly.bodies[item.body]
+        placed = self.assembly.bodies[item.body].at(item.node)
         return paths[placed.carrier.key], placed.shape(item.node)
 
     def _paths(self, states: States) -> dict[int, CarrierPath]:
@@ -95,6 +101,8 @@ class ExudynModel:
         for link in self.assembly.links.values():
             carriers += [carrier for stage in link.stages for carrier in (stage.inboard, stage.outboard)]
             carriers += list(link.spherical[1:]) if link.spherical else []
+        for element in self.assembly.elements:
+            carriers += [element.left, element.right]
         return {key: carrier_path(self.assembly, c, states) for key, c in {c.key: c for c in carriers}.items()}
 
     def _loads_and_balance(

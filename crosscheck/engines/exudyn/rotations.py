@@ -64,6 +64,21 @@ def left_jacobian_rate(theta: Real, rate: Real) -> Real:
     return left_jacobian(theta + 1j * step * rate).imag / step
 
 
+def logarithm(turn: Real, apart: Real) -> Real:
+    """[translation; rotation] (T,6) whose exponential is a motion: a turn (T,3,3) and a displacement (T,3) in the axes
+    from which both start."""
+    vector = Rotation.from_matrix(turn).as_rotvec()
+    angle = np.linalg.norm(vector, axis=1)
+    small = angle**2 < _SERIES_BELOW
+    half = np.where(small, 1.0, angle) / 2.0
+    # of the square of the cross matrix in the inverse of the left Jacobian
+    series = 1.0 / 12.0 * (1.0 + angle**2 / 60.0 * (1.0 + angle**2 / 42.0 * (1.0 + angle**2 / 40.0)))
+    factor = np.where(small, series, (1.0 - half / np.tan(half)) / (4.0 * half**2))
+    K = cross_matrices(vector)
+    inverse = np.eye(3) - 0.5 * K + factor[:, None, None] * (K @ K)
+    return np.concatenate([np.einsum("tij,tj->ti", inverse, apart), vector], axis=1)
+
+
 def cross_matrices(a: Real) -> Real:
     """skew(a) (..., 3, 3) of vectors (..., 3): skew(a) b = a x b."""
     x, y, z = np.moveaxis(a, -1, 0)

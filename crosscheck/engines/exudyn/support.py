@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import assert_never
 
 from crosscheck.engines.contract import Support
@@ -22,13 +22,14 @@ NOT_WORKLESS = (
 
 def supports(scene: Scene) -> Support:
     """"no" with the first reason, else "surrogate" with all reasons, else "exact"."""
-    for reason in _refusals(scene):
+    for reason in refusals(scene, scene.bodies):
         return Support("no", reason)
     weak = tuple(dict.fromkeys(_approximations(scene)))
     return Support("surrogate", "; ".join(weak)) if weak else Support("exact")
 
 
-def _refusals(scene: Scene) -> Iterator[str]:
+def refusals(scene: Scene, floating: Sequence[Body]) -> Iterator[str]:
+    """Why Exudyn cannot run a scene whose bodies `floating` are rigid or have floating frames."""
     for closure in scene.closures:
         if closure.body_b == GROUND:
             yield f'closure "{closure.name}": its load is read on body_b, which is the ground here: exchange a and b'
@@ -41,7 +42,7 @@ def _refusals(scene: Scene) -> Iterator[str]:
     if armed:
         yield f'coordinate "{armed}" has an armature: the adapter of Exudyn offers none'
     bodies = {body.name: body for body in scene.bodies}
-    for body in scene.bodies:
+    for body in floating:
         yield from _body_refusals(body)
     for hinge in scene.hinges:
         if not isinstance(hinge, Free) and deforming(bodies[hinge.child], hinge.child_node):

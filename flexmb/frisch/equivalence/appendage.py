@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import assert_never
 
 import msgspec
 import numpy as np
@@ -16,7 +17,7 @@ from flexmb.modal.beam import beam_elements
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
-from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
+from flexmb.scene.bodies import BeamBody, Level, ModalBody, RigidBody, SidBody
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -29,13 +30,15 @@ _POINT_ARRAYS = ("mass", "position", "com_offset", "inertia", "translation", "ro
 class Appendage:
     """A flexible body clamped at its origin, body axes, modes normalised as in (41) and ordered by frequency.
 
-    `name`; `model` with those modes; `parameters`, the corrected ones; `frequencies` (n,) rad/s with the base fixed.
+    `name`; `level` of the body in its scene; `model` with those modes; `parameters`, the corrected ones; `frequencies`
+    (n,) rad/s with the base fixed.
     """
 
     name: str
     model: FlexibleModel
     parameters: ModeParameters
     frequencies: Real
+    level: Level = "full"
 
     @property
     def mode_count(self) -> int:
@@ -103,10 +106,11 @@ def with_modes(model: FlexibleModel, chosen: NDArray[np.intp]) -> FlexibleModel:
 def appendage_of(scene: Scene, body: str, modes: int | None = None) -> Appendage:
     """The body of that name as an appendage of its inboard body.
 
-    `modes` is the number of modes to use. Those of a beam are computed from its finite elements, whatever number the
-    scene gives; a modal body has only the modes it was given. Default: all modes of a modal body; of a beam the lower
-    half of the modes of its finite elements, which is accurate, up to `DEFAULT_MODES`. Raises ValueError if the body
-    does not exist, is not flexible or not clamped, or if anything is attached to it.
+    `modes` is the number of modes to use. Those of a beam are computed from its finite elements, at level exact from as
+    many polynomials, whatever number the scene gives; a modal body has only the modes it was given. Default: all modes
+    of a modal body; of a beam the lower half of the modes of its finite elements, which is accurate, up to
+    `DEFAULT_MODES`. Raises ValueError if the body does not exist, is not flexible or not clamped, or if anything is
+    attached to it.
     """
     found = next((candidate for candidate in scene.bodies if candidate.name == body), None)
     if found is None:
@@ -120,20 +124,25 @@ def appendage_of(scene: Scene, body: str, modes: int | None = None) -> Appendage
     name = f'body "{body}"'
     if modes is not None and modes < 1:
         raise ValueError(f"{name}: at least one mode is needed, got {modes}")
-    if isinstance(found, BeamBody):
-        return appendage(flexible_model(_with_modes(found, modes)), name)
-    return _first(appendage(flexible_model(found), name), modes)
+    match found:
+        case BeamBody():
+            chosen = appendage(flexible_model(_with_modes(found, modes)), name)
+        case ModalBody():
+            chosen = _first(appendage(flexible_model(found), name), modes)
+        case _:
+            assert_never(found)
+    return replace(chosen, level=found.level)
 
 
 def _with_modes(body: BeamBody, modes: int | None) -> BeamBody:
-    """The beam with its lowest eigenmodes; damping does not matter here."""
+    """The beam with its lowest eigenmodes; damping does not matter here, nor at how many points the scene sums them."""
     elements = beam_elements(body)
     rotary = np.any(elements.table.inertia[:, 3, 3] > 0.0)
     idle = {"torsion"} if body.points == "line" or not rotary else set()
     moving = [field for family, field in elements.fields.items() if family not in idle]
     coordinates = sum(field.size - len(field.clamped_coordinates) for field in moving)
     count = max(body.modes.count, min(DEFAULT_MODES, coordinates // 2)) if modes is None else modes
-    eigenmodes = msgspec.structs.replace(body.modes, count=count, static=False, damping_ratio=0.0)
+    eigenmodes = msgspec.structs.replace(body.modes, count=count, static=False, damping_ratio=0.0, points=None)
     return msgspec.structs.replace(body, modes=eigenmodes)
 
 

@@ -2,7 +2,8 @@
 results".
 
 A rigid body on a spring hinge has only one vibration per axis, but its motion is exact at any angle. Modes have one
-vibration each, but omit all terms of second order in the deflection.
+vibration each, but omit all terms of second order in the deflection, except those of a beam of level exact: they are
+its strains, which omit none.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike
 from flexmb.frisch.equivalence.appendage import Appendage, inertia_about_origin
 from flexmb.frisch.equivalence.mode_count import Direction, directions
 from flexmb.frisch.equivalence.relations import HingeFit, best_hinge, fit_at, modal_effective_inertia
+from flexmb.scene.bodies import Level
 
 AT_CLAMP, BEST, GIVEN = "hinge at the clamp", "best hinge", "given hinge"
 
@@ -112,21 +114,40 @@ def _verdicts(body: Appendage, accuracy: float, fit: HingeFit) -> tuple[Preferen
                 f"the appendage and {percent(left[0])} of its inertia about the clamp",
             )
         )
-    angle = np.sqrt(2.0 * accuracy)
-    verdicts += [
+    return (*verdicts, *_at_large_motion(body.level, accuracy, f[first]))
+
+
+def _at_large_motion(level: Level, accuracy: float, hertz: float) -> tuple[Preference, Preference]:
+    """Where terms matter that the relations omit; hertz: the first frequency that the hinge replaces."""
+    bent = f"deflections beyond {np.sqrt(2.0 * accuracy):.2g} rad at the hinge"
+    spun = f"base spinning faster than {np.sqrt(accuracy) * hertz:.3g} Hz"
+    if level == "exact":
+        return (
+            Preference(
+                bent,
+                "flexible",
+                "strains of level exact omit terms of no order, and the beam bends all along; the rotation of a hinge "
+                "is exact too, but in one place. The numbers above are those of small deflections",
+            ),
+            Preference(
+                spun,
+                "either",
+                "centrifugal stiffening is in the kinematics of level exact, and of a rigid body on a hinge",
+            ),
+        )
+    return (
         Preference(
-            f"deflections beyond {angle:.2g} rad at the hinge",
+            bent,
             "rigid",
             f"modes omit terms of second order, 1 - cos = {percent(accuracy)} there; the rotation of a hinge is exact",
         ),
         Preference(
-            f"base spinning faster than {np.sqrt(accuracy) * f[first]:.3g} Hz",
+            spun,
             "rigid",
-            f"modes without second-order shapes have no centrifugal stiffening, an error of (spin / {f[first]:.4g} "
+            f"modes without second-order shapes have no centrifugal stiffening, an error of (spin / {hertz:.4g} "
             "Hz)^2 in the squared frequency; a rigid body on a hinge has it",
         ),
-    ]
-    return tuple(verdicts)
+    )
 
 
 def _beyond(body: Appendage, fit: HingeFit) -> tuple[float, float]:

@@ -24,7 +24,6 @@ from tests.benchmarks.rivals import ROUNDS, turns
 GROUP = "Beams of level exact: errors"
 COST = "Beams of level exact: one evaluation"
 LOAD = 10.0  # P L^2 / EI of the elastica
-PRINCETON_POINTS = 12  # rotations have order 4 in them: nine leave 1.3e-7 m
 BEND_TIP = (47.1501, 15.6847, 53.4755)  # m: 33 modes of a prototype, two numbers of points within 2e-5
 SOROMOX_US, SOROMOX_DOFS = 860.0, 148  # of SoRoMoX 0.4 on a CPU, FP64, its authors' figure: dynamics terms, no solve
 TURN = 0.5  # rad of the tip of the free beam
@@ -74,12 +73,12 @@ def _princeton() -> Measured:
     curvatures = dict.fromkeys(("torsion", "bending_y", "bending_z"), 6)
     others = dict.fromkeys(("axial", "shear_y", "shear_z"), 3)
     polynomials = StrainPolynomials(**curvatures, **others)
-    scene = scenes.princeton(polynomials, 45.0, PRINCETON_POINTS)
+    scene = scenes.princeton(polynomials, 45.0)
     found = scenes.tip_at_rest(scene, 2.0, 4.0, 6.0, 8.896)[1:]
     (bar,) = load_scene(scenes.PRINCETON).bodies
     coarse, fine = (exact_in_space(exudyn, bar, np.deg2rad(45.0), 8.896, n) for n in (16, 32))
     theirs = fine + (fine - coarse) / 3.0
-    detail = f"Exudyn's 16 and 32 elements extrapolated; {PRINCETON_POINTS} points"
+    detail = "Exudyn's 16 and 32 elements extrapolated; default points"
     return _exactly(float(np.linalg.norm(found - theirs)), detail)
 
 

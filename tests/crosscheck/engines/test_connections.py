@@ -166,7 +166,7 @@ def test_connectors_at_bending_nodes_in_exudyn(kind):
 
 
 def test_what_an_adapter_does_not_have_it_refuses():
-    support = CheckedEngine(engine("exudyn-beam")).supports(only(load_scene(CASE), AngularFriction))
+    support = CheckedEngine(engine("dart")).supports(only(load_scene(CASE), AngularFriction))
     assert support.kind == "no" and "bearing" in support.reason
 
 

@@ -49,18 +49,30 @@ def test_engines_of_rigid_bodies_and_of_modes_refuse_it_with_the_remedy(name: st
 @pytest.mark.parametrize(
     ("scene", "what"),
     [
-        (strip(polynomials=s.StrainPolynomials(bending_y=3, torsion=2)), "polynomials of torsion"),
-        (strip(curvature=0.3), "curved where it is not loaded"),
         (strip(viscosity_s=1e-3), "rate of strain"),
         (strip(damping_ratio=0.01), "modal damping"),
-        (replace(strip(), gravity_m_s2=(0.0, 0.0, -1.0)), "gravity pulls out of the plane"),
     ],
 )
-def test_exudyns_planar_beam_refuses_what_it_has_not(scene: s.Scene, what: str) -> None:
+def test_exudyns_beams_refuse_what_they_have_not(scene: s.Scene, what: str) -> None:
     check_scene(scene)
     support = engine("exudyn-beam").supports(scene)
     assert support.kind == "no"
     assert what in support.reason
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        strip(polynomials=s.StrainPolynomials(bending_y=3, torsion=2)),
+        strip(curvature=0.3),
+        replace(strip(), gravity_m_s2=(0.0, 0.0, -1.0)),
+    ],
+)
+def test_what_exudyns_planar_beam_has_not_its_beams_in_space_have(scene: s.Scene) -> None:
+    check_scene(scene)
+    support = engine("exudyn-beam").supports(scene)
+    assert support.kind == "surrogate"
+    assert "strip: shear as stiff as stretch" in support.reason
 
 
 @pytest.mark.parametrize("axial", [0, 1])

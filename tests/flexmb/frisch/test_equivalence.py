@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
-from flexmb.frisch.equivalence.appendage import Appendage, appendage
+from flexmb.frisch.equivalence.appendage import Appendage, appendage, appendage_of
 from flexmb.frisch.equivalence.comparison import AT_CLAMP, BEST, GIVEN, coupling_error, equivalence
 from flexmb.frisch.equivalence.mode_count import directions
 from flexmb.frisch.equivalence.relations import (
@@ -23,7 +23,9 @@ from flexmb.frisch.equivalence.relations import (
 )
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
-from flexmb.scene.bodies import TipMass
+from flexmb.scene.bodies import Modes, TipMass
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.shapes import beam_section
 from tests.bounds import gamma, observed_order, relative
 from tests.flexmb.modal.beam_references import beam, clamped_free_roots
 
@@ -337,3 +339,17 @@ def test_verdicts_follow_the_numbers():
     assert equivalence(cantilever(1)).verdicts[1].better == "rigid"  # no other modes to speak of
     with pytest.raises(ValueError, match="a fraction between 0 and 1"):
         equivalence(cantilever(), accuracy=5.0)
+
+
+def test_verdicts_on_a_beam_of_level_exact():
+    """Its strains omit no order, whatever the number of points of the scene: only the relations are linear."""
+    builder = SceneBuilder("appendage").rigid_body("hub", mass=10.0, inertia=(1.0, 1.0, 1.0))
+    builder.free("base", "ground", "hub")
+    for level, last in (("exact", ["flexible", "either"]), ("full", ["rigid", "rigid"])):
+        modes = Modes(count=3, families=("bending_y",), points=5 if level == "exact" else None)
+        section = beam_section(E=7e10, G=2.7e10, A=1e-3, Iy=2e-7, Iz=1e-7, rho=2700.0)
+        builder.beam(level, length=2.0, elements=12, section=section, modes=modes, level=level)
+        scene = builder.weld(f"w {level}", "hub", level).scene()
+        found = equivalence(appendage_of(scene, level)).verdicts
+        assert [verdict.better for verdict in found[-2:]] == last
+        assert any("second order" in verdict.reason for verdict in found) == (level == "full")

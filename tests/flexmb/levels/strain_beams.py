@@ -8,7 +8,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from flexmb.modal.exact import exact_model
-from flexmb.modal.strain_field import MEAN, STRETCH, StrainField
+from flexmb.modal.strain_field import STRETCH, WHOLE, StrainField
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.typing import Real
@@ -52,8 +52,16 @@ BEAMS: dict[str, dict[str, Any]] = {
 
 def bent(field: Any, seed: int = 0, size: float = 1.0) -> tuple[Real, Real, Real]:
     """Coordinates of strains of some `size` in all modes, with two rates."""
-    scale = size / np.max(np.abs(field.rows), axis=(0, 1, 2))
+    scale = size / np.max(np.abs(strains(field)), axis=(0, 1, 2))
     return tuple(np.random.default_rng(seed).normal(size=(3, field.mode_count)) * scale)
+
+
+def strains(field: StrainField) -> Real:
+    """(n,2,3,m): each mode's mean curvature before each section that turns others, and stretch and shears there."""
+    own = np.arange(field.steps)
+    rows = field.rows[own][:, [WHOLE, STRETCH]].copy()
+    rows[:, 0] /= np.diff(field.x[own], prepend=0.0)[:, None, None]
+    return rows
 
 
 def body_of(builder: SceneBuilder, name: str = "rod") -> s.BeamBody:
@@ -73,8 +81,8 @@ def field_of(builder: SceneBuilder) -> StrainField:
 
 def strained(field: StrainField, like: StrainField, coordinates: Real, sections: Any, turn: Real) -> Real:
     """Coordinates (m,) of `field` whose strains are those of the `sections` of another, seen from axes R_own_like."""
-    rows = field.rows[: len(sections), [MEAN, STRETCH]].reshape(-1, field.mode_count)
-    wanted = np.einsum("ab,jrbm,m->jra", turn, like.rows[sections][:, [MEAN, STRETCH]], coordinates)
+    rows = field.rows[: len(sections), [WHOLE, STRETCH]].reshape(-1, field.mode_count)
+    wanted = np.einsum("ab,jrbm,m->jra", turn, like.rows[sections][:, [WHOLE, STRETCH]], coordinates)
     found, *_ = np.linalg.lstsq(rows, wanted.ravel())
     np.testing.assert_allclose(rows @ found, wanted.ravel(), atol=1e-12 * np.abs(wanted).max())
     return np.asarray(found)

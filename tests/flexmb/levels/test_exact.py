@@ -9,7 +9,6 @@ import msgspec
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from scipy.spatial.transform import Rotation
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import flexmb
@@ -19,7 +18,7 @@ from flexmb.modal.beam import beam_elements
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.exact import exact_model
 from flexmb.modal.second_order import beam_second_order
-from flexmb.modal.strain_field import FIRST, MEAN, SECOND, strain_field
+from flexmb.modal.strain_field import LINEAR, SQUARE, WHOLE
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
@@ -39,6 +38,7 @@ from tests.flexmb.levels.strain_beams import (
     field_of,
     stations,
     strained,
+    strains,
 )
 
 
@@ -113,18 +113,21 @@ def test_mass_matrix_is_virtual_work():
     assert relative(system.mass_matrix(system.state(eta, none)), M) <= ROUNDING
 
 
-@pytest.mark.parametrize(("sign", "order"), [(1.0, 4.0), (-1.0, 2.0)])
-def test_rotations_converge(sign, order):
-    """Of the fourth order in the intervals; with the wrong sign of the commutator, of the second only."""
+@pytest.mark.parametrize(("linear", "square", "order"), [(1.0, 1.0, 6.0), (1.0, 0.0, 4.0), (-1.0, 1.0, 2.0)])
+def test_rotations_converge(linear, square, order):
+    """Of the sixth order in the intervals; of the fourth without the second moment of the curvature, and of the second
+    with the wrong sign of the first."""
 
     def kappa(x: float) -> Real:
-        return np.array([3.0, 2.0 + 2.0 * x, 5.0 - 4.0 * x])
+        return np.array([3.0 - 6.0 * x * x, 2.0 + 2.0 * x, 5.0 - 4.0 * x + 3.0 * x * x])
 
     def error(pieces: int) -> float:
-        linear = s.StrainPolynomials(torsion=2, bending_y=2, bending_z=2)
-        field = field_of(beam(s.Modes(count=2, pieces=pieces, polynomials=linear, points=3)))
-        field = replace(field, commutator=sign * field.commutator)
+        three = s.StrainPolynomials(torsion=3, bending_y=3, bending_z=3)
+        field = field_of(beam(s.Modes(count=3, pieces=pieces, polynomials=three, points=4)))
+        factors = np.ones(4)
+        factors[[LINEAR, SQUARE]] = linear, square
         eta, none = _with_curvature(field, kappa), np.zeros(field.mode_count)
+        field = replace(field, rows=field.rows * factors[:, None, None])
         exact, _ = curve(kappa, lambda _: np.eye(3)[0], field.x[-1:])
         return float(np.max(np.abs(moved_sections(field, eta, none, none).R[-1] - exact[0])))
 
@@ -133,12 +136,13 @@ def test_rotations_converge(sign, order):
 
 
 def _with_curvature(field: Any, kappa: Any) -> Real:
-    """Coordinates of a straight beam whose curvature is kappa(x) (3,) at all x of the field."""
+    """Coordinates of a straight beam whose curvature is kappa(x) (3,), a polynomial that it can have."""
     left = np.where(field.before >= 0, field.x[field.before], 0.0)
-    places = left + (field.x - left) * (0.5 - np.sqrt(3.0) / 6.0)
-    wanted = np.array([kappa(x) for x in places])
-    found, *_ = np.linalg.lstsq(field.rows[:, 0].reshape(-1, field.mode_count), wanted.ravel())
-    np.testing.assert_allclose(np.einsum("jam,m->ja", field.rows[:, 0], found), wanted, atol=1e-11)
+    h, (xi, w) = field.x - left, np.polynomial.legendre.leggauss(4)
+    at = left[:, None] + h[:, None] / 2.0 * (1.0 + xi)
+    wanted = np.einsum("j,p,jpa->ja", h / 2.0, w, np.array([[kappa(x) for x in places] for places in at]))
+    found, *_ = np.linalg.lstsq(field.rows[:, WHOLE].reshape(-1, field.mode_count), wanted.ravel())
+    np.testing.assert_allclose(np.einsum("jam,m->ja", field.rows[:, WHOLE], found), wanted, atol=1e-11)
     return np.asarray(found)
 
 
@@ -241,7 +245,7 @@ def test_free_flight_conserves_energy_and_momentum(name):
     builder = beam(**BEAMS[name]).free("base", "ground", "rod", **motion)
     field = field_of(beam(**BEAMS[name]))
     eta = np.zeros(field.mode_count)
-    eta[0] = brentq(lambda a: _turn(field, a) - 0.5, 0.0, 10.0 / np.max(np.abs(field.rows[..., 0])))
+    eta[0] = brentq(lambda a: _turn(field, a) - 0.5, 0.0, 10.0 / np.max(np.abs(strains(field)[..., 0])))
     done = flexmb.simulate(builder.modal_state("rod", coordinates=eta).scene(), 1.0, rtol=1e-10, atol=1e-12, samples=21)
     assert np.max(np.abs(done.energy_drift)) <= 1e-10 * done.energy_scale
     assert np.ptp(done.energy["kinetic"]) > 0.01 * done.energy_scale, "nothing moves: this would show nothing"
@@ -396,37 +400,3 @@ def test_roll_up_closes():
     assert np.linalg.norm(tip.position) < 1e-10
     np.testing.assert_allclose(tip.rotation, np.eye(3), atol=1e-10)
     np.testing.assert_allclose(rotation_matrix(tip.quaternion), tip.rotation, atol=ROUNDING)
-
-
-def test_points_that_strong_twist_and_bending_need():
-    """What docs/exact.md says of rotations: 5 rad of curvature in all, of three polynomials about each axis."""
-    rng, off = np.random.default_rng(0), []
-    degrees = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, 400), 2)
-    for _ in range(20):
-        eta = rng.normal(size=9)
-        curvature = degrees @ eta.reshape(3, 3).T
-        eta *= 5.0 / np.mean(np.linalg.norm(curvature, axis=1))
-        back = _rotation_of_tip(120, eta).T
-        off.append([Rotation.from_matrix(back @ _rotation_of_tip(n, eta)).magnitude() for n in (6, 12)])
-    default, more = np.median(off, axis=0)
-    assert 2e-3 < default < 4e-3 and 1e-4 < more < 3e-4
-
-
-def _rotation_of_tip(points, eta):
-    """By strains of Legendre's polynomials on a straight beam of length 1."""
-    families = ("torsion", "bending_z", "bending_y")
-    section = {
-        "EA_N": 1.0, "EIy_Nm2": 1.0, "EIz_Nm2": 1.0, "GJ_Nm2": 1.0, "mass_per_length_kg_m": 1.0, "rotary_y_kg_m": 0.1,
-        "rotary_z_kg_m": 0.1,
-    }  # fmt: skip
-    body = s.BeamBody(
-        name="rod", length_m=1.0, elements=1, stations=tuple(s.BeamStation(x_m=x, **section) for x in (0.0, 1.0)),
-        level="exact", modes=s.Modes(count=3, points=points, families=families),
-    )  # fmt: skip
-    field = strain_field(body, np.array([1.0]))
-    R = []
-    for j, before in enumerate(field.before):
-        k1, k2, mean = (field.rows[j, row] @ eta for row in (FIRST, SECOND, MEAN))
-        step = Rotation.from_rotvec(mean + field.commutator[j] * np.cross(k1, k2)).as_matrix()
-        R.append(step if before < 0 else R[before] @ step)
-    return R[-1]

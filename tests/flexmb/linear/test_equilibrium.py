@@ -137,3 +137,15 @@ def test_rail_too_fast_for_its_spring():
     assert spin.linearize().stability.verdict == "unstable"
     with pytest.raises(fm.EquilibriumError):
         fm.steady_spin(bead(), "drive", 5.0)
+
+
+def test_linear_models_of_one_system_do_not_share_what_they_return():
+    """They write to the same workspaces; what they return is a copy."""
+    system = fm.compile(trees.random_scene(4))
+    kept = ("A", "B", "C")
+    model = fm.linearize(system)
+    before = [getattr(model, name).copy() for name in kept]
+    state = system.initial_state
+    fm.linearize(system, system.state(state.q, state.u + 0.3, 0.2))
+    for name, as_it_was in zip(kept, before, strict=True):
+        np.testing.assert_array_equal(getattr(model, name), as_it_was)

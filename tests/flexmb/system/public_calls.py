@@ -201,6 +201,8 @@ def calls() -> dict[str, Call]:
     along_speeds = np.arange(1.0, chain.nu + 1.0)
     add("ClosedSystem.acceleration_derivatives", chain.acceleration_derivatives,
         {"state": start, "forces": along_speeds}, state=closed_states, forces=but_none(vectors))  # fmt: skip
+    add("ClosedSystem.derivative_evaluator", _copying(chain.derivative_evaluator()), arguments, t=numbers, q=wrong_only,
+        u=wrong_only)  # fmt: skip
     add("ClosedSystem.inverse_dynamics_derivatives", chain.inverse_dynamics_derivatives,
         {"state": start, "accelerations": along_speeds}, state=closed_states, accelerations=vectors)  # fmt: skip
     add(
@@ -390,7 +392,7 @@ EXEMPT = {
     "ClosedSystem.factorise",
     "ClosedSystem.operators", "ClosedSystem.partitions", "ClosedSystem.nested",  # always refused
     "ClosedSystem.coordinate", "ClosedSystem.speed", "ClosedSystem.state", "ClosedSystem.scene_state",
-    "ClosedSystem.evaluator", "ClosedSystem.derivative_evaluator",  # always refused
+    "ClosedSystem.evaluator",  # always refused
     "ClosedSystem.workspace", "ClosedSystem.recursion_workspace", "ClosedSystem.composite_workspace",
     "load_scene", "save_scene", "SceneBuilder",  # files and data, checked where they are compiled
     "AccelerationDerivatives", "EvaluationDerivatives", "InverseDynamicsDerivatives",  # results

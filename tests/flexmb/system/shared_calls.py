@@ -92,7 +92,7 @@ def questions(system: Any, state: Any) -> dict[str, Question]:
     found["loads_in, of a run"] = lambda s, x: once(
         shared, (s, "run"), lambda: fm.simulate(s, 2e-3, samples=5)
     ).loads_in("outboard")  # fmt: skip
-    if is_tree and not scene.controllers:
+    if not scene.controllers:
         found["derivative_evaluator"] = lambda s, x: differentiated(
             once(shared, (s, "derivatives"), lambda: s.derivative_evaluator()), x
         )

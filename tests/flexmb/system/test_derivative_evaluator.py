@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.run.warm_up import looped
 from flexmb.system.derivative_evaluator import DerivativeEvaluator
 from tests.flexmb.system.argument_kinds import World
 from tests.flexmb.system.test_copies import controlled
@@ -72,7 +71,5 @@ def test_what_is_refused(system: fm.System) -> None:
         evaluator(0.0, state.q, state.u[:-1])
     with pytest.raises(fm.DynamicsError):
         evaluator(0.0, state.q, np.full(system.nu, 1e200))
-    with pytest.raises(NotImplementedError, match="for trees only"):
-        fm.compile(looped()).derivative_evaluator()
     with pytest.raises(NotImplementedError, match="has controllers"):
         fm.compile(controlled()).derivative_evaluator()

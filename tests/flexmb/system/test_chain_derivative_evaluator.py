@@ -1,0 +1,126 @@
+"""Derivatives of closed chains in a loop: against those by dense factors, dual numbers and identities; refusals."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import flexmb as fm
+from flexmb.run.warm_up import looped
+from flexmb.system.derivative_evaluator import DerivativeEvaluator
+from tests.flexmb.closure import mechanisms as m
+from tests.flexmb.closure.test_jacobian import MOVING, Linearised
+from tests.flexmb.closure.test_stiff_loops import stiff_four_bar
+from tests.flexmb.system.test_copies import controlled
+
+# Initial values of random loops do not close them: the nearest ones that do are taken, and told.
+pytestmark = pytest.mark.filterwarnings("ignore:.*the nearest values that they allow are taken:flexmb.SceneWarning")
+NAMES = "by_displacement", "by_speed", "by_force"
+# Both routes round the mass matrix of the tree, whose condition is up to 1e4 here, and the rows, with another 1e2.
+TOLERANCE = 1e-9
+
+
+def moved(system: fm.System, t: float) -> fm.State:
+    """A closed state of a motion, the initial one at t = 0."""
+    if t == 0.0:
+        return system.initial_state
+    run = fm.simulate(system, t, samples=2, rtol=1e-12, atol=1e-12)
+    return fm.State(run.q[-1], run.u[-1], run.t[-1])
+
+
+def scales(system: fm.System, state: fm.State) -> dict[str, float]:
+    """What the derivatives of the tree's accelerations are of, at this state: sizes that rounding is relative to."""
+    inverse = np.linalg.inv(system.mass_matrix(state))
+    found = system.inverse_dynamics_derivatives(state, system.accelerations(state))
+    sizes = {name: np.abs(inverse) @ np.abs(getattr(found, name)) for name in NAMES[:2]} | {NAMES[2]: inverse}
+    return {name: max(1.0, float(np.abs(size).max())) for name, size in sizes.items()}
+
+
+@pytest.mark.parametrize("t", [0.0, 0.1])
+@pytest.mark.parametrize("name", MOVING)
+def test_it_gives_what_dense_factors_give(name: str, t: float) -> None:
+    """In all directions, also those that closures do not allow, for the same choice of rows."""
+    system = fm.compile(MOVING[name]())
+    evaluator, state = system.derivative_evaluator(), moved(system, t)
+    expected = system.acceleration_derivatives(state)
+    rates = evaluator(state.t, state.q, state.u)
+    assert np.allclose(rates, expected.accelerations, rtol=0.0, atol=TOLERANCE * max(1.0, np.abs(rates).max()))
+    size = scales(system, state)
+    for each in NAMES:
+        found, wanted = getattr(evaluator, each), getattr(expected, each)
+        assert np.abs(found - wanted).max() < TOLERANCE * size[each], each
+    assert np.abs(system.closure_operators(state).J @ evaluator.by_force).max() < TOLERANCE * size["by_force"]
+    assert np.abs(evaluator.by_force - evaluator.by_force.T).max() < TOLERANCE * size["by_force"]
+
+
+@pytest.mark.parametrize("name", ["flexible four-bar", "connected", "slider-crank", "coupled"])
+def test_it_gives_what_dual_numbers_give(name: str) -> None:
+    system = fm.compile(MOVING[name]())
+    evaluator, state = system.derivative_evaluator(), moved(system, 0.1)
+    evaluator(0.0, state.q, state.u)  # duals are taken at t = 0
+    state = fm.State(state.q, state.u, 0.0)
+    J = Linearised(system, state.y.copy()).by_duals(system)[system.nq : -1]
+    # Rows that depend on others change only what closures do not allow.
+    allowed = np.eye(system.nu) - np.linalg.pinv(rows := system.closure_operators(state).J) @ rows
+    by_displacement = J[:, : system.nq] @ system.acceleration_derivatives(state).motion
+    size = scales(system, state)
+    assert np.abs((evaluator.by_speed - J[:, system.nq : -1]) @ allowed).max() < TOLERANCE * size["by_speed"]
+    off = np.abs((evaluator.by_displacement - by_displacement) @ allowed)
+    assert off.max() < TOLERANCE * size["by_displacement"]
+    assert np.abs((1.0 + 1e-6) * by_displacement @ allowed - by_displacement @ allowed).max() > off.max()
+
+
+def test_threads_and_copies_have_arrays_of_their_own() -> None:
+    system = fm.compile(MOVING["connected"]())
+    evaluator, states = system.derivative_evaluator(), [moved(system, t) for t in (0.0, 0.05, 0.1)]
+
+    def values(of: DerivativeEvaluator, state: fm.State) -> list[np.ndarray]:
+        return [of(state.t, state.q, state.u).copy(), *(getattr(of, name).copy() for name in NAMES)]
+
+    def same(one: list[np.ndarray], other: list[np.ndarray]) -> bool:
+        return all(np.array_equal(*pair) for pair in zip(one, other, strict=True))
+
+    expected = [values(evaluator, state) for state in states]
+    assert not same(expected[0], expected[1])
+    with ThreadPoolExecutor(3) as pool:
+        found = list(pool.map(lambda i: same(values(evaluator, states[i % 3]), expected[i % 3]), range(60)))
+    assert all(found)
+    for other in (copy.deepcopy(evaluator), pickle.loads(pickle.dumps(evaluator))):
+        assert isinstance(other, DerivativeEvaluator) and same(values(other, states[1]), expected[1])
+    with pytest.raises(ValueError, match="read-only"):
+        evaluator.by_force[:] = 0.0
+
+
+def test_singular_positions_are_told() -> None:
+    """All bars of a four-bar on one line: fewer rows are independent; the states before and after it answer again."""
+    system = fm.compile(m.windows(1, 30.0))
+    evaluator, start = system.derivative_evaluator(), system.initial_state
+    evaluator(start.t, start.q, start.u)
+    before = evaluator.by_force.copy()
+    flat = [0.0, 0.0, 0.0]  # the feet and the corner
+    assert max(max(gap) for gap in system.closure_gaps(system.state(flat, [1.0, 1.0, -1.0], 0.0)).values()) < 1e-12
+    with pytest.raises(fm.DynamicsError, match='"window 0"') as told:
+        evaluator(0.0, flat, [1.0, 1.0, -1.0])
+    assert told.value.status is fm.Status.CLOSURE_SINGULAR
+    evaluator(start.t, start.q, start.u)
+    np.testing.assert_array_equal(evaluator.by_force, before)
+
+
+def test_what_is_refused() -> None:
+    system = fm.compile(looped())
+    evaluator, state = system.derivative_evaluator(), system.initial_state
+    with pytest.raises(ValueError, match="give finite numbers"):
+        evaluator(0.0, state.q, state.u + np.nan)
+    with pytest.raises(ValueError, match="numbers in a row"):
+        evaluator(0.0, state.q, state.u[:-1])
+    with pytest.raises(fm.DynamicsError):
+        evaluator(0.0, state.q, np.full(system.nu, 1e200))
+    with pytest.raises(NotImplementedError, match='level "ruthless".*use level "linear" or a better one'):
+        fm.compile(stiff_four_bar("ruthless")).derivative_evaluator()
+    held = controlled()
+    with pytest.raises(NotImplementedError, match="has controllers"):
+        fm.compile(held).derivative_evaluator()
