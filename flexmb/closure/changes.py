@@ -32,11 +32,11 @@ from flexmb.closure.tables import COUPLINGS, ON_GROUND, ClosureConstants
 from flexmb.jain.derivatives.applied import subtract_applied
 from flexmb.jain.derivatives.columns import put_until
 from flexmb.jain.derivatives.strips_of import strips_of
-from flexmb.jain.derivatives.sweeps import forces_of_bodies, rows_of_speeds
+from flexmb.jain.derivatives.sweeps import clear_matrix, forces_of_bodies, rows_of_speeds
 from flexmb.jain.derivatives.tables import Derivatives, derivatives
 from flexmb.jit.bundle import bundle
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper, sweep
+from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import put, strip, strip_zeros, width
 from flexmb.spatial.spatial_vector import add6, dot6, scale6, sum6
@@ -79,14 +79,15 @@ def tree_derivatives(c: Constants, cc: ClosureConstants, nq: int, nu: int) -> De
     return found
 
 
-@sweep
+@kernel
 def differentiate(c, w, d, cc, cw, x, masses, rates):
     """Derivatives of M udot + b - T - J'f to `matrix` by displacements and speeds, those of the rows to x.
 
     Needs the forward dynamics and the poses in w, udot under the loads of cw.row, and these. M beside them if `masses`,
     x.rate if `rates`.
     """
-    forces_of_bodies(c, w, d, masses)
+    clear_matrix(c, d, masses)
+    forces_of_bodies(c, w, d)
     filled = -1
     for i in range(cc.closure.shape[0]):
         if has(cc, COUPLINGS) and is_coupling(cc, i):

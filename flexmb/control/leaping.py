@@ -21,7 +21,7 @@ from flexmb.integrate.control import Interval, copy
 from flexmb.integrate.leap import cubic
 from flexmb.integrate.lobatto import EDGE_WEIGHT, INNER, INNER_WEIGHT
 from flexmb.jit.direct import real_at, status_at
-from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.tables.status import OK
 
 # Relative accuracy of speeds and controller states: below the tightest usual tolerance, 1e-10.
@@ -129,7 +129,7 @@ def _carry(step, y, dy, y_new, dy_new, s):
     return False
 
 
-@helper
+@sweep
 def _carry_in(parts, step, y, dy, y_new, dy_new, s):
     """As `_carry`, by the classical Runge-Kutta rule in `parts` substeps; rows 1 and 2 of s.driven get the average and
     the first moment."""

@@ -15,7 +15,6 @@ from flexmb.control.schedule import instants, slack, with_instants
 from flexmb.control.tangent import jacobian
 from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, StiffProblem, problem, stiff_problem
 from flexmb.integrate.watch import Watch
-from flexmb.jit.pointer import REAL, STATUS, VECTOR, pointer
 from flexmb.tables.state import State
 from flexmb.typing import Real, Record
 
@@ -139,8 +138,7 @@ class LoopRun(LoopTables):
 
     def watching(self, watch: Watch) -> Watch:
         """The same watch with access to the signals of this run, which must have begun."""
-        look = pointer(loop.look, STATUS, REAL, VECTOR, VECTOR, self.running)
-        return watch._replace(signal=np.zeros(len(self.running.signal)), look=look)
+        return watch.seeing(len(self.running.signal), loop.look, self.running)
 
     @property
     def motion(self) -> tuple[Any, a.Loop, a.Loop]:

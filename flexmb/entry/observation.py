@@ -145,9 +145,9 @@ def sense_markers(t, y, c, w, out):
     _observe_each_marker(c, w, out)
 
 
-@helper
+@kernel
 def observe_bodies(c, w, out):
-    """Loads of wheels, energy, momentum, connectors and markers.
+    """Loads of wheels, energy, momentum, connectors and markers. It is a kernel because four others share it.
 
     Needs the velocity, pose and acceleration sweeps of the equations of motion. For bodies of level ruthless the sweeps
     are repeated: energy and momentum need their true modal speeds, markers their true deformation, too.

@@ -14,15 +14,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from flexmb.integrate.control import ACCEPTED, SAMPLES, Interval, copy
 from flexmb.integrate.problem import Accuracy
-from flexmb.jit.bundle import AnyBundle
+from flexmb.jit.bundle import AnyBundle, bundle
+from flexmb.jit.direct import addresses, status_at
 from flexmb.jit.kernel import helper, kernel, sweep
-from flexmb.jit.pointer import REAL, STATUS, VECTOR, Pointer, pointer
+from flexmb.jit.pointer import REAL, STATUS, VECTOR
 from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
@@ -36,8 +38,12 @@ _NARROW = 2.0**-20  # fraction of a step: accuracy of a turning point, where val
 _NOWHERE, _PASSES, _TURNS = range(3)  # relation of a quantity to its level in a step
 
 
-class Watch(NamedTuple):
-    """entry (k,) of y, or -1 - j for signal j; level (k,); direction (k,): 1 rising, -1 falling, 0 either.
+@bundle
+class Watch:
+    """What a run watches. As a tuple, its seventeen arrays were copied and counted in every call: short steps of `rk4`
+    took twice as long (measured), and an integrator had half as much code again.
+
+    entry (k,) of y, or -1 - j for signal j; level (k,); direction (k,): 1 rising, -1 falling, 0 either.
 
     side (k,): -1 where it is below its level, 1 above, 0 at it, kept from step to step. came (k,): of what is at its
     level where a run begins and may go either way, the side that it came from, else 0; see `RESTED`. still (k,): what
@@ -47,7 +53,7 @@ class Watch(NamedTuple):
     entries are watched. leap (2,): start and end (s) of the leap in which a level is reached, NaN if it is none; before
     (n,): y at its start. kept (1,): 1 where the run can be resumed from before a step that its end shortened;
     kept_side, kept_came (k,): as they were there.
-    look(t, y, signal, constants) finds all signals and returns a status code.
+    look (1,): address of the kernel look(t, y, signal, constants), which finds all signals and returns a status code.
     """
 
     entry: Index
@@ -67,7 +73,11 @@ class Watch(NamedTuple):
     kept: Index
     kept_side: Index
     kept_came: Index
-    look: Pointer
+    look: Index
+
+    def seeing(self, signals: int, look: Any, constants: Any) -> Watch:
+        """The same with access to this number of signals, which the kernel `look` finds by a bundle of constants."""
+        return replace(self, signal=np.zeros(signals), look=_address(look, constants))
 
 
 class Ends(NamedTuple):
@@ -137,7 +147,7 @@ def _look(problem, watch, t, y):
     """watch.value of all at t and y (n,); a status code."""
     status = OK
     if watch.signal.shape[0] > 0:
-        status = watch.look(t, y, watch.signal, problem.constants)
+        status = status_at(watch.look[0], (t, y, watch.signal, problem.constants))
     for i in range(watch.entry.shape[0]):
         entry = watch.entry[i]
         watch.value[i] = (y[entry] if entry >= 0 else watch.signal[-1 - entry]) - watch.level[i]
@@ -169,8 +179,10 @@ def _rates(problem, watch, t, y, dy, ahead, trial):
 def meets(problem, watch, step, ends):
     """Whether a step may reach a level: (status, whether). If it does not, sides are updated to those at its end."""
     h, count, trial = step.end - step.start, watch.entry.shape[0], np.empty(ends.y.shape[0])
+    before, begun = np.empty(count), np.empty(count)
     status = _rates(problem, watch, step.start, ends.y, ends.dy, _NEAR * h, trial)
-    before, begun = watch.rate.copy(), watch.value.copy()
+    copy(watch.rate, before)
+    copy(watch.value, begun)
     for i in range(count):
         if watch.side[i] == UNKNOWN:
             side = _first_side(watch.value[i], before[i] * h, watch.still[i])
@@ -383,13 +395,18 @@ def watch(
     entries: Sequence[int], levels: Sequence[float], directions: Sequence[int], sides: Sequence[int],
     came: Sequence[int], still: Sequence[float], size: int,
 ) -> Watch:  # fmt: skip
-    """Of lists of equal lengths, for a state of `size` numbers; who has signals gives it a `signal` and a `look`."""
+    """Of lists of equal lengths, for a state of `size` numbers; who has signals lets it see them by `Watch.seeing`."""
     count = len(entries)
     whole = [np.array(each, np.int64) for each in (entries, directions, sides, came)]
     return Watch(
         whole[0], np.array(levels, float), *whole[1:], np.array(still, float), np.zeros(count, np.int64),
         np.zeros(count), np.zeros(count), np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(0),
         np.full(2, math.nan), np.zeros(size), np.zeros(1, np.int64), np.zeros(count, np.int64),
-        np.zeros(count, np.int64),
-        pointer(_no_signals, STATUS, REAL, VECTOR, VECTOR, AnyBundle._numba_type_),
+        np.zeros(count, np.int64), _address(_no_signals, AnyBundle._numba_type_),
     )  # fmt: skip
+
+
+def _address(look: Any, constants: Any) -> Index:
+    """(1,) Address of a kernel for `Watch.look`."""
+    function, *_ = addresses(look, STATUS, REAL, VECTOR, VECTOR, constants)
+    return np.array([function])

@@ -4,6 +4,9 @@
 `keep`   compiled kernels are kept on disk by our own cache; see `flexmb/jit/cache.py`.
 `address`  a compiled kernel is called by the address of the wrapper that numba made with it; see `pointer.py`.
 
+A kernel that kernels call with constants, as in `velocity_sweep(c, w, False, True)`, is compiled once for all values:
+numba by itself compiles a version for each.
+
 With any other numba, or if one of the internals is missing, kernels are compiled by plain `njit` and called through
 `cfunc`, both documented: results are the same, every process compiles anew, and one warning says so. Numba's own cache
 cannot be used instead: it does not notice an edited helper in another file, and two processes may overwrite each
@@ -19,6 +22,7 @@ from types import FunctionType
 from typing import Any
 
 from numba import __version__, cfunc
+from numba.types import unliteral
 
 from flexmb.jit.folder import cache_directory, warn_once
 from flexmb.jit.progress import announced
@@ -76,6 +80,7 @@ def _by_internals() -> Hooks:
     def keep(compiled: Any, function: FunctionType) -> None:
         compiled._cache = cache = KernelCache(function, cache_directory())
         compiled.compile = cache.filling(compiled)
+        compiled.get_call_template = _of_any_value(compiled.get_call_template)
 
     def address(kernel: Any, signature: Any) -> int:
         return int(CompileResultWAP(kernel.overloads[signature.args]).__wrapper_address__())
@@ -84,6 +89,15 @@ def _by_internals() -> Hooks:
         "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True, "pipeline_class": PartCompiler
     }  # fmt: skip
     return Hooks(parts, {"pipeline_class": KernelCompiler}, keep, address)
+
+
+def _of_any_value(resolve: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    """How numba finds the version of a kernel for a call from another kernel, by the types of constants alone."""
+
+    def typed(arguments: Any, named: Any) -> Any:
+        return resolve([unliteral(each) for each in arguments], {name: unliteral(each) for name, each in named.items()})
+
+    return typed
 
 
 def _version() -> tuple[int, int]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import islice
 
 import numpy as np
 
@@ -43,31 +44,43 @@ BATCHED: tuple[Method, ...] = ("rk4", "dop853")
 
 
 def uses() -> Iterator[tuple[str, Use]]:
-    """The uses by name, those that take longest first. Neighbours share few kernels, for which one would wait."""
-    for name, builder in {"tree": scenes.pendulum, "loop": scenes.looped}.items():
-        yield f"derivatives of runs, {name}", partial(_derivatives, builder)
-    yield "linear models", _linear_models
+    """The uses by name, in an order in which neighbours share few kernels: else the processes wait for each other.
+
+    Derivatives in dual numbers come beside those by recursion; what shares most kernels with others comes late.
+    """
     yield "derivatives by numbers, tree", partial(_numbers, scenes.pendulum)
-    yield "laws that a scene may name", _laws
+    yield "linear models", _linear_models
+    yield "derivatives of runs, loop", partial(_derivatives, scenes.looped)
     yield "derivatives by numbers, loop", partial(_numbers, scenes.looped)
+    yield "laws that a scene may name", _laws
     yield "batches", _batches
-    for name, builder in LOOPS.items():
-        yield f"single states of a {name}", partial(_single_states_of_a_loop, builder)
-    yield "single states", _single_states
+    between = iter((
+        ("single states", _single_states),
+        ("single states of a loop at rest shape", partial(_single_states_of_a_loop, scenes.looped_at_rest_shape)),
+        ("derivatives of runs, tree", partial(_derivatives, scenes.pendulum)),
+        ("single states of a loop", partial(_single_states_of_a_loop, scenes.looped)),
+    ))  # fmt: skip
     for method in sorted(INTEGRATORS, key=lambda name: not INTEGRATORS[name].linearises):
-        loops = {"loop": scenes.looped} if INTEGRATORS[method].linearises else LOOPS
-        for name, builder in {"tree": scenes.pendulum, **loops}.items():
-            yield f"{method}, {name}, feedback", partial(_regulated, builder, method)
-            yield f"{method}, {name}, events", partial(_eventful, builder, method)
-        for algorithm in RUNNING:
-            if algorithm in WITH_JACOBIAN or not INTEGRATORS[method].linearises:
-                yield f"{method}, tree, {algorithm}", partial(_run, scenes.pendulum().scene(), method, algorithm)
-                if algorithm in ON_CHAINS:
-                    yield f"{method}, loop, {algorithm}", partial(_run, scenes.looped().scene(), method, algorithm)
-        if INTEGRATORS[method].keeps_jacobian:
-            yield f"{method}, many speeds", partial(_run, scenes.panelled(MANY_SPEEDS, "full").scene(), method)
-        yield f"{method}, condensed", partial(_run, scenes.panelled(18, "ruthless").scene(), method, "articulated")
+        yield from _runs(method)
+        yield from islice(between, 1)
+    yield from between
     yield "advice", _advice
+
+
+def _runs(method: Method) -> Iterator[tuple[str, Use]]:
+    """All kinds of runs by one method."""
+    loops = {"loop": scenes.looped} if INTEGRATORS[method].linearises else LOOPS
+    for name, builder in {"tree": scenes.pendulum, **loops}.items():
+        yield f"{method}, {name}, feedback", partial(_regulated, builder, method)
+        yield f"{method}, {name}, events", partial(_eventful, builder, method)
+    for algorithm in RUNNING:
+        if algorithm in WITH_JACOBIAN or not INTEGRATORS[method].linearises:
+            yield f"{method}, tree, {algorithm}", partial(_run, scenes.pendulum().scene(), method, algorithm)
+            if algorithm in ON_CHAINS:
+                yield f"{method}, loop, {algorithm}", partial(_run, scenes.looped().scene(), method, algorithm)
+    if INTEGRATORS[method].keeps_jacobian:
+        yield f"{method}, many speeds", partial(_run, scenes.panelled(MANY_SPEEDS, "full").scene(), method)
+    yield f"{method}, condensed", partial(_run, scenes.panelled(18, "ruthless").scene(), method, "articulated")
 
 
 def _run(scene: Scene, method: Method, algorithm: Algorithm = "articulated") -> None:

@@ -159,7 +159,7 @@ def _relative_acceleration(c, w, k, i):
     return A
 
 
-@helper
+@sweep
 def _change(c, w, d, k, i):
     """Derivatives of V_r, A_r and the motions of port i to `change` and `bent`; its point moves along, too.
 

@@ -11,15 +11,12 @@ sweep inward, so that each source takes some fifty products; the rows and column
 the terms of these sums one by one.
 """
 
-from flexmb.jain.derivatives.attached import attach, wheel_axis
-from flexmb.jain.derivatives.bodies import own_force
-from flexmb.jain.derivatives.connected import attach_connectors
+from flexmb.jain.derivatives.attached import wheel_axis
 from flexmb.jain.derivatives.hinges import force_to_world, outboard_rotation, to_world
 from flexmb.jain.derivatives.modes import in_body_axes
-from flexmb.jain.derivatives.motion import move
-from flexmb.jain.derivatives.ports import clear_ports, move_ports
 from flexmb.jain.derivatives.pull_tables import G0, G1, G2, W_HINGE, W
 from flexmb.jain.derivatives.strips_of import six_of
+from flexmb.jain.derivatives.sweeps import forces_of_bodies
 from flexmb.jain.derivatives.tables import (
     BY_ACCELERATION,
     BY_RATE,
@@ -62,15 +59,7 @@ def pull(c, w, d, p):
 
     Needs forward dynamics in w.
     """
-    on_ports = has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS)
-    for k in range(c.body.shape[0]):
-        move(c, w, d, k)
-        if on_ports:
-            clear_ports(c, d, k)
-            move_ports(c, w, d, k)
-        own_force(c, w, d, k)
-        if has(c, LOADS) or has(c, WHEELS):
-            attach(c, w, d, k)
+    forces_of_bodies(c, w, d)
     if has(c, SEVERAL) or has(c, MODES) or has(c, WHEELS):
         _solve(c, w, p)
     else:
@@ -78,14 +67,10 @@ def pull(c, w, d, p):
     for k in range(c.body.shape[0]):
         _virtual_motion(c, d, p, k)
     if has(c, CONNECTORS):
-        for f in range(c.function.shape[0]):
-            for i in range(3):
-                d.duals.function[f, i] = w.function[f, i]
-        attach_connectors(c, w, d)
         _pull_connectors(c, d, p)
     for k in range(c.body.shape[0] - 1, -1, -1):
         _own(c, d, p, k)
-        if on_ports:
+        if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):
             _ports(c, w, d, p, k)
         if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0 and not is_at_rest(c.body[k].level):
             _frame(c, d, p, k)

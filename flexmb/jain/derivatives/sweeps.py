@@ -23,33 +23,39 @@ def inverse_dynamics(c, w, d, masses):
 
     Needs the velocity sweep in w, that of poses if there are connectors, and udot in w.speed.acceleration.
     """
+    clear_matrix(c, d, masses)
     if is_rigid_tree(c):
-        _begin(c, w, d, masses)
+        _copy_functions(c, w, d)
         for k in range(c.body.shape[0]):
             move(c, w, d, k)
         rigid_tree(c, w, d, masses)
     else:
-        forces_of_bodies(c, w, d, masses)
+        forces_of_bodies(c, w, d)
         rows_of_speeds(c, w, d, masses)
 
 
 @helper
-def _begin(c, w, d, masses):
-    """Clear the matrix where it is not written, and copy the functions of time."""
+def clear_matrix(c, d, masses):
+    """Clear the matrix where it is not written; it goes before `forces_of_bodies`, if `rows_of_speeds` comes after."""
     nu = d.speed.shape[0]
     if d.shape[BRANCHES] or has(c, WHEELS):  # else every element is written
         for place in range(nu):
             _clear(d.matrix[place], 0, 3 * nu if masses else 2 * nu)
+
+
+@helper
+def _copy_functions(c, w, d):
+    """The functions of time."""
     for f in range(c.function.shape[0]):
         for i in range(3):
             d.duals.function[f, i] = w.function[f, i]
 
 
-@helper
-def forces_of_bodies(c, w, d, masses):
-    """Outward: motion and forces of the bodies and of what is attached to them. `masses`, and what it needs in w: see
-    `inverse_dynamics`."""
-    _begin(c, w, d, masses)
+@kernel
+def forces_of_bodies(c, w, d):
+    """Outward: motion and forces of the bodies and of what is attached to them. What it needs in w: see
+    `inverse_dynamics`. A kernel, because the derivatives of trees, of closed chains and of single rows share it."""
+    _copy_functions(c, w, d)
     for k in range(c.body.shape[0]):
         move(c, w, d, k)
         if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):
@@ -62,7 +68,7 @@ def forces_of_bodies(c, w, d, masses):
         attach_connectors(c, w, d)
 
 
-@helper
+@kernel
 def rows_of_speeds(c, w, d, masses):
     """Inward, after `forces_of_bodies` and what else acts on the bodies: the matrix, from what they answer."""
     for k in range(c.body.shape[0] - 1, -1, -1):

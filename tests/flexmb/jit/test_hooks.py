@@ -36,6 +36,20 @@ def total(numbers):
     return found
 
 
+@kernel
+def first_or_all(numbers, all_of_them):
+    found = numbers.values[0]
+    if all_of_them:
+        for i in range(1, numbers.values.shape[0]):
+            found += numbers.values[i]
+    return found
+
+
+@kernel
+def all_but_the_first(numbers):
+    return first_or_all(numbers, True) - first_or_all(numbers, False)
+
+
 @pytest.fixture
 def compiled(tmp_path, monkeypatch):
     """Compiled in this test, for a helper has no versions where its kernel was found on disk."""
@@ -49,6 +63,12 @@ def test_the_hooks_are_in_use():
     """With a numba that nobody tried yet this fails: try it, then move the bounds in `hooks` and pyproject.toml."""
     assert hooks.Hooks() != hooks.HOOKS, f"numba {numba.__version__} takes none of the hooks"
     assert hooks.HOOKS.parts["pipeline_class"] is PartCompiler
+
+
+def test_a_kernel_is_compiled_once_for_all_constants_that_kernels_call_it_with():
+    assert all_but_the_first(Numbers(np.arange(1.0, 5.0))) == 9.0
+    [(_, flag)] = first_or_all.overloads
+    assert flag == numba.types.boolean
 
 
 def test_helpers_are_parts_without_machine_code(compiled):
