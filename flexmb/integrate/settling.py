@@ -9,29 +9,22 @@ z' = J z:
 
 What is stiff dies out, and what closes a constraint stays: J is that of constrained equations, which keep its error but
 for its rate. Then little is left to project.
-
-How far a step ends from its manifold is an error too, which the estimates of a method need not see.
 """
 
-from flexmb.integrate.control import copy, scaled_norm
+from flexmb.integrate.control import copy
 from flexmb.integrate.newton_matrix import factorise, find_blocks, solve
 from flexmb.jit.kernel import helper, sweep
 
 
 @sweep
 def settle(problem, t, rate, y, s, accuracy):
-    """Put y on its manifold at time t; s: J (n,n), factors `real` of rate - J, and `change` (n,).
-
-    Returns the scaled norm of the way to the manifold; 0 where the problem does not settle.
-    """
-    away = 0.0
+    """Put y on its manifold at time t; s: J (n,n), factors `real` of rate - J, and `change` (n,)."""
     if problem.settles:
         n = accuracy.controlled
         copy(y, s.change)
         problem.project(t, s.change, problem.constants)
         for i in range(y.shape[0]):
             s.change[i] -= y[i]
-        away = scaled_norm(s.change, y, accuracy)
         for i in range(accuracy.coordinates):
             for j in range(accuracy.coordinates, n):
                 s.change[i] -= s.J[i, j] * s.change[j] / rate
@@ -39,7 +32,6 @@ def settle(problem, t, rate, y, s, accuracy):
         for i in range(n):
             y[i] += rate * s.change[i]
     problem.project(t, y, problem.constants)
-    return away
 
 
 @helper

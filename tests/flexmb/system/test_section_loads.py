@@ -182,11 +182,10 @@ def test_statics_of_a_beam_bent_by_its_length() -> None:
 
 
 def field_curvature(field: StrainField, eta: np.ndarray, x: float) -> float:
-    """The elastic curvature about z at x: the polynomial through its values where the field has them."""
-    left = np.where(field.before >= 0, field.x[field.before], 0.0)
-    places = left + (field.x - left) * (0.5 - np.sqrt(3.0) / 6.0)
-    values = field.rows[:, 0, 2] @ eta
-    return float(np.polynomial.legendre.Legendre.fit(places, values, field.mode_count - 1, domain=[0.0, 1.0])(x))
+    """The elastic curvature about z at x: the slope of the polynomial that the turn of the sections is, without load."""
+    turn, _ = field.shapes()
+    angle = np.polynomial.legendre.Legendre.fit(field.x, turn[:, 2] @ eta, field.mode_count, domain=[0.0, 1.0])
+    return float(angle.deriv()(x))
 
 
 def test_a_cut_through_a_rigid_beam_is_a_weld() -> None:
