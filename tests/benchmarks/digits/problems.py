@@ -32,7 +32,7 @@ def problems() -> list[Problem]:
     """At rest first, then in motion."""
     return [
         _rolled_up(), _elastica_at_rest(), _princeton(), _bend(), _elastica(), _spun(), _pendulum(), _spaghetti(),
-        _elbow(), _frame(), _crank(), _blade(), _four_bar(), _shaft(),
+        _elbow(), _frame(), _crank(), _blade(), _four_bar(),
     ]  # fmt: skip
 
 
@@ -290,19 +290,5 @@ def _four_bar() -> Problem:
         {
             EXACT: moving(exact, (1, 2, 3, 4), times, implicit),
             PIECES: moving(cut(pieces), (1, 2, 4), times, implicit),
-        },
-    )  # fmt: skip
-
-
-def _shaft() -> Problem:
-    scene, times = scene_of("rotors/passing_critical_speed"), np.linspace(0.0, 2.5, 251)
-    pieces = scene_of("rotors/passing_critical_speed", "modes.toml")
-    exact = curved(scene)
-    return Problem(
-        "shaft", "Shaft through its critical speed, 2.5 s", 6.0, native.converged(exact(6), times), OWN,
-        {
-            EXACT: moving(exact, (2, 3, 4, 5), times),
-            PIECES: moving(cut(pieces), (1, 2, 4, 8), times),
-            ELEMENTS: over((4, 8, 16, 32), lambda n: elements.in_space(scene, n, times)),
         },
     )  # fmt: skip

@@ -122,8 +122,8 @@ def in_flight(points, strains):
 
 @pytest.mark.parametrize(("points", "turn"), [(4, 5.0), (None, 5.0), (None, 8.0), (9, 5.0)])
 def test_what_is_said_of_points_is_true(points, turn):
-    """Strains of so many rad: beams are named where the tip's rotation is off by more than is allowed, with its size; and
-    what is said to be enough is enough. The truth is by scipy."""
+    """Strains of so many rad: beams are named where the tip's rotation is off by more than is allowed, with its size;
+    and what is said to be enough is enough. The truth is by scipy."""
     named = 0
     for strains in random_strains(turn, 6):
         truth, _ = curve(lambda x, eta=strains: curvature(eta, x), lambda _: np.eye(3)[0], np.array([1.0]))

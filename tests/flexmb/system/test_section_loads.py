@@ -182,7 +182,7 @@ def test_statics_of_a_beam_bent_by_its_length() -> None:
 
 
 def field_curvature(field: StrainField, eta: np.ndarray, x: float) -> float:
-    """The elastic curvature about z at x: the slope of the polynomial that the turn of the sections is, without load."""
+    """The elastic curvature about z at x: the slope of the polynomial that the turn of the sections is."""
     turn, _ = field.shapes()
     angle = np.polynomial.legendre.Legendre.fit(field.x, turn[:, 2] @ eta, field.mode_count, domain=[0.0, 1.0])
     return float(angle.deriv()(x))
