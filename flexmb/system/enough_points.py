@@ -27,8 +27,8 @@ ALLOWED = 1e-4
 whose six points leave 6e-5."""
 SMALL_TURN = 0.5
 """rad: between points that turn by less, nothing of ALLOWED's size is lost. The seventh order of Magnus' expansion
-leaves 3e-5 rad of random strains where they turn by 0.6, and six points 6e-5 of the length where a plane beam turns by 0.47.
-Looking closer takes longer than a short run, so that what is harmless is not looked at."""
+leaves 3e-5 rad of random strains where they turn by 0.6, and six points 6e-5 of the length where a plane beam turns by
+0.47. Looking closer takes longer than a short run, so that what is harmless is not looked at."""
 _SEEN_AT = 4
 """The parts of a beam at whose ends places and rotations are compared."""
 _MOST = 2e7

@@ -65,8 +65,8 @@ def draw(asked: list[Problem], kept: Fronts) -> None:
     figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="lower right", fontsize=10)
     drawn = StringIO()
     figure.savefig(drawn, format="svg", metadata={"Date": None})
-    without_indentation = re.sub(r"\n\s+", "\n", re.sub(r"<!--.*?-->", "", drawn.getvalue()))
-    PICTURE.write_text(without_indentation, encoding="utf-8")
+    short = re.sub(r"<!--.*?-->| id=\"[a-z.0-9]+_[0-9]+\"", "", drawn.getvalue())  # comments, and names that nothing uses
+    PICTURE.write_text(re.sub(r"\n\s+", "\n", short), encoding="utf-8")
 
 
 def _panel(axes: Axes, problem: Problem, found: dict[str, list[Point]]) -> None:
