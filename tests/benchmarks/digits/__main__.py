@@ -65,7 +65,7 @@ def draw(asked: list[Problem], kept: Fronts) -> None:
     figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="lower right", fontsize=10)
     drawn = StringIO()
     figure.savefig(drawn, format="svg", metadata={"Date": None})
-    short = re.sub(r"<!--.*?-->| id=\"[a-z.0-9]+_[0-9]+\"", "", drawn.getvalue())  # comments, and names that nothing uses
+    short = re.sub(r"<!--.*?-->| id=\"[a-z.0-9]+_[0-9]+\"", "", drawn.getvalue())  # names that nothing uses
     PICTURE.write_text(re.sub(r"\n\s+", "\n", short), encoding="utf-8")
 
 
