@@ -14,13 +14,16 @@ from scipy.optimize import root
 LENGTH, TWIST, FORCE = 10.0, 0.05 * np.pi, np.array([0.0, 0.0, -4e6])  # m, 1/m, N
 STIFFNESS = np.array([2.5e10, 8.2604167e9, 8.2604167e9, 1.41872656e8, 5.20833e8, 1.30208333e8])  # N, N m^2
 GROWTH_S = 300.0  # the force grows by 35 x^4 - 84 x^5 + 70 x^6 - 20 x^7, x being the part of this time
+STEP = 0.1  # part of the force: the whole of it at once may be balanced by another shape of the rod, too
 
 
 def exact(times):
     """Position (T, 3) m and unit quaternion (T, 4) of the tip, which is at rest under each force."""
-    x, moment, tips = np.asarray(times) / GROWTH_S, np.zeros(3), []
+    x, moment, before, tips = np.asarray(times) / GROWTH_S, np.zeros(3), 0.0, []
     for part in x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3):
-        moment = root(lambda m, part=part: _at_tip(m, part * FORCE)[12:], moment, tol=1e-13).x
+        for under in np.linspace(before, part, 2 + int(abs(part - before) / STEP))[1:]:
+            moment = root(lambda m, under=under: _at_tip(m, under * FORCE)[12:], moment, tol=1e-13).x
+        before = part
         tips.append(_at_tip(moment, part * FORCE))
     positions, rotations = np.array(tips)[:, :3], np.array(tips)[:, 3:12].reshape(-1, 3, 3)
     return {"marker:tip.position": positions, "marker:tip.orientation": np.array([_quaternion(R) for R in rotations])}
