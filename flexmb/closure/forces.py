@@ -81,13 +81,20 @@ def _locate(route, t, y, s):
 
 @helper
 def _refine(route, s):
-    """Remove the rounding residual of the row accelerations by one refinement step; requires `accelerate`."""
+    """Remove the rounding residual of the row accelerations by one refinement step; requires `accelerate`.
+
+    cw.row.load is what acts, before and after: derivatives, and whoever else comes behind, read it there.
+    """
     if not _is_delicate(s.cc, s.cw):
         return
+    for r in range(s.cw.row.shape[0]):
+        s.cw.unrefined[r] = s.cw.row[r].load
     evaluate_rows(s.c, s.w, s.cc, s.cw, True)
     _stop_rows(s.cc, s.cw)
     sum_rows(s.cc, s.cw, s.cw.coefficient)
     _pass_outward(route, s, s.cw.coefficient, s.cw.step)
+    for r in range(s.cw.row.shape[0]):
+        s.cw.row[r].load += s.cw.unrefined[r]
     for j in range(s.cw.step.shape[0]):
         s.w.speed[j].acceleration += s.cw.step[j]
 

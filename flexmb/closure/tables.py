@@ -132,6 +132,7 @@ class ClosureWorkspace:
     chosen: Index  # (G,) by group, rows by pivot; the first `rank` of each are independent
     rank: Index  # (K,) independent rows; -1 until they are counted
     scratch: Real  # (G,) right-hand sides in the order of `chosen`
+    unrefined: Real  # (G,) loads of the rows before their refinement, to which it adds
     size: Real  # (G,) response of the separate ports of a row's closure, `flexmb.closure.sizes`
     response: Response  # loads in the inward sweep, and the response to them
     coefficient: Real  # (nu,)
@@ -194,6 +195,7 @@ def workspace(c: ClosureConstants, tree: Constants, coordinates: int) -> Closure
         chosen=np.arange(rows),
         rank=np.full(len(c.group), -1),
         scratch=np.zeros(rows),
+        unrefined=np.zeros(rows),
         size=np.zeros(rows),
         response=response(tree),
         coefficient=np.zeros(nu),

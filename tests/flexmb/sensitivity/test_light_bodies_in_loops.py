@@ -1,0 +1,66 @@
+"""Loops with a body that is light beside the others: their nearly cancelling loads are refined, and derivatives of what
+these loads do must be of all of the load, not of what the refinement adds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+import flexmb as fm
+from flexmb.scene.schema import Scene
+from tests.flexmb.entry.test_tangent import extrapolated
+from tests.flexmb.sensitivity.differences import differences, relative_error
+
+ROOT = Path(__file__).parents[3]
+RATIOS = [1.0, 1e-4, 1e-6, 1e-8]
+NUMBER, OUTPUT = "crank.com_m.0", "drive.rotation.rate"
+
+
+def four_bar(ratio: float) -> Scene:
+    """The four-bar of the library, with mass and inertia of its coupler times `ratio`."""
+    scene = fm.load_scene(ROOT / "cases" / "closed_chains" / "four_bar" / "scene.toml")
+
+    def lighter(body):
+        inertia = tuple(tuple(ratio * each for each in row) for row in body.inertia_kg_m2)
+        return msgspec.structs.replace(body, mass_kg=ratio * body.mass_kg, inertia_kg_m2=inertia)
+
+    bodies = tuple(lighter(each) if each.name == "coupler" else each for each in scene.bodies)
+    assert bodies != scene.bodies or ratio == 1.0
+    return msgspec.structs.replace(scene, bodies=bodies)
+
+
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")  # of the runs with other numbers
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_runs_agree_with_differences(ratio):
+    scene = four_bar(ratio)
+    found = fm.sensitivities(scene, 0.2, [NUMBER], [OUTPUT], samples=3, rtol=1e-11, atol=1e-13)
+    expected = differences(scene, 0.2, NUMBER, [OUTPUT], 1e-3, samples=3)
+    assert np.max(expected.error) < 1e-6 * np.max(np.abs(expected.outputs)), "differences tell a millionth"
+    assert relative_error(found, NUMBER, expected)[0] < 3e-6
+    gradient = fm.gradient(scene, 0.2, [NUMBER], fm.FinalValue(OUTPUT), rtol=1e-11, atol=1e-13).derivatives[0]
+    assert gradient == pytest.approx(found.derivatives[-1, 0, 0], rel=1e-7)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_accelerations_at_a_state_agree_with_differences(ratio):
+    """Under loads that are held, and by the evaluator's recursion, along a speed that the closures allow."""
+    system = fm.compile(four_bar(ratio))
+    state = system.admissible(system.initial_state)
+    d = system.acceleration_derivatives(state)
+    evaluator = system.derivative_evaluator()
+    along = state.u / np.linalg.norm(state.u)
+
+    def faster(h):
+        return np.asarray(system.accelerations(system.state(state.q, state.u + h * along, state.t)))
+
+    expected, doubt = extrapolated(faster, 1e-2)
+    size = float(np.max(np.abs(d.by_speed)))
+    allowed = 30.0 * float(np.max(doubt)) + 1e-9 * size
+    np.testing.assert_allclose(d.by_speed @ along, expected, rtol=0.0, atol=allowed)
+    evaluator(state.t, state.q, state.u)
+    allowed += np.finfo(float).eps / ratio * size  # its columns are solved for once, without the refinement of the loads
+    np.testing.assert_allclose(evaluator.by_speed @ along, expected, rtol=0.0, atol=allowed)
+    assert np.max(np.abs(expected)) > 10.0 * allowed, "a slope of nothing would be noticed"
