@@ -61,6 +61,6 @@ def test_accelerations_at_a_state_agree_with_differences(ratio):
     allowed = 30.0 * float(np.max(doubt)) + 1e-9 * size
     np.testing.assert_allclose(d.by_speed @ along, expected, rtol=0.0, atol=allowed)
     evaluator(state.t, state.q, state.u)
-    allowed += np.finfo(float).eps / ratio * size  # its columns are solved for once, without the refinement of the loads
+    allowed += np.finfo(float).eps / ratio * size  # its columns are solved for once, without refining the loads
     np.testing.assert_allclose(evaluator.by_speed @ along, expected, rtol=0.0, atol=allowed)
     assert np.max(np.abs(expected)) > 10.0 * allowed, "a slope of nothing would be noticed"
