@@ -1,22 +1,54 @@
-"""Kernels of the suite are general ones: a thousand scenes, each for a moment, would each ask for kernels of its own.
+"""What holds for every test: general kernels, draws that are pinned, and skips that are told by reason.
 
-That kernels of a scene's own features compute the same is for tests/flexmb/tables/test_features.py to show.
+Kernels of the suite are general ones: a thousand scenes, each for a moment, would each ask for kernels of its own. That
+kernels of a scene's own features compute the same is for tests/flexmb/tables/test_features.py to show.
+
+Whoever runs the suite gets the same draws; `-m slow` searches on: there tests by hypothesis count as slow, and draw
+ten times as many examples at random.
 """
 
 import gc
 import os
+from collections import Counter
 
 import pytest
+from hypothesis import settings
 
 os.environ.setdefault("FLEXMB_KERNELS", "general")
 
+settings.register_profile("pinned", derandomize=True, database=None, deadline=None)
+settings.register_profile("search", parent=settings.get_profile("pinned"), derandomize=False, max_examples=1000)
+
+
+def _searches(config: pytest.Config) -> bool:
+    """Whether the session was asked for slow tests."""
+    return config.option.markexpr == "slow"
+
 
 def pytest_configure(config: pytest.Config) -> None:
-    """A kernel that cannot be kept fails the test that compiles it: every process would compile it anew."""
-    config.addinivalue_line("filterwarnings", "error:.* holds addresses of this process:RuntimeWarning")
+    """The profile of the draws, before any module of tests takes its settings from it."""
+    settings.load_profile("search" if _searches(config) else "pinned")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Tests that draw are slow ones where draws are searched; before pytest itself selects by marks."""
+    for item in items:
+        if _searches(config) and getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
+            item.add_marker(pytest.mark.slow)
 
 
 def pytest_collection_finish() -> None:
     """The collector passes over what is there from now on: a million objects of numba's, and thousands of tests."""
     gc.collect()
     gc.freeze()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Skips by reason, the most frequent first."""
+    skips = terminalreporter.stats.get("skipped", [])
+    reasons = Counter(skip.longrepr[2].removeprefix("Skipped: ") for skip in skips)
+    if reasons:
+        terminalreporter.section(f"{len(skips)} skipped, by reason")
+    for reason, count in reasons.most_common():
+        terminalreporter.write_line(f"{count:5d}  {reason}")

@@ -108,20 +108,20 @@ class Operators:
 
     @cached_property
     def _articulated(self) -> tuple[Real, Real, Real]:
-        """P (nbar,nbar), D^-1 (n,n) and G (nbar,n) by the recursion (51), tips to base."""
+        """P (nbar,nbar), the Cholesky factor of D (n,n) and G (nbar,n) by the recursion (51), tips to base."""
         from scipy.linalg import cho_factor, cho_solve  # slow to import, and not needed for H, M_m or M
 
-        P, G, D_inverse = self.M_m.copy(), np.zeros_like(self.H.T), np.zeros((len(self.H), len(self.H)))
+        P, G, D_factor = self.M_m.copy(), np.zeros_like(self.H.T), np.zeros((len(self.H), len(self.H)))
         for k in reversed(range(len(self.parent))):
             rows, columns = self.rows[k], self.columns[k]
             H, P_k = self.H[rows, columns], P[columns, columns]
-            factor = cho_factor(H @ P_k @ H.T + np.diag(self.J[rows]))
-            D_inverse[np.ix_(rows, rows)] = cho_solve(factor, np.eye(len(rows)))
+            factor = cho_factor(H @ P_k @ H.T + np.diag(self.J[rows]), lower=True)
+            D_factor[np.ix_(rows, rows)] = np.tril(factor[0])
             G_k = cho_solve(factor, H @ P_k).T
             G[columns, rows] = G_k
             tau_bar = np.eye(len(P_k)) - G_k @ H
             self._add_to_parent(P, k, tau_bar @ P_k)
-        return P, D_inverse, G
+        return P, D_factor, G
 
     @property
     def P(self) -> Real:
@@ -133,10 +133,10 @@ class Operators:
         """H P H' + diag(J) (n,n), block diagonal (52)."""
         return self.H @ self.P @ self.H.T + np.diag(self.J)
 
-    @property
+    @cached_property
     def D_inverse(self) -> Real:
         """(n,n), block diagonal."""
-        return self._articulated[1]
+        return self._over_D(np.eye(len(self.H)))
 
     @property
     def G(self) -> Real:
@@ -188,7 +188,7 @@ class Operators:
         T = self._speeds("T", T)
         forces = self.K @ T + self.P @ self.a_m + self.b_m + self.K_m @ self.deformation
         innovation = T - self.H @ (self.Psi @ forces)
-        chi_dot = self.innovations_inverse.T @ (self.D_inverse @ innovation)
+        chi_dot = self.innovations_inverse.T @ self._over_D(innovation)
         return arguments.representable(chi_dot - self.K.T @ (self.Psi.T @ self.a_m))
 
     def driven(self, prescribed: NDArray[np.bool_], rates: Real) -> Operators:
@@ -209,6 +209,15 @@ class Operators:
             chi=self.chi[~prescribed],
             a_m=self.a_m + self.H[prescribed].T @ rates[prescribed],
         )
+
+    def _over_D(self, x: Real) -> Real:
+        """D^-1 x, x (n,) or (n,m), by substitution: a product with the inverse is worse by the condition of D."""
+        from scipy.linalg import cho_solve
+
+        found, factor = np.zeros_like(x), self._articulated[1]
+        for rows in self.rows:
+            found[rows] = cho_solve((factor[np.ix_(rows, rows)], True), x[rows])
+        return found
 
     def _speeds(self, name: str, values: Real) -> Real:
         """(n,) finite numbers; ValueError or TypeError for others."""

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from rich.console import Console
@@ -70,7 +70,6 @@ def shown(*renderables: object) -> str:
 
 
 @given(FOREIGN)
-@settings(deadline=None)
 def test_the_terminal_shows_what_stands_there(name: str) -> None:
     console = Console(file=io.StringIO(), width=10_000, force_terminal=False)
     print_outcome(console, outcome_of(name))
@@ -84,7 +83,6 @@ def test_the_terminal_shows_what_stands_there(name: str) -> None:
 
 
 @given(FOREIGN)
-@settings(deadline=None)
 def test_markdown_shows_what_stands_there(name: str) -> None:
     assume(flat(name))
     text = written(write_summary, name)
@@ -104,7 +102,6 @@ def test_markdown_shows_what_stands_there(name: str) -> None:
 
 
 @given(FOREIGN)
-@settings(deadline=None)
 def test_junit_is_xml_that_says_what_stands_there(name: str) -> None:
     suites = ElementTree.fromstring(written(write_junit, name))
     failures = [each.get("message") for each in suites.iter("failure")]
@@ -113,7 +110,6 @@ def test_junit_is_xml_that_says_what_stands_there(name: str) -> None:
 
 
 @given(st.recursive(FOREIGN, lambda inner: st.lists(inner) | st.dictionaries(FOREIGN, inner)))
-@settings(deadline=None)
 def test_embedded_data_comes_back(data: object) -> None:
     text = str(embedded(data))
     assert json.loads(text) == data

@@ -23,6 +23,7 @@ MOST_S = 120.0
 WITH_CODE = [page for page in PAGES if any(each.language in RUN and not each.why for each in snippets(page))]
 
 
+@pytest.mark.filterwarnings("error:.*more than its points can follow")  # an example would teach it
 @pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: str(page.relative_to(ROOT)))
 def test_the_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One block after the other, in a folder that has the cases; Python's blocks see the names of those before them."""

@@ -57,7 +57,7 @@ def items_of(kind: type) -> st.SearchStrategy:
 
 
 @pytest.mark.parametrize("kind", COLLECTIONS, ids=lambda kind: kind.__name__)
-@settings(max_examples=20, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=settings.default.max_examples // 5, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_round_trip_is_the_identity(kind, data):
     """Every kind of item, nested structs and functions included, with arbitrary text and bit-exact floats."""
