@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import msgspec
 
@@ -20,6 +19,7 @@ from crosscheck.judging.verdict import Signal, compare
 from crosscheck.library.patterns import most_specific
 from crosscheck.records.held import Asked
 from crosscheck.running.held import held_reference
+from flexmb.kept import kept
 from flexmb.typing import Real
 
 
@@ -31,7 +31,7 @@ class ByReference:
     reference: ReferenceSignals
     asked: Asked
 
-    @cached_property
+    @kept
     def trusted(self) -> frozenset[str]:
         found = hold(self.true, self.reference, self.asked)
         return frozenset(name for name, _, finding in found if finding.status == "agree")

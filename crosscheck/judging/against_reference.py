@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import StoredReference
 from crosscheck.records.held import Asked, RecordedReference
 from crosscheck.records.packing import unpack
+from flexmb.kept import kept
 from flexmb.typing import Real
 
 NAME = "against the reference"
@@ -40,7 +40,7 @@ class ReferenceSignals:
     channels: Mapping[str, Real]
     uncertainties: Mapping[str, float]
 
-    @cached_property
+    @kept
     def _sizes(self) -> Sizes:
         return Sizes(tuple(self.channels), self.channels.__getitem__)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from functools import cached_property
 
 from crosscheck.engines.registry import BUILT_IN
 from crosscheck.judging.applicable import Inapplicable, set_apart
@@ -13,6 +12,7 @@ from crosscheck.judging.claims import idle_claims
 from crosscheck.judging.figures import recordable
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.verdict import Verdict
+from flexmb.kept import kept
 
 NO_REFERENCE = "has a recipe of a reference, no reference yet: crosscheck regenerate {}"
 FAULTS = ("failed", "crashed", "did not finish")  # of an engine that was asked to run
@@ -72,7 +72,7 @@ class SessionOutcome:
         judged = {engine for verdict in self.all if verdict.kind != "control" for _, engine in verdict.sides}
         return [engine for engine in self.asked if engine not in judged]
 
-    @cached_property
+    @kept
     def never_applicable(self) -> dict[str, list[str]]:
         """For each engine the cases of which it can represent nothing."""
         judged = {(verdict.case, engine) for verdict in self.all for _, engine in verdict.sides}
@@ -117,7 +117,7 @@ class SessionOutcome:
         """Verdicts as expected between the library's own engines, for which no figures were accepted yet."""
         return [each for each in self.all if each.ok and each.accepted is None and recordable(each, BUILT_IN)]
 
-    @cached_property
+    @kept
     def lost(self) -> list[Absence]:
         """Runs that were asked for and did not run, or that failed without a verdict that shows it.
 

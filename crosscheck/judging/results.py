@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from crosscheck.library.channels import is_judged, known_to
 from crosscheck.records.drawing import FILM
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record, RunRecord, RunStatus
 from crosscheck.records.packing import Packed, unpack
+from flexmb.kept import kept
 from flexmb.run.channels import signal_range
 from flexmb.typing import Real
 
@@ -42,7 +42,7 @@ class Result:
     _unpacked: dict[int, Real] = field(default_factory=dict, repr=False)
     _estimates: dict[str, Uncertainty] = field(default_factory=dict, repr=False)
 
-    @cached_property
+    @kept
     def _sizes(self) -> Sizes:
         return Sizes(tuple(self.finest.channels), self.values)
 

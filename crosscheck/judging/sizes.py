@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 from crosscheck.judging.uncertainty import roundoff_floor
+from flexmb.kept import kept
 from flexmb.run.channels import family, magnitude, signal_range
 from flexmb.typing import Real
 
@@ -85,7 +85,7 @@ class Sizes:
                 return max(turning, _ratio(speed, extent))
         return 0.0
 
-    @cached_property
+    @kept
     def _families(self) -> dict[str, list[str]]:
         found: dict[str, list[str]] = {}
         for name in self.channels:

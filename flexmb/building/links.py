@@ -7,7 +7,7 @@ node that deforms does the link keep the modal frame of its body.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import NamedTuple, assert_never
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from flexmb.building.models import ORIGIN, Models, level_of, one_point
 from flexmb.hinges.catalogue import kind_of
 from flexmb.hinges.kind import HingeKind, Reduced, z_to
+from flexmb.kept import kept
 from flexmb.levels.body import BY_NAME
 from flexmb.levels.level import FidelityLevel
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
@@ -105,7 +106,7 @@ class BodyLink:
         """How many wheels the body carries."""
         return 0 if isinstance(self.body, s.PointMass) else len(self.models.wheels.get(self.name, ()))
 
-    @cached_property
+    @kept
     def mode_count(self) -> int:
         """Modes of the body at its level."""
         return 0 if self.is_rigid else self.models[self.name].mode_count
@@ -115,12 +116,12 @@ class BodyLink:
         """Scalar coordinates of the hinge."""
         return coordinates(self.hinge)
 
-    @cached_property
+    @kept
     def inboard(self) -> Port:
         """The inboard hinge frame on the parent, in the parent's own frame."""
         return port(self.models.node(self.parent, self.inboard_end.node), *self.inboard_end[1:], self.turn)
 
-    @cached_property
+    @kept
     def outboard(self) -> Port:
         """The outboard hinge frame on the body, in the body's own frame."""
         return port(self._own_node(self.outboard_end.node), *self.outboard_end[1:], self.turn)
@@ -133,7 +134,7 @@ class BodyLink:
         node = self._own_node(name)
         return node if self.outboard.deforms else node.seen_from(self.outboard.origin, self.outboard.frame.T)
 
-    @cached_property
+    @kept
     def model(self) -> FlexibleModel:
         """Inertia points and modes, in the frame of the link."""
         if isinstance(self.body, s.PointMass):

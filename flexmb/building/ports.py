@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -12,6 +11,7 @@ from flexmb.building.connector_arrays import end_ports
 from flexmb.building.links import BodyLink, Port, port, sides_of_closures
 from flexmb.building.models import ORIGIN
 from flexmb.building.rigid_arrays import Frames, inboard_frames, outboard_frames
+from flexmb.kept import kept
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.tree import GROUND
@@ -38,7 +38,7 @@ class _Ports:
         body, i = place
         return body, self._first[body] + i
 
-    @cached_property
+    @kept
     def _first(self) -> list[int]:
         """For each body, the number of ports of the bodies before it."""
         return list(accumulate((len(ports) for ports in self.by_body), initial=0))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ from flexmb.closure.null_loads import GroupResponse, blocks, null_loads
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.response import Response, response
+from flexmb.kept import kept
 from flexmb.levels.body import LEVELS
 from flexmb.scene.schema import Closure, Coupling
 from flexmb.tables.arrays import Constants, Workspace
@@ -238,7 +238,7 @@ class Closures:
             status = int(dynamics.linearise(t, y, self._chain))
         return status
 
-    @cached_property
+    @kept
     def _stiff(self) -> Constants:
         """The tree with modal masses M + K (STIFF/omega)^2, where omega is the lowest modal frequency."""
         c = self.constants[0]

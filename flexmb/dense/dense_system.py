@@ -7,7 +7,6 @@ matrix and bias of first order (`flexmb.dense.first_order_bodies`).
 
 from __future__ import annotations
 
-from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +20,7 @@ from flexmb.dense.function_jets import profile
 from flexmb.dense.hinge_frames import ball_energy, ball_torque
 from flexmb.dense.jets import MovingFrame
 from flexmb.dense.members import DenseTree, ScalarSpeed, Seat, build
+from flexmb.kept import kept
 from flexmb.scene import schema as s
 from flexmb.scene.connectors import AlongHinge, BetweenNodes
 from flexmb.typing import Real
@@ -89,12 +89,12 @@ class DenseSystem:
         self.nq, self.nu = self.tree.nq, self.tree.nu
         self._gravity = np.array(scene.gravity_m_s2)
 
-    @cached_property
+    @kept
     def points(self) -> InertiaPoints:
         """All inertia points."""
         return points(self.tree)
 
-    @cached_property
+    @kept
     def _summed(self) -> InertiaPoints:
         """The points that are summed: of bodies of level linear only the rotary inertia of their wheels."""
         truncated = np.isin(self.points.member, self.tree.linear)
@@ -111,7 +111,7 @@ class DenseSystem:
         M += sum((S[k].T @ body.M @ S[k] for k, body in now.first_order.items()), start=np.zeros_like(M))
         return M + np.diag(self.armature)
 
-    @cached_property
+    @kept
     def armature(self) -> Real:
         """(nu,) inertia along each speed alone, kg m^2 or kg."""
         found = np.zeros(self.nu)

@@ -14,7 +14,6 @@ route, with the kinematics of `flexmb.dense` and the paper's operator equations.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 from flexmb.dense.dense_system import DenseSystem, Instant
 from flexmb.dense.function_jets import profile
 from flexmb.jain.elements import Configuration, phi, rate, undeformed, value, with_wheels
+from flexmb.kept import kept
 from flexmb.scene import schema as s
 from flexmb.tables import arguments
 from flexmb.typing import Real
@@ -64,7 +64,7 @@ class Operators:
 
     # Newton-Euler operators, section II
 
-    @cached_property
+    @kept
     def Phi(self) -> Real:
         """(1 - E_Phi)^-1 (nbar,nbar) (19)."""
         return self._resolvent(self.E_Phi)
@@ -82,13 +82,13 @@ class Operators:
         """T (n,) (41), with the armatures J chi_dot."""
         return arguments.representable(self.H @ self.f_m(chi_dot) + self.J * chi_dot)
 
-    @cached_property
+    @kept
     def M(self) -> Real:
         """Mass matrix (n,n), Newton-Euler factorisation (43)."""
         H_Phi = self.H @ self.Phi
         return H_Phi @ self.M_m @ H_Phi.T + np.diag(self.J)
 
-    @cached_property
+    @kept
     def C(self) -> Real:
         """Coriolis, centrifugal and elastic forces (n,) in M chi_dot + C = T (43)."""
         forces = self.M_m @ (self.Phi.T @ self.a_m) + self.b_m + self.K_m @ self.deformation
@@ -96,7 +96,7 @@ class Operators:
 
     # Composite bodies, section IV
 
-    @cached_property
+    @kept
     def R(self) -> Real:
         """Composite-body inertias (nbar,nbar), block diagonal (47)."""
         R = self.M_m.copy()
@@ -106,7 +106,7 @@ class Operators:
 
     # Articulated bodies, section V
 
-    @cached_property
+    @kept
     def _articulated(self) -> tuple[Real, Real, Real]:
         """P (nbar,nbar), the Cholesky factor of D (n,n) and G (nbar,n) by the recursion (51), tips to base."""
         from scipy.linalg import cho_factor, cho_solve  # slow to import, and not needed for H, M_m or M
@@ -128,7 +128,7 @@ class Operators:
         """Articulated-body inertias (nbar,nbar), block diagonal (51). LinAlgError where a D(k) is not definite."""
         return self._articulated[0]
 
-    @cached_property
+    @kept
     def D(self) -> Real:
         """H P H' + diag(J) (n,n), block diagonal (52)."""
         return self.H @ self.P @ self.H.T + np.diag(self.J)
@@ -143,32 +143,32 @@ class Operators:
         """P H' D^-1 (nbar,n), block diagonal (52)."""
         return self._articulated[2]
 
-    @cached_property
+    @kept
     def K(self) -> Real:
         """E_Phi G (nbar,n) (52)."""
         return self.E_Phi @ self.G
 
-    @cached_property
+    @kept
     def tau_bar(self) -> Real:
         """1 - G H (nbar,nbar), block diagonal (52)."""
         return np.eye(len(self.P)) - self.G @ self.H
 
-    @cached_property
+    @kept
     def E_Psi(self) -> Real:
         """E_Phi tau_bar (nbar,nbar) (52)."""
         return self.E_Phi @ self.tau_bar
 
-    @cached_property
+    @kept
     def Psi(self) -> Real:
         """(1 - E_Psi)^-1 (nbar,nbar) (53)."""
         return self._resolvent(self.E_Psi)
 
-    @cached_property
+    @kept
     def innovations(self) -> Real:
         """1 + H Phi K (n,n), unit triangular by blocks: M = (1 + H Phi K) D (1 + H Phi K)' (54)."""
         return np.eye(len(self.H)) + self.H @ self.Phi @ self.K
 
-    @cached_property
+    @kept
     def innovations_inverse(self) -> Real:
         """1 - H Psi K (n,n), the inverse of `innovations` (55)."""
         return np.eye(len(self.H)) - self.H @ self.Psi @ self.K

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, matrix_balance
 
+from flexmb.kept import kept
 from flexmb.output.whole import whole_file
 from flexmb.tables import arguments
 from flexmb.tables.state import State
@@ -152,12 +152,12 @@ class LinearModel:
         self._refuse_torn()
         return self.C[[_place(self.outputs, name, "output") for name in names], : len(self.rates)]
 
-    @cached_property
+    @kept
     def eigenvalues(self) -> Complex:
         """All 2n eigenvalues (rad/s), by modulus."""
         return self._decomposition[0]
 
-    @cached_property
+    @kept
     def modes(self) -> tuple[Mode, ...]:
         """One mode for each conjugate pair and for each real eigenvalue, by modulus."""
         values, vectors, tolerances = self._decomposition
@@ -169,7 +169,7 @@ class LinearModel:
                 found.append(Mode(complex(value), shape, float(tolerance), energy / np.sum(energy)))
         return tuple(found)
 
-    @cached_property
+    @kept
     def rigid_body_shapes(self) -> Real:
         """(n,r) orthonormal displacements of all zero eigenvalues, on which no stiffness acts.
 
@@ -275,7 +275,7 @@ class LinearModel:
             raise ValueError("the shape of the mode is not finite: give one of `modes`")
         return mode.shape
 
-    @cached_property
+    @kept
     def _decomposition(self) -> tuple[Complex, Complex, Real]:
         """Eigenvalues by modulus, right eigenvectors, and bounds n u |A| / |y'x| of the changes from rounding of A.
 

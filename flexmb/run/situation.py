@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from functools import cached_property
 from typing import NamedTuple, assert_never
 
 import numpy as np
 from msgspec.structs import replace
 
 from flexmb.integrate.settings import Settings
+from flexmb.kept import kept
 from flexmb.run.event_record import EventRecord
 from flexmb.run.impulses import struck
 from flexmb.run.origin import Beginning
@@ -78,12 +78,12 @@ class Situation:
                 return self.system.accelerations(begin.state, self._algorithm)
             return solve.feedback.accelerations(begin)
 
-    @cached_property
+    @kept
     def _paths(self) -> dict[str, str]:
         """Paths of scalar coordinates in the scene, by name; events do not alter them."""
         return scalar_paths(self.given)
 
-    @cached_property
+    @kept
     def places(self) -> dict[str, int]:
         """Indices of coordinates and speeds in [q, u, work], by name."""
         q, u = self.system.state_names

@@ -152,8 +152,10 @@ def fit(
     standard deviation of the noise, of all channels or by channel; None: estimated from the residuals. settings: of
     the runs, see `simulate`; their tolerances should lie well below the noise.
 
-    Raises ValueError or TypeError for data, bounds or sigmas that do not fit, and what `sensitivities` raises.
+    Raises ValueError or TypeError for data, bounds, sigmas or `max_runs` that do not fit, and what `sensitivities`
+    raises.
     """
+    max_runs = arguments.count("max_runs", max_runs)
     found, given = numbers(scene, parameters), measurements(data)
     names = tuple(each.name for each in found)
     problem = _Problem(

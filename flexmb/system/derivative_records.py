@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from flexmb.entry.observation import parts
 from flexmb.entry.variation import displacement_of
+from flexmb.kept import kept
 from flexmb.system.observables import ENERGIES, Observation
 from flexmb.typing import Real
 
@@ -74,7 +74,7 @@ class AccelerationDerivatives:
     by_time: Real
     motion: Real
 
-    @cached_property
+    @kept
     def by_coordinates(self) -> Real:
         """(nu,nq) by the entries of q, with quaternions normalised: by_displacement = by_coordinates @ motion."""
         return np.asarray(self.by_displacement @ displacement_of(self.motion))
@@ -91,7 +91,7 @@ class InverseDynamicsDerivatives:
     by_time: Real
     motion: Real
 
-    @cached_property
+    @kept
     def by_coordinates(self) -> Real:
         """(nu,nq), as of accelerations."""
         return np.asarray(self.by_displacement @ displacement_of(self.motion))

@@ -7,7 +7,7 @@ linear equations is solved for. `docs/derivatives.md` says what is held fixed.
 
 from __future__ import annotations
 
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, NamedTuple, TypeVar, overload
 
 import numpy as np
@@ -24,6 +24,7 @@ from flexmb.entry.tangent import TangentWorkspace, tangent_workspace, time_deriv
 from flexmb.entry.variation import ByAllDirections, FreeVariation, coordinate_motion
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
+from flexmb.kept import kept
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.system.complex_step import load_row, section_row
 from flexmb.system.derivative_evaluator import DerivativeEvaluator, fresh_derivative_evaluator
@@ -157,7 +158,7 @@ class DifferentiableMotion(FreeMotion):
         of_rates = ByAllDirections(by_displacement, by_speed, by_force, self._by_time(t, y))
         return FreeVariation(accelerations, of_rates, self._coordinate_motion(t, y), *self._no_rows)
 
-    @cached_property
+    @kept
     def _no_rows(self) -> tuple[Real, ByAllDirections, Real, Real]:
         """What a `FreeVariation` has of the rows of closures, in a tree."""
         none = np.zeros((0, self.nu))
@@ -207,7 +208,7 @@ class DifferentiableMotion(FreeMotion):
         """Which section loads (X,6) it does not determine."""
         return np.zeros((len(balance.x), 6), bool)
 
-    @cached_property
+    @kept
     def _has_corners(self) -> bool:
         return has_corners(self.constants)
 
@@ -266,7 +267,7 @@ class DifferentiableMotion(FreeMotion):
         self._move(t, y, N)
         return N
 
-    @per_thread  # not `cached_property`, which before Python 3.12 holds a lock while this possibly compiles
+    @per_thread
     def _constant_motion(self) -> Real:
         N = np.zeros((self.nq, self.nu))
         self._move(0.0, self._at_start, N)

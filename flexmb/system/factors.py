@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from flexmb.entry import factorisation
 from flexmb.jain.response import Response, response
+from flexmb.kept import kept
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.per_thread import per_thread
@@ -100,7 +100,7 @@ class MassMatrixFactors:
         """M x for x (nu,) or (nu,m)."""
         return self._by_columns(factorisation.multiply, x)
 
-    @cached_property
+    @kept
     def condition(self) -> Condition:
         """Condition number of the scaled M, by the power method on F^-1 S'S F'^-1; each step is O(N)."""
         free = self._c.speed["prescribed"] < 0

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flexmb.kept import kept
 from flexmb.motion import coordinates
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm
@@ -58,7 +58,7 @@ class FreeMotion(Mechanics):
         coordinates.project(t, y, self.constants)
         return y
 
-    @cached_property
+    @kept
     def _at_start(self) -> Real:
         """(nq+nu+1,) [q, u, 0] of the scene at t = 0."""
         q, u = np.zeros(self.nq), np.zeros(self.nu)
@@ -111,7 +111,7 @@ class FreeMotion(Mechanics):
         """By name of the algorithm."""
         return {}
 
-    @per_thread  # not `cached_property`, which before Python 3.12 holds a lock while this possibly compiles
+    @per_thread
     def start_precision(self) -> Precision | None:
         """`precision_if_doubtful` of the initial state, found once."""
         return self.precision_if_doubtful(self.initial_state)

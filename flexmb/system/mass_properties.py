@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from flexmb.kept import kept
 from flexmb.modal.cross import cross_matrix
 from flexmb.system.frames import AT_GROUND, body_pose, link_pose
 from flexmb.system.scene_arrays import SceneArrays
@@ -44,7 +44,7 @@ class MassProperties:
         arm = cross_matrix(self.centre - arguments.finite("point", arguments.vector("point", point, 3)))
         return self.inertia - self.mass * arm @ arm
 
-    @cached_property
+    @kept
     def principal(self) -> tuple[Real, Real]:
         """Moments (3,) kg m², ascending, and their axes (3,3) in its columns, World, right-handed."""
         moments, axes = np.linalg.eigh(self.inertia)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Set
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -18,6 +18,7 @@ from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
+from flexmb.kept import kept
 from flexmb.scene import schema as s
 from flexmb.system.factors import MassMatrixFactors
 from flexmb.system.observables import Observation
@@ -303,7 +304,7 @@ class Mechanics(SceneArrays):
         tables = held_hinges(self.constants, self.workspace())
         return direct(consistent_accelerations, STATUS, REAL, VECTOR, VECTOR, self.constants, *tables)
 
-    @cached_property
+    @kept
     def _is_modal(self) -> NDArray[np.bool_]:
         """Which entries of u (nu,) are modal."""
         found = np.zeros(self.nu, bool)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -13,6 +12,7 @@ from flexmb.building.links import links
 from flexmb.building.models import wheels_by_body
 from flexmb.building.numbering import Numbering
 from flexmb.jain.elimination import Elimination, with_elimination
+from flexmb.kept import kept
 from flexmb.scene import schema as s
 from flexmb.scene.connectors import AlongHinge, HingeSpring
 from flexmb.system.observables import Names
@@ -45,7 +45,7 @@ class SceneArrays:
         self.layout = numbering.layout
         self.nq, self.nu = self.layout.nq, self.layout.nu
 
-    @cached_property
+    @kept
     def recursion_constants(self) -> Constants:
         """The same constants with bodies eliminated as chosen."""
         return with_elimination(self.constants, self._elimination)

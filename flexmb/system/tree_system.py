@@ -12,13 +12,13 @@ speeds in the same order. `system.coordinate(name)` and `system.speed(name)` giv
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexmb.entry import articulated
 from flexmb.jain.elimination import ELIMINATIONS, Elimination
+from flexmb.kept import kept
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
 from flexmb.system import algorithms, labels
@@ -149,7 +149,7 @@ class System(DifferentiableMotion):
             found = self.kept.setdefault("batch", Batch([self]))
         return found
 
-    @cached_property
+    @kept
     def state_names(self) -> tuple[labels.Names, labels.Names]:
         """((name, unit) of every entry of q, the same of u)."""
         return labels.names_of_states(self)

@@ -103,6 +103,14 @@ def whole(name: str, value: Any) -> int:
     return int(value)
 
 
+def count(name: str, value: Any) -> int:
+    """The value as an integer of at least 1; TypeError or ValueError."""
+    found = whole(name, value)
+    if found < 1:
+        raise ValueError(f"{name} is {found}: at least 1 is needed")
+    return found
+
+
 def index(name: str, value: Any, length: int) -> int:
     """An index from 0 to `length` - 1; TypeError or ValueError."""
     found = whole(name, value)

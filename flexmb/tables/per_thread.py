@@ -25,7 +25,7 @@ class Own(local):
         return Own, ()
 
 
-class per_thread(Generic[Value]):  # noqa: N801  (used as `functools.cached_property` is)
+class per_thread(Generic[Value]):  # noqa: N801  (used as `property` is)
     """A property that is computed once for each thread, at its first access.
 
     The values are in the object's attribute `own`. A value set on the object itself is shared by all threads.

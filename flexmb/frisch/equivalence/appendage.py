@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import assert_never
 
 import msgspec
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from flexmb.frisch.elements import inertia_of
 from flexmb.frisch.normalisation import combined, normalised
 from flexmb.frisch.parameters import ModeParameters, mode_parameters
+from flexmb.kept import kept
 from flexmb.modal.beam import beam_elements
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.flexible import flexible_model
@@ -44,12 +44,12 @@ class Appendage:
     def mode_count(self) -> int:
         return len(self.frequencies)
 
-    @cached_property
+    @kept
     def rigid_inertia(self) -> Real:
         """(6,6), order [angular; linear]: the undeformed body about its clamp."""
         return inertia_about_origin(self.parameters)
 
-    @cached_property
+    @kept
     def moving(self) -> ModeParameters:
         """Parameters of the points that some mode moves or turns; points at the clamp move with the base."""
         model = self.model
@@ -59,7 +59,7 @@ class Appendage:
         points = {name: getattr(model, name)[moved] for name in _POINT_ARRAYS}
         return mode_parameters(replace(model, **points))
 
-    @cached_property
+    @kept
     def momenta(self) -> Real:
         """(n,6) [angular about the clamp; linear] momentum of each mode at unit rate: Q_n + m alpha x A_n and m A_n."""
         p = self.parameters

@@ -3,7 +3,7 @@
 from flexmb.jain.derivatives.tables import BY_ACCELERATION, BY_RATE, SPEED_BY_ACCELERATION, SPEED_BY_RATE, TURN
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
-from flexmb.jit.strips import after, put, strip, width
+from flexmb.jit.strips import after, part, put, strip, width
 from flexmb.spatial.rows import strips3
 from flexmb.spatial.spatial_vector import dot6, shift_force, store6, vec6
 from flexmb.spatial.vector import dot, vec3
@@ -104,10 +104,14 @@ def own_columns(d, J, place, start, stop, masses):
 
 @helper
 def put_until(d, row, n, count, x):
-    """Write the first `count` elements of a strip to row[n]; what follows there stays."""
+    """Write the first `count` elements of a strip to row[n]; what follows there stays.
+
+    Elements beyond are chosen, never subtracted: those of x may be infinite or NaN, left by a state that overflowed.
+    """
     if count < width(d):
-        beyond = count - 1
-        x = x - after(d, x, 0, beyond) + after(d, strip(d, row, n), 0, beyond)
+        present = after(d, strip(d, row, n), 0, count - 1)
+        put(d, row, n, x)
+        x = part(d, row, n, 0, count) + present
     put(d, row, n, x)
 
 

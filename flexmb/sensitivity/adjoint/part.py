@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
 from flexmb.control.wiring import wired
+from flexmb.kept import kept
 from flexmb.sensitivity.adjoint.arc import Arc
 from flexmb.sensitivity.adjoint.sampling import ActedInstant
 from flexmb.sensitivity.adjoint.transposes import Transposes
@@ -46,7 +46,7 @@ class StateDirections:
         """Those of y."""
         return slice(self.lanes, self.memory)
 
-    @cached_property
+    @kept
     def along(self) -> Real:
         """(n,D) change of y along all directions."""
         found = np.zeros((self.entries, self.size))

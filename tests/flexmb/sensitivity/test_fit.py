@@ -137,6 +137,7 @@ def test_files_and_gaps(tmp_path, ring_down):
         ({"bounds": {"bob.mass": (0.0, 1.0)}}, "not fitted"),
         ({"bounds": {"bob.mass_kg": (2.0, 3.0)}}, "search starts"),
         ({"bounds": {"bob.mass_kg": (3.0, 2.0)}}, "lower one"),
+        ({"max_runs": 0}, "max_runs is 0: at least 1 is needed"),
     ],
 )
 def test_bad_input_is_refused(change, message):
@@ -144,3 +145,11 @@ def test_bad_input_is_refused(change, message):
     with warnings.catch_warnings(), pytest.raises(ValueError, match=message):
         warnings.simplefilter("ignore")
         fm.fit(scenes.pendulum().scene(), given.pop("data"), ["bob.mass_kg"], **given)
+
+
+@pytest.mark.parametrize("runs", [0.5, np.nan, 3.0, True, "3", None])
+def test_the_number_of_runs_is_a_whole_number(runs):
+    """Others were compared with the number of runs made, and a search never ended."""
+    data = {"t": [0.0, 0.1, 0.2], "pivot.rotation": [0.0, 0.0, 0.0]}
+    with pytest.raises(TypeError, match="max_runs is .*: give a whole number"):
+        fm.fit(scenes.pendulum().scene(), data, ["bob.mass_kg"], max_runs=runs)

@@ -26,6 +26,7 @@ import flexmb as fm
 from flexmb.closure.closures import Closures
 from flexmb.frisch.nested_system import NestedSystem
 from flexmb.jit.direct import Direct
+from flexmb.kept import kept
 from flexmb.run.warm_up import looped
 from flexmb.system.closed import ClosedSystem
 from flexmb.system.evaluator import Evaluator
@@ -336,6 +337,46 @@ def test_a_process_that_is_forked_off_while_a_thread_compiles_can_compile():
         child.kill()
     thread.join()
     assert not hangs and child.exitcode == 0
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_process_that_is_forked_off_while_a_thread_finds_a_kept_value_finds_it_too():
+    """For all that is kept in an object: the thread is inside the property, and is not there in the child."""
+    finding, end = threading.Event(), threading.Event()
+
+    class Kept:
+        @kept
+        def value(self) -> int:
+            if not end.is_set():
+                finding.set()
+                end.wait(60)
+            return 1
+
+    thread = threading.Thread(target=lambda: Kept().value)
+    thread.start()
+    assert finding.wait(60)
+
+    def work() -> None:
+        end.set()
+        sys.exit(Kept().value != 1)
+
+    child = multiprocessing.get_context("fork").Process(target=work)
+    child.start()
+    child.join(20)
+    hangs = child.is_alive()
+    if hangs:
+        child.kill()
+    end.set()
+    thread.join()
+    assert not hangs and child.exitcode == 0
+
+
+def test_kept_values_take_no_lock():
+    """Only kernels' keys are, which are found under numba's lock, for which forks wait (`flexmb.jit.once`)."""
+    files = [file for name in ("flexmb", "crosscheck") for file in (ROOT / name).rglob("*.py")]
+    found = {str(file.relative_to(ROOT)) for file in files if "import cached_property" in file.read_text()}
+    assert len(files) > 100 and found == {str(Path("flexmb", "jit", "cache.py"))}
 
 
 def _compile_in_a_child() -> None:
