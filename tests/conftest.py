@@ -28,6 +28,7 @@ def _searches(config: pytest.Config) -> bool:
 def pytest_configure(config: pytest.Config) -> None:
     """The profile of the draws, before any module of tests takes its settings from it."""
     settings.load_profile("search" if _searches(config) else "pinned")
+    config.addinivalue_line("filterwarnings", "error:.* holds addresses of this process:RuntimeWarning")
 
 
 @pytest.hookimpl(tryfirst=True)
