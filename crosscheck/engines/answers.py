@@ -117,7 +117,7 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
         **{name: _output(getattr(found, name), name, count, known.get(name)) for name in OUTPUTS},
         wall_s=_number(found.wall_s, "wall_s"),
         evaluations=_count(found.evaluations),
-        undetermined=_undetermined(found),
+        undetermined=_undetermined(found, scene),
     )
     wrong = fault_of_linear(run.derivatives, run.frequencies, run.known_to, scene)
     _require(not wrong, wrong)
@@ -215,14 +215,22 @@ def _finite_samples(run: Trajectory, finished: bool) -> int:
     return count
 
 
-def _undetermined(found: Trajectory) -> tuple[str, ...]:
-    """The names of undetermined channels, which must be loads or drives of the run."""
+def _undetermined(found: Trajectory, scene: Scene) -> tuple[str, ...]:
+    """The names of undetermined channels, which must be loads or drives of the run.
+
+    Only redundant closures leave loads undetermined, so on a tree the claim itself is a breach: it would hide its
+    author's numbers, and take those of all other engines out of the comparison.
+    """
     _instance(found.undetermined, tuple, "undetermined")
     there = {f"load:{name}.{part}" for name in found.loads for part in LOAD_PARTS}
     there |= {f"drive:{name}" for name in found.drives}
     for each in found.undetermined:
         right = isinstance(each, str) and each in there
         _require(right, f"undetermined has {each!r:.80}: it names channels of loads and drives that the run has")
+        _require(
+            bool(scene.constraints),
+            f"undetermined has {each!r:.80}: the scene has no closures or couplings: the motion determines its loads",
+        )
     return tuple(sorted(set(found.undetermined)))
 
 

@@ -23,6 +23,7 @@ from crosscheck.running import rung as of_rungs
 from crosscheck.running.execute import execute, find_engine
 from crosscheck.running.job import Done, Job
 from flexmb.run.channels import channels_of
+from flexmb.scene.schema import Scene
 from tests.crosscheck.fake_engines import Fake, Pendulum
 from tests.crosscheck.sessions import CASE
 
@@ -229,7 +230,10 @@ def test_a_refusal_is_recorded_and_nothing_is_compiled() -> None:
     assert actor.heard == ["version", "supports"]
 
 
-def test_what_an_engine_leaves_undetermined_is_recorded_and_its_numbers_are_not() -> None:
+def test_what_an_engine_leaves_undetermined_is_recorded_and_its_numbers_are_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Scene, "constraints", (SimpleNamespace(name="loop"),))
     open_load = "load:pivot.torque"
     (found,) = records(Actor(play=lambda run, count: replace(run, undetermined=(open_load,))), finest_only=True)
     assert found.undetermined == (open_load,) and open_load not in found.channels
