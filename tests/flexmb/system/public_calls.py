@@ -100,6 +100,9 @@ def calls() -> dict[str, Call]:
     add("System.section_load_derivatives", tree.section_load_derivatives, of_sections, state=states, body=names,
         x=chosen(None, "root", [0.6], [-0.1], [[0.1]], [np.nan], [0.1j], plain=(([0.25, 0], np.array([0.25, 0.0])),)),
     )  # fmt: skip
+    found["System.section_load_derivatives, nowhere"] = Call(
+        lambda: tree.section_load_derivatives(state, "arm", []).by_speed, {}, {}
+    )
     in_axes = {"state": state, "axes": "outboard", "about": ("arm", "tip")}
     add("System.hinge_load_derivatives", tree.hinge_load_derivatives, in_axes, state=states,
         axes=chosen(None, "body", 5), about=chosen("tip", ("arm", "nowhere"), ("nobody", "tip"), 5))  # fmt: skip
@@ -123,6 +126,8 @@ def calls() -> dict[str, Call]:
     by = tree.parameters(["gravity_m_s2.0"])
     for name in ("accelerations", "loads"):
         add(f"Parameters.{name}", getattr(by, name), {"state": state}, state=states)
+    add("Parameters.slopes", by.slopes, {"t": 0.5, "y": W.y, "dy": np.ones((len(W.y), 1))}, t=numbers,
+        y=quaternion_first, dy=matrices)  # fmt: skip
     add("Parameters.inverse_dynamics", by.inverse_dynamics, of_rates, state=states, accelerations=vectors)
     add("System.factorise", lambda state: tree.factorise(state).log_determinant, {"state": state}, state=states)
     add("System.operators", lambda state: tree.operators(state).M, {"state": state}, state=states)
