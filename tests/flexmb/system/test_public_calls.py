@@ -46,6 +46,21 @@ def test_faults_are_seen(function, variant, fault):
     assert len(found) == 1 and fault in found[0]
 
 
+def test_what_a_refused_call_leaves_behind_is_seen():
+    """Negative controls: a call that remembers what it has refused, by other numbers or by an error."""
+    for kept, fault in ((3.0, "give other numbers"), (None, "give TypeError")):
+        memory = [2.0]
+
+        def call(q, memory=memory, kept=kept):
+            if q == "wrong":
+                memory[0] = kept
+                raise ValueError("q")
+            return 1.0 * memory[0]
+
+        found = list(faults("call", Call(call, {"q": 0.5}, {"q": lambda _: [Variant("text", "wrong")]})))
+        assert len(found) == 1 and fault in found[0]
+
+
 @pytest.mark.parametrize(
     ("failed", "rows"),
     [
