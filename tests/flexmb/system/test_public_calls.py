@@ -30,6 +30,13 @@ def test_a_public_name_that_is_not_called_is_found(monkeypatch):
     assert {"System.novel", "System.accelerations", "NestedSystem.reduced"} <= public_calls.unlisted()
 
 
+def test_a_class_that_an_attribute_leads_to_is_found(monkeypatch):
+    """Negative control: a new kind of result, with a method that nobody calls."""
+    novel = type("Novel", (), {"__module__": "flexmb.system.novel", "ask": lambda self, x: x})
+    monkeypatch.setattr(public_calls.fm.System, "novel", property(lambda self: novel()), raising=False)
+    assert novel in public_calls.reached() and "Novel.ask" in public_calls.unlisted()
+
+
 @pytest.mark.parametrize(
     ("function", "variant", "fault"),
     [
