@@ -81,7 +81,13 @@ class Feedback(LoopRun):
         return y
 
     def begin_at(self, begin: Starting, held: Mapping[str, Any]) -> Real:
-        """`only_at` with these outputs of sampled controllers in force; KeyError and ValueError for what are none."""
+        """`only_at` with these outputs of sampled controllers in force; TypeError, KeyError and ValueError for what are
+        none."""
+        if not isinstance(held, Mapping):
+            raise TypeError(
+                f"held is {held!r}: give the outputs of sampled controllers by name, as a dict; these are: "
+                f"{sorted(self.sampled_widths)}"
+            )
         y, widths = self.only_at(begin), self.sampled_widths
         for name, values in held.items():
             if name not in widths:

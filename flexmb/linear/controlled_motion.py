@@ -31,6 +31,7 @@ from flexmb.system.derivatives import FreeRow, free_row
 from flexmb.system.kinks import NotDifferentiableError
 from flexmb.system.tree_system import System
 from flexmb.tables.arguments import finite, vector
+from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Flags, Real
 
@@ -59,7 +60,8 @@ class ControlledMotion:
 
     All methods take `states` (X,), of continuous controllers, by default their initial ones (of a `Pid` with a filter
     the present error), and `held`: the outputs of sampled controllers by name, by default zero as before their first
-    sample. Between samples these are constant, so that nothing depends on them. For one thread.
+    sample. Between samples these are constant, so that nothing depends on them. Threads may share it: each has a copy
+    of the system and of the controllers, made at its first call. Laws of users are called by all these threads.
 
     All methods raise `NotDifferentiableError` (a DynamicsError) where a law has a corner, DynamicsError, ValueError and
     TypeError as the methods of a `System` do.
@@ -69,9 +71,18 @@ class ControlledMotion:
         """SceneError for a function of a user that cannot be loaded."""
         if not isinstance(system, System | Scene):
             raise TypeError(f"a System or a Scene is needed, not {type(system).__name__}")
-        self._plant = copy(compile(system) if isinstance(system, Scene) else system)
-        chosen, route = algorithms.chosen("articulated"), self._plant.route()
-        self._feedback = Feedback(self._plant, chosen, route, route.tables())
+        self._shared = compile(system) if isinstance(system, Scene) else system
+        self._feedback  # noqa: B018  (raises what cannot be built)
+
+    @per_thread
+    def _plant(self) -> System:
+        """A copy for one thread: controllers write what they drive to its functions of time."""
+        return copy(self._shared)
+
+    @per_thread
+    def _feedback(self) -> Feedback:
+        route = self._plant.route()
+        return Feedback(self._plant, algorithms.chosen("articulated"), route, route.tables())
 
     @property
     def state_names(self) -> list[str]:
@@ -80,7 +91,7 @@ class ControlledMotion:
 
     def initial_states(self, state: State, held: Mapping[str, Any] | None = None) -> Real:
         """(X,) with which continuous controllers begin at a state of the motion."""
-        y = self._feedback.begin_at(FreshStart(self._entering(state)), held or {})
+        y = self._feedback.begin_at(FreshStart(self._entering(state)), {} if held is None else held)
         return y[self._plant.nq + self._plant.nu : -1].copy()
 
     def acceleration_derivatives(
@@ -104,7 +115,7 @@ class ControlledMotion:
 
     def _at(self, state: State, states: Sequence[float] | Real | None, held: Mapping[str, Any] | None) -> _At:
         plant, feedback, state = self._plant, self._feedback, self._entering(state)
-        y = self._begin(state, states, held or {})
+        y = self._begin(state, states, {} if held is None else held)
         laws = law_derivatives(feedback, state.t, y)
         row = free_row(plant, state, "ControlledMotion")
         drives, k = len(feedback.driven), row.change.shape[1]

@@ -30,6 +30,7 @@ from flexmb.parameters.together import derivatives_together
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.scene.values import with_values
+from flexmb.tables import arguments
 from flexmb.tables.per_thread import Own, per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.tables.status import OK
@@ -82,11 +83,19 @@ class Parameters:
         Raises DynamicsError where the accelerations do not exist.
         """
         t, y = self.plant.layout.entering(state)
-        found = self.slopes(t, y, np.zeros((len(y), len(self.names))))
-        return finite_result(found[self.plant.nq : -1], t)
+        return finite_result(self._slopes(t, y, np.zeros((len(y), len(self.names))))[self.plant.nq : -1], t)
 
     def slopes(self, t: float, y: Real, dy: Real) -> Real:
-        """d(dy/dt)/dp (n,P) at y (n,) = [q, u, work], which changes along dy (n,P), one column for each parameter."""
+        """d(dy/dt)/dp (n,P) at y (n,) = [q, u, work], which changes along dy (n,P), one column for each parameter.
+
+        ValueError or TypeError for arrays that do not fit, DynamicsError where the accelerations do not exist.
+        """
+        t, y = self.plant.layout.whole(t, y)
+        along = arguments.finite("dy", arguments.shaped("dy", dy, (len(y), len(self.names))))
+        return finite_result(self._slopes(t, y, along), t)
+
+    def _slopes(self, t: float, y: Real, dy: Real) -> Real:
+        """The same of arrays that fit."""
         found = np.empty(dy.shape)
         for start, bound in self._bound:
             place = slice(start, start + bound.count)
@@ -126,8 +135,10 @@ class Parameters:
         return finite_result(found, t)
 
     def workspace(self, block: ParameterBlock) -> Any:
-        """A new workspace for kernels that take the constants of a block; one per thread."""
+        """A new workspace for kernels that take the constants of a block; one per thread. ValueError for others."""
         plant = self.plant
+        if not any(block is each for each in self.blocks):
+            raise ValueError("block: give one of the `blocks` of these parameters")
         return kernels.parameter_workspace(block.constants, plant.constants, plant.nq, plant.nu)
 
     def _open(self, t: float, y: Real) -> Real:

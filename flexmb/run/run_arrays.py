@@ -14,6 +14,7 @@ from flexmb.run.restart import Restart
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.system.observables import undetermined_loads
 from flexmb.tables import arguments
+from flexmb.tables.named import name_parts
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -95,6 +96,7 @@ class RunArrays:
     def __post_init__(self) -> None:
         """TypeError or ValueError for inconsistent arrays. Methods that use them check again, as arrays may change."""
         refuse_torn(self)
+        name_parts(self, "markers", "energy", *SPATIAL, *SOME)
 
     @property
     def undetermined(self) -> dict[str, NDArray[np.bool_]]:

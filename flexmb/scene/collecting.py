@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
+from inspect import Parameter, isfunction, signature
 from typing import Any, Self, get_args, get_type_hints
 
 import msgspec
@@ -41,8 +43,30 @@ def _collections() -> dict[type, str]:
 COLLECTIONS = _collections()
 
 
+def _with_known_keywords(method: Callable[..., Any]) -> Callable[..., Any]:
+    """The method itself where it takes keywords of any name, which `make` examines."""
+    known = signature(method).parameters
+    if any(each.kind is Parameter.VAR_KEYWORD for each in known.values()):
+        return method
+
+    @wraps(method)
+    def examined(*given: Any, **named: Any) -> Any:
+        for name in named:
+            if name not in known:
+                raise TypeError(f'{method.__name__}() has no argument "{name}": {closest(name, list(known)[1:])}')
+        return method(*given, **named)
+
+    return examined
+
+
 class Collector:
     """Collects the structs of a scene; `flexmb.scene.build.SceneBuilder` has a method for each kind."""
+
+    def __init_subclass__(cls) -> None:
+        """Methods refuse a keyword that they do not have by the nearest one that they have."""
+        for name, method in list(vars(cls).items()):
+            if isfunction(method) and not name.startswith("_"):
+                setattr(cls, name, _with_known_keywords(method))
 
     def __init__(
         self, name: str, *, gravity: ArrayLike = ZERO, description: str = "", allow: Sequence[s.Waiver] = ()

@@ -16,6 +16,7 @@ from flexmb.entry.observation import parts
 from flexmb.entry.variation import displacement_of
 from flexmb.kept import kept
 from flexmb.system.observables import ENERGIES, Observation
+from flexmb.tables.named import name_parts
 from flexmb.typing import Real
 
 
@@ -124,6 +125,9 @@ class EvaluationDerivatives(Generic[By]):
     momentum: By
     connectors: dict[str, By]
     hinge_forces: dict[str, By]
+
+    def __post_init__(self) -> None:
+        name_parts(self, "markers", "loads", "wheel_loads", "drives", "energy", "connectors", "hinge_forces")
 
 
 def by_names(

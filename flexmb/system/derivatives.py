@@ -141,7 +141,7 @@ class DifferentiableMotion(FreeMotion):
         motion, directions = self._freely(t, y)
         change = push.derivatives(motion, directions, partial(section_row, balance, push, self.observation))
         is_open = self._open_sections(state, balance)
-        found = finite_result(change, t).reshape(*is_open.shape, -1)
+        found = finite_result(change, t).reshape(*is_open.shape, change.shape[-1])
         return _split(self.nu, OfFreeMotion, np.where(is_open[..., None], np.nan, found))
 
     # What closed chains do otherwise

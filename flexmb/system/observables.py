@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flexmb.entry.observation import Outputs, outputs, parts, places, shapes
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
+from flexmb.tables.named import name_parts
 from flexmb.tables.state import finite_result
 from flexmb.typing import Index, Real
 
@@ -56,6 +57,9 @@ class Evaluation:
     momentum: Real
     connectors: dict[str, Real] = field(default_factory=dict)
     hinge_forces: dict[str, Real] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        name_parts(self, "markers", "loads", "wheel_loads", "drives", "energy", "connectors", "hinge_forces")
 
     @property
     def undetermined(self) -> dict[str, NDArray[np.bool_]]:

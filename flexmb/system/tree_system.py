@@ -267,11 +267,11 @@ class System(DifferentiableMotion):
             self.observe_rates(t, y, self._evaluator(chosen)(t, y[: self.nq], y[self.nq : -1]))
 
     def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
-        """Everything observable at y = [q, u, work], which is not checked, into a row as `Observation.columns` has it.
+        """Everything observable at y = [q, u, work] into a row as `Observation.columns` has it.
 
-        Raises DynamicsError as `evaluate` does.
+        The numbers of y are not checked, its length is. Raises DynamicsError as `evaluate` does.
         """
-        self._observe(t, y, algorithm)
+        self._observe(t, self._fitting(y), algorithm)
         row[:] = self.observation.row(t, _NO_CLOSURES)
 
 def copied(kind: type[System], kernels: Kernels, *given: Any) -> System:

@@ -2,6 +2,7 @@
 
 A call with one argument exchanged may raise one of the documented errors, or return what it returns for the same
 numbers as plain floats; never crash, and never return numbers that are not finite. What is not to be had must raise.
+After all that is wrong with an argument, the right call gives the same bits as before.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import faulthandler
 import inspect
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -100,6 +101,9 @@ def calls() -> dict[str, Call]:
     add("System.section_load_derivatives", tree.section_load_derivatives, of_sections, state=states, body=names,
         x=chosen(None, "root", [0.6], [-0.1], [[0.1]], [np.nan], [0.1j], plain=(([0.25, 0], np.array([0.25, 0.0])),)),
     )  # fmt: skip
+    found["System.section_load_derivatives, nowhere"] = Call(
+        lambda: tree.section_load_derivatives(state, "arm", []).by_speed, {}, {}
+    )
     in_axes = {"state": state, "axes": "outboard", "about": ("arm", "tip")}
     add("System.hinge_load_derivatives", tree.hinge_load_derivatives, in_axes, state=states,
         axes=chosen(None, "body", 5), about=chosen("tip", ("arm", "nowhere"), ("nobody", "tip"), 5))  # fmt: skip
@@ -123,7 +127,19 @@ def calls() -> dict[str, Call]:
     by = tree.parameters(["gravity_m_s2.0"])
     for name in ("accelerations", "loads"):
         add(f"Parameters.{name}", getattr(by, name), {"state": state}, state=states)
+    add("Parameters.slopes", by.slopes, {"t": 0.5, "y": W.y, "dy": np.ones((len(W.y), 1))}, t=numbers,
+        y=quaternion_first, dy=matrices)  # fmt: skip
     add("Parameters.inverse_dynamics", by.inverse_dynamics, of_rates, state=states, accelerations=vectors)
+    add("Parameters.evaluate", by.evaluate, {"state": state}, state=states)
+    regressor, many = tree.inertia_regressor(), {"states": [state], "accelerations": rates[None]}
+    for name in ("at", "rest"):
+        add(f"InertiaRegressor.{name}", getattr(regressor, name), of_rates, state=states, accelerations=vectors)
+    for name in ("stacked", "base"):
+        add(f"InertiaRegressor.{name}", getattr(regressor, name), many,
+            states=chosen(None, [], 5, [None], [state, state], ["state"]),
+            accelerations=chosen(None, [], 5, [None], rates, [rates[:-1]], [rates + np.nan]))  # fmt: skip
+    add("MarkerPath.angles", lambda sequence: W.run.markers["centre"].angles(sequence).values, {"sequence": "zyx"},
+        sequence=chosen(None, 5, "", "zy", "zyxz", "abc", "zzx", ["z", "y"]))  # fmt: skip
     add("System.factorise", lambda state: tree.factorise(state).log_determinant, {"state": state}, state=states)
     add("System.operators", lambda state: tree.operators(state).M, {"state": state}, state=states)
     add(
@@ -235,6 +251,16 @@ def calls() -> dict[str, Call]:
     )
     add("ControlledMotion", lambda system, state: fm.ControlledMotion(system).acceleration_derivatives(state).motion,
         {"system": tree, "state": state}, system=systems, state=states)  # fmt: skip
+    controlled = fm.ControlledMotion(tree)
+    no_mapping = chosen("x", 5, [], [1.0], np.zeros(2), {"nobody": 1.0}, {"elbow"})
+    for name in ("acceleration_derivatives", "evaluation_derivatives", "initial_states"):
+        add(f"ControlledMotion.{name}", getattr(controlled, name), {"state": state, "held": {}}, state=states,
+            held=no_mapping)  # fmt: skip
+    stresses = tree.section_loads(state, "arm", [0.25])
+    add("SectionLoads.normal_stress", stresses.normal_stress, {"E": 7e10, "y": 0.1, "z": 0.1}, E=wrong_only_number,
+        y=wrong_only_number, z=wrong_only_number)  # fmt: skip
+    add("SectionLoads.torsion_stress", stresses.torsion_stress, {"G": 2.7e10, "r": 0.1}, G=wrong_only_number,
+        r=wrong_only_number)  # fmt: skip
     add("ControlledMotion, states", _under_a_controller, {"x": np.array([0.5, -1.0])}, x=but_none(vectors))
     add(
         "equilibrium",
@@ -343,7 +369,7 @@ def calls() -> dict[str, Call]:
         parameters=chosen(None, 5, [], ["nobody"]), sigma=chosen("1", -1.0, 0.0, np.nan, {"nobody": 1.0}))  # fmt: skip
     asked = {"tolerance": 1e-2, "quantity": "marker:centre.position@1", "t_end": 0.01}
     refused = chosen(*NO_NUMBER, 0.0, -1.0)
-    found["advise"] = Call(lambda **given: fm.advise(W.scene, **given), asked, {
+    found["advise"] = Call(lambda **given: replace(fm.advise(W.scene, **given), seconds=0.0), asked, {
         "tolerance": chosen(*NO_NUMBER, 0.0, 1.0, -1.0), "t_end": refused, "quantity": chosen("nobody", 5, ("nobody",)),
     })  # fmt: skip
     add(
@@ -377,6 +403,7 @@ INSIDE = {  # of the mechanics, for numbers that have been examined
 EXEMPT = {
     *(f"{system}.{name}" for system in ("System", "ClosedSystem") for name in INSIDE),
     "System.workspace", "System.recursion_workspace", "System.composite_workspace", "NestedSystem.workspace",  # nothing
+    "Parameters.workspace",  # of a block
     "System.fault_name", "ClosedSystem.fault_name",  # of the status of a kernel
     "Trajectory.columns", "LinearModel.to_scipy", "LinearModel.to_control",  # nothing
     "Trajectory.to_csv", "Trajectory.plot", "Trajectory.to_npz", "Trajectory.to_parquet",  # a path
@@ -427,12 +454,55 @@ def _under_a_controller(x: Any) -> Any:
     return found.accelerations, found.rates, found.of_accelerations.by_states
 
 
+INNER = {  # classes of the mechanics and of runs, which users meet only behind what they are given
+    "Closures", "ClosureConstants", "NestedConstants", "DualConstants", "Constants", "Layout", "Timing", "Integration",
+    "BodyLink", "FlexibleNode", "HingeKind", "Models", "Observation", "Settings", "Integrator",
+    "Restart",  # its files: tests/flexmb/run/test_damaged_restarts.py
+}  # fmt: skip
+DEEP = 4  # attributes in a row
+
+
+def reached() -> set[type]:
+    """The classes of this library, with public methods, of all that attributes of public objects lead to."""
+    tree, state = W.tree, W.state
+    roots = (
+        tree, W.chain, W.run, W.model, tree.parameters(["gravity_m_s2.0"]), tree.inertia_regressor(),
+        tree.factorise(state), tree.operators(state), tree.nested(), tree.evaluator(), tree.derivative_evaluator(),
+        tree.section_loads(state, "arm", [0.25]), fm.ControlledMotion(tree),
+    )  # fmt: skip
+    found: set[type] = set()
+    for root in roots:
+        _follow(root, found, 0)
+    return {each for each in found if _methods(each)}
+
+
+def _follow(thing: Any, found: set[type], depth: int) -> None:
+    if type(thing) in (list, tuple) or isinstance(thing, dict):
+        for each in list(thing.values() if isinstance(thing, dict) else thing)[:DEEP]:
+            _follow(each, found, depth)
+    kind = type(thing)
+    inside = kind.__module__.startswith(("flexmb.scene", "flexmb.jit"))  # data; kernels
+    if kind in found or inside or not kind.__module__.startswith("flexmb") or depth > DEEP:
+        return
+    found.add(kind)
+    for name in {*dir(kind), *getattr(thing, "__dict__", ())}:
+        if not name.startswith("_") and not inspect.isroutine(getattr(kind, name, None)):
+            try:
+                part = getattr(thing, name)
+            except DOCUMENTED:
+                continue  # what this object has not
+            _follow(part, found, depth + 1)
+
+
+def _methods(kind: type) -> list[str]:
+    return [name for name, _ in inspect.getmembers(kind, inspect.isfunction) if not name.startswith("_")]
+
+
 def public() -> set[str]:
-    """Names of everything public that can be called; of a class its methods too."""
+    """Names of everything public that can be called; of a class, and of those that it leads to, its methods too."""
     found = set(fm.__all__) - set(schema.__all__)
-    for each in CLASSES:
-        methods = inspect.getmembers(each, inspect.isfunction)
-        found |= {f"{each.__name__}.{name}" for name, _ in methods if not name.startswith("_")}
+    for each in {*CLASSES, *(kind for kind in reached() if kind.__name__ not in INNER)}:
+        found |= {f"{each.__name__}.{name}" for name in _methods(each)}
     return found
 
 
@@ -470,8 +540,10 @@ def finite(result: Any) -> bool:
 
 def faults(name: str, call: Call) -> Iterator[str]:
     """What is not right about a call."""
-    if not finite(call.function(**call.arguments)):
+    first = call.function(**call.arguments)
+    if not finite(first):
         yield f"{name}: sound arguments give numbers that are not finite"
+    before = bits(first)
     for argument, kind in call.kinds.items():
         for variant in kind(call.arguments[argument]):
             where = f"{name}({argument}: {variant.name})"
@@ -492,6 +564,16 @@ def faults(name: str, call: Call) -> Iterator[str]:
                     result, call.function(**call.arguments | {argument: variant.plain})
                 ):
                     yield f"{where}: another result than that of floats"
+        try:
+            if bits(call.function(**call.arguments)) != before:
+                yield f"{name}: after wrong values of {argument} the right ones give other numbers"
+        except Exception as error:
+            yield f"{name}: after wrong values of {argument} the right ones give {type(error).__name__}: {error}"
+
+
+def bits(result: Any) -> list[bytes]:
+    """All numbers in a result, to be compared to the bit."""
+    return [each.tobytes() for each in arrays_of(result)]
 
 
 def is_status(result: tuple[Any, ...]) -> bool:

@@ -30,6 +30,13 @@ def test_a_public_name_that_is_not_called_is_found(monkeypatch):
     assert {"System.novel", "System.accelerations", "NestedSystem.reduced"} <= public_calls.unlisted()
 
 
+def test_a_class_that_an_attribute_leads_to_is_found(monkeypatch):
+    """Negative control: a new kind of result, with a method that nobody calls."""
+    novel = type("Novel", (), {"__module__": "flexmb.system.novel", "ask": lambda self, x: x})
+    monkeypatch.setattr(public_calls.fm.System, "novel", property(lambda self: novel()), raising=False)
+    assert novel in public_calls.reached() and "Novel.ask" in public_calls.unlisted()
+
+
 @pytest.mark.parametrize(
     ("function", "variant", "fault"),
     [
@@ -44,6 +51,21 @@ def test_faults_are_seen(function, variant, fault):
     quiet = Call(lambda q: 1.0 if isinstance(q, str) else function(q), {"q": "sound"}, {"q": lambda _: [variant]})
     found = list(faults("call", quiet))
     assert len(found) == 1 and fault in found[0]
+
+
+def test_what_a_refused_call_leaves_behind_is_seen():
+    """Negative controls: a call that remembers what it has refused, by other numbers or by an error."""
+    for kept, fault in ((3.0, "give other numbers"), (None, "give TypeError")):
+        memory = [2.0]
+
+        def call(q, memory=memory, kept=kept):
+            if q == "wrong":
+                memory[0] = kept
+                raise ValueError("q")
+            return 1.0 * memory[0]
+
+        found = list(faults("call", Call(call, {"q": 0.5}, {"q": lambda _: [Variant("text", "wrong")]})))
+        assert len(found) == 1 and fault in found[0]
 
 
 @pytest.mark.parametrize(
