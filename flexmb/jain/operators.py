@@ -133,7 +133,7 @@ class Operators:
         """H P H' + diag(J) (n,n), block diagonal (52)."""
         return self.H @ self.P @ self.H.T + np.diag(self.J)
 
-    @cached_property
+    @kept
     def D_inverse(self) -> Real:
         """(n,n), block diagonal."""
         return self._over_D(np.eye(len(self.H)))
