@@ -151,10 +151,7 @@ def _numbers(value: Any) -> list[float]:
 
 def _sid(path: Path) -> str | None:
     sid = read_sid(path)
-    try:
-        body = imported_sid(sid, "body").body
-    except SidError as error:
-        raise SidError(f"{path}: {error}") from None
+    body = imported_sid(sid, "body").body
     given = re.findall(r"(?im)^\s*mass\s*=\s*([-+\w.]+)", path.read_text(encoding="utf-8-sig"))
     if given and float(given[-1].lower().replace("d", "e")) != sid.mass:
         return f"the mass is {sid.mass}, not {given[-1]}"
