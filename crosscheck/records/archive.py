@@ -12,20 +12,22 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 import msgspec
 
 from crosscheck.library.channels import part_of
 from crosscheck.library.check import check_recorded
+from crosscheck.records.held import RecordedReference
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Record, RunRecord, Written
 from crosscheck.records.packing import Packed, packed_bytes, unpack
 from flexmb.output.whole import whole_file
 from flexmb.output.writing import folder, writing
 from flexmb.scene.reading import MIB, allowance, regular_size
 
+T = TypeVar("T")
 LONGEST_LINE = 128 * MIB  # a hundred markers at ten thousand times fit
 
 
@@ -73,9 +75,20 @@ def decoded_lines(file: Path, kind: Any) -> list[Any]:
                 record = decoder.decode(line)
                 left -= _checked(record, left)
             except (ValueError, RecursionError) as error:  # broken JSON, another schema, text that is not UTF-8
-                record = BrokenLine(str(file), number, str(error))
+                record = BrokenLine(str(file), number, _reason(error, line))
             found.append(record)
     return found
+
+
+def _reason(error: Exception, line: bytes) -> str:
+    """What is wrong with a line, in words for whoever has the file."""
+    if isinstance(error, RecursionError):
+        return "its brackets are nested too deeply"
+    try:
+        line.decode()
+    except UnicodeDecodeError as found:  # an error of the decoder counts from the start of a text inside the line
+        return f"it is not UTF-8 (byte 0x{line[found.start]:02x} is byte {found.start + 1} of the line)"
+    return str(error)
 
 
 def _lines(stream: BinaryIO) -> Iterator[bytes]:
@@ -94,24 +107,37 @@ def _checked(record: Any, limit: int) -> int:
         check_recorded(record.run)
         if record.variants.keys() != {variant.name for variant in record.run.variants}:
             raise ValueError("its variants are not those of its run file")
-        return 0 if record.reference is None else _checked_arrays(record.reference.arrays, limit)
+        return 0 if record.reference is None else _checked_arrays(_arrays(record.reference), limit)
     if not isinstance(record, RunRecord):
         return 0
     sized = 0.0 < record.effort_value < math.inf or (record.effort_value == 0.0 and record.rungs < 2)
     if not (0 <= record.rung <= max(record.rungs - 1, 0) and sized):
         raise ValueError(f"effort {record.effort_value} on rung {record.rung} of {record.rungs} is none")
     _check_shapes(record)
-    return _checked_arrays([*record.channels.values(), *([] if record.times is None else [record.times])], limit)
+    return _checked_arrays(_arrays(record), limit)
 
 
-def _checked_arrays(arrays: Sequence[Packed], limit: int) -> int:
-    """Bytes of memory that arrays need; ValueError if one is damaged or they exceed `limit`."""
-    size = sum(packed_bytes(packed) for packed in arrays)
+def _arrays(record: RunRecord | RecordedReference) -> dict[str, Packed]:
+    """All arrays by name, for messages."""
+    return {**record.channels, **({} if record.times is None else {"times": record.times})}
+
+
+def _checked_arrays(arrays: Mapping[str, Packed], limit: int) -> int:
+    """Bytes of memory that arrays need; ValueError, with its name, if one is damaged, or if they exceed `limit`."""
+    size = sum(_named(name, packed_bytes, packed) for name, packed in arrays.items())
     if size > limit:
         raise ValueError(f"its arrays would take {size / MIB:.3g} MiB, more than a file of this size can hold")
-    for packed in arrays:
-        unpack(packed)
+    for name, packed in arrays.items():
+        _named(name, unpack, packed)
     return size
+
+
+def _named(name: str, read: Callable[[Packed], T], packed: Packed) -> T:
+    """What is read from an array; a ValueError tells which array it is."""
+    try:
+        return read(packed)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
 
 
 def _check_shapes(record: RunRecord) -> None:

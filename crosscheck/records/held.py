@@ -27,7 +27,3 @@ class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     uncertainties: dict[str, float] = {}
     routes: tuple[str, ...] = ()
     fault: str = ""
-
-    @property
-    def arrays(self) -> tuple[Packed, ...]:
-        return (*self.channels.values(), *([] if self.times is None else [self.times]))

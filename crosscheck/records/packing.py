@@ -33,16 +33,20 @@ def unpack(packed: Packed) -> Real:
     size = packed_bytes(packed)
     unpacker = zlib.decompressobj()
     try:
-        data = unpacker.decompress(base64.b64decode(packed.data, validate=True), size + 1)
-    except (zlib.error, ValueError) as error:
-        raise ValueError(f"an array is damaged: {error}") from None
+        deflated = base64.b64decode(packed.data, validate=True)
+    except ValueError:
+        raise ValueError("its array is damaged: the text is not base64") from None
+    try:
+        data = unpacker.decompress(deflated, size + 1)
+    except zlib.error:
+        raise ValueError("its array is damaged: the text was changed or cut off") from None
     if len(data) != size or not unpacker.eof:
-        raise ValueError(f"an array of shape {packed.shape} does not hold the numbers that it should")
+        raise ValueError(f"its array of shape {packed.shape} does not hold the numbers that it should")
     return np.frombuffer(data, dtype="<f8").reshape(packed.shape).astype(np.float64)
 
 
 def packed_bytes(packed: Packed) -> int:
     """Bytes of an array by its shape. ValueError for an invalid shape."""
     if not 1 <= len(packed.shape) <= 2 or any(length < 0 for length in packed.shape):
-        raise ValueError(f"no signal has the shape {packed.shape}")
+        raise ValueError(f"its array has the shape {packed.shape}, which no signal has")
     return 8 * math.prod(packed.shape)

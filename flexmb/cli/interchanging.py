@@ -151,10 +151,12 @@ def _imported(model: Path, free_base: bool, repair: bool) -> tuple[Scene, tuple[
         found = read_mjcf(model)
         return found.scene, found.notes
     if ending in SID:
+        from flexmb.interchange.imported import naming
         from flexmb.interchange.sid import imported_sid, read_sid
 
         imported = imported_sid(read_sid(model), model.stem)
-        return _held(imported.body), imported.notes
+        with naming(str(model)):
+            return _held(imported.body), imported.notes
     raise ValueError(f'{model}: "{model.suffix}" is not a known kind of model: give .urdf, .xml (MJCF) or .sid')
 
 

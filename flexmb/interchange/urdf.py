@@ -27,6 +27,11 @@ from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
 
 MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
+ONCE = {
+    "link": ("inertial",), "joint": ("parent", "child", "origin", "axis", "mimic"),
+    "inertial": ("origin", "mass", "inertia"),
+}  # fmt: skip
+"""What an element has at most once: of several, no reader could tell which one is meant."""
 IGNORED = {"limit": "limits", "dynamics": "damping and friction", "safety_controller": "safety limits"}
 NO_MECHANICS = ("material", "transmission", "gazebo", "sensor", "ros2_control")
 Z = np.array([0.0, 0.0, 1.0])
@@ -81,6 +86,7 @@ class _Robot:
         self.file, self.robot, self.repair = file, robot, repair
         self.links = self._named("link")
         self.joints = self._named("joint")
+        self._refuse_doubles()
         self.mimics = Mimics(self.joints, self._fail)
         self.ignored: dict[str, list[str]] = {}
         self.repaired: list[str] = []
@@ -108,6 +114,16 @@ class _Robot:
                 self._fail(f'{tag} "{name}"', "it has no name, or one that is taken", "rename it")
             found[name] = element
         return found
+
+    def _refuse_doubles(self) -> None:
+        """ModelError for a link, a joint or an inertial that has twice what it may have once."""
+        places = [(f'link "{name}"', link) for name, link in self.links.items()]
+        places += [(f'joint "{name}"', joint) for name, joint in self.joints.items()]
+        places += [(place, inertial) for place, link in places for inertial in link.findall("inertial")]
+        for place, element in places:
+            for tag in ONCE[element.tag]:
+                if (count := len(element.findall(tag))) > 1:
+                    self._fail(place, f"its {element.tag} has {count} elements {tag}", "keep one of them")
 
     def _root(self) -> str:
         """The only link that is not a child of a joint. ModelError if the joints do not form a tree."""

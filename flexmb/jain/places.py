@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.jit.bundle import bundle
+from flexmb.scene.sizes import refuse_large_matrix
 from flexmb.tables.arrays import Constants
 from flexmb.typing import Index, Real
 
@@ -35,8 +36,10 @@ class Matrices:
 
 
 def matrices(c: Constants) -> Matrices:
-    """Places of a tree, and matrices of the right sizes."""
+    """Places of a tree, and matrices of the right sizes. ValueError for a tree whose mass matrix would be too large."""
     bodies, nu = len(c.body), len(c.speed)
+    remedy = 'take fewer bodies or modes for derivatives, or run by the algorithm "articulated", which needs none'
+    refuse_large_matrix(nu, "the mass matrix", remedy)
     children: list[list[int]] = [[] for _ in range(bodies + 1)]
     for k, parent in enumerate(c.body["parent"].tolist()):
         children[parent].append(k)

@@ -123,7 +123,9 @@ def _read(path: str | os.PathLike[str]) -> Restart:
     """The contents of a file, not yet validated; KeyError for a missing array, ValueError for one of the wrong form."""
     file = unpacked(path, _KINDS)
     version = file.get("version", np.array(VERSION))
-    if version.shape or version != VERSION:
+    if version.shape:
+        raise ValueError(f'"version" has the shape {version.shape}, but must be one value')
+    if version != VERSION:
         raise ValueError(f"it is of version {version} of the format, but this flexmb reads version {VERSION}")
     for name in ("method", "t"):
         if file[name].shape:

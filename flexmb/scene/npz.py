@@ -21,6 +21,7 @@ HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.re
 ENCRYPTED = 0x1
 ONE_ARRAY, ARCHIVE = np.lib.format.MAGIC_PREFIX, b"PK"  # first bytes of an .npy file and of a zip archive
 DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OverflowError, ValueError)
+NO_TABLE = "it is not a whole .npz archive of plain arrays: its table of contents is damaged or cut off"
 PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
@@ -51,8 +52,7 @@ def unpacked(file: str | os.PathLike[str], kinds: Mapping[str, str]) -> dict[str
         with zipfile.ZipFile(file) as archive:
             for member in archive.infolist():
                 name = _name(member, kinds, found)
-                with archive.open(member) as stream:
-                    found[name] = _read(stream, name, left, kinds[name])
+                found[name] = _member(archive, member, name, left, kinds[name])
                 left -= max(8, found[name].itemsize) * found[name].size
         return found
     except Unreadable:
@@ -61,9 +61,20 @@ def unpacked(file: str | os.PathLike[str], kinds: Mapping[str, str]) -> dict[str
         if error.filename is not None:
             raise
         # A damaged table of contents can refer to a position before the start of the file.
-        raise Unreadable(f"it is not an .npz archive of plain arrays ({error})", "write it with numpy.savez") from None
-    except DAMAGED as error:
-        raise Unreadable(f"it is not an .npz archive of plain arrays ({error})", "write it with numpy.savez") from None
+        raise Unreadable(NO_TABLE, "write the file again with numpy.savez") from None
+    except DAMAGED:
+        raise Unreadable(NO_TABLE, "write the file again with numpy.savez") from None
+
+
+def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str, limit: int, kinds: str) -> NDArray[Any]:
+    """One array of an archive; Unreadable tells which one is damaged, and not what the unpacking library says."""
+    try:
+        with archive.open(member) as stream:
+            return _read(stream, name, limit, kinds)
+    except Unreadable:
+        raise
+    except (*DAMAGED, OSError):
+        raise Unreadable(f'"{name}" is damaged: its bytes were changed or cut off', "write the file again") from None
 
 
 def _name(member: zipfile.ZipInfo, known: Collection[str], found: Collection[str]) -> str:

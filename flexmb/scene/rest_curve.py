@@ -7,7 +7,8 @@ the quaternion of R and then r are found by collocation at Gauss points, to roun
 from __future__ import annotations
 
 from functools import lru_cache
-from math import ceil
+from itertools import pairwise
+from math import ceil, hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +18,13 @@ from flexmb.scene.collocation import partial_integrals
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.typing import Real
 
+_Station = tuple[float, tuple[float, float, float]]  # x in m, curvature in 1/m
 POINTS = 16
 """Gauss points of a span: the error of a solution that turns by one radian is some (1/2)^32 / 32!."""
+
+
+MOST_TURN = 10_000.0
+"""Radians by which an unloaded axis may turn: each takes a third of a millisecond. Coils of 1,500 turns stay below."""
 
 
 class _Span(NamedTuple):
@@ -38,13 +44,26 @@ def is_curved(body: BeamBody) -> bool:
     return any(any(station.curvature_1_m) for station in body.stations)
 
 
+def turn_at_rest(body: BeamBody) -> float:
+    """Upper bound (rad) of the angle by which the sections of an unloaded beam turn from its root to its tip."""
+    return sum(_turn(left, right) for left, right in pairwise(_stations(body)))
+
+
 def rest_sections(body: BeamBody, x: Real) -> tuple[Real, Real]:
-    """Position (n,3) and rotation (n,3,3), section to body axes, of the unloaded sections at x (n,) m."""
+    """Position (n,3) and rotation (n,3,3), section to body axes, of the unloaded sections at x (n,) m.
+
+    ValueError for a beam that turns by more than MOST_TURN, before anything is computed; `check_scene` names the place.
+    """
     x = np.asarray(x, float)
     if not is_curved(body):
         zero = np.zeros_like(x)
         return np.column_stack([x, zero, zero]), np.tile(np.eye(3), (len(x), 1, 1))
-    spans = _spans(tuple((s.x_m, s.curvature_1_m) for s in body.stations), body.length_m)
+    if not (turn := turn_at_rest(body)) <= MOST_TURN:
+        raise ValueError(
+            f'body "{body.name}" turns by {turn:.6g} rad at rest, and the limit is {MOST_TURN:g} rad: correct '
+            "curvature_1_m, or divide the beam into several that are welded together"
+        )
+    spans = _spans(_stations(body))
     at = np.searchsorted([span.start for span in spans], x, side="right") - 1
     quaternion, position = np.zeros((len(x), 4)), np.zeros((len(x), 3))
     for i, (place, s) in enumerate(zip(np.maximum(at, 0), x, strict=True)):
@@ -54,15 +73,23 @@ def rest_sections(body: BeamBody, x: Real) -> tuple[Real, Real]:
     return position, rotation_matrix(quaternion)
 
 
+def _stations(body: BeamBody) -> tuple[_Station, ...]:
+    return tuple((station.x_m, station.curvature_1_m) for station in body.stations)
+
+
+def _turn(left: _Station, right: _Station) -> float:
+    """Upper bound (rad) of the turn between two stations."""
+    return max(hypot(*left[1]), hypot(*right[1])) * (right[0] - left[0])
+
+
 @lru_cache(maxsize=128)
-def _spans(stations: tuple[tuple[float, tuple[float, float, float]], ...], length: float) -> list[_Span]:
+def _spans(stations: tuple[_Station, ...]) -> list[_Span]:
     quaternion, position = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
     spans = []
     xi, _ = np.polynomial.legendre.leggauss(POINTS)
     inner, whole = partial_integrals(xi, POINTS), partial_integrals(np.ones(1), POINTS)[0]
-    for (left, first), (right, last) in zip(stations, stations[1:], strict=False):
-        turn = max(np.linalg.norm(first), np.linalg.norm(last)) * (right - left)
-        count = max(1, ceil(turn))
+    for (left, first), (right, last) in pairwise(stations):
+        count = max(1, ceil(_turn((left, first), (right, last))))
         for start, stop in zip(*_ends(left, right, count), strict=True):
             if stop == start:
                 continue

@@ -12,7 +12,8 @@ from flexmb.scene.bodies import BeamBody, Level
 from flexmb.scene.sections import has_plain_sections
 
 MOST_BYTES = 2**32
-"""Limit of the memory that the model of one body may need while it is made, the same as for the outputs of a run."""
+"""Limit of the memory that the model of one body may need while it is made, the same as for the outputs of a run and
+for one matrix over all speeds."""
 MOST_MODES = 2_000  # of one body: the dense eigenproblem of its matrices takes minutes
 ENDLESS = 10**18  # larger integers, which files can contain, are replaced by this one, so that floats do not overflow
 _COORDINATES = {"axial": 1, "torsion": 1, "bending_y": 2, "bending_z": 2}  # per element; bending with shear: twice
@@ -56,6 +57,15 @@ def beam_estimate(body: BeamBody, modes: int) -> Estimate:
     )
     memory = _PER_COORDINATE * size**2 + modes_memory(body.level, points, modes)
     return Estimate(memory, 1e-3 * size**3 / _SPEED)
+
+
+def refuse_large_matrix(n: int, what: str, remedy: str) -> None:
+    """ValueError if a matrix (n,n) of real numbers would exceed MOST_BYTES; called before it is allocated."""
+    if (size := 8 * n**2) > MOST_BYTES:
+        raise ValueError(
+            f"{what} would be a matrix of {n} x {n} numbers, which takes {size / 2**30:.3g} GiB, but "
+            f"{MOST_BYTES / 2**30:g} GiB are allowed: {remedy}"
+        )
 
 
 def modes_memory(level: Level, points: float, modes: int) -> float:

@@ -93,6 +93,22 @@ def rest_frames(body: Body) -> dict[str, NodeFrame]:
             assert_never(body)
 
 
+def node_names(body: Body) -> tuple[str, ...]:
+    """Names of the nodes of `rest_frames`, in its order, without their frames; none of a SID body's."""
+    match body:
+        case RigidBody():
+            implicit: tuple[str, ...] = ("origin",)
+        case BeamBody():
+            implicit = ("origin", "root", "tip")
+        case ModalBody():
+            implicit = ("origin",) if body.boundary == "clamped-free" else ()
+        case SidBody():
+            return ()
+        case _:
+            assert_never(body)
+    return tuple(dict.fromkeys((*implicit, *(node.name for node in body.nodes))))
+
+
 def nodes_along(beam: BeamBody) -> dict[str, float]:
     """Places (m) along the beam of all its nodes by name, implicit ones included."""
     return {"origin": 0.0, "root": 0.0, "tip": beam.length_m, **{node.name: node.x_m for node in beam.nodes}}

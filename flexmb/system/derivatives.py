@@ -26,6 +26,7 @@ from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.kept import kept
 from flexmb.scene.open_loop import refuse_feedback
+from flexmb.scene.sizes import refuse_large_matrix
 from flexmb.system.complex_step import load_row, section_row
 from flexmb.system.derivative_evaluator import DerivativeEvaluator, fresh_derivative_evaluator
 from flexmb.system.derivative_records import (
@@ -247,7 +248,9 @@ class DifferentiableMotion(FreeMotion):
     # Directions
 
     def _differentiable(self, state: State, what: str) -> tuple[float, Real]:
-        """Time and y of a state at which derivatives exist; NotImplementedError for scenes with controllers."""
+        """Time and y of a state at which derivatives exist; NotImplementedError for scenes with controllers, ValueError
+        for a scene with so many speeds that a matrix of derivatives would be too large."""
+        refuse_large_matrix(self.nu, what, "take a scene of fewer bodies or modes: derivatives by all speeds are dense")
         refuse_feedback(self.scene, what, INSTEAD)
         return self._without_kinks(state, what)
 

@@ -11,7 +11,7 @@ from flexmb.modal.flexible_model import FlexibleNode
 from flexmb.modal.strain_field import StrainField
 from flexmb.scene.bodies import SidBody
 from flexmb.scene.quaternions import rotation_matrix
-from flexmb.scene.tree import GROUND, rest_frames
+from flexmb.scene.tree import GROUND, node_names
 from flexmb.system.moved_sections import moved_sections
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.system.turning_points import rotation_along
@@ -144,5 +144,5 @@ def _port(w: MotionTables, port: int) -> tuple[Real, Real]:
 
 def _without_node(arrays: SceneArrays, body: str, node: str) -> str:
     found = next((each for each in arrays.scene.bodies if each.name == body), None)  # none for a point mass
-    nodes = "" if found is None or isinstance(found, SidBody) else f'; its nodes are {", ".join(rest_frames(found))}'
+    nodes = "" if found is None or isinstance(found, SidBody) else f'; its nodes are {", ".join(node_names(found))}'
     return f'body "{body}" has no node "{node}"{nodes}'

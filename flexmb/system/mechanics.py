@@ -20,6 +20,7 @@ from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.kept import kept
 from flexmb.scene import schema as s
+from flexmb.scene.sizes import refuse_large_matrix
 from flexmb.system.factors import MassMatrixFactors
 from flexmb.system.observables import Observation
 from flexmb.system.scene_arrays import SceneArrays
@@ -114,7 +115,8 @@ class Mechanics(SceneArrays):
         return composite.CompositeWorkspace(self.workspace(), matrices(self.constants))
 
     def mass_matrix(self, state: State) -> Real:
-        """M (nu,nu), by composite bodies."""
+        """M (nu,nu), by composite bodies. ValueError for a scene with so many speeds that M would be too large."""
+        refuse_large_matrix(self.nu, "the mass matrix", "use `factorise`, whose products and solutions take O(N)")
         t, y = self.layout.entering(state)
         M = np.empty((self.nu, self.nu))
         self._fill_mass_matrix(t, y, M)

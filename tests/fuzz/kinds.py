@@ -52,6 +52,12 @@ ACCEPTED = b"""["rigid, all engines"]
 "energy.total | fine (rigid) | stepper (rigid)" = { E = 3.0e-11 }
 "marker:tip.position | fine (rigid) | stepper (rigid)" = { E = 1.2e-9, U = 4.5e-8 }
 """
+CHANNELS = (
+    "marker", "energy", "momentum", "load", "wheel_load", "connector", "hinge_force", "drive", "work", "derivatives",
+    "frequencies", "known_to",
+)  # fmt: skip
+
+
 def kinds(folder: Path) -> dict[str, Kind]:
     """All kinds by name; `folder` receives what has to lie beside the mutants."""
     _prepare(folder)
@@ -177,6 +183,12 @@ def _case(folder: Path) -> str | None:
 def _accepted(path: Path) -> str | None:
     wrong = _case(path.parent)
     value = msgspec.to_builtins(load_case(path.parent).accepted)
+    for table in value.values():
+        for place in table:
+            channel, *sides = place.split(" | ")
+            head = channel.partition(":")[0] if ":" in channel else channel.partition(".")[0]
+            if len(sides) != 2 or head not in CHANNELS or not all(side.endswith(" (rigid)") for side in sides):
+                wrong = wrong or f"{place!r} is the key of no verdict"
     negative = any(isinstance(leaf, int | float) and leaf < 0 for _, leaf in _leaves(value))
     return wrong or _differs(_toml(path), value) or _not_finite(value) or ("a figure is negative" if negative else None)
 

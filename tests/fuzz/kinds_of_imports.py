@@ -88,7 +88,17 @@ def _urdf(path: Path) -> str | None:
     given = {
         link.get("name"): (link.find("inertial/mass"), link.find("inertial/origin")) for link in root.findall("link")
     }
-    return _not_finite(scene) or _masses(scene, given, "value", "xyz")
+    return _not_finite(scene) or _masses(scene, given, "value", "xyz") or _doubled(root)
+
+
+def _doubled(root: ElementTree.Element) -> str | None:
+    """A link, a joint or an inertial with two elements of which only one can be meant."""
+    once = {"mass", "inertia", "inertial", "parent", "child", "axis", "mimic", "origin"}
+    for element in (*root.findall("link"), *root.findall("joint"), *root.findall("link/inertial")):
+        tags = [child.tag for child in element if child.tag in once]
+        if len(set(tags)) < len(tags):
+            return f"{element.tag} has one of {tags} twice"
+    return None
 
 
 def _mjcf(path: Path) -> str | None:
@@ -151,10 +161,7 @@ def _numbers(value: Any) -> list[float]:
 
 def _sid(path: Path) -> str | None:
     sid = read_sid(path)
-    try:
-        body = imported_sid(sid, "body").body
-    except SidError as error:
-        raise SidError(f"{path}: {error}") from None
+    body = imported_sid(sid, "body").body
     given = re.findall(r"(?im)^\s*mass\s*=\s*([-+\w.]+)", path.read_text(encoding="utf-8-sig"))
     if given and float(given[-1].lower().replace("d", "e")) != sid.mass:
         return f"the mass is {sid.mass}, not {given[-1]}"

@@ -62,7 +62,10 @@ class SidNode:
 
 @dataclass(frozen=True, eq=False)
 class Sid:
-    """One flexible body, in SI units and its reference frame; `modes` are the names of the modal coordinates."""
+    """One flexible body, in SI units and its reference frame; `modes` are the names of the modal coordinates.
+
+    `file` is where it was read from, for messages; "" if it was made here.
+    """
 
     mass: float
     modes: tuple[str, ...]
@@ -78,6 +81,7 @@ class Sid:
     ksigma: Taylor
     Ke: Taylor
     De: Taylor
+    file: str = ""
 
 
 def shapes(m: int) -> dict[str, tuple[int, int]]:

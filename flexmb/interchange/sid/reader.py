@@ -70,7 +70,8 @@ class _Reader:
                 self._fail(
                     f'"{line.word}" is not a block of a modal body', f"blocks are frame, {', '.join(known.values())}"
                 )
-        return Sid(mass=mass, modes=names, nodes=tuple(nodes), **self._complete(blocks, shapes(self.modes), "the body"))
+        whole = self._complete(blocks, shapes(self.modes), "the body")
+        return Sid(mass=mass, modes=names, nodes=tuple(nodes), **whole, file=self.file)
 
     def _refmod(self) -> tuple[float, tuple[str, ...]]:
         mass, count, names = math.nan, -1, {}

@@ -22,6 +22,7 @@ from flexmb.modal.first_order import symmetric
 from flexmb.scene.bodies import Level, ModalBody, SidBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.problems import SceneError
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -42,9 +43,19 @@ def imported_sid(sid: Sid, name: str, level: Level | None = None) -> ImportedSid
     """A raw modal body with the modal integrals of `sid`.
 
     Its default level is "full", or "ruthless" for a file of order 0, which does not describe changes with the modes. A
-    node at the origin that no mode moves makes it "clamped-free". Raises SidError, which names the block, for blocks
-    that contradict each other, that no distribution of mass can have, or that scenes do not support.
+    node at the origin that no mode moves makes it "clamped-free". Raises SidError, which names the file and the block,
+    for blocks that contradict each other, that no distribution of mass can have, or that scenes do not support.
     """
+    try:
+        return _imported(sid, name, level)
+    except SidError as error:
+        raise SidError(f"{sid.file}: {error}" if sid.file else str(error)) from None
+    except SceneError as error:
+        raise SceneError(sid.file or name, error.problems) from None
+
+
+def _imported(sid: Sid, name: str, level: Level | None) -> ImportedSid:
+    """`imported_sid`, whose errors name no file yet."""
     _refuse(sid)
     notes: list[str] = []
     sums = _Sums(sid, notes)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import hypot
 
 from flexmb.scene.bodies import BeamBody, Modes
 from flexmb.scene.problems import Defect, Doubt, Place
+from flexmb.scene.rest_curve import MOST_TURN, turn_at_rest
 from flexmb.scene.sizes import MOST_MODES
 from flexmb.scene.strains import FEWEST_POINTS, MORE_POINTS, STRAINS, points_of_piece, polynomials
 
@@ -18,6 +20,11 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
     """Strains, points and damping of a beam of level exact."""
     modes = place.key("modes")
     yield from _numbers(modes, body)
+    if (turn := turn_at_rest(body)) > MOST_TURN:
+        worst = max(range(len(body.stations)), key=lambda i: hypot(*body.stations[i].curvature_1_m))
+        what = f"at rest the beam turns by {turn:.6g} rad, and the limit is {MOST_TURN:g} rad"
+        remedy = "correct the curvature (1/m), or divide the beam into several that are welded together"
+        yield Defect(str(place.key("stations", worst, "curvature_1_m")), what, remedy)
     if body.modes.boundary != "clamped-free":
         remedy = 'leave it out: the body frame is at the root, and a hinge may sit on any node of the beam'
         yield Defect(str(modes.key("boundary")), "strains have no boundary conditions to choose", remedy)

@@ -10,7 +10,7 @@ from flexmb.scene.check.walk import entries
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Closure, Scene
-from flexmb.scene.tree import GROUND, rest_frames
+from flexmb.scene.tree import GROUND, node_names
 
 # Hinges, wheels, point masses, closures, couplings and connectors share tables of loads, drive loads and coordinates,
 # hence one set of names.
@@ -100,7 +100,7 @@ class Bodies:
     def nodes(self, name: str) -> dict[str, None]:
         """Names of the nodes of a body, in their order."""
         if name not in self._nodes:
-            self._nodes[name] = dict.fromkeys(rest_frames(self.named[name]))
+            self._nodes[name] = dict.fromkeys(node_names(self.named[name]))
         return self._nodes[name]
 
 

@@ -192,7 +192,7 @@ def test_the_library_is_as_strict_as_it_asks_others_to_be() -> None:
     assert all(faults_of((case.folder / "run.toml").read_text(encoding="utf-8")) == "" for case in shipped())
 
 
-PLACE = "load.force | native (rigid) | mujoco (rigid)"
+PLACE = "load:elbow.force | native (rigid) | mujoco (rigid)"
 
 
 @pytest.mark.parametrize(
@@ -201,7 +201,17 @@ PLACE = "load.force | native (rigid) | mujoco (rigid)"
         ({"rigid, all engines": {PLACE: Figure(1e-9, 2e-9)}}, ""),
         ({"energy conserved": {"energy.total | native (rigid) | conservation law (rigid)": Figure(1e-12)}}, ""),
         ({"rigid, some engines": {PLACE: Figure(1e-9, 2e-9)}}, "no such comparison"),
-        ({"rigid, all engines": {"load.force | native": Figure(1e-9, 2e-9)}}, "no channel with two sides"),
+        ({"rigid, all engines": {"load:elbow.force | native": Figure(1e-9, 2e-9)}}, "no channel with two sides"),
+        *[
+            ({"rigid, all engines": {PLACE.replace(good, bad): Figure(1e-9, 2e-9)}}, said)
+            for good, bad, said in (
+                ("load:", "laod:", 'no kind of channel such as "laod:elbow.force"'),
+                (":elbow.force", ".force", 'no kind of channel such as "load.force"'),
+                (".force", ".farce", 'no kind of channel such as "load:elbow.farce"'),
+                ("mujoco (rigid)", "mujoco (rigit)", 'no variant "rigit"'),
+                ("mujoco (rigid)", "mujoco", '"mujoco" is not an engine with a variant'),
+            )
+        ],
         *[({"rigid, all engines": {PLACE: Figure(bad, 1.0)}}, "are no figures") for bad in (-1.0, math.inf, math.nan)],
         *[({"rigid, all engines": {PLACE: Figure(1.0, bad)}}, "are no figures") for bad in (-1.0, math.inf, math.nan)],
     ],

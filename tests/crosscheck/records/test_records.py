@@ -120,6 +120,26 @@ def test_a_broken_line_costs_that_line_and_is_named(tmp_path: Path, line: bytes)
     assert (tmp_path / "records.jsonl.broken").read_bytes() == line + b"\n"
 
 
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (WRONG[3], "it is not UTF-8 (byte 0xff is byte 1 of the line)"),
+        (b'{"record": "run\xfe"}', "it is not UTF-8 (byte 0xfe is byte 16 of the line)"),
+        (WRONG[7], "nested too deeply"),
+        (CONTRADICTIONS["text that is no base64"], "drive:a: its array is damaged: the text is not base64"),
+        (CONTRADICTIONS["base64 that is not deflated"], "drive:a: its array is damaged: the text was changed or cut"),
+        (CONTRADICTIONS["a cut text"], "times: its array"),
+        (CONTRADICTIONS["fewer numbers than the shape"], "drive:a: its array of shape (7, 3) does not hold"),
+    ],
+)
+def test_what_is_wrong_with_a_line_is_told_in_words_of_the_file(tmp_path: Path, line: bytes, said: str) -> None:
+    """With the array, and without the words of the libraries that unpack it."""
+    (tmp_path / "records.jsonl").write_bytes(line + b"\n")
+    (broken,) = read(tmp_path / "records.jsonl")
+    assert said in str(broken)
+    assert not any(word in str(broken) for word in ("codec", "compress", "Error -"))
+
+
 @given(st.lists(st.binary(max_size=30).map(lambda line: line.replace(b"\n", b"")), max_size=4))
 def test_any_bytes_between_records_cost_only_themselves(lines: list[bytes]) -> None:
     whole = msgspec.json.encode(record("one")) + b"\n"

@@ -217,6 +217,14 @@ def test_blocks_that_contradict_each_other_are_refused(fault):
         imported_sid(change(sid_of(beam())), "rod")
 
 
+@pytest.mark.parametrize("fault", CONTRADICTIONS)
+def test_what_is_wrong_with_the_body_is_told_with_its_file(fault, tmp_path):
+    change, words = CONTRADICTIONS[fault]
+    write_sid(change(sid_of(beam())), tmp_path / "body.sid")
+    with pytest.raises(SidError, match=rf"body\.sid: .*{words}"):
+        imported_sid(read_sid(tmp_path / "body.sid"), "rod")
+
+
 def test_sums_whose_ratios_overflow_belong_to_no_masses():
     """Neither an eigenvalue that is not a number nor LAPACK's message."""
     gram = np.diag([1.0, 1e-200, 1e-200, 1e-200])

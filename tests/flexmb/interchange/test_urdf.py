@@ -223,6 +223,18 @@ BAD = {
     "no mass": (re.sub(r"<mass[^>]*/>", "", SINGLE), "mass value is missing"),
     "nan": (re.sub(r'ixx="[^"]*"', 'ixx="nan"', SINGLE), "inertia ixx is 'nan'"),
     "words": (re.sub(r'xyz="[^"]*"', 'xyz="1 2"', SINGLE, count=1), 'xyz is "1 2"'),
+    **{
+        f"two {tag}": (re.sub(rf"(<{tag}\b[^>]*/>)", r"\1\1", SINGLE, count=1), f"has 2 elements {tag}: keep one")
+        for tag in ("mass", "inertia", "parent", "child", "axis", "origin")
+    },
+    "two inertial": (
+        re.sub(r"(<inertial>.*?</inertial>)", r"\1\1", SINGLE, count=1),
+        'link "a": its link has 2 elements inertial',
+    ),
+    "two mimic": (
+        SINGLE.replace("<axis", '<mimic joint="k"/><mimic joint="k"/><axis'),
+        'joint "j": its joint has 2 elements mimic',
+    ),
     "no axis": (re.sub(r'<axis xyz="[^"]*"', '<axis xyz="0 0 0"', SINGLE), "axis has no length"),
     "xacro": ('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arm/></robot>', "expand them first"),
     "entities": ('<!DOCTYPE robot [<!ENTITY a "b">]><robot/>', "declares entities"),

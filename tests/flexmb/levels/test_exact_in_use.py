@@ -18,6 +18,7 @@ from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.check import SceneError
 from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.values import changed_at
 from flexmb.system.frames import node_pose
 from flexmb.system.moved_sections import moved_sections
@@ -49,6 +50,17 @@ def refused(text: str, **more: Any) -> None:
         beam(**more).weld("clamp", "ground", "rod").scene()
 
 
+def test_turns_without_a_check_of_the_scene():
+    """Positions of an unchecked beam are refused before memory is asked for, and an infinity by the same words."""
+    coiled = s.BeamBody(
+        name="coil", length_m=1.0, elements=1, level="exact", modes=s.Modes(count=1), stations=tuple(stations(1.0))
+    )
+    for curvature in (2e4, 9e15, np.inf, np.nan):
+        turning = tuple(msgspec.structs.replace(each, curvature_1_m=(curvature, 0.0, 0.0)) for each in coiled.stations)
+        with pytest.raises(ValueError, match=r'"coil" turns by .* rad at rest, and the limit is 10000 rad: correct'):
+            rest_sections(msgspec.structs.replace(coiled, stations=turning), np.ones(1))
+
+
 def test_refusals():
     """What the level does not have, or has too little of, is said before anything runs."""
     four = s.Modes(count=4, families=PLANE)
@@ -56,6 +68,10 @@ def test_refusals():
     refused("without inertia", modes=s.Modes(count=4, families=PLANE, points=4))
     refused("no strain", modes=s.Modes(count=0))
     refused("consistent", modes=four, mass="lumped")
+    refused(
+        r"stations\[0\].curvature_1_m .*turns by 9e\+15 rad, and the limit is 10000 rad",
+        modes=four, section=stations(1.0, (0.0, 9e15, 0.0)),
+    )  # fmt: skip
     refused("straight beams only", modes=four, level="full", section=stations(1.0, (0.0, 0.0, 1.0)))
     refused('leave it out, or make the level "exact"', modes=s.Modes(count=2, pieces=2), level="full")
     refused("give 2000 at most", modes=s.Modes(count=40, pieces=1000))

@@ -3,7 +3,7 @@
 import pytest
 
 from flexmb.scene import schema as s
-from flexmb.scene.tree import coordinates, node_frame, ordered, rest_frames
+from flexmb.scene.tree import coordinates, node_frame, node_names, ordered, rest_frames
 
 UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -56,6 +56,8 @@ def test_node_frames_of_every_kind():
     end = s.ModalNode(name="end", position_m=(1.0, 0.0, 0.0), translation_modes=shape, rotation_modes=shape)
     assert rest_frames(s.ModalBody(name="m", nodes=(end,))).keys() == {"origin", "end"}
     assert rest_frames(s.ModalBody(name="m", nodes=(end,), boundary="free-free")).keys() == {"end"}
+    for body in (beam, hub, s.ModalBody(name="m", nodes=(end,)), s.ModalBody(name="f", boundary="free-free")):
+        assert node_names(body) == tuple(rest_frames(body))
     with pytest.raises(ValueError, match="SID"):
         node_frame(s.SidBody(name="panel", file="panel.sid"), "origin")
 
