@@ -7,20 +7,20 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import EngineWords, Json, Quiet, Verbose, app, console, print_json, refuse, verbosity
+from crosscheck.cli import common
+from crosscheck.cli.common import app, console, print_json, verbosity
 from crosscheck.conformance.limit import CLAUSE_LIMIT_S
-from flexmb.scene.problems import closest
 
 
 @app.command()
 def contract(
-    names: EngineWords,
+    names: common.EngineWords,
     time_limit: Annotated[
         float, typer.Option("--time-limit", metavar="SECONDS", min=0.1, help="Of each clause, compiling included.")
     ] = CLAUSE_LIMIT_S,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    as_json: common.Json = False,
+    quiet: common.Quiet = False,
+    verbose: common.Verbose = False,
 ) -> None:
     """
     Try whether engines keep the contract: names, statuses, shapes, frames, signs, reference points, repeatability.
@@ -30,20 +30,16 @@ def contract(
     for it, and which clauses would then be tried.
 
     **Exit code**: 0 every clause that is offered holds, among them all on the form of an answer and a run that is known
-    in closed form; 1 a clause is broken, too little was shown, or the engine's library is missing; 2 there is no such
-    engine.
+    in closed form; 1 a clause is broken, or too little was shown; 2 there is no such engine, or its library is not
+    installed.
 
     **Examples**: `crosscheck contract native` · `crosscheck contract mycode --verbose`
     """
     from crosscheck.conformance.trial import try_engine, verdict_on
-    from crosscheck.engines.registry import engines
     from crosscheck.terminal.clauses import print_clauses
 
     shown = verbosity(quiet, verbose)
-    known = engines()
-    for name in names:
-        if name not in known:
-            refuse(f'no engine "{name}": {closest(name, known)}; `crosscheck engines` shows them')
+    common.require_engines(names, broken=True)
     kept, tried = [], {}
     for name in names:
         with console.status(f"trying {name}"):

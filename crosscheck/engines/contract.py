@@ -205,4 +205,4 @@ class Engine(Protocol):
 
 
 class EngineMissing(RuntimeError):
-    """The engine's library is not installed; the message names the extra that installs it."""
+    """The engine's library is not installed; the message says what installs it."""
