@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
+from fnmatch import fnmatchcase
 from typing import Annotated
 
 import typer
@@ -10,6 +12,7 @@ import typer
 from crosscheck.cli import common
 from crosscheck.cli.common import app, console, print_json, verbosity
 from crosscheck.conformance.limit import CLAUSE_LIMIT_S
+from flexmb.scene.problems import closest
 
 
 @app.command()
@@ -18,6 +21,10 @@ def contract(
     time_limit: Annotated[
         float, typer.Option("--time-limit", metavar="SECONDS", min=0.1, help="Of each clause, compiling included.")
     ] = CLAUSE_LIMIT_S,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Clauses at a time.")] = 1,
+    clause: Annotated[
+        list[str] | None, typer.Option("--clause", metavar="PATTERN", help="Only clauses of such names (repeat it).")
+    ] = None,
     as_json: common.Json = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
@@ -25,7 +32,9 @@ def contract(
     """
     Try whether engines keep the contract: names, statuses, shapes, frames, signs, reference points, repeatability.
 
-    Every clause is a sentence of the contract, tried in a process of its own on a small scene whose answer is known. A
+    Every clause is a sentence of the contract, tried on a small scene whose answer is known. Clauses on the form of an
+    answer have a process each; those on mechanics share one, and what is broken there is tried again in one of its own.
+    An engine that states `precision = "single"` is held to the bounds of 32-bit floats, and the last line says so. A
     scene that the engine refuses, or an output that it leaves out, counts as *not offered*; a line says what to offer
     for it, and which clauses would then be tried.
 
@@ -33,24 +42,36 @@ def contract(
     in closed form; 1 a clause is broken, or too little was shown; 2 there is no such engine, or its library is not
     installed.
 
-    **Examples**: `crosscheck contract native` · `crosscheck contract mycode --verbose`
+    **Examples**: `crosscheck contract native` · `crosscheck contract mycode --verbose` ·
+    `crosscheck contract mycode --clause '*tree*' --jobs 2`
     """
     from crosscheck.conformance.trial import try_engine, verdict_on
-    from crosscheck.terminal.clauses import print_clauses
+    from crosscheck.terminal.clauses import clauses_bar, print_clauses
 
     shown = verbosity(quiet, verbose)
     common.require_engines(names, broken=True)
+    chosen = _chosen(clause or ())
     kept, tried = [], {}
     for name in names:
-        with console.status(f"trying {name}"):
-            outcomes = list(try_engine(name, limit_s=time_limit))
-        verdict = verdict_on(outcomes)
+        with clauses_bar(console, name, len(chosen), quiet) as hear:
+            outcomes = list(try_engine(name, chosen, limit_s=time_limit, workers=jobs, listener=hear))
+        verdict = verdict_on(outcomes, bool(clause))
         kept.append(verdict.kept)
         tried[name] = {
             "kept": verdict.kept, "whole": verdict.whole, "headline": verdict.text,
             "clauses": [asdict(outcome) for outcome in outcomes],
         }  # fmt: skip
-        print_clauses(console, name, outcomes, shown)
+        print_clauses(console, name, outcomes, shown, bool(clause))
     if as_json:
         print_json(tried)
     raise typer.Exit(0 if all(kept) else 1)
+
+
+def _chosen(patterns: Sequence[str]) -> tuple[str, ...]:
+    """The clauses whose names one of the patterns matches, all without patterns; one that matches none is refused."""
+    from crosscheck.conformance.catalogue import CLAUSES
+
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in CLAUSES):
+            common.refuse(f'no clause "{pattern}": {closest(pattern, CLAUSES)}')
+    return tuple(name for name in CLAUSES if not patterns or any(fnmatchcase(name, each) for each in patterns))

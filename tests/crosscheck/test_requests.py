@@ -47,6 +47,7 @@ UNKNOWN: dict[tuple[str, ...], tuple[str, str]] = {
     ("regenerate", "CASE"): ("compund", 'did you mean "compound"?'),
     ("export", "CASE"): ("compund", 'did you mean "compound"?'),
     ("contract", "ENGINE"): ("natve", NATIVE),
+    ("contract", "native", "--clause"): ("a-pendlum-swings", 'did you mean "a-pendulum-swings"?'),
     ("mutate", "CASE", "-e"): ("natve", NATIVE),
     ("invariance", "CASE", "-e"): ("natve", NATIVE),
     ("stability", "MAP"): ("vibrating_hinje", 'did you mean "vibrating_hinge"?'),
