@@ -97,7 +97,7 @@ def require(condition: bool, message: str) -> None:
 
 
 def equal(what: str, found: Any, expected: Any, scale: float = 1.0) -> None:
-    """Compare numbers with expected ones, within POINTWISE (or its allowance) of each, of `scale` (SI) for small ones."""
+    """Compare numbers, within POINTWISE (or its allowance) of each expected one, of `scale` (SI) for small ones."""
     right = np.asarray(expected, dtype=float)
     value = np.asarray(found, dtype=float)
     allowed = allowance(POINTWISE) * np.maximum(np.abs(right), scale)

@@ -6,7 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.clause import Chapter, acceleration, allowance, equal, finest_two, given, require, snapshot, within
+from crosscheck.conformance.clause import (
+    Chapter,
+    acceleration,
+    allowance,
+    equal,
+    finest_two,
+    given,
+    require,
+    snapshot,
+    within,
+)
 from crosscheck.conformance.scenes import INERTIA, MASS, NONE, QUARTER, THIRD, arm, hub
 from crosscheck.engines.contract import Engine
 from crosscheck.engines.conventions import cross_matrix, rotation_matrix
