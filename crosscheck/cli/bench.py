@@ -61,12 +61,15 @@ def bench(
     if not available():
         common.refuse(MISSING)
     shown = common.verbosity(quiet, False)
+    chosen = common.found(tuple(cases))
+    common.require_variants(chosen, variant or ())
+    common.require_engines(engine or ())
     benches = []
     with common.in_one_line():
         if json_file is not None:
             check_folder(json_file.parent)
             take_away(json_file)
-        for case in common.found(tuple(cases)):
+        for case in chosen:
             with LiveProgress(common.console, shown) as live:
                 done = bench_case(
                     case, engine or (), variant or (),

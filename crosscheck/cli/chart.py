@@ -43,10 +43,13 @@ def chart(
 
     common.check_limit(time_limit)
     shown = common.verbosity(quiet, False)
+    chosen = common.found(tuple(cases))
+    common.require_variants(chosen, variant or ())
+    common.require_engines(engine or ())
     done = []
     with common.sole_writer(out):
         (out / INDEX).unlink(missing_ok=True)  # of earlier charts, should this command be killed
-        for case in common.found(tuple(cases)):
+        for case in chosen:
             with LiveProgress(common.console, shown) as live:
                 charts = chart_case(
                     case, engine or (), variant or (),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from math import inf, isfinite
 from pathlib import Path
@@ -19,7 +19,7 @@ from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
 from flexmb.output.terminal import Terminal
 from flexmb.output.writing import in_words
-from flexmb.scene.problems import SceneWarning
+from flexmb.scene.problems import SceneWarning, closest
 from flexmb.scene.user_code import forbid_user_code
 
 if TYPE_CHECKING:
@@ -184,6 +184,31 @@ def found(words: tuple[str, ...]) -> tuple[Case, ...]:
         return resolve(words)
     except CaseError as error:
         refuse(str(error))
+
+
+def require_engines(names: Iterable[str], broken: bool = False) -> None:
+    """End the program with exit code 2 unless all engines that the user names are installed here, and work.
+
+    With `broken` only those that are not installed end it.
+    """
+    from crosscheck.running.installed import require_engines as require
+
+    names = tuple(names)
+    if not names:
+        return
+    try:
+        require(names, broken)
+    except CaseError as error:
+        refuse(str(error))
+
+
+def require_variants(cases: tuple[Case, ...], names: Iterable[str]) -> None:
+    """End the program with exit code 2 if a variant that the user names is in none of the cases."""
+    known = [variant.name for case in cases for variant in case.run.variants]
+    for name in names:
+        if name not in known:
+            refuse(f'no variant "{name}" in {", ".join(each.name for each in cases[:3])}'
+                   f'{" and others" if len(cases) > 3 else ""}: {closest(name, set(known))}')  # fmt: skip
 
 
 def claimed(

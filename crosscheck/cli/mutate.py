@@ -53,6 +53,7 @@ def mutate(
 
     common.check_limit(time_limit)
     chosen = common.found(tuple(cases))
+    common.require_engines((engine,))
     with common.sole_writer(out):
         with LiveProgress(common.console, Verbosity.NORMAL) as live:
             limits = Limits(jobs, time_limit)

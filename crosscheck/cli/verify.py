@@ -7,7 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from crosscheck.cli.common import CaseWord, Json, NoUserCode, SchedulerAddress, app, console, found, in_one_line, refuse
+from crosscheck.cli.common import (
+    CaseWord,
+    Json,
+    NoUserCode,
+    SchedulerAddress,
+    app,
+    console,
+    found,
+    in_one_line,
+    refuse,
+    require_engines,
+    require_variants,
+)
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.text import words
 from flexmb.output.whole import write_whole
@@ -65,6 +77,8 @@ def verify(
         if len(cases) > 1:
             refuse(f'"{case}" is {len(cases)} cases: name one of {", ".join(each.name for each in cases)}')
         (chosen,) = cases
+        require_variants(cases, () if variant is None else (variant,))
+        require_engines(() if engine is None else (engine,))
         if template:
             _write_template(csv, chosen, variant)
             return

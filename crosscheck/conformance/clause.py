@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,15 +12,23 @@ import numpy as np
 from crosscheck.conformance.contents import to_offer
 from crosscheck.conformance.digits import told_apart
 from crosscheck.conformance.scenes import simple_scenes
+from crosscheck.engines.answers import checked_precision
 from crosscheck.engines.checked import CheckedEngine
-from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Trajectory
+from crosscheck.engines.contract import UNIT_ROUNDOFF, Effort, Engine, Model, Run, Snapshot, Trajectory
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 # Pointwise results need one linear solve. Minimal coordinates have errors of about 1e-14, redundant ones with
 # Euler parameters of about 1e-11. A wrong sign or frame changes the first digit.
 POINTWISE = 1e-9
+ROUNDINGS = 2**10
+"""How many unit roundoffs a correct result may be off, relative to its size: minimal coordinates have some hundred, and
+sums over a tree or over the steps of a run a few times that. In double precision this is 1e-13, and the bounds of the
+clauses, which allow for redundant coordinates and for integrators, are wider; in single precision it is 6e-5."""
 CONVERGED = 1e-2  # of a signal: largest distance of the last two efforts for which a clause on runs can be tested
+
+
+_roundoff: ContextVar[float] = ContextVar("roundoff", default=UNIT_ROUNDOFF["double"])  # of the engine on trial
 
 
 class ClauseBroken(AssertionError):
@@ -62,10 +71,23 @@ class Chapter:
 
         def add(check: Callable[[Engine], None]) -> Callable[[Engine], None]:
             name = check.__name__.replace("_", "-")
-            self.clauses.append(Clause(name, sentence, check, self.physical))
+
+            def bounded(engine: Engine) -> None:
+                before = _roundoff.set(UNIT_ROUNDOFF[checked_precision(engine)])
+                try:
+                    check(engine)
+                finally:
+                    _roundoff.reset(before)
+
+            self.clauses.append(Clause(name, sentence, bounded, self.physical))
             return check
 
         return add
+
+
+def allowance(double: float, roundings: float = ROUNDINGS) -> float:
+    """A bound that is `double` in double precision, and never below what rounding does to the engine on trial."""
+    return max(double, roundings * _roundoff.get())
 
 
 def require(condition: bool, message: str) -> None:
@@ -75,10 +97,10 @@ def require(condition: bool, message: str) -> None:
 
 
 def equal(what: str, found: Any, expected: Any, scale: float = 1.0) -> None:
-    """Compare numbers with expected ones, within POINTWISE of each, or of `scale` (SI) for small ones."""
+    """Compare numbers, within POINTWISE (or its allowance) of each expected one, of `scale` (SI) for small ones."""
     right = np.asarray(expected, dtype=float)
     value = np.asarray(found, dtype=float)
-    allowed = POINTWISE * np.maximum(np.abs(right), scale)
+    allowed = allowance(POINTWISE) * np.maximum(np.abs(right), scale)
     good = value.shape == right.shape and bool(np.all(np.abs(value - right) <= allowed))  # False with any NaN
     expected_digits, found_digits = told_apart(right, value, allowed)
     require(good, f"{what} must be {expected_digits} and is {found_digits}")
@@ -98,7 +120,7 @@ def hold_at_samples(what: str, found: Iterable[Real], expected: Real, times: Rea
     require(refinement <= CONVERGED * size, f"{what}: the last two efforts are {refinement:.3g} apart, of {size:.3g}")
     error = np.abs(fine - expected).max(axis=1)
     worst = int(np.argmax(error))
-    within(f"{what} at t = {times[worst]:g} s", float(error[worst]), 3.0 * refinement + 1e-7 * size)
+    within(f"{what} at t = {times[worst]:g} s", float(error[worst]), 3.0 * refinement + allowance(1e-7) * size)
 
 
 def offered(engine: Engine, scene: Scene) -> Model:

@@ -6,7 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.clause import Chapter, acceleration, equal, finest_two, given, require, snapshot, within
+from crosscheck.conformance.clause import (
+    Chapter,
+    acceleration,
+    allowance,
+    equal,
+    finest_two,
+    given,
+    require,
+    snapshot,
+    within,
+)
 from crosscheck.conformance.scenes import INERTIA, MASS, NONE, QUARTER, THIRD, arm, hub
 from crosscheck.engines.contract import Engine
 from crosscheck.engines.conventions import cross_matrix, rotation_matrix
@@ -201,7 +211,7 @@ def connectors_balance_energy_and_work(engine: Engine) -> None:
     gained, done = energy - energy[0], work - work[0]
     require(bool(done[-1] < -0.01), f"dampers and friction take energy, and the work is {done[-1]:.6g} J")
     refinement = np.abs(rough - work).max() + np.abs(before - energy).max()
-    within("the energy (J) gained, less the work,", np.abs(gained - done).max(), refinement + 1e-8)
+    within("the energy (J) gained, less the work,", np.abs(gained - done).max(), refinement + allowance(1e-8))
 
 
 def _held(**line: Any) -> SceneBuilder:

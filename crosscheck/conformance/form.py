@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import psutil
 
-from crosscheck.conformance.clause import Chapter, equal, ladder, require, simplest, simulated
+from crosscheck.conformance.clause import Chapter, allowance, equal, ladder, require, simplest, simulated
 from crosscheck.conformance.scenes import MASS, simple_scenes
 from crosscheck.engines.answers import RUNGS
 from crosscheck.engines.checked import CheckedEngine
@@ -110,7 +110,7 @@ def sample_times_do_not_change_the_motion(engine: Engine) -> None:
     for name, values in many.items():
         size = max(1.0, float(np.abs(values).max()))
         error, refinement = distance(name, few[name], values[::5]).max(), distance(name, rough[name], values).max()
-        bound = 2.0 * min(refinement, 1e-2 * size) + 1e-9 * size
+        bound = 2.0 * min(refinement, 1e-2 * size) + allowance(1e-9) * size
         require(bool(error <= bound), f"with fewer sample times {name} is {error:.3g} (SI) another")
 
 

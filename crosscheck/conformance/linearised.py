@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.clause import Chapter, NotOffered, ladder, offered, require, within
+from crosscheck.conformance.clause import Chapter, NotOffered, allowance, ladder, offered, require, within
 from crosscheck.conformance.tree_derivatives import KnownDerivatives, derivatives
 from crosscheck.conformance.tree_scenes import AXES, bending, branched, chain, driven, loaded, placed, sprung
 from crosscheck.engines.contract import Engine, LinearPart, Run, Trajectory
@@ -148,7 +148,7 @@ def _compare(run: Trajectory, scene: Scene, name: str, right: Real) -> None:
     what = f"the derivative {name} of the acceleration of {names[row]}, by {names[column]}, {found[row, column]:.6g}"
     size = float(np.linalg.norm(right))
     require(known <= 1e-2 * size, f"derivatives {name} are known to {known:.2g} by the engine, of {size:.3g}")
-    within(what, float(apart[row, column]), known + SHARE * size)
+    within(what, float(apart[row, column]), known + allowance(SHARE) * size)
 
 
 def _frequencies(engine: Engine, scene: Scene, right: Real) -> None:
@@ -161,7 +161,7 @@ def _frequencies(engine: Engine, scene: Scene, right: Real) -> None:
     require(known <= 1e-2 * size, f"frequencies are known to {known:.2g} rad/s by the engine, of {size:.3g}")
     worst = int(np.argmax(np.abs(found - right)))
     what = f"frequency {worst + 1} of {len(right)}, {found[worst]:.6g} rad/s,"
-    within(what, float(np.abs(found - right)[worst]), known + SHARE * size)
+    within(what, float(np.abs(found - right)[worst]), known + allowance(SHARE) * size)
 
 
 def _lacking(what: str) -> NotOffered:

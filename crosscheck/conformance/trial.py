@@ -1,7 +1,9 @@
-"""Trying an engine clause by clause, each in a process of its own, so that clauses cannot affect each other.
+"""Trying an engine clause by clause, in processes that no other clause can spoil.
 
-A new interpreter for each would take a second or two, most of it for imports. So where the system supports it, they
-are forked from a process that has imported this package and the native engine and has called
+A clause on the form of an answer has a process of its own. Those on mechanics share one, in which the engine starts
+and compiles once; one that is broken there is tried again alone, and only that counts: no clause is broken by what
+another one left behind. A new interpreter for each would take a second or two, most of it for imports. So where the
+system supports it, processes are forked from one that has imported this package and the native engine and has called
 nothing.
 """
 
@@ -17,8 +19,8 @@ from typing import Literal, NamedTuple
 from crosscheck.conformance.catalogue import CLAUSES, SHOWN
 from crosscheck.conformance.clause import Clause, ClauseBroken, NotOffered
 from crosscheck.conformance.limit import CLAUSE_LIMIT_S
-from crosscheck.engines.answers import BrokenContract, clean, describe
-from crosscheck.engines.contract import Engine, EngineMissing
+from crosscheck.engines.answers import BrokenContract, checked_precision, clean, describe
+from crosscheck.engines.contract import Engine, EngineMissing, Precision
 from crosscheck.running.execute import NoSuchEngine, find_engine
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Work
@@ -35,7 +37,8 @@ ClauseStatus = Literal["holds", "broken", "not offered", "missing"]
 class ClauseOutcome:
     """The outcome of a clause.
 
-    `message` says why it does not hold or was not tried, `offer` what the engine would have to offer.
+    `message` says why it does not hold or was not tried, `offer` what the engine would have to offer. `precision` is
+    the one that the engine states, from which the clause takes its bounds.
     """
 
     clause: str
@@ -43,47 +46,80 @@ class ClauseOutcome:
     status: ClauseStatus
     message: str = ""
     offer: str = ""
+    precision: Precision = "double"
 
 
 class ClauseTrial(NamedTuple):
-    """One clause to be tried on one engine of a provider, "module:function"."""
+    """One clause to be tried on one engine of a provider, "module:function", in a process `alone` or a shared one."""
 
     provider: str
     engine: str
     clause: str
+    alone: bool = True
+
+
+Listener = Callable[[int, str], None]
 
 
 def try_clause(engine: Engine, clause: Clause) -> ClauseOutcome:
     """Try one clause in this process. Everything that the engine does, except ending the process, has an outcome."""
+    precision: Precision = "double"
+
+    def outcome(status: ClauseStatus, message: str = "", offer: str = "") -> ClauseOutcome:
+        return ClauseOutcome(clause.name, clause.sentence, status, clean(message), clean(offer), precision)
+
     try:
+        precision = checked_precision(engine)
         clause.check(engine)
     except NotOffered as reason:
-        return ClauseOutcome(clause.name, clause.sentence, "not offered", clean(str(reason)), clean(reason.offer))
+        return outcome("not offered", str(reason), reason.offer)
     except EngineMissing as error:
-        return ClauseOutcome(clause.name, clause.sentence, "missing", clean(str(error)))
+        return outcome("missing", str(error))
     except (ClauseBroken, BrokenContract) as error:
-        return ClauseOutcome(clause.name, clause.sentence, "broken", clean(str(error)))
+        return outcome("broken", str(error))
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # a call of sys.exit too
-        return ClauseOutcome(clause.name, clause.sentence, "broken", describe(error))
-    return ClauseOutcome(clause.name, clause.sentence, "holds")
+        return outcome("broken", describe(error))
+    return outcome("holds")
 
 
 def try_engine(
-    name: str, clauses: tuple[str, ...] = tuple(CLAUSES), provider: str = PROVIDER, limit_s: float = CLAUSE_LIMIT_S
+    name: str,
+    clauses: tuple[str, ...] = tuple(CLAUSES),
+    provider: str = PROVIDER,
+    limit_s: float = CLAUSE_LIMIT_S,
+    workers: int = 1,
+    listener: Listener = lambda done, clause: None,
 ) -> Iterator[ClauseOutcome]:
-    """Try clauses on the engine called `name`, one after the other; one that takes more than `limit_s` seconds is
-    broken."""
-    trials = [ClauseTrial(provider, name, clause) for clause in clauses]
+    """Try clauses on the engine called `name`, `workers` at a time; the outcomes are in the order of the clauses.
+
+    One that takes more than `limit_s` seconds is broken. The `listener` hears the number of clauses that are decided,
+    and the name of one that begins.
+    """
+    shared = [clause for clause in clauses if CLAUSES[clause].physical]
+    trials = [ClauseTrial(provider, name, clause, clause not in shared or len(shared) == 1) for clause in clauses]
+    decided: dict[str, ClauseOutcome] = {}
+    waiting = list(clauses)
     with tempfile.TemporaryDirectory() as folder:
         log = str(Path(folder) / "log")
-        for event in run_jobs(Work(attempt, trials, log, 1, _clause, lambda trial: limit_s), _start_method()):
-            if event.kind == "emitted":
-                yield event.content
-            elif event.kind in ("crashed", "stopped"):
-                clause = CLAUSES[trials[event.job].clause]
-                yield ClauseOutcome(clause.name, clause.sentence, "broken", clean(str(event.content)))
+        for event in run_jobs(Work(attempt, trials, log, workers, _process, lambda trial: limit_s), _start_method()):
+            trial = trials[event.job]
+            clause = CLAUSES[trial.clause]
+            if event.kind == "started":
+                listener(len(decided), trial.clause)
+                continue
+            if event.kind == "ended":
+                continue
+            found: ClauseOutcome = event.content
+            if event.kind in ("crashed", "stopped"):
+                found = ClauseOutcome(clause.name, clause.sentence, "broken", clean(str(event.content)))
+            if found.status == "broken" and not trial.alone:
+                trials.append(trial._replace(alone=True))
+                continue
+            decided[trial.clause] = found
+            while waiting and waiting[0] in decided:
+                yield decided[waiting.pop(0)]
 
 
 def attempt(trial: ClauseTrial, emit: Callable[[ClauseOutcome], None]) -> None:
@@ -105,8 +141,8 @@ class ContractVerdict:
     text: str
 
 
-def verdict_on(outcomes: list[ClauseOutcome]) -> ContractVerdict:
-    """The verdict on an engine.
+def verdict_on(outcomes: list[ClauseOutcome], chosen: bool = False) -> ContractVerdict:
+    """The verdict on an engine; of `chosen` clauses, which are not all, that at least one holds and none is broken.
 
     The contract is kept if no clause is broken or missing and the essential ones were tried: the form of an answer, and
     a run that is known in closed form.
@@ -115,13 +151,18 @@ def verdict_on(outcomes: list[ClauseOutcome]) -> ContractVerdict:
     missing = next((each for each in outcomes if each.status == "missing"), None)
     if missing is not None:
         return ContractVerdict(False, False, missing.message)
-    text = f"{counts['holds']} of {len(outcomes)} clauses hold, {counts['broken']} broken"
+    single = any(each.precision == "single" for each in outcomes)
+    which = "clauses that were chosen" if chosen else "clauses"
+    text = f"{counts['holds']} of {len(outcomes)} {which} hold{' in single precision' if single else ''}"
+    text += f", {counts['broken']} broken"
     if counts["not offered"]:
         text += f", {counts['not offered']} not tried, since it does not offer what they are about"
     holding = {each.clause for each in outcomes if each.status == "holds"}
     formal = all(each.clause in holding for each in outcomes if not CLAUSES[each.clause].physical)
     if counts["broken"]:
         return ContractVerdict(False, not counts["not offered"], text)
+    if chosen:
+        return ContractVerdict(bool(holding), False, text)
     if not formal or not holding.intersection(SHOWN):
         return ContractVerdict(False, False, f"{text}: too little was shown. Offer first: {_first_offer(outcomes)}")
     return ContractVerdict(True, not counts["not offered"], text)
@@ -141,9 +182,9 @@ def _first_offer(outcomes: list[ClauseOutcome]) -> str:
     return next((each.offer for each in wanted if each.status == "not offered"), "a scene with a known answer")
 
 
-def _clause(trial: ClauseTrial) -> str:
-    """The kind of a trial: one process for each clause."""
-    return trial.clause
+def _process(trial: ClauseTrial) -> str:
+    """The kind of a trial: those of one kind share a process."""
+    return trial.clause if trial.alone else "shared"
 
 
 def _start_method() -> Method:

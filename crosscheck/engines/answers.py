@@ -19,9 +19,12 @@ import numpy as np
 from crosscheck.engines.contract import (
     ENERGIES,
     OUTPUTS,
+    UNIT_ROUNDOFF,
     Effort,
+    Engine,
     MarkerPath,
     Model,
+    Precision,
     Status,
     Support,
     Trajectory,
@@ -62,6 +65,15 @@ def describe(error: BaseException) -> str:
     if isinstance(error, BrokenContract):
         return clean(f"broke the contract: {text}")
     return clean(f"{type(error).__name__}: {text}{place}")
+
+
+def checked_precision(engine: Engine) -> Precision:
+    """The precision that an engine states, double if it states none; BrokenContract for another than there are."""
+    stated = getattr(engine, "precision", "double")
+    for known in UNIT_ROUNDOFF:
+        if isinstance(stated, str) and stated == known:
+            return known
+    raise BrokenContract(f"precision is {clean(repr(stated))}: it is one of {', '.join(UNIT_ROUNDOFF)}")
 
 
 def checked_version(found: Any) -> str:

@@ -15,6 +15,8 @@ from flexmb.typing import Real
 
 Array = Real  # the name that engines outside this package import
 Status = Literal["finished", "diverged", "failed"]
+Precision = Literal["double", "single"]
+UNIT_ROUNDOFF: dict[Precision, float] = {"double": 2.0**-53, "single": 2.0**-24}
 ENERGIES = ("kinetic", "strain", "spring", "gravity")  # the kinds of energy that an engine may give
 
 
@@ -185,6 +187,8 @@ class Engine(Protocol):
     `settings`, a sentence or two on how it is run: its best solver, what is switched off, whose loop steps it, and what
     its `wall_s` contains. `takes` names what its adapter handles of "connectors", "couplings", "controllers" and
     "events" (a scene with others is refused) and "t_start" (runs that begin at another time than 0).
+    `precision` is "single" where the code computes with 32-bit floats, else "double": the clauses of the contract take
+    their bounds from its unit roundoff; verdicts on cases do not, since U follows from the engine's efforts.
     `efforts_for(scene, duration_s)` replaces `efforts` for engines with fixed steps, whose ladder depends on the
     duration (see `crosscheck.engines.steps`).
     """
@@ -205,4 +209,4 @@ class Engine(Protocol):
 
 
 class EngineMissing(RuntimeError):
-    """The engine's library is not installed; the message names the extra that installs it."""
+    """The engine's library is not installed; the message says what installs it."""

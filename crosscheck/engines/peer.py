@@ -42,12 +42,12 @@ class PeerEngine:
 
 
 @contextmanager
-def needed(library: str, extra: str) -> Iterator[None]:
-    """Around the import of a library: if it fails, EngineMissing says which extra of flexmb installs it."""
+def needed(library: str, distribution: str) -> Iterator[None]:
+    """Around the import of a library: if it fails, EngineMissing says which distribution has it."""
     try:
         yield
     except ImportError as error:
-        raise EngineMissing(f"{library} is not installed: pip install flexmb[{extra}]") from error
+        raise EngineMissing(f"{library} is not installed: pip install {distribution}") from error
 
 
 def inertia_obstacle(links: Iterable[Link], engine: str) -> str:

@@ -8,6 +8,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 
 from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Support
+from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 
 GROUP = "crosscheck.engines"
@@ -102,10 +103,10 @@ def home(name: str) -> str:
 
 
 def engine(name: str) -> Engine:
-    """One engine; KeyError lists the known names."""
+    """One engine; KeyError names the nearest name that is known."""
     known = engines()
     if name not in known:
-        raise KeyError(f'no engine "{name}"; there are {", ".join(known)}')
+        raise KeyError(f'no engine "{name}": {closest(name, known)}')
     return known[name]
 
 

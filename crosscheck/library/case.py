@@ -119,6 +119,7 @@ import msgspec
 from crosscheck.engines.contract import LinearPart
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.recipe import EffortLadder, ReferenceRecipe
+from flexmb.scene.problems import closest
 from flexmb.scene.schema import Level
 
 Expectation = Literal["agree", "differ", "unresolved", "refused", "diverged", "failed"]
@@ -327,12 +328,11 @@ class RunFile(_CasePart, frozen=True, kw_only=True):
         )
 
     def variant(self, name: str) -> Variant:
-        """The variant called `name`; CaseError lists the names."""
+        """The variant called `name`; CaseError says which is the nearest."""
         for variant in self.variants:
             if variant.name == name:
                 return variant
-        known = ", ".join(variant.name for variant in self.variants)
-        raise CaseError(f'no variant "{name}"; the variants are {known}')
+        raise CaseError(f'no variant "{name}": {closest(name, (variant.name for variant in self.variants))}')
 
 
 class PublishedNumber(_CasePart, frozen=True, kw_only=True):

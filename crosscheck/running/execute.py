@@ -19,13 +19,14 @@ from crosscheck.records.packing import pack
 from crosscheck.running.job import Done, Job
 from crosscheck.running.ladder import extended
 from crosscheck.running.rung import Solved, solve_rung
+from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 
 FULLY_STORED = 4  # the finest efforts, which the uncertainty needs in every channel
 
 
 class NoSuchEngine(LookupError):
-    """The provider has no engine of this name; the message lists those that it has."""
+    """The provider has no engine of this name; the message names the nearest."""
 
 
 def execute(job: Job, emit: Callable[[RunRecord | Confirmed | str], None]) -> None:
@@ -56,11 +57,16 @@ def solve_job(job: Job, emit: Callable[[Solved | Confirmed | str], None]) -> Non
 
 def find_engine(provider: str, name: str) -> Engine:
     """The engine called `name` of a provider "module:function"; no other engine is loaded. Raises NoSuchEngine."""
+    return known_engine(provider, name)[name]
+
+
+def known_engine(provider: str, name: str) -> Mapping[str, Engine]:
+    """The engines of a provider, none of them loaded; NoSuchEngine unless one is called `name`."""
     module, _, function = provider.partition(":")
     engines: Mapping[str, Engine] = getattr(import_module(module), function)()
     if name not in engines:
-        raise NoSuchEngine(f'there is no engine "{name}"; the engines are {", ".join(engines)}')
-    return engines[name]
+        raise NoSuchEngine(f'there is no engine "{name}": {closest(name, engines)}')
+    return engines
 
 
 def _solve_efforts(found: Engine, job: Job, scene: Scene, emit: Callable[[Solved | Confirmed | str], None]) -> None:

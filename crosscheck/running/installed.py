@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from crosscheck.engines.answers import checked_version, clean, describe
 from crosscheck.engines.contract import EngineMissing
-from crosscheck.engines.registry import BUILT_IN, BrokenPlugIn, engine, plug_ins
+from crosscheck.engines.registry import BUILT_IN, BrokenPlugIn, plug_ins
+from crosscheck.library.case_error import CaseError
+from crosscheck.running.execute import NoSuchEngine, find_engine, known_engine
 from crosscheck.running.pool import run_jobs
-from crosscheck.running.scheduler import Work
+from crosscheck.running.scheduler import Scheduler, Work
+from crosscheck.running.sweep import PROVIDER
 
 ANSWER_LIMIT_S = 60.0
+ABSENT, USELESS = "not installed", "does not work"  # why an engine cannot be used
 
 
 @dataclass(frozen=True)
@@ -24,34 +28,60 @@ class EngineState:
     version: str | None
     advice: str
     summary: str = ""
-    absence: str = "not installed"
+    absence: str = ABSENT
 
 
 def describe_engines() -> list[EngineState]:
     """All engines, built-in ones and plug-ins; plug-ins are asked in their own processes."""
-    states = [_state(name) for name in BUILT_IN]
-    names = plug_ins()
-    found = {name: _useless(name, "it gave no answer") for name in names}
-    with tempfile.TemporaryDirectory() as folder:
-        log = str(Path(folder) / "log")
-        for event in run_jobs(Work(tell, names, log, 1, str, lambda name: ANSWER_LIMIT_S)):
-            name = names[event.job]
-            if event.kind == "emitted":
-                found[name] = event.content
-            elif event.kind in ("crashed", "stopped"):
-                found[name] = _useless(name, event.content)
-    return [*states, *(found[name] for name in names)]
+    return _describe((*BUILT_IN, *plug_ins()), PROVIDER, run_jobs)
 
 
-def tell(name: str, emit: Callable[[EngineState], None]) -> None:
-    """The job of a worker that describes an engine."""
-    emit(_state(name))
+def require_engines(
+    names: Iterable[str], broken: bool = False, provider: str = PROVIDER, scheduler: Scheduler = run_jobs
+) -> None:
+    """Engines that a user names, before anything runs: CaseError unless all of them are installed and work.
+
+    With `broken` those that do not work may be named too, to find out why. What a case names by itself is not required:
+    its absence is a status of its runs.
+    """
+    names = tuple(dict.fromkeys(names))
+    try:
+        for name in names:
+            known_engine(provider, name)
+    except NoSuchEngine as error:
+        raise CaseError(f"{error}; `crosscheck engines` shows them") from None
+    for state in _describe(names, provider, scheduler):
+        if state.version is None and not (broken and state.absence == USELESS):
+            why = f"is {ABSENT}" if state.absence == ABSENT else state.absence
+            raise CaseError(f"engine {state.name} {why}: {state.advice}")
 
 
-def _state(name: str) -> EngineState:
+def tell(asked: tuple[str, str], emit: Callable[[EngineState], None]) -> None:
+    """The job of a worker that describes an engine: its provider and name."""
+    emit(_state(*asked))
+
+
+def _describe(names: Sequence[str], provider: str, scheduler: Scheduler) -> list[EngineState]:
+    """The states of engines; all but built-in ones are asked in processes of their own."""
+    others = [(provider, name) for name in names if name not in BUILT_IN]
+    found = {name: _useless(name, "it gave no answer") for _, name in others}
+    found |= {name: _state(provider, name) for name in names if name in BUILT_IN}
+    if others:
+        with tempfile.TemporaryDirectory() as folder:
+            log = str(Path(folder) / "log")
+            for event in scheduler(Work(tell, others, log, 1, str, lambda asked: ANSWER_LIMIT_S)):
+                _, name = others[event.job]
+                if event.kind == "emitted":
+                    found[name] = event.content
+                elif event.kind in ("crashed", "stopped"):
+                    found[name] = _useless(name, event.content)
+    return [found[name] for name in names]
+
+
+def _state(provider: str, name: str) -> EngineState:
     summary = ""
     try:
-        found = engine(name)
+        found = find_engine(provider, name)
         summary = clean(str(getattr(found, "summary", "")))
         return EngineState(name, checked_version(found.version()), "", summary)
     except EngineMissing as error:
@@ -63,4 +93,4 @@ def _state(name: str) -> EngineState:
 
 
 def _useless(name: str, why: str) -> EngineState:
-    return EngineState(name, None, clean(why), absence="does not work")
+    return EngineState(name, None, clean(why), absence=USELESS)

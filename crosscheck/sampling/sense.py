@@ -8,7 +8,9 @@ from typing import get_args
 
 import numpy as np
 
+from crosscheck.engines.answers import clean
 from crosscheck.engines.checked import CheckedEngine
+from crosscheck.engines.contract import EngineMissing
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import part_of
 from crosscheck.running.execute import NoSuchEngine, find_engine
@@ -97,14 +99,21 @@ def _engines(sweep: SweepFile, scene: Scene, duration_s: float, provider: str) -
         try:
             engine = CheckedEngine(find_engine(provider, name), duration_s=duration_s)
         except NoSuchEngine as error:
-            yield Defect(str(Place().key("engines", index)), str(error), "name one of them")
+            yield Defect(str(Place().key("engines", index)), str(error), "`crosscheck engines` shows them")
+            continue
+        try:
+            engine.version()
+        except EngineMissing as error:
+            yield Defect(str(Place().key("engines", index)), clean(str(error)), "install it, or leave the engine out")
+            continue
+        except Exception:  # it does not work: every sample reports that
             continue
         for number, effort in enumerate(sweep.efforts):
             if effort.engine != name:
                 continue
             try:
                 own = {each.method for each in engine.efforts(scene)}
-            except Exception:  # not installed, or it refuses the scene: every sample reports that
+            except Exception:  # it refuses the scene: every sample reports that
                 continue
             if wrong := _method(effort, own):
                 yield Defect(str(Place().key("efforts", number, "method")), *wrong)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pytest_benchmark.stats import Stats
 
 PACKAGE = "pytest_benchmark"
-MISSING = "pytest-benchmark is not installed, whose statistics and files these are: pip install flexmb[bench]"
+MISSING = "pytest-benchmark is not installed, whose statistics and files these are: pip install pytest-benchmark"
 
 
 def available() -> bool:

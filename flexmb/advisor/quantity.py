@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexmb.run.channels import Recorded, channels_of, distance, family, magnitude, matches, signal_range, unit
+from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -69,7 +70,7 @@ def measured(wanted: tuple[Quantity, ...], run: Recorded) -> Signals:
     for quantity in wanted:
         named = {name: values for name, values in channels.items() if matches(quantity.pattern, name)}
         if not named:
-            raise ValueError(f"the scene has no quantity {quantity.pattern!r}; there are {', '.join(sorted(channels))}")
+            raise ValueError(f"the scene has no quantity {quantity.pattern!r}: {closest(quantity.pattern, channels)}")
         found |= named
     return found
 

@@ -66,6 +66,7 @@ def export(
         from flexmb.scene.bodies import BeamBody, ModalBody
         from flexmb.scene.check import check_and_warn
         from flexmb.scene.files import load_scene
+        from flexmb.scene.problems import closest
 
         loaded = load_scene(scene)
         check_and_warn(loaded)
@@ -74,8 +75,7 @@ def export(
             each.name: each for each in with_sid_bodies(loaded).bodies if isinstance(each, BeamBody | ModalBody)
         }
         if body not in flexible:
-            names = ", ".join(flexible) or "none"
-            raise ValueError(f'"{body}" is not a flexible body of the scene; these are: {names}')
+            raise ValueError(f'"{body}" is not a flexible body of the scene: {closest(body, flexible)}')
         folder(out.parent)
         write_sid(sid_of(flexible[body]), out)
     console.print("wrote", str(out), soft_wrap=True)

@@ -14,6 +14,7 @@ from flexmb.cli import run_options as o
 from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, NoUserCode, SceneFile, Strict, console, no_traceback
 from flexmb.output.whole import whole_file
 from flexmb.output.writing import check_folder, folder
+from flexmb.scene.problems import closest
 
 if TYPE_CHECKING:
     from flexmb.run.trajectory import Trajectory
@@ -165,7 +166,7 @@ def _section(beams: dict[str, BeamBody], word: str) -> tuple[str, list[float]]:
     if word in beams:  # a name may hold a colon
         name, places = word, ""
     if name not in beams:
-        raise ValueError(f"--sections: there is no beam {name!r}; these are: {', '.join(beams) or 'none'}")
+        raise ValueError(f"--sections: there is no beam {name!r}: {closest(name, beams)}")
     if not places:
         return name, [beams[name].length_m * i / (SECTIONS - 1) for i in range(SECTIONS)]
     try:

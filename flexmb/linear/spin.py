@@ -12,6 +12,7 @@ from flexmb.linear.linearize import linear_model
 from flexmb.linear.newton import balanced
 from flexmb.linear.variations import Equations
 from flexmb.scene.open_loop import refuse_feedback
+from flexmb.scene.problems import closest
 from flexmb.scene.schema import Revolute, Scene
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
@@ -79,5 +80,5 @@ def _turning(system: System, hinge: str) -> int:
     angles = [found.name for found in system.scene.hinges if isinstance(found, Revolute)]
     angles += [wheel.name for wheel in system.scene.wheels]
     if hinge not in angles:
-        raise ValueError(f"{hinge!r} does not spin about one axis; there are {', '.join(angles) or 'none'}")
+        raise ValueError(f"{hinge!r} does not spin about one axis: {closest(hinge, angles)}")
     return system.speed(hinge).start

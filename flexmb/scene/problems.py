@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+LISTED = 24  # known words that a message lists; of more it names the nearest
 
 @dataclass(frozen=True)
 class Place:
@@ -77,9 +78,12 @@ def in_short(scene: str, doubts: Sequence[Doubt]) -> str:
 
 
 def closest(word: str, known: Iterable[str]) -> str:
-    """The remedy for an unknown word: the nearest known word, or all known words."""
+    """The remedy for an unknown word: the nearest known word; if none is near, all known words, if they are few."""
     words = sorted(known)
     near = get_close_matches(word, words, n=1)
     if near:
         return f'did you mean "{near[0]}"?'
+    if len(words) > LISTED:
+        nearest = get_close_matches(word, words, n=1, cutoff=0.0)
+        return f'none of the {len(words)} that there are is near; the nearest is "{nearest[0]}"'
     return f"use one of: {', '.join(words)}" if words else "there is none: add it first"

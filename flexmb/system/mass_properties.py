@@ -8,6 +8,7 @@ import numpy as np
 
 from flexmb.kept import kept
 from flexmb.modal.cross import cross_matrix
+from flexmb.scene.problems import closest
 from flexmb.system.frames import AT_GROUND, body_pose, link_pose
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables import arguments
@@ -61,7 +62,7 @@ def mass_properties(arrays: SceneArrays, w: Workspace, inertias: Real, body: str
         first = names.index(body)
         counted, frame = _carried(parent.tolist(), first), body_pose(arrays, w, first)
     else:
-        raise ValueError(f'there is no body "{body}"; there are {", ".join(names)}')
+        raise ValueError(f'there is no body "{body}": {closest(body, names)}')
     found = zip(*(_of_link(inertias[k]) for k in counted), strict=True)
     mass, first_moment, inertia = (np.array(each) for each in found)
     poses = [link_pose(w, k) for k in counted]

@@ -15,6 +15,7 @@ from crosscheck.library.find import Case, load_case, shipped_cases
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord
 from crosscheck.records.session import last_session
+from crosscheck.running.installed import require_engines
 from crosscheck.running.job import Job
 from crosscheck.running.scheduler import Event, Events, Work
 from crosscheck.running.sweep import run_planned, sweep
@@ -88,6 +89,11 @@ def only(verdicts: list[Verdict], a: str, b: str) -> Verdict:
 def sweep_here(cases: Iterable[Case], asked: tuple[str, ...], records: Path, **options: Any) -> None:
     """What `sweep` records, in this process."""
     sweep(cases, asked, records, **{"provider": PROVIDER, **options, "scheduler": here})
+
+
+def engines_here(names: Iterable[str], broken: bool = False) -> None:
+    """What `require_engines` says of fake engines, in this process."""
+    require_engines(names, broken, PROVIDER, here)
 
 
 def run_here(

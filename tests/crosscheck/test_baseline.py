@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from crosscheck import cli
 from crosscheck.sealed.seal import read_results
-from tests.crosscheck.sessions import copy_case, sweep_here
+from tests.crosscheck.sessions import copy_case, engines_here, sweep_here
 
 RUN_FILE = """
 [[variant]]
@@ -35,6 +35,7 @@ reason = "its steps are long"
 def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """Runs `crosscheck run` on the small case in a folder of its own; the exit code and what was shown."""
     monkeypatch.setattr("crosscheck.running.sweep.sweep", sweep_here)
+    monkeypatch.setattr("crosscheck.running.installed.require_engines", engines_here)
     monkeypatch.setattr(cli.common.console, "_width", 300)
     monkeypatch.chdir(tmp_path)
     case = copy_case(tmp_path / "cases", RUN_FILE)
@@ -113,17 +114,21 @@ def test_only_what_became_worse_since_the_baseline_fails(run, tmp_path: Path) ->
 
 def test_worse_new_and_missing_fail(run, tmp_path: Path) -> None:
     assert run("fine", "--baseline", "kept")[0] == 0
-    for engine in ("biased", "crasher", "absent", "refuser", "no-such-engine"):
-        if engine == "crasher":
-            continue  # it would end this very process
+    for engine in ("biased", "refuser"):
         code, output = run(engine, "--baseline", "kept", out=engine)
         assert code == 1 and "Worse than the baseline" in output, engine
     assert "❌ Worse" in (tmp_path / "biased" / "summary.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("engine", ["absent", "refuser", "no-such-engine"])
-def test_a_session_that_shows_nothing_is_no_baseline(run, tmp_path: Path, engine: str) -> None:
+@pytest.mark.parametrize("engine", ["absent", "no-such-engine"])
+def test_an_engine_that_is_not_there_is_refused_beside_a_baseline_too(run, tmp_path: Path, engine: str) -> None:
     code, output = run(engine, "--baseline", "kept")
+    assert (code, f'engine "{engine}"' in output or f"engine {engine} is not installed" in output) == (2, True), output
+    assert not (tmp_path / "kept").exists() and not (tmp_path / "out").exists()
+
+
+def test_a_session_that_shows_nothing_is_no_baseline(run, tmp_path: Path) -> None:
+    code, output = run("refuser", "--baseline", "kept")
     assert code == 1 and "this session cannot be one" in output
     assert not (tmp_path / "kept").exists()
 

@@ -25,7 +25,7 @@ class BasiliskEngine(PeerEngine):
     )
 
     def version(self) -> str:
-        with needed("Basilisk", "more-peers"):
+        with needed("Basilisk", "bsk"):
             import Basilisk  # noqa: F401
         return version("bsk")
 

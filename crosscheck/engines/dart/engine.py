@@ -25,7 +25,7 @@ class DartEngine(PeerEngine):
     )
 
     def version(self) -> str:
-        with needed("DART", "more-peers"):
+        with needed("DART", "dartpy"):
             import dartpy  # noqa: F401
         return version("dartpy")
 

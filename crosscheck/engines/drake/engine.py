@@ -19,7 +19,7 @@ class DrakeEngine(PeerEngine):
     summary = "rigid trees in minimal coordinates, error-controlled Runge-Kutta 5"
 
     def version(self) -> str:
-        with needed("Drake", "more-peers"):
+        with needed("Drake", "drake"):
             import pydrake  # noqa: F401
         return version("drake")
 

@@ -12,7 +12,7 @@ import numpy as np
 from crosscheck.engines.contract import EngineMissing
 from flexmb.typing import Real
 
-REMEDY = "Exudyn is not installed: `pip install flexmb[peers]`"
+REMEDY = "Exudyn is not installed: pip install exudyn"
 
 
 @cache

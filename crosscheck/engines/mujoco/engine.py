@@ -30,7 +30,7 @@ class MujocoEngine(PeerEngine):
     )
 
     def version(self) -> str:
-        with needed("MuJoCo", "peers"):
+        with needed("MuJoCo", "mujoco"):
             import mujoco
         return mujoco.__version__
 

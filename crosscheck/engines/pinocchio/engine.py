@@ -30,7 +30,7 @@ class PinocchioEngine(PeerEngine):
         try:
             import pinocchio
         except ImportError as error:
-            raise EngineMissing("Pinocchio is not installed: pip install flexmb[peers]") from error
+            raise EngineMissing("Pinocchio is not installed: pip install pin") from error
         return pinocchio.__version__
 
     def obstacle(self, scene: Scene) -> str:

@@ -19,6 +19,7 @@ from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.scene.bodies import BeamBody, Level, ModalBody, RigidBody, SidBody
 from flexmb.scene.connectors import BetweenNodes
+from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -114,8 +115,8 @@ def appendage_of(scene: Scene, body: str, modes: int | None = None) -> Appendage
     """
     found = next((candidate for candidate in scene.bodies if candidate.name == body), None)
     if found is None:
-        names = ", ".join(f'"{candidate.name}"' for candidate in scene.bodies if not isinstance(candidate, RigidBody))
-        raise ValueError(f'the scene has no body "{body}"; its flexible bodies are {names or "none"}')
+        names = [candidate.name for candidate in scene.bodies if not isinstance(candidate, RigidBody)]
+        raise ValueError(f'the scene has no flexible body "{body}": {closest(body, names)}')
     if isinstance(found, RigidBody):
         raise ValueError(f'body "{body}" is rigid: it has no modes to compare with a hinge; choose a flexible body')
     if isinstance(found, SidBody):

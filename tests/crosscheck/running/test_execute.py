@@ -161,7 +161,7 @@ def test_a_scene_that_cannot_be_made_fails_without_its_engine() -> None:
 
 def test_an_engine_that_is_none_did_not_run_and_the_others_are_named() -> None:
     found = emitted(Actor(), engine="acter")
-    text = 'there is no engine "acter"; the engines are actor, other'
+    text = 'there is no engine "acter": did you mean "actor"?'
     assert found == [the("did not run", text, engine="acter")]
     MADE["actor"] = actor = Actor()
     assert find_engine("tests.crosscheck.running.test_execute:engines", "actor") is actor

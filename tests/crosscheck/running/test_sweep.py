@@ -88,7 +88,7 @@ def test_efforts_without_effect_leave_the_uncertainty_unknown(tmp_path) -> None:
     ("engine", "status", "words"),
     [
         ("absent", "did not run", "install the extra"),
-        ("nonsense", "did not run", 'no engine "nonsense"; the engines are fine'),
+        ("nonsense", "did not run", 'no engine "nonsense": '),
         ("refuser", "refused", "revolute hinges are beyond it"),
         ("crasher", "crashed", "exit code 139"),
         ("raiser", "failed", "RuntimeError: the solver gave up on purpose"),

@@ -36,7 +36,7 @@ WRONG = {
     "missing": (("import", "robot.urdf"), "No such file"),
     "mjcf and base": (("import", "robot.xml", "--free-base"), "are for URDF"),
     "rigid": (
-        ("export", "scene.toml", "load", "--out", "b.sid"), "is not a flexible body of the scene; these are: rod",
+        ("export", "scene.toml", "load", "--out", "b.sid"), "is not a flexible body of the scene: use one of: rod",
     ),
     "interface": (("reduce", "K.mtx", "M.mtx", "n.csv", "--interface", "a", "--out", "b.sid"), "numbers of nodes"),
     "out": (("reduce", "K.mtx", "M.mtx", "n.csv", "--interface", "1", "--out", "b.txt"), "neither a SID file"),

@@ -75,7 +75,7 @@ def test_bodies_inside_the_tree_are_refused(change, message):
 @pytest.mark.parametrize(
     ("scene", "body", "message"),
     [
-        (gyrostat(), "wing", 'no body "wing"; its flexible bodies are "panel"'),
+        (gyrostat(), "wing", 'no flexible body "wing": use one of: panel'),
         (gyrostat(), "hub", 'body "hub" is rigid'),
         (gyrostat(child_node="tip"), "panel", 'hinge "mount" is at its node "tip"'),
         (gyrostat(boundary="free-free"), "panel", "its modes are free-free"),
