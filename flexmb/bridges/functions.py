@@ -13,6 +13,7 @@ import numpy as np
 
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.system.tree_system import System
+from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
@@ -66,6 +67,7 @@ class Accelerations(Function):
     """udot under further generalised forces along the speeds, the third argument."""
 
     def values(self, q: Real, u: Real, third: Real, t: Real) -> Real:
+        third = arguments.array("forces", third)  # products of other types would have other bits
         found = self.system.accelerations_batch(q, u, t).accelerations
         for i in np.flatnonzero(np.any(third, axis=1) & np.isfinite(found).all(axis=1)).tolist():
             state = self.system.state(q[i], u[i], float(t[i]))

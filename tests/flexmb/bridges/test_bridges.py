@@ -74,6 +74,20 @@ def test_functions_of_many_states(name: str, kind: str) -> None:
     assert np.isnan(found[1]).all()
 
 
+@CASES
+def test_arguments_of_extended_precision_give_the_same_bits(name: str, kind: str) -> None:
+    system = SYSTEMS[name]()
+    of = Accelerations(system) if kind == "accelerations" else InverseDynamics(system)
+    rows = [np.array([x]) for x in arguments(system)]
+    rows[2] = np.random.default_rng(1).standard_normal((20, system.nu))
+    rows = [np.repeat(row, 20 // len(row), axis=0) for row in rows]
+    longer = [row.astype(np.longdouble) for row in rows]
+    for found, wanted in zip(
+        (of.values(*longer), *of.jacobians(*longer)), (of.values(*rows), *of.jacobians(*rows)), strict=True
+    ):
+        assert found.tobytes() == wanted.tobytes()
+
+
 def test_what_bridges_refuse() -> None:
     from tests.flexmb.system.test_copies import controlled
 
