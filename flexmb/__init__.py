@@ -13,6 +13,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from flexmb import forks as forks  # from now on forks wait for imports by other threads
+
 # The public names are those of `flexmb.scene.schema.__all__`, and these of other modules.
 _HOME = {
     "flexmb.advisor.advice": "Advice advise",

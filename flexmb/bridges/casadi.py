@@ -25,7 +25,8 @@ except ImportError as error:  # pragma: no cover
 def accelerations(system: System) -> casadi.Callback:
     """`f(q, u, forces, t)`: udot (nu,) of q (nq,), u (nu,), further generalised forces (nu,) and the time (s).
 
-    NaN where there are no accelerations. NotImplementedError for scenes with controllers.
+    NaN where there are no accelerations; derivatives there raise an error. NotImplementedError for scenes with
+    controllers.
     """
     return _Bridged("accelerations", Accelerations(system), ("q", "u", "forces", "t"), "udot")
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.system.tree_system import System
+from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
@@ -27,7 +28,8 @@ class Jacobians(NamedTuple):
 
 
 class Function(ABC):
-    """A function of n states at once. The rows of a state where it has no value, or no derivative, are NaN."""
+    """A function of n states at once. Its values are NaN at a state where it has none, by which searches shorten their
+    steps; derivatives are asked for where a search stands, and raise there."""
 
     def __init__(self, system: System) -> None:
         """TypeError for anything but a System, NotImplementedError for one with controllers."""
@@ -47,14 +49,15 @@ class Function(ABC):
         """Jacobians at one state."""
 
     def jacobians(self, q: Real, u: Real, third: Real, t: Real) -> Jacobians:
-        """At the same arguments."""
+        """At the same arguments. DynamicsError or ValueError, with a note of its number, for a state without them."""
         n, nu = len(q), self.system.nu
-        found = Jacobians(*(np.full((n, nu, *shape), np.nan) for shape in self.shapes))
+        found = Jacobians(*(np.empty((n, nu, *shape)) for shape in self.shapes))
         for i in range(n):
             try:
                 parts = self._derivatives(self.system.state(q[i], u[i], float(t[i])), third[i])
-            except (DynamicsError, ValueError):  # no accelerations; not finite, no orientation
-                continue
+            except (DynamicsError, ValueError) as error:  # no accelerations; not finite, no orientation
+                error.add_note(f"derivatives were asked for at this state, {i} of {n} counted from 0")
+                raise
             for whole, part in zip(found, parts, strict=True):
                 whole[i] = part
         return found
@@ -64,6 +67,7 @@ class Accelerations(Function):
     """udot under further generalised forces along the speeds, the third argument."""
 
     def values(self, q: Real, u: Real, third: Real, t: Real) -> Real:
+        third = arguments.array("forces", third)  # products of other types would have other bits
         found = self.system.accelerations_batch(q, u, t).accelerations
         for i in np.flatnonzero(np.any(third, axis=1) & np.isfinite(found).all(axis=1)).tolist():
             state = self.system.state(q[i], u[i], float(t[i]))

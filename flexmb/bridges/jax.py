@@ -30,8 +30,8 @@ except ImportError as error:  # pragma: no cover
 def accelerations(system: System) -> Callable[..., jax.Array]:
     """`f(q, u, forces=0, t=0)`: udot (nu,) of q (nq,), u (nu,), further generalised forces (nu,) and the time (s).
 
-    NaN where there are no accelerations. TypeError for numbers that have not 64 bits, ValueError for shapes that do not
-    fit, NotImplementedError for scenes with controllers.
+    NaN where there are no accelerations; derivatives there raise an error. TypeError for numbers that have not 64 bits,
+    ValueError for shapes that do not fit, NotImplementedError for scenes with controllers.
     """
     return _bridged(Accelerations(system))
 

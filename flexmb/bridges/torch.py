@@ -25,8 +25,9 @@ except ImportError as error:  # pragma: no cover
 def accelerations(system: System) -> Callable[..., torch.Tensor]:
     """`f(q, u, forces=0, t=0)`: udot (n,nu) of q (n,nq), u (n,nu), further generalised forces (n,nu), times (n,) in s.
 
-    One state (nq,), (nu,) gives udot (nu,). NaN where there are no accelerations. TypeError for anything but tensors of
-    64 bits, ValueError for shapes that do not fit, NotImplementedError for scenes with controllers.
+    One state (nq,), (nu,) gives udot (nu,). NaN where there are no accelerations; derivatives there raise an error.
+    TypeError for anything but tensors of 64 bits, ValueError for shapes that do not fit, NotImplementedError for scenes
+    with controllers.
     """
     return _bridged(Accelerations(system))
 

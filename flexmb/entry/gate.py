@@ -11,7 +11,6 @@ writes. The gate compares the number of the calling thread (2 ns), and passes ca
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Sequence
 from functools import cache
 from threading import RLock
@@ -19,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from flexmb.forks import fork_waits_for
 from flexmb.jit.bundle import bundle
 from flexmb.jit.direct import at_address, nothing_at, status_at
 from flexmb.jit.hooks import HOOKS
@@ -49,8 +49,7 @@ NOBODY = -1  # no thread has this number
 # Held while `builtin` registers a kernel that is new to it. Nothing in between takes another lock. Forking waits for
 # it, because a lock that is held during a fork is never released in the child.
 _making = RLock()
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(before=_making.acquire, after_in_parent=_making.release, after_in_child=_making.release)
+fork_waits_for(_making)
 
 _UNLOCKED_FROM = 50  # speeds: from so many on the kernel releases the interpreter's lock, which costs 50 ns
 

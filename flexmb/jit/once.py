@@ -13,7 +13,7 @@ would wait for it without end. Therefore forking waits until these locks are fre
 
 from __future__ import annotations
 
-import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
@@ -22,24 +22,25 @@ from typing import Any
 from llvmlite.binding import ffi
 from numba.core.compiler_lock import global_compiler_lock
 
+from flexmb.forks import fork_waits_for
+
 PATIENCE = 600.0  # s; the longest kernel takes a tenth of it on an idle processor
 
+
+class _OfFingerprints:
+    """The lock that Python 3.11 holds while any kernel's fingerprint is found; later versions have none."""
+
+    def __enter__(self) -> None:
+        cache = getattr(sys.modules.get(f"{__package__}.cache"), "KernelCache", None)  # its module imports this one
+        self._lock: Any = getattr(vars(cache)["_fingerprint"] if cache else None, "lock", nullcontext())
+        self._lock.__enter__()
+
+    def __exit__(self, *error: object) -> None:
+        self._lock.__exit__(*error)
+
+
 # llvmlite's lock is not public; should it move in a later version, forks do not wait for it.
-_LOCKS: tuple[Any, ...] = (global_compiler_lock, getattr(getattr(ffi, "lib", None), "_lock", nullcontext()))
-
-
-def _take() -> None:
-    for lock in _LOCKS:
-        lock.__enter__()
-
-
-def _let_go() -> None:
-    for lock in reversed(_LOCKS):
-        lock.__exit__(None, None, None)
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(before=_take, after_in_parent=_let_go, after_in_child=_let_go)
+fork_waits_for(global_compiler_lock, getattr(getattr(ffi, "lib", None), "_lock", nullcontext()), _OfFingerprints())
 
 
 @contextmanager

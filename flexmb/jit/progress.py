@@ -13,9 +13,9 @@ from __future__ import annotations
 import logging
 import re
 import threading
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from types import FunctionType
 
@@ -23,8 +23,8 @@ from flexmb.jit.installed import unfit
 
 AFTER = 2.0  # s
 _LOGGER = logging.getLogger("flexmb.jit")
-_versions = Counter[str]()  # number of announced versions by the name of the kernel
-_counting = threading.Lock()
+# Of announced versions by the name of the kernel. It is counted without a lock, which a forked process could inherit.
+_versions: dict[str, Iterator[int]] = {}
 _thread = threading.local()  # has an attribute `announcing` while this thread compiles
 
 
@@ -47,9 +47,7 @@ def announced(function: FunctionType, folder: Path | None) -> Iterator[None]:
 
 def _announce(function: FunctionType, folder: Path | None) -> None:
     name = f"{function.__module__}.{function.__qualname__}"
-    with _counting:
-        _versions[name] += 1
-        version = _versions[name]
+    version = next(_versions.setdefault(name, count(1)))
     purpose = re.split(r"[.;:\n]", (function.__doc__ or "a kernel").strip(), maxsplit=1)[0]
     which = name if version == 1 else f"version {version} of {name}"
     how_often = f"once: it is kept in {folder}" if folder else "in every process: no folder is writable to keep it"

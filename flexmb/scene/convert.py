@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from numbers import Real
 from typing import Any, TypeVar
 
 import msgspec
@@ -57,7 +58,11 @@ def label(collection: str, item: Any) -> str:
 
 def _array_to_list(value: Any) -> Any:
     if hasattr(value, "tolist"):
-        return value.tolist()
+        found = value.tolist()
+        if type(found) is not type(value):
+            return found
+        if isinstance(value, Real):  # numpy has no plain number for one of extended precision
+            return float(value)
     raise TypeError(f"a scene cannot hold a {type(value).__name__}")
 
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
+import msgspec
+
 from flexmb.scene import connectors, couplings, hinges
 from flexmb.scene.bodies import (
     ZERO,
@@ -194,6 +196,10 @@ class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
         """
         return with_values(self, values)
 
+
+# msgspec keeps what it finds out about a struct in its class before it has found all: of two threads that decode their
+# first scenes at once, one reads an unfinished part, and the process crashes. One thread alone imports a module.
+msgspec.msgpack.Decoder(Scene)
 
 __all__ = [
     "Action", "BeamBody", "BeamNode", "BeamStation", "Body", "Change", "Constant", "ControlSignal", "Controller",

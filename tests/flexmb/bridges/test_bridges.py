@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -55,18 +56,36 @@ CASES = pytest.mark.parametrize(("name", "kind"), [
 
 @CASES
 def test_functions_of_many_states(name: str, kind: str) -> None:
-    """A state without accelerations gives NaN, and spoils no other."""
+    """A state without accelerations has values of NaN, and spoils no other; its derivatives raise."""
     system = SYSTEMS[name]()
     of = Accelerations(system) if kind == "accelerations" else InverseDynamics(system)
     value, parts = expected(system, kind)
     rows = [np.array([x, x, x]) for x in arguments(system)]
     rows[0][1] = np.nan
-    found, jacobians = of.values(*rows), of.jacobians(*rows)
+    found = of.values(*rows)
+    with pytest.raises(ValueError) as refused:
+        of.jacobians(*rows)
+    assert refused.value.__notes__ == ["derivatives were asked for at this state, 1 of 3 counted from 0"]
+    jacobians = of.jacobians(*(np.delete(row, 1, axis=0) for row in rows))
     for i in (0, 2):
         close(found[i], value)
         for part, wanted in zip(jacobians, parts, strict=True):
-            close(part[i], wanted)
-    assert np.isnan(found[1]).all() and all(np.isnan(part[1]).all() for part in jacobians)
+            close(part[i // 2], wanted)
+    assert np.isnan(found[1]).all()
+
+
+@CASES
+def test_arguments_of_extended_precision_give_the_same_bits(name: str, kind: str) -> None:
+    system = SYSTEMS[name]()
+    of = Accelerations(system) if kind == "accelerations" else InverseDynamics(system)
+    rows = [np.array([x]) for x in arguments(system)]
+    rows[2] = np.random.default_rng(1).standard_normal((20, system.nu))
+    rows = [np.repeat(row, 20 // len(row), axis=0) for row in rows]
+    longer = [row.astype(np.longdouble) for row in rows]
+    for found, wanted in zip(
+        (of.values(*longer), *of.jacobians(*longer)), (of.values(*rows), *of.jacobians(*rows)), strict=True
+    ):
+        assert found.tobytes() == wanted.tobytes()
 
 
 def test_what_bridges_refuse() -> None:
@@ -152,3 +171,39 @@ def test_casadi(name: str, kind: str) -> None:
     jacobian = casadi.Function("J", symbols, [casadi.jacobian(out, x) for x in symbols])
     for part, wanted in zip(jacobian(*given), parts, strict=True):
         close(np.array(part), wanted)
+
+
+def gradient_in(library: str, system: fm.System, q: Any, u: Any) -> Any:
+    """Of the first acceleration by the speeds, as the library's users take it."""
+    pytest.importorskip(library)
+    bridge = import_module(f"flexmb.bridges.{library}")
+    f, used = bridge.accelerations(system), import_module(library)
+    if library == "jax":
+        used.config.update("jax_enable_x64", True)
+        return np.asarray(used.grad(lambda u: f(q, u)[0])(u))
+    if library == "torch":
+        speeds = used.tensor(u, requires_grad=True)
+        f(used.tensor(q), speeds)[0].backward()
+        return speeds.grad.numpy()
+    symbol = used.MX.sym("u", system.nu)
+    of_first = used.jacobian(f(q, symbol, np.zeros(system.nu), 0.0)[0], symbol)
+    return np.array(used.Function("J", [symbol], [of_first])(u)).ravel()
+
+
+@pytest.mark.parametrize("library", ["jax", "torch", "casadi"])
+def test_derivatives_of_a_refused_state_raise_with_the_words_of_flexmb(library: str) -> None:
+    """Not NaN, with which an optimiser would go on; afterwards a right state has the gradient that it had before."""
+    system = SYSTEMS["flexible"]()
+    q, u, *_ = arguments(system)
+    right = gradient_in(library, system, q, u)
+    close(right, expected_by_speed(system, q, u))
+    spoiled = q.copy()
+    spoiled[-1] = np.nan
+    for state, said in (((spoiled, u), "give finite numbers"), ((q, u + 1e160), "not finite|infinite|overflow")):
+        with pytest.raises(Exception, match=said):
+            gradient_in(library, system, *state)
+        assert gradient_in(library, system, q, u).tobytes() == right.tobytes()
+
+
+def expected_by_speed(system: fm.System, q: Any, u: Any) -> Any:
+    return system.acceleration_derivatives(system.state(q, u)).by_speed[0]

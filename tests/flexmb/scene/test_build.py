@@ -140,3 +140,14 @@ def test_inertia_helpers_against_sums_over_points():
     # a disc cut from an n x n grid is round to its cell: 1/n of its area
     np.testing.assert_allclose(cylinder_inertia(mass, radius, length, "x"), expected, rtol=1.0 / n, atol=1e-12)
     np.testing.assert_array_equal(inertia_moments(1, 2, 3, 4, 5, 6), [[1, 4, 5], [4, 2, 6], [5, 6, 3]])
+
+
+def test_numbers_of_extended_precision_are_rounded_and_complex_ones_refused():
+    def scene(mass, inertia):
+        return SceneBuilder("one").rigid_body("hub", mass=mass, inertia=inertia).revolute("h", "ground", "hub").scene()
+
+    third = np.longdouble(1) / 3
+    assert scene(third, np.array([third] * 3)) == scene(float(third), [float(third)] * 3)
+    for wrong in (np.clongdouble(1.0), np.array([1j] * 3)):
+        with pytest.raises(TypeError, match="cannot hold a c"):
+            scene(1.0, wrong)

@@ -372,8 +372,42 @@ def test_a_process_that_is_forked_off_while_a_thread_finds_a_kept_value_finds_it
     assert not hangs and child.exitcode == 0
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
+def test_a_process_that_is_forked_off_while_threads_import_and_read_first_scenes():
+    """Of a module that they were importing, the child would wait for the rest; and none of their calls crashes."""
+    assert program("forked_while_importing").split()[:2] == ["0", "0"]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_fifteen_processes_that_are_forked_off_while_threads_compile_scenes():
+    """What threads find meanwhile is kept without locks, or forks wait for it: see `flexmb.kept`, `flexmb.forks`."""
+    busy = threading.Event()
+
+    def work() -> None:
+        while not busy.is_set():
+            _compile_and_evaluate()
+
+    threads = [threading.Thread(target=work) for _ in range(3)]
+    for each in threads:
+        each.start()
+    try:
+        for _ in range(15):
+            child = multiprocessing.get_context("fork").Process(target=_compile_and_evaluate)
+            child.start()
+            child.join(30)
+            hangs = child.is_alive()
+            if hangs:
+                child.kill()
+            assert not hangs and child.exitcode == 0
+    finally:
+        busy.set()
+        for each in threads:
+            each.join()
+
+
 def test_kept_values_take_no_lock():
-    """Only kernels' keys are, which are found under numba's lock, for which forks wait (`flexmb.jit.once`)."""
+    """Only kernels' keys do in Python 3.11, and forks wait for these (`flexmb.jit.once`)."""
     files = [file for name in ("flexmb", "crosscheck") for file in (ROOT / name).rglob("*.py")]
     found = {str(file.relative_to(ROOT)) for file in files if "import cached_property" in file.read_text()}
     assert len(files) > 100 and found == {str(Path("flexmb", "jit", "cache.py"))}
@@ -382,6 +416,11 @@ def test_kept_values_take_no_lock():
 def _compile_in_a_child() -> None:
     with global_compiler_lock:
         pass
+
+
+def _compile_and_evaluate() -> None:
+    system = fm.compile(W.scene)
+    system.accelerations(system.initial_state)
 
 
 def _in_a_child(system: fm.System, state: fm.State, told: Any) -> None:
