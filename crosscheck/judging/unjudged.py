@@ -45,7 +45,7 @@ class Unjudged:
 
 
 @dataclass(frozen=True)
-class Group:
+class UnjudgedChannels:
     """Channels of one engine on one variant that are unjudged for one reason."""
 
     case: str
@@ -61,13 +61,13 @@ class Group:
         return f"{self.case}, {self.variant}, {self.engine} offers what nothing judges: {names}: {self.reason}"
 
 
-def grouped(left: Iterable[Unjudged]) -> list[Group]:
+def grouped(left: Iterable[Unjudged]) -> list[UnjudgedChannels]:
     """Unjudged channels by case, variant, engine and reason, what is not excused first."""
     found: dict[tuple[str, str, str, str, bool], list[str]] = {}
     for each in left:
         found.setdefault((each.case, each.variant, each.engine, each.reason, each.excused), []).append(each.channel)
     groups = [
-        Group(case, variant, engine, tuple(channels), reason, excused)
+        UnjudgedChannels(case, variant, engine, tuple(channels), reason, excused)
         for (case, variant, engine, reason, excused), channels in found.items()
     ]
     return sorted(groups, key=lambda group: group.excused)

@@ -8,7 +8,7 @@ from typing import Any
 from crosscheck.judging.applicable import Inapplicable
 from crosscheck.judging.outcome import NO_REFERENCE, Absence, SessionOutcome
 from crosscheck.judging.results import CaseResults
-from crosscheck.judging.unjudged import Group, grouped
+from crosscheck.judging.unjudged import UnjudgedChannels, grouped
 from crosscheck.library.case import Provenance
 from crosscheck.report.mutations import CaseScore
 from crosscheck.report.places import CasePlace
@@ -37,7 +37,7 @@ class CaseView:
     controls: Block | None
     absences: list[Absence]
     inapplicable: list[Inapplicable]
-    unjudged: list[Group]
+    unjudged: list[UnjudgedChannels]
     unreferenced: str
     timings: list[dict[str, Any]]
     mutation: CaseScore | None

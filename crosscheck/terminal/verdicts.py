@@ -83,12 +83,11 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         yield marked("✕", "red", text)
     for case in outcome.idle:
         yield marked("–", "yellow", f"{case}: nothing was compared")
-    for case in outcome.unreferenced:
-        sign, colour = ("✕", "red") if outcome.strict else ("!", "yellow")
-        yield marked(sign, colour, f"{case} {NO_REFERENCE.format(case)}")
     sign, colour = ("✕", "red") if outcome.strict else ("!", "yellow")
-    for group in grouped(outcome.unaccounted):
-        yield marked(sign, colour, str(group))
+    for case in outcome.unreferenced:
+        yield marked(sign, colour, f"{case} {NO_REFERENCE.format(case)}")
+    for left in grouped(outcome.unaccounted):
+        yield marked(sign, colour, str(left))
     yield from _by_claims(outcome)
     for verdict in outcome.worse:
         yield marked("!", "yellow", f"{_place(verdict)} {verdict.grown}")
