@@ -11,6 +11,7 @@ from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.claims import idle_claims
 from crosscheck.judging.figures import recordable
 from crosscheck.judging.results import CaseResults, Session
+from crosscheck.judging.unjudged import Unjudged, unjudged
 from crosscheck.judging.verdict import Verdict
 from flexmb.kept import kept
 
@@ -35,7 +36,8 @@ class SessionOutcome:
     """All verdicts of a session, by case; all absences; broken lines of the records, in words.
 
     `strict`: figures worse than recorded or missing, and references that were never made, are not as expected.
-    `inapplicable`: what engines that joined a case cannot represent of it. `asked`: the engines asked for by name.
+    `inapplicable`: what engines that joined a case cannot represent of it. `unjudged`: channels that are offered and
+    judged by nothing, which a strict session forbids unless they are excused. `asked`: the engines asked for by name.
     `unreferenced`: the cases with a recipe of a reference but no reference. `made_with`: versions and processor of the
     last session in the records. `unfinished`: the session has not ended, so nothing is judged. `idle_claims`: the
     user's claims that name nothing, in words.
@@ -51,6 +53,7 @@ class SessionOutcome:
     made_with: str = ""
     unfinished: bool = False
     idle_claims: tuple[str, ...] = ()
+    unjudged: tuple[Unjudged, ...] = ()
 
     @property
     def all(self) -> list[Verdict]:
@@ -86,6 +89,11 @@ class SessionOutcome:
     def not_offered(self) -> dict[str, int]:
         """For each engine the number of channels that would be judged and that it does not offer."""
         return dict(Counter(each.engine for each in self.inapplicable if each.channel))
+
+    @property
+    def unaccounted(self) -> list[Unjudged]:
+        """Channels that are offered and judged by nothing, and may not be."""
+        return [each for each in self.unjudged if not each.excused]
 
     @property
     def loosened(self) -> list[Verdict]:
@@ -136,7 +144,7 @@ class SessionOutcome:
         """Whether every verdict is as expected, everything asked for was judged, and no run is lost."""
         complete = not self.unfinished and bool(self.all) and not self.lost and not self.broken
         sound = complete and not self.unexpected and not self.uncompared and not self.idle_claims
-        lacking = self.worse or self.outgrown or self.unrecorded or self.unreferenced
+        lacking = self.worse or self.outgrown or self.unrecorded or self.unreferenced or self.unaccounted
         return sound and not (self.strict and lacking)
 
     @property
@@ -165,6 +173,9 @@ class SessionOutcome:
         if self.strict and self.unreferenced:
             cases = "case has" if len(self.unreferenced) == 1 else "cases have"
             parts.append(f"{len(self.unreferenced)} {cases} a recipe and no reference")
+        if self.strict and self.unaccounted:
+            count = len(self.unaccounted)
+            parts.append(f"{count} channel{'s are' if count > 1 else ' is'} offered and judged by nothing")
         if self.uncompared:
             parts.append(self._uncompared)
         if self.broken:
@@ -206,9 +217,11 @@ class SessionOutcome:
 def conclude(session: Session, strict: bool = False) -> SessionOutcome:
     verdicts: dict[str, list[Verdict]] = {}
     inapplicable: tuple[Inapplicable, ...] = ()
+    left: tuple[Unjudged, ...] = ()
     for case in session.cases:
         verdicts[case.case.case], apart = set_apart(case, judge(case))
         inapplicable += apart
+        left += unjudged(case, verdicts[case.case.case], apart)
     whole = {(each.case, each.variant, each.engine) for each in inapplicable if not each.channel}
     absences = [absence for case in session.cases for absence in _absences(case)]
     return SessionOutcome(
@@ -221,6 +234,7 @@ def conclude(session: Session, strict: bool = False) -> SessionOutcome:
         unreferenced=tuple(case.case.case for case in session.cases if case.case.unreferenced),
         made_with=_made_with(session),
         idle_claims=idle_claims(session.cases, verdicts, inapplicable),
+        unjudged=left,
     )
 
 

@@ -4,26 +4,31 @@ In the reduced run file every comparison is an explicit pair, and `engines` of a
 
 Without engines: everything. With one: every comparison of it, including its partners. With several: the comparisons
 among these. An engine that the case names in no variant (ours, a user's own, or a misspelt one) joins every
-variant that is compared engine by engine, and the variant of the stored reference; if it does not exist, it is
+variant whose engines are compared with each other, and the variant of the stored reference; if it does not exist, it is
 *did not run*. What it cannot represent there is *not applicable*, see `crosscheck.judging.applicable`. An engine that
 the case names runs only its variants.
+
+A comparison that lists engines does so since other ones of the case lack a channel, or come less near. Where it expects
+agreement an engine that joins is compared with those listed, in the channels that no comparison of all engines has.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import combinations
+from itertools import combinations, product
 
 import msgspec
 
 from crosscheck.library.case import Chart, Comparison, ComparisonSide, Conservation, Control, RunFile, Variant
+from flexmb.run.channels import matches
 from flexmb.scene.problems import closest
 
 
 def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     """The reduced run file; variants keep the engines that are needed, and are removed if none is."""
+    foreign = joining(run, asked)
     run = _joined(run, asked)
-    comparisons = [pair for comparison in run.comparisons for pair in _pairs(run, comparison)]
+    comparisons = [pair for comparison in run.comparisons for pair in _pairs(run, comparison, foreign)]
     kept = tuple(pair for pair in comparisons if _wanted(asked, pair.sides))
     controls = tuple(control for control in run.controls if _wanted(asked, control.sides))
     conservations = tuple(each for item in run.conservations if (each := _narrowed(run, item, asked)) is not None)
@@ -82,7 +87,7 @@ def held(run: RunFile, engines: Iterable[str]) -> dict[str, tuple[dict[str, floa
     engines = tuple(engines)
     foreign = joining(run, engines)
     run = _joined(run, engines)
-    pairs = [pair for each in run.comparisons for pair in _pairs(run, each)]
+    pairs = [pair for each in run.comparisons for pair in _pairs(run, each, foreign)]
     pairs = [pair for pair in pairs if all(side.variant == recipe.variant for side in pair.sides)]
     named = {side.engine for pair in pairs for side in pair.sides}
     pairs = [pair for pair in pairs if pair.expect == "agree"]
@@ -115,9 +120,9 @@ def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
 
 
 def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
-    """The run file with unknown engines added to the variants that are compared engine by engine."""
+    """The run file with unknown engines added to the variants whose engines are compared with each other."""
     foreign = joining(run, asked)
-    open_to_all = {each.variant for each in run.comparisons if each.variant and not each.engines}
+    open_to_all = {each.variant for each in run.comparisons if each.variant and (not each.engines or _admits(each))}
     open_to_all |= {run.reference.variant} if run.reference is not None else set()
     variants = tuple(
         msgspec.structs.replace(variant, engines=variant.engines + foreign) if variant.name in open_to_all else variant
@@ -126,20 +131,54 @@ def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     return msgspec.structs.replace(run, variants=variants)
 
 
-def _pairs(run: RunFile, comparison: Comparison) -> list[Comparison]:
+def _admits(comparison: Comparison) -> bool:
+    """Whether engines that join are compared with those that the comparison lists."""
+    return bool(comparison.engines) and comparison.expect == "agree"
+
+
+def _pairs(run: RunFile, comparison: Comparison, foreign: tuple[str, ...]) -> list[Comparison]:
+    """The pairs of a comparison; `run` has the `foreign` engines in the variants that they join."""
     if comparison.variant is None:
         return [comparison]
     engines = comparison.engines or run.variant(comparison.variant).engines
-    return [
-        msgspec.structs.replace(
-            comparison,
-            variant=None,
-            engines=(),
-            a=ComparisonSide(variant=comparison.variant, engine=first),
-            b=ComparisonSide(variant=comparison.variant, engine=second),
-        )
-        for first, second in combinations(engines, 2)
-    ]
+    pairs = [_pair(comparison, *each) for each in combinations(engines, 2)]
+    if foreign and _admits(comparison):
+        left = _not_open(run, comparison)
+        among = (*product(engines, foreign), *combinations(foreign, 2)) if left.goals else ()
+        pairs += [_pair(left, *each) for each in among]
+    return pairs
+
+
+def _pair(comparison: Comparison, first: str, second: str) -> Comparison:
+    """The comparison of one variant, of two engines."""
+    assert comparison.variant is not None
+    return msgspec.structs.replace(
+        comparison,
+        variant=None,
+        engines=(),
+        a=ComparisonSide(variant=comparison.variant, engine=first),
+        b=ComparisonSide(variant=comparison.variant, engine=second),
+    )
+
+
+def _not_open(run: RunFile, comparison: Comparison) -> Comparison:
+    """The comparison with those of its goals and scales that no comparison of all engines of the variant includes."""
+    of_all = [
+        each for each in run.comparisons
+        if each.variant == comparison.variant and not each.engines and each.expect == "agree"
+    ]  # fmt: skip
+    included = [pattern for each in of_all for pattern in each.goals]
+    goals = {
+        pattern: goal
+        for pattern, goal in comparison.goals.items()
+        if not any(matches(one, pattern) for one in included)
+    }
+    scales = {
+        pattern: scale
+        for pattern, scale in comparison.scales.items()
+        if any(matches(pattern, one) or matches(one, pattern) for one in goals)
+    }
+    return msgspec.structs.replace(comparison, goals=goals, scales=scales)
 
 
 def _wanted(asked: tuple[str, ...], sides: tuple[ComparisonSide, ComparisonSide]) -> bool:

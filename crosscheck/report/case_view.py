@@ -8,6 +8,7 @@ from typing import Any
 from crosscheck.judging.applicable import Inapplicable
 from crosscheck.judging.outcome import NO_REFERENCE, Absence, SessionOutcome
 from crosscheck.judging.results import CaseResults
+from crosscheck.judging.unjudged import UnjudgedChannels, grouped
 from crosscheck.library.case import Provenance
 from crosscheck.report.mutations import CaseScore
 from crosscheck.report.places import CasePlace
@@ -36,6 +37,7 @@ class CaseView:
     controls: Block | None
     absences: list[Absence]
     inapplicable: list[Inapplicable]
+    unjudged: list[UnjudgedChannels]
     unreferenced: str
     timings: list[dict[str, Any]]
     mutation: CaseScore | None
@@ -60,6 +62,7 @@ def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, muta
         controls=control_block(verdicts),
         absences=[absence for absence in outcome.absences if absence.case == record.case],
         inapplicable=[each for each in outcome.inapplicable if each.case == record.case],
+        unjudged=grouped(each for each in outcome.unjudged if each.case == record.case),
         unreferenced=f"It {NO_REFERENCE.format(record.case)}" if record.case in outcome.unreferenced else "",
         timings=_timings(case),
         mutation=mutation,

@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
+from crosscheck.judging.unjudged import grouped
 from crosscheck.judging.verdict import STATUSES, Verdict
 from crosscheck.sealed.compare import Differences
 from flexmb.output.printable import printable
@@ -27,7 +28,7 @@ def write_verdicts(outcome: SessionOutcome, file: Path) -> None:
 
 
 def write_summary(outcome: SessionOutcome, file: Path) -> None:
-    """summary.md: headline, counts by case, what is not as expected, what did not run, what is not applicable."""
+    """summary.md: headline, counts by case, what is not as expected, did not run, is not applicable or not judged."""
     lines = [f"# {'✅' if outcome.ok else '❌'} {_flat(outcome.headline)}", ""]
     lines += [f"| case | verdicts | as expected | {' | '.join(STATUSES)} |"]
     lines += ["|---" * (3 + len(STATUSES)) + "|"]
@@ -55,6 +56,12 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
         lines += ["", "## Not applicable", ""]
         for apart in outcome.inapplicable:
             lines.append(f"- {_flat(f'{apart.case}, {apart.where}, {apart.engine}: {apart.reason}')}")
+    if outcome.unjudged:
+        lines += ["", "## Offered, and judged by nothing", ""]
+        groups = grouped(outcome.unjudged)
+        lines += [f"- {_flat(str(group))}" for group in groups[:SHOWN]]
+        if len(groups) > SHOWN:
+            lines += [f"- ... and {len(groups) - SHOWN} more, in results.json."]
     if outcome.unreferenced:
         lines += ["", "## No stored reference", ""]
         lines += [f"- {_flat(f'{case} {NO_REFERENCE.format(case)}')}" for case in outcome.unreferenced]

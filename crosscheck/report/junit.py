@@ -16,6 +16,7 @@ from crosscheck.engines.registry import BUILT_IN
 from crosscheck.judging.figures import recordable
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.results import CaseResults, Key, Result, Session
+from crosscheck.judging.unjudged import grouped
 from crosscheck.judging.verdict import Verdict
 from flexmb.output.printable import printable
 from flexmb.output.whole import whole_file
@@ -29,7 +30,8 @@ def write_junit(outcome: SessionOutcome, file: Path, session: Session = NO_SESSI
     Verdicts that need a lost run are skipped, because the failing test of that run stands for them.
 
     A verdict that is worse than recorded says so in its output, and fails if the session is strict. What is not
-    applicable is skipped, and so is a reference that was never made, unless the session is strict. An engine that was
+    applicable is skipped, and so are a reference that was never made and what an engine that joined offers and nothing
+    judges, unless the session is strict. An engine that was
     compared in nothing fails a test of its own, and so does a claim of the user that names nothing.
 
     `session` gives machine, versions and times. The time of a test is an equal share of that of the runs it needs, so
@@ -97,6 +99,12 @@ def _not_judged(suite: ElementTree.Element, case: str, outcome: SessionOutcome) 
             test = ElementTree.SubElement(suite, "testcase", classname=case, name=f"{each.where} by {each.engine}")
             ElementTree.SubElement(test, "skipped", message=f"not applicable: {each.reason}")
             found.append("skipped")
+    for group in grouped(each for each in outcome.unaccounted if each.case == case):
+        name = f"what {group.engine} offers on {group.variant} is judged: {', '.join(group.channels)}"
+        test = ElementTree.SubElement(suite, "testcase", classname=case, name=name)
+        kind = "failure" if outcome.strict else "skipped"
+        ElementTree.SubElement(test, kind, message=f"judged by nothing: {group.reason}")
+        found.append(kind)
     if case in outcome.unreferenced:
         test = ElementTree.SubElement(suite, "testcase", classname=case, name="it has a stored reference")
         kind = "failure" if outcome.strict else "skipped"

@@ -23,6 +23,8 @@ The file is one JSON object. Every key:
   - ``not_applicable`` (left out if empty): the engine's reason by "variant | engine", or "variant | engine | channel"
     where it is one channel, of engines that the case names nowhere; ``unreferenced`` (left out: false): it has a recipe
     of a reference and no reference;
+  - ``unjudged`` (left out if empty): the reason by "variant | engine | channel" of channels that are offered and judged
+    by nothing; a strict session demands of engines that joined that they are as others have them;
   - ``runs``: by "variant | engine | role": ``status``, ``effort``, ``wall_s`` and ``compile_s`` of the finest effort.
 
 Figures have four digits, times three.
@@ -77,13 +79,14 @@ class SealedRun(_SealedPart, frozen=True, kw_only=True):
 
 
 class SealedCase(_SealedPart, frozen=True, kw_only=True):
-    """A case: digests of its files and scenes, its verdicts by comparison, its runs, what is not applicable in it."""
+    """A case: digests of files and scenes, verdicts by comparison, runs, what is not applicable and what not judged."""
 
     files: dict[str, str]
     scenes: dict[str, str]
     verdicts: dict[str, dict[str, SealedVerdict]]
     runs: dict[str, SealedRun]
     not_applicable: dict[str, str] = {}
+    unjudged: dict[str, str] = {}
     unreferenced: bool = False
     claims: Claims | None = None
 
@@ -159,6 +162,7 @@ def _case(case: CaseResults, outcome: SessionOutcome) -> SealedCase:
             for each in outcome.inapplicable
             if each.case == name
         },
+        unjudged={each.key: each.reason for each in outcome.unjudged if each.case == name},
         unreferenced=name in outcome.unreferenced,
         claims=None if case.case.claims == Claims() else case.case.claims,
     )

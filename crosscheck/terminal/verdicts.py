@@ -12,6 +12,7 @@ from rich.text import Text
 from crosscheck.judging.figures import GROWTH
 from crosscheck.judging.finer import BEYOND
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
+from crosscheck.judging.unjudged import grouped
 from crosscheck.judging.verdict import STATUSES, Verdict
 from crosscheck.terminal.text import marked, words
 from crosscheck.terminal.verbosity import Verbosity
@@ -38,6 +39,8 @@ def print_outcome(console: Console, outcome: SessionOutcome, verbosity: Verbosit
         for each in outcome.inapplicable if verbosity is Verbosity.VERBOSE else ():
             text = f"{each.case}, {each.where}, {each.engine} not applicable: {each.reason}"
             console.print(marked("○", "dim", text), soft_wrap=True)
+        for group in grouped(outcome.unjudged) if verbosity is Verbosity.VERBOSE else ():
+            console.print(marked("○", "dim", str(group)), soft_wrap=True)
         if len(shown) < len(lines):
             console.print(words(f"... and {len(lines) - len(shown)} lines more: --verbose shows all", "dim"))
     colour = "green" if outcome.ok else "red"
@@ -58,6 +61,8 @@ def _inventory(outcome: SessionOutcome) -> str:
         parts.append(f"{engine} not applicable in {len(cases)}")
     for engine, channels in outcome.not_offered.items():
         parts.append(f"{channels} not offered by {engine}")
+    if outcome.unjudged:
+        parts.append(f"{len(outcome.unjudged)} offered and judged by nothing")
     return f"{count} case{'s' if count > 1 else ''}: {', '.join(parts)}"
 
 
@@ -78,9 +83,11 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         yield marked("✕", "red", text)
     for case in outcome.idle:
         yield marked("–", "yellow", f"{case}: nothing was compared")
+    sign, colour = ("✕", "red") if outcome.strict else ("!", "yellow")
     for case in outcome.unreferenced:
-        sign, colour = ("✕", "red") if outcome.strict else ("!", "yellow")
         yield marked(sign, colour, f"{case} {NO_REFERENCE.format(case)}")
+    for left in grouped(outcome.unaccounted):
+        yield marked(sign, colour, str(left))
     yield from _by_claims(outcome)
     for verdict in outcome.worse:
         yield marked("!", "yellow", f"{_place(verdict)} {verdict.grown}")

@@ -120,6 +120,42 @@ def test_a_foreign_engine_joins_what_is_compared_engine_by_engine() -> None:
     assert all("mine" in pair for pair in pairs(run))
 
 
+def listing(**changes: object) -> RunFile:
+    """The example, whose engines are compared in momentum and energy by a comparison that lists two of them."""
+    listed = Comparison(
+        name="listed", variant="rigid", engines=("native", "pinocchio"), goals={"momentum": 1e-7, "energy.total": 1e-9},
+        scales={"momentum.linear": 1.0, "energy.total": 2.0},
+    )  # fmt: skip
+    everyone = next(each for each in example().comparisons if each.variant == "rigid")
+    everyone = msgspec.structs.replace(everyone, goals={"energy": 1e-9})
+    run = msgspec.structs.replace(example(), comparisons=(everyone, msgspec.structs.replace(listed, **changes)))
+    check_run_file(run)
+    return run
+
+
+def test_a_foreign_engine_joins_listed_engines_in_what_is_open_to_it_nowhere_else() -> None:
+    found = [each for each in select(listing(), ("mine", "yours")).comparisons if each.name == "listed"]
+    assert {(each.a.engine, each.b.engine) for each in found} == {("mine", "yours")}
+    found = [each for each in select(listing(), ("mine",)).comparisons if each.name == "listed"]
+    assert {(each.a.engine, each.b.engine) for each in found} == {("native", "mine"), ("pinocchio", "mine")}
+    assert {tuple(each.goals) for each in found} == {("momentum",)}
+    assert {tuple(each.scales) for each in found} == {("momentum.linear",)}
+    own = [each for each in select(listing(), ()).comparisons if each.name == "listed"]
+    assert [(each.a.engine, each.b.engine, len(each.goals)) for each in own] == [("native", "pinocchio", 2)]
+
+
+def test_a_foreign_engine_joins_a_variant_of_which_only_listed_engines_are_compared() -> None:
+    run = msgspec.structs.replace(listing(), comparisons=listing().comparisons[1:])
+    (one, other) = select(run, ("mine",)).comparisons
+    assert set(one.goals) == set(other.goals) == {"momentum", "energy.total"}
+    assert "mine" in select(run, ("mine",)).variant("rigid").engines
+
+
+def test_a_foreign_engine_is_not_expected_to_differ_as_listed_ones_are() -> None:
+    run = listing(expect="refused", because="no momentum", reason="they have none")
+    assert not [each for each in select(run, ("mine",)).comparisons if each.name == "listed"]
+
+
 def left_out(engine: str, variants: tuple[str, ...]) -> RunFile:
     """The example without an engine in some of its variants."""
     return msgspec.structs.replace(

@@ -1,0 +1,159 @@
+"""Channels that an engine offers and nothing judges: no comparison, conservation or reference with a goal names them.
+
+A verdict *agree*, *differ* or *unresolved* accounts for a channel, and so does being told as not applicable. Of an
+engine that the case names, the rest is the choice of whoever wrote the case. Of an engine that joins nobody has looked
+at it: it is held against the stored reference, or another engine of the variant, and excused if it agrees by the
+loosest goal that the case has for the variant, or is the same to rounding where uncertainties are unknown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.judging.against_reference import ReferenceSignals, at_samples, of_record, shared_times
+from crosscheck.judging.applicable import Inapplicable
+from crosscheck.judging.results import CaseResults, Result
+from crosscheck.judging.verdict import WHOLE_RANGE, Signal, Status, Verdict, compare
+from crosscheck.library.case import Comparison
+from crosscheck.library.patterns import most_specific
+from flexmb.kept import kept
+from flexmb.run.channels import distance
+
+ACCOUNTING: tuple[Status, ...] = ("agree", "differ", "unresolved")
+ROUNDING = 1e-9  # relative, and in SI units: a distance within it is none, whatever is known of the uncertainties
+OPEN = "the case has no goal for it"
+
+
+@dataclass(frozen=True)
+class Unjudged:
+    """A channel of a finished result without a verdict, and why; an `excused` one may stay so in a strict session."""
+
+    case: str
+    variant: str
+    engine: str
+    channel: str
+    reason: str
+    excused: bool
+
+    @property
+    def key(self) -> str:
+        """Variant, engine and channel, as in results.json."""
+        return f"{self.variant} | {self.engine} | {self.channel}"
+
+
+@dataclass(frozen=True)
+class UnjudgedChannels:
+    """Channels of one engine on one variant that are unjudged for one reason."""
+
+    case: str
+    variant: str
+    engine: str
+    channels: tuple[str, ...]
+    reason: str
+    excused: bool
+
+    def __str__(self) -> str:
+        """The group in words."""
+        names = ", ".join(self.channels)
+        return f"{self.case}, {self.variant}, {self.engine} offers what nothing judges: {names}: {self.reason}"
+
+
+def grouped(left: Iterable[Unjudged]) -> list[UnjudgedChannels]:
+    """Unjudged channels by case, variant, engine and reason, what is not excused first."""
+    found: dict[tuple[str, str, str, str, bool], list[str]] = {}
+    for each in left:
+        found.setdefault((each.case, each.variant, each.engine, each.reason, each.excused), []).append(each.channel)
+    groups = [
+        UnjudgedChannels(case, variant, engine, tuple(channels), reason, excused)
+        for (case, variant, engine, reason, excused), channels in found.items()
+    ]
+    return sorted(groups, key=lambda group: group.excused)
+
+
+def unjudged(
+    case: CaseResults, verdicts: Iterable[Verdict], inapplicable: Iterable[Inapplicable] = ()
+) -> tuple[Unjudged, ...]:
+    """Every channel that nothing judges, of every finished result of the case's variants. Never raises."""
+    told = {
+        (*side, verdict.channel)
+        for verdict in verdicts
+        if verdict.kind != "control" and verdict.status in ACCOUNTING
+        for side in verdict.sides
+    }
+    told |= {(each.variant, each.engine, each.channel) for each in inapplicable}
+    results = [case.get(variant.name, engine) for variant in case.case.run.variants for engine in variant.engines]
+    left = _Left(case)
+    return tuple(
+        left.open(result, channel)
+        for result in results
+        for channel in result.channels
+        if (result.variant, result.engine, channel) not in told and channel not in case.undetermined(result.variant)
+    )
+
+
+@dataclass(frozen=True)
+class _Left:
+    """What a case leaves open."""
+
+    case: CaseResults
+
+    @kept
+    def _reference(self) -> ReferenceSignals | None:
+        recorded = self.case.case.reference
+        return None if recorded is None or recorded.fault else of_record(recorded)
+
+    def open(self, result: Result, channel: str) -> Unjudged:
+        """The channel, with what others say of it if the engine joined the case."""
+        record = self.case.case
+        if result.engine not in record.joined:
+            return Unjudged(record.case, result.variant, result.engine, channel, OPEN, excused=True)
+        reason, excused = self._held(result, channel)
+        expected = [each.channels for each in record.claims.failures if each.engine == result.engine]
+        excused = excused or any(most_specific(patterns, channel) is not None for patterns in expected)
+        return Unjudged(record.case, result.variant, result.engine, channel, f"{OPEN}; {reason}", excused)
+
+    def _held(self, result: Result, channel: str) -> tuple[str, bool]:
+        """What the first of those who have the channel says of it, and whether that is the same."""
+        for name, own, other in self._others(result, channel):
+            finding = compare(channel, own, other, self._goal(result, channel))
+            if finding.status == "agree" or _same(channel, own, other):
+                return f"the same as {name} gives", True
+            return f"{finding.status} beside {name}: {finding.reason}", False
+        return "no other engine of the variant offers it", False
+
+    def _goal(self, result: Result, channel: str) -> float:
+        """The goal that the engine claims of the channel, or else the loosest of the variant's comparisons."""
+        claimed = self.case.case.claims.goals_of(result.engine)
+        pattern = most_specific(claimed, channel)
+        if pattern is not None:
+            return claimed[pattern][0]
+        about = [each for each in self.case.case.run.comparisons if (result.variant, result.engine) in _sides(each)]
+        return max((goal for each in about for goal in each.goals.values()), default=WHOLE_RANGE)
+
+    def _others(self, result: Result, channel: str) -> Iterator[tuple[str, Signal, Signal]]:
+        """Those who have the channel, the stored reference first, with the signals of both at the same times."""
+        own, recorded, stored = result.signal(channel, across=False), self.case.case.reference, self._reference
+        if recorded is not None and stored is not None:
+            places = shared_times(stored.times, result.times)
+            if recorded.variant == result.variant and channel in stored.channels and places is not None:
+                yield "the reference", at_samples(own, places), stored.signal(channel)
+        for engine in self.case.case.run.variant(result.variant).engines:
+            other = self.case.get(result.variant, engine)
+            named = engine not in self.case.case.joined
+            if named and channel in other.channels and np.array_equal(other.times, result.times):
+                yield engine, own, other.signal(channel, across=False)
+
+
+def _sides(comparison: Comparison) -> list[tuple[str, str]]:
+    return [(side.variant, side.engine) for side in comparison.sides]
+
+
+def _same(channel: str, own: Signal, other: Signal) -> bool:
+    """Whether the distance of two signals is none but for rounding."""
+    if own.values.shape != other.values.shape or own.values.size == 0:
+        return False
+    apart = np.max(distance(channel, own.values, other.values))
+    return bool(apart <= ROUNDING * max(1.0, float(np.max(np.abs(other.values)))))

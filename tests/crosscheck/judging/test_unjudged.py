@@ -1,0 +1,103 @@
+"""What an engine offers and nothing judges is told everywhere; of a guest it must be as others have it, if strict."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from crosscheck.judging.outcome import SessionOutcome
+from crosscheck.report.ci import write_summary
+from crosscheck.report.junit import write_junit
+from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.verdicts import print_outcome
+from flexmb.typing import Real
+from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, judged, ladder, way
+
+VELOCITY = "marker:tip.velocity"
+ASKED = ("one", "two", "guest")
+REST = np.zeros((len(TIMES), 3))
+NAMED = [
+    *ladder("one", {TIP: way(), VELOCITY: way(axis=1), "momentum.linear": REST}),
+    *ladder("two", {TIP: way(), VELOCITY: way(axis=1)}),
+]
+
+
+def session(values: Real | None, channel: str = VELOCITY, **options: object) -> SessionOutcome:
+    """The outcome of a session with a guest that offers these values of a channel without a goal."""
+    offered = {TIP: way()} | ({} if values is None else {channel: values})
+    return judged(ONE_PAIR, [*NAMED, *ladder("guest", offered)], asked=ASKED, **options)
+
+
+def told(outcome: SessionOutcome, verbosity: Verbosity = Verbosity.NORMAL) -> tuple[int, str]:
+    text = io.StringIO()
+    return print_outcome(Console(file=text, width=300), outcome, verbosity), text.getvalue()
+
+
+def test_what_engines_of_the_case_offer_beyond_its_goals_is_told_and_is_no_error(tmp_path: Path) -> None:
+    outcome = session(None, strict=True)
+    offered = {(each.engine, each.channel): each.excused for each in outcome.unjudged}
+    assert offered == dict.fromkeys([("one", VELOCITY), ("one", "momentum.linear"), ("two", VELOCITY)], True)
+    assert outcome.unaccounted == [] and outcome.ok
+    assert "3 agree, 3 offered and judged by nothing" in told(outcome)[1]
+    line = f"made/made, rigid, one offers what nothing judges: {VELOCITY}, momentum.linear: the case has no goal for it"
+    assert line in told(outcome, Verbosity.VERBOSE)[1] and line not in told(outcome)[1]
+    write_summary(outcome, tmp_path / "summary.md")
+    section = "## Offered, and judged by nothing\n\n- made/made, rigid, one offers"
+    assert section in (tmp_path / "summary.md").read_text(encoding="utf-8")
+
+
+def test_what_a_guest_offers_as_others_do_is_excused() -> None:
+    outcome = session(way(axis=1), strict=True)
+    (guest,) = [each for each in outcome.unjudged if each.engine == "guest"]
+    assert guest.excused and guest.reason.endswith("the same as one gives")
+    assert outcome.ok
+    assert session(REST, "momentum.linear", strict=True).ok  # it is zero, and nothing measures it
+
+
+@pytest.mark.parametrize("values", [
+    pytest.param(-way(axis=1), id="reversed"),
+    pytest.param(REST, id="zero"),
+    pytest.param(2.0 * way(axis=1), id="doubled"),
+    pytest.param(np.nan * way(axis=1), id="no numbers"),
+    pytest.param(np.inf + way(axis=1), id="endless"),
+    pytest.param(way(axis=1)[:, :1], id="of another shape"),
+])  # fmt: skip
+def test_what_a_guest_offers_otherwise_fails_a_strict_session_only(values: Real, tmp_path: Path) -> None:
+    outcome = session(values, strict=True)
+    (guest,) = outcome.unaccounted
+    assert (guest.engine, guest.channel, outcome.ok) == ("guest", VELOCITY, False)
+    assert outcome.headline == "1 channel is offered and judged by nothing"
+    code, text = told(outcome)
+    assert code == 1 and f"✕ made/made, rigid, guest offers what nothing judges: {VELOCITY}" in text
+    write_junit(outcome, tmp_path / "junit.xml")
+    root = ElementTree.parse(tmp_path / "junit.xml").getroot()
+    (failure,) = root.findall(".//failure")
+    assert "judged by nothing" in str(failure.get("message")) and root.get("failures") == "1"
+    lax = session(values)
+    assert lax.ok and "! made/made, rigid, guest offers what nothing judges" in told(lax)[1]
+
+
+def test_what_nobody_else_offers_cannot_be_held_against_anything() -> None:
+    outcome = session(way(), "marker:tip.angular_velocity", strict=True)
+    (guest,) = outcome.unaccounted
+    assert guest.reason.endswith("no other engine of the variant offers it") and not outcome.ok
+
+
+def test_a_control_accounts_for_nothing() -> None:
+    control = """
+[[control]]
+name = "heavier"
+mutation = "mass"
+a = { variant = "rigid", engine = "one" }
+b = { variant = "rigid", engine = "two" }
+goals = { "marker:tip.velocity" = 1e-3 }
+"""
+    faulty = ladder("one", {TIP: way(), VELOCITY: way(2.0, axis=1)}, role="control:heavier")
+    outcome = judged(ONE_PAIR + control, [*NAMED, *faulty])
+    assert outcome.controls() == (1, 1)
+    assert {(each.engine, each.channel) for each in outcome.unjudged} >= {("one", VELOCITY), ("two", VELOCITY)}
