@@ -97,7 +97,7 @@ def wrenches(dense: DenseSystem, q: Real) -> dict[str, Real]:
     still = Motions(q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu)))
     frames = member_frames(dense.tree, still)
     found, start = {}, 0
-    count = sum(sum(map(len, suppressed(closure))) for closure in dense.scene.closures)
+    count = sum(len(axes) for closure in dense.scene.closures for axes in suppressed(closure))
     for closure in dense.scene.closures:
         seats = (seat_frame(dense.tree, frames, *side, still) for side in _sides(dense, closure))
         world, R_B = (frame.rotation.value[0, 0] for frame in seats)
@@ -121,7 +121,8 @@ def through_hinges(dense: DenseSystem, q: Real, loads: Mapping[str, Real]) -> di
     still = Motions(q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu)))
     at_rest = Motions(dense.undeformed(q), still.u, still.rates)
     frames, rest = member_frames(dense.tree, still), member_frames(dense.tree, at_rest)
-    points, ends = {}, {}
+    points: dict[str, Real] = {}
+    ends: dict[str, tuple[int, int]] = {}
     for closure in dense.scene.closures:
         points[closure.name] = seat_frame(dense.tree, frames, *_sides(dense, closure)[1], still).position.value[0, 0]
         ends[closure.name] = dense.tree.index(closure.body_a), dense.tree.index(closure.body_b)
@@ -131,9 +132,9 @@ def through_hinges(dense: DenseSystem, q: Real, loads: Mapping[str, Real]) -> di
         hinge = seat_frame(dense.tree, frames, k, member.outboard, still)
         turn = seat_frame(dense.tree, rest, k, member.outboard, at_rest).rotation.value[0, 0]
         turn = turn @ hinge.rotation.value[0, 0].T
-        for closure, (a, b) in ends.items():
-            load = loads[closure]
-            torque = load[:3] + np.cross(points[closure] - hinge.position.value[0, 0], load[3:], axisb=0, axisc=0)
+        for joint, (a, b) in ends.items():
+            load = loads[joint]
+            torque = load[:3] + np.cross(points[joint] - hinge.position.value[0, 0], load[3:], axisb=0, axisc=0)
             sign = (b in outboard) - (a in outboard)
             found[name] = found.get(name, 0.0) - sign * np.concatenate([turn @ torque, turn @ load[3:]])
     return found
@@ -145,11 +146,6 @@ class Spread(NamedTuple):
 
     loads: dict[str, NDArray[np.bool_]]
     drives: dict[str, bool]
-
-    @property
-    def is_none(self) -> bool:
-        """Whether the motion determines all loads."""
-        return not (any(each.any() for each in self.loads.values()) or any(self.drives.values()))
 
 
 def spread(dense: DenseSystem, q: Real, held: NDArray[np.bool_]) -> Spread:
