@@ -7,16 +7,17 @@ The motion of flexmb gives the states; what is open there follows from the rank 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import assert_never
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.closure.closures import ClosureError
 from flexmb.dense import DenseSystem
-from flexmb.dense.closures import spread
+from flexmb.dense.closures import open_loads
 from flexmb.run.simulate import simulate
 from flexmb.run.trajectory import Trajectory
-from flexmb.scene.events import Impact, Latch, Release
+from flexmb.scene.events import Change, EndRun, Impact, Latch, Release
 from flexmb.scene.schema import Scene
 from flexmb.scene.stops import leaving
 from flexmb.scene.tree import coordinates
@@ -82,16 +83,20 @@ def _held_after(dense: DenseSystem, held: Held, name: str, after: State) -> Held
     """The speeds that are held after an event; a coordinate that rests on a stop has no speed."""
     held, place = held.copy(), _places(dense)
     for event in dense.scene.events:
-        for action in event.actions:
+        for action in event.actions if name in (event.name, leaving(event)) else ():
             match action:
-                case Latch() if event.name == name:
+                case Latch():
                     held[place[action.coordinate]] = True
-                case Release() if event.name == name:
+                case Release():
                     held[place[action.coordinate]] = False
-                case Impact(rests=True) if event.name == name:
-                    held[place[action.coordinate]] |= after.u[place[action.coordinate]] == 0.0
-                case Impact() if leaving(event) == name:
-                    held[place[action.coordinate]] = False
+                case Impact():
+                    if action.rests:
+                        stands = after.u[place[action.coordinate]] == 0.0
+                        held[place[action.coordinate]] = stands and name == event.name
+                case Change() | EndRun():
+                    pass
+                case _:
+                    assert_never(action)
     return held
 
 
@@ -117,6 +122,6 @@ def _prescribed(dense: DenseSystem) -> Held:
 
 
 def _at(dense: DenseSystem, state: State, held: Held) -> set[str]:
-    found = spread(dense, state.q, held)
+    found = open_loads(dense, state.q, held)
     loads = {f"load:{name}.{part}" for name, is_open in found.loads.items() for part, at in PARTS if is_open[at].any()}
     return loads | {f"drive:{name}" for name, is_open in found.drives.items() if is_open}

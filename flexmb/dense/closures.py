@@ -140,7 +140,7 @@ def through_hinges(dense: DenseSystem, q: Real, loads: Mapping[str, Real]) -> di
     return found
 
 
-class Spread(NamedTuple):
+class OpenLoads(NamedTuple):
     """Which loads the motion leaves open: components (6,) of those of hinges, closures and couplings, World axes, and
     the drive loads of hinges, point masses and wheels that are held."""
 
@@ -148,7 +148,7 @@ class Spread(NamedTuple):
     drives: dict[str, bool]
 
 
-def spread(dense: DenseSystem, q: Real, held: NDArray[np.bool_]) -> Spread:
+def open_loads(dense: DenseSystem, q: Real, held: NDArray[np.bool_]) -> OpenLoads:
     """What null loads of the rows change at q (nq,), where the speeds `held` (nu,) are prescribed or latched."""
     scene = dense.scene
     motion = Motions(q, np.eye(dense.nu), np.zeros((dense.nu, dense.nu)))
@@ -166,7 +166,7 @@ def spread(dense: DenseSystem, q: Real, held: NDArray[np.bool_]) -> Spread:
     drives = np.abs(J.T @ null)
     least = UNCHANGED * max((np.max(np.abs(each), initial=0.0) for each in (*changes.values(), drives)), default=0.0)
     reached = np.any(drives > least, axis=1) & held
-    return Spread(
+    return OpenLoads(
         {name: np.any(np.abs(each) > least, axis=1) for name, each in changes.items()},
         {x.owner: False for x in dense.tree.scalars if held[x.u]}
         | {x.owner: True for x in dense.tree.scalars if reached[x.u]},

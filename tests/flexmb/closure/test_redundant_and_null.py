@@ -11,7 +11,7 @@ import flexmb
 from flexmb.closure import closures as closure_system
 from flexmb.closure.null_loads import blocks
 from flexmb.dense import DenseSystem
-from flexmb.dense.closures import spread, wrenches
+from flexmb.dense.closures import open_loads, wrenches
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.shapes import beam_section
@@ -62,7 +62,7 @@ def check(seed: int) -> None:
         share = np.max(np.abs(wrench[closure.name] @ U[:, rank:]), axis=1, initial=0.0)
         clear = (share < 1e-10) | (share > 1e-5)
         assert np.array_equal(determined[closure.name][clear], share[clear] < 1e-10), closure
-    by_dense = spread(DenseSystem(scene), state.q, ~dense.free)
+    by_dense = open_loads(DenseSystem(scene), state.q, ~dense.free)
     assert {name for name, each in determined.items() if not each.all()} == {
         name for name, each in by_dense.loads.items() if each.any()
     }
