@@ -31,13 +31,13 @@ class AgainstBaseline:
     baseline: Baseline
     differences: Differences | None = None
     unfit: str = ""
-    idle_claims: bool = False
+    idle: bool = False
 
     @property
     def code(self) -> int:
-        """The exit code: a claim that names nothing is an error whatever was before."""
+        """The exit code: a claim or a control that says nothing is an error whatever was before."""
         regressed = self.differences is not None and self.differences.regressed
-        return int(regressed or bool(self.unfit) or self.idle_claims)
+        return int(regressed or bool(self.unfit) or self.idle)
 
 
 def read_baseline(given: Path, out: Path) -> Baseline:
@@ -66,12 +66,12 @@ def hold_against(baseline: Baseline, outcome: SessionOutcome, out: Path) -> Agai
     if baseline.results is not None:
         differences = compare_results(baseline.results, read_results(out / FILE))
         add_differences(differences, out / "summary.md")
-        return AgainstBaseline(baseline, differences, idle_claims=bool(outcome.idle_claims))
+        return AgainstBaseline(baseline, differences, idle=bool(outcome.idle_claims or outcome.lost_controls))
     unfit = _unfit(outcome)
     if not unfit:
         folder(baseline.file.parent)
         write_whole(baseline.file, (out / FILE).read_bytes())
-    return AgainstBaseline(baseline, unfit=unfit, idle_claims=bool(outcome.idle_claims))
+    return AgainstBaseline(baseline, unfit=unfit, idle=bool(outcome.idle_claims or outcome.lost_controls))
 
 
 def print_held(held: AgainstBaseline, shown: Verbosity) -> None:

@@ -134,7 +134,8 @@ class Trajectory:
     `crosscheck.engines.linear.frequencies` defines them; `known_to` (T,), by these names and "frequencies", says how
     far (Frobenius norm) they may be from those of the same state in exact arithmetic. `undetermined`: the channels
     "load:<name>.torque", "load:<name>.force" or "drive:<name>" that redundant closures leave undetermined; they may
-    hold NaN and are not compared. To name one on a scene without closures and couplings breaks the contract.
+    hold NaN and are not compared. An engine that names one that the motion determines has failed; on a scene without
+    closures and couplings that is all of them.
     """
 
     status: Status

@@ -7,7 +7,7 @@ up to there and that of the reference. Goals and scales are those of the engine'
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,20 +79,23 @@ def judge_reference(case: CaseResults) -> Iterator[Verdict]:
             yield from (question.verdict(pattern, goal, absent) for pattern, goal in asked.goals.items())
             continue
         names = coordinates_of(case.case.variants.get(recorded.variant))
-        for channel, goal, finding in hold(result, signals, asked, goal_of=question.goal, coordinates=names):
+        open_ = case.undetermined(recorded.variant)
+        for channel, goal, finding in hold(result, signals, asked, open_, goal_of=question.goal, coordinates=names):
             advice = finer_efforts(case.case, channel, question.goal(channel, goal), finding, (result,))
             yield question.verdict(channel, goal, finding, advice=advice)
 
 
 def hold(
-    result: Result, reference: ReferenceSignals, asked: Asked, like: Result | None = None,
-    goal_of: Callable[[str, float], float] = lambda channel, goal: goal, coordinates: Sequence[str] = (),
+    result: Result, reference: ReferenceSignals, asked: Asked, undetermined: Collection[str] = (),
+    like: Result | None = None, goal_of: Callable[[str, float], float] = lambda channel, goal: goal,
+    coordinates: Sequence[str] = (),
 ) -> Iterator[tuple[str, float, Finding]]:
     """The finding on every channel of the reference that has a goal, with that goal. Never raises.
 
-    `goal_of` replaces the goal of a channel. `coordinates` name the rows of derivatives. `like` is the result whose U
-    is used: for a control that of the unmutated run. A kind of energy that the engine does not offer is left out; any
-    other channel counts as refused. A result that did not finish has its status for each goal.
+    Channels that the motion leaves `undetermined` are not compared. `goal_of` replaces the goal of a channel.
+    `coordinates` name the rows of derivatives. `like` is the result whose U is used: for a control that of the
+    unmutated run. A kind of energy that the engine does not offer is left out; any other channel counts as refused. A
+    result that did not finish has its status for each goal.
     """
     if result.status != "finished":
         ending = result.ending
@@ -109,7 +112,9 @@ def hold(
         return
     for channel, pattern in named:
         goal = asked.goals[pattern]
-        if channel in result.channels:
+        if channel in undetermined:
+            yield channel, goal, not_determined()
+        elif channel in result.channels:
             scaled = most_specific(asked.scales, channel)
             scale = asked.scales[scaled] if scaled is not None else None
             own = at_samples(result.control_signal(channel, like or result, across=False), places)
@@ -117,8 +122,6 @@ def hold(
             found = compare(channel, own, stored, goal_of(channel, goal), scale)
             apart = with_worst_entry(found, channel, own.values, stored.values, reference.times, coordinates)
             yield channel, goal, apart
-        elif channel in result.undetermined:
-            yield channel, goal, not_determined(result.engine)
         elif not channel.startswith("energy."):
             yield channel, goal, Finding("refused", f"{result.engine} does not offer {channel}")
 

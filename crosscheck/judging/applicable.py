@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Literal, assert_never
 
 from crosscheck.judging.against_reference import REFERENCE
 from crosscheck.judging.results import CaseResults, Result
@@ -16,16 +17,31 @@ from crosscheck.judging.verdict import Verdict
 from crosscheck.library.patterns import most_specific
 from flexmb.run.channels import matches
 
+Kind = Literal["refused", "not offered", "not determined"]
+"""The engine refuses the scene; it lacks the channel; the motion of the scene does not determine the channel."""
+
 
 @dataclass(frozen=True)
 class Inapplicable:
-    """Something that an engine cannot represent, by its own `reason`; `channel` is "" for the whole variant."""
+    """What has no verdict, with the `reason`; `channel` is "" where the engine refused the whole variant."""
 
     case: str
     variant: str
     engine: str
     channel: str
     reason: str
+    kind: Kind
+
+    @property
+    def lies_with_engine(self) -> bool:
+        """Whether the engine lacks something; otherwise the scene leaves it open to all."""
+        match self.kind:
+            case "refused" | "not offered":
+                return True
+            case "not determined":
+                return False
+            case _:
+                assert_never(self.kind)
 
     @property
     def where(self) -> str:
@@ -43,7 +59,9 @@ def set_apart(case: CaseResults, verdicts: Iterable[Verdict]) -> tuple[list[Verd
         open_ = case.undetermined(verdict.variant_a, verdict.variant_b)
         if verdict.status == "refused" and verdict.channel in open_:
             for variant, engine in dict.fromkeys(verdict.sides):
-                apart = Inapplicable(case.case.case, variant, engine, verdict.channel, verdict.reason)
+                apart = Inapplicable(
+                    case.case.case, variant, engine, verdict.channel, verdict.reason, "not determined"
+                )
                 found |= {apart: None} if engine != REFERENCE else {}
             continue
         refusing = _refusing(case, verdict)
@@ -98,9 +116,10 @@ def _has(result: Result, pattern: str) -> bool:
 
 
 def _inapplicable(case: CaseResults, result: Result, channel: str) -> Inapplicable:
-    whole = result.status == "refused"
-    named, reason = ("", result.message) if whole else (channel, f"{result.engine} does not offer it")
-    return Inapplicable(case.case.case, result.variant, result.engine, named, reason)
+    where = case.case.case, result.variant, result.engine
+    if result.status == "refused":
+        return Inapplicable(*where, "", result.message, "refused")
+    return Inapplicable(*where, channel, f"{result.engine} does not offer it", "not offered")
 
 
 def _has_figures(case: CaseResults, engine: str) -> bool:

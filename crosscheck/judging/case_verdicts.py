@@ -56,15 +56,15 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
         yield question.verdict(channel, goal, finding, beyond, advice)
     if _missing(a, b) is None and _elsewhere(a, b) is None:
         patterns: dict[str, Iterable[str]] = {"scale": item.scales, "band": item.band}
-        for pattern, finding in (*_unused(item.goals, patterns, a, b), *_vanished(question, item, a, b, case)):
+        for pattern, finding in (*_unused(item.goals, patterns, a, b, case), *_vanished(question, item, a, b, case)):
             yield question.verdict(pattern, 0.0, finding, finding.reason)
 
 
 def _unused(
-    goals: Iterable[str], given: Mapping[str, Iterable[str]], a: Result, b: Result
+    goals: Iterable[str], given: Mapping[str, Iterable[str]], a: Result, b: Result, case: CaseResults
 ) -> Iterator[tuple[str, Finding]]:
     """Scales and bands whose pattern names no judged channel: a misspelt pattern must not be ignored silently."""
-    there = _union(_union(a.channels, b.channels), _union(a.undetermined, b.undetermined))
+    there = _union(_union(a.channels, b.channels), case.undetermined(a.variant, b.variant))
     judged = [name for name in there if most_specific(goals, name) is not None]
     for what, patterns in given.items():
         for pattern in patterns if judged else ():
@@ -103,7 +103,7 @@ def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
             finding = with_worst_entry(finding, channel, signal.values, other.values, b.times, names)
         yield question.verdict(channel, goal, finding)
     if _missing(faulty, b) is None and _elsewhere(faulty, b) is None:
-        for pattern, finding in _unused(item.goals, {"scale": item.scales}, faulty, b):
+        for pattern, finding in _unused(item.goals, {"scale": item.scales}, faulty, b, case):
             yield question.verdict(pattern, 0.0, finding)
 
 
@@ -168,7 +168,7 @@ def _channels(
             yield pattern, goal, Finding("did not run", _without(pattern, goals, a, b))
         for name in offered:
             if name in undetermined:
-                yield name, goal, not_determined(undetermined[name])
+                yield name, goal, not_determined()
             else:
                 yield name, goal, _absent(a, name) or _absent(b, name)
 

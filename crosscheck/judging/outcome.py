@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from crosscheck.engines.registry import BUILT_IN
@@ -32,6 +33,20 @@ class Absence:
 
 
 @dataclass(frozen=True)
+class LostControl:
+    """A control whose engines ran, and of whose `channels` none was compared: nobody knows whether the session would
+    notice the fault."""
+
+    case: str
+    control: str
+    channels: tuple[str, ...]
+
+    def __str__(self) -> str:
+        goals = ", ".join(self.channels)
+        return f'{self.case}, control "{self.control}": none of its channels was compared ({goals}): give it others'
+
+
+@dataclass(frozen=True)
 class SessionOutcome:
     """All verdicts of a session, by case; all absences; broken lines of the records, in words.
 
@@ -40,7 +55,7 @@ class SessionOutcome:
     judged by nothing, which a strict session forbids unless they are excused. `asked`: the engines asked for by name.
     `unreferenced`: the cases with a recipe of a reference but no reference. `made_with`: versions and processor of the
     last session in the records. `unfinished`: the session has not ended, so nothing is judged. `idle_claims`: the
-    user's claims that name nothing, in words.
+    user's claims that name nothing, in words. `lost_controls`: controls that were compared in no channel.
     """
 
     verdicts: dict[str, list[Verdict]]
@@ -54,6 +69,7 @@ class SessionOutcome:
     unfinished: bool = False
     idle_claims: tuple[str, ...] = ()
     unjudged: tuple[Unjudged, ...] = ()
+    lost_controls: tuple[LostControl, ...] = ()
 
     @property
     def all(self) -> list[Verdict]:
@@ -81,14 +97,20 @@ class SessionOutcome:
         judged = {(verdict.case, engine) for verdict in self.all for _, engine in verdict.sides}
         found: dict[str, dict[str, None]] = {}
         for each in self.inapplicable:
-            if (each.case, each.engine) not in judged:
+            if each.lies_with_engine and (each.case, each.engine) not in judged:
                 found.setdefault(each.engine, {})[each.case] = None
         return {engine: list(cases) for engine, cases in found.items()}
 
     @property
     def not_offered(self) -> dict[str, int]:
         """For each engine the number of channels that would be judged and that it does not offer."""
-        return dict(Counter(each.engine for each in self.inapplicable if each.channel))
+        return dict(Counter(each.engine for each in self.inapplicable if each.kind == "not offered"))
+
+    @property
+    def undetermined(self) -> int:
+        """The number of channels, by case and variant, that would be judged and that the motion does not determine."""
+        open_ = (each for each in self.inapplicable if each.kind == "not determined")
+        return len({(each.case, each.variant, each.channel) for each in open_})
 
     @property
     def unaccounted(self) -> list[Unjudged]:
@@ -143,7 +165,8 @@ class SessionOutcome:
     def ok(self) -> bool:
         """Whether every verdict is as expected, everything asked for was judged, and no run is lost."""
         complete = not self.unfinished and bool(self.all) and not self.lost and not self.broken
-        sound = complete and not self.unexpected and not self.uncompared and not self.idle_claims
+        idle = self.uncompared or self.idle_claims or self.lost_controls
+        sound = complete and not self.unexpected and not idle
         lacking = self.worse or self.outgrown or self.unrecorded or self.unreferenced or self.unaccounted
         return sound and not (self.strict and lacking)
 
@@ -180,6 +203,9 @@ class SessionOutcome:
             parts.append(self._uncompared)
         if self.broken:
             parts.append(self._broken)
+        if self.lost_controls:
+            faults = "fault was" if len(self.lost_controls) == 1 else "faults were"
+            parts.append(f"{len(self.lost_controls)} deliberate {faults} compared in nothing")
         if self.idle_claims:
             parts.append(f"{len(self.idle_claims)} of your own expectations name nothing")
         return " and ".join(parts)
@@ -197,7 +223,9 @@ class SessionOutcome:
     @property
     def _unoffered(self) -> str:
         told = [f"{engine} {count} channel{'s' if count > 1 else ''}" for engine, count in self.not_offered.items()]
-        return f"; not offered and not judged: {', '.join(told)}" if told else ""
+        offered = f"; not offered and not judged: {', '.join(told)}" if told else ""
+        channels = f"{self.undetermined} channel{'s' if self.undetermined > 1 else ''}"
+        return offered + (f"; not determined and not judged: {channels}" if self.undetermined else "")
 
     @property
     def _broken(self) -> str:
@@ -218,11 +246,13 @@ def conclude(session: Session, strict: bool = False) -> SessionOutcome:
     verdicts: dict[str, list[Verdict]] = {}
     inapplicable: tuple[Inapplicable, ...] = ()
     left: tuple[Unjudged, ...] = ()
+    lost_controls: tuple[LostControl, ...] = ()
     for case in session.cases:
         verdicts[case.case.case], apart = set_apart(case, judge(case))
         inapplicable += apart
         left += unjudged(case, verdicts[case.case.case], apart)
-    whole = {(each.case, each.variant, each.engine) for each in inapplicable if not each.channel}
+        lost_controls += tuple(_lost_controls(case, verdicts[case.case.case]))
+    whole = {(each.case, each.variant, each.engine) for each in inapplicable if each.kind == "refused"}
     absences = [absence for case in session.cases for absence in _absences(case)]
     return SessionOutcome(
         verdicts=verdicts,
@@ -235,7 +265,18 @@ def conclude(session: Session, strict: bool = False) -> SessionOutcome:
         made_with=_made_with(session),
         idle_claims=idle_claims(session.cases, verdicts, inapplicable),
         unjudged=left,
+        lost_controls=lost_controls,
     )
+
+
+def _lost_controls(case: CaseResults, verdicts: Iterable[Verdict]) -> Iterator[LostControl]:
+    """The controls without a verdict that counts, though no engine refused their scenes."""
+    judged = {verdict.comparison for verdict in verdicts if verdict.kind == "control"}
+    for item in case.case.run.controls:
+        faulty = case.get(item.a.variant, item.a.engine, f"control:{item.name}")
+        sides = faulty, case.get(item.a.variant, item.a.engine), case.get(item.b.variant, item.b.engine)
+        if item.name not in judged and not any(each.status == "refused" for each in sides):
+            yield LostControl(case.case.case, item.name, tuple(item.goals))
 
 
 def _made_with(session: Session) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
+import msgspec
 import numpy as np
 
 from crosscheck.judging.sizes import Sizes
@@ -53,11 +54,6 @@ class Result:
     @property
     def channels(self) -> tuple[str, ...]:
         return tuple(filter(is_judged, self.finest.channels)) if self.status == "finished" else ()
-
-    @property
-    def undetermined(self) -> tuple[str, ...]:
-        """Names of the channels that the motion does not determine, by the finest run."""
-        return self.finest.undetermined if self.status == "finished" else ()
 
     @property
     def times(self) -> Real:
@@ -193,11 +189,12 @@ class CaseResults:
         """A result; one that was never recorded "did not run"."""
         return self.results.get((variant, engine, role)) or _never_recorded(variant, engine)
 
-    def undetermined(self, *variants: str) -> dict[str, str]:
-        """Channels that the motion of these variants does not determine, with an engine that says so: the values of
-        other engines are one choice of infinitely many."""
-        said = (result for (variant, _, _), result in self.results.items() if variant in variants)
-        return {channel: result.engine for result in said for channel in result.undetermined}
+    def undetermined(self, *variants: str) -> tuple[str, ...]:
+        """Channels that the motion of any of these variants does not determine: the values of an engine are one choice
+        of infinitely many. They were found from the scenes; what engines say changes nothing here."""
+        infos = [self.case.variants[name] for name in variants if name in self.case.variants]
+        found = [each.undetermined for each in infos if not isinstance(each.undetermined, msgspec.UnsetType)]
+        return tuple(dict.fromkeys(channel for each in found for channel in each))
 
 
 @dataclass(frozen=True)
@@ -237,7 +234,7 @@ def _case_results(case: CaseRecord, runs: Iterable[RunRecord]) -> CaseResults:
         ladder = ladders.get((run.variant, run.engine))
         if not run.effort or ladder is None or run.role == FILM or _on(ladder, run):  # a film climbs no ladder
             groups.setdefault((run.variant, run.engine, run.role), []).append(run)
-    results = {key: _result(key, group) for key, group in groups.items()}
+    results = {key: _result(key, group, _contrary_claim(case, key, group)) for key, group in groups.items()}
     for variant in case.run.variants:
         if variant.refined is None:
             continue
@@ -249,6 +246,25 @@ def _case_results(case: CaseRecord, runs: Iterable[RunRecord]) -> CaseResults:
                 main.refined = refined or _never_recorded(variant.name, engine)
                 main.refinement = (ratio, variant.refined.order)
     return CaseResults(case, results)
+
+
+def _contrary_claim(case: CaseRecord, key: Key, group: Iterable[RunRecord]) -> str:
+    """What an engine calls undetermined though the motion determines it, in words; "" if there is nothing.
+
+    A contrary claim fails its author: it would take its wrong loads out of the session. The scene of a control is
+    another one, whose loads may be undetermined; a fault that is not compared there is not noticed.
+    """
+    variant, _, role = key
+    info = case.variants.get(variant)
+    if role != "main" or info is None:
+        return ""
+    named = dict.fromkeys(channel for run in group for channel in run.undetermined)
+    if not named:
+        return ""
+    if isinstance(info.undetermined, msgspec.UnsetType):
+        return f"undetermined has {next(iter(named))!r}, which this older record cannot show: run the case again"
+    contrary = [channel for channel in named if channel not in info.undetermined]
+    return f"undetermined has {contrary[0]!r:.80}: the motion of the scene determines it" if contrary else ""
 
 
 def _malformed(run: RunRecord) -> str:
@@ -294,8 +310,8 @@ def _past(status: RunStatus) -> str:
     return f"was {status}" if status == "refused" else status
 
 
-def _result(key: Key, group: list[RunRecord]) -> Result:
-    """A result from the runs with the same scene and key as the last record."""
+def _result(key: Key, group: list[RunRecord], claim: str) -> Result:
+    """A result from the runs with the same scene and key as the last record; a contrary `claim` of them fails it."""
     variant, engine, _ = key
     last = group[-1]
     if not last.effort:
@@ -311,8 +327,8 @@ def _result(key: Key, group: list[RunRecord]) -> Result:
         message = "the finest effort is not recorded: the session was cut short"
         return Result(variant, engine, "did not run", message, runs)
     fault = _malformed(finest)
-    if fault:
-        return Result(variant, engine, "failed", fault, runs)
+    if fault or claim:
+        return Result(variant, engine, "failed", fault or claim, runs)
     if finest.status != "diverged":
         return Result(variant, engine, finest.status, finest.message, runs)
     reached = 0.0 if finest.times is None else float(np.max(unpack(finest.times), initial=0.0))

@@ -176,10 +176,10 @@ def compare(channel: str, a: Signal, b: Signal, goal: float, scale: float | None
     return Finding("agree", f"{apart:.2g} of the range apart, within the uncertainty {doubt:.2g}", apart, doubt, size)
 
 
-def not_determined(engine: str) -> Finding:
-    """The finding on a channel that the motion does not determine, by an engine's statement; it is not compared."""
-    what = "closures are redundant, and infinitely many loads go with the same motion"
-    return Finding("refused", f"not determined, as {engine} says: {what}")
+def not_determined() -> Finding:
+    """The finding on a channel that the motion of the scene does not determine; it is not compared."""
+    why = "closures are redundant, and infinitely many loads go with the same motion"
+    return Finding("refused", f"not determined: {why}")
 
 
 def conserve(drift: Real, scale: float, limit: float) -> Finding:

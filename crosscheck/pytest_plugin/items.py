@@ -172,9 +172,12 @@ class ChannelItem(_CaseItem):
     def _without_verdict(self) -> None:
         """Skip a channel that is not applicable, with the engine's reason, or an energy that it does not offer."""
         apart = self.request.runs.outcome(self.case, self.engine).inapplicable
-        reason = next((each.reason for each in apart if each.channel in ("", *self.wanted)), "")
+        mine = next((each for each in apart if each.channel in ("", *self.wanted)), None)
+        reason = "" if mine is None else mine.reason
         if reason and self.request.strict:
             raise NotAsExpected(f"{self.case.name}, {self.engine}, {self.wanted[0]}: not applicable: {reason}")
+        if mine is not None and not mine.lies_with_engine:
+            pytest.skip(reason)
         pytest.skip(f"{self.engine} refuses: {reason}" if reason else f"{self.engine} does not know {self.wanted[0]}")
 
     def _verdict(self) -> Verdict | None:

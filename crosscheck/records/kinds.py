@@ -43,7 +43,9 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     `drawing` uses the markers of every run, `film` those of a run made for the animation. `basis` identifies scene,
     transformation and sample times as given in the case's files ("" in older records). `coordinates` are the names of
-    those by which derivatives are given, where the variant asks for them.
+    those by which derivatives are given, where the variant asks for them. `undetermined` are the channels that the
+    motion does not determine, as follows from the scene (`crosscheck.running.undetermined`), whatever engines say;
+    older records do not say.
     """
 
     level: str
@@ -52,6 +54,7 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     film: Drawing | None = None
     basis: str = ""
     coordinates: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
+    undetermined: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
@@ -85,7 +88,7 @@ class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
 
     `status`: "finished"; "diverged", by the engine's statement; "failed" if the adapter raised or broke the contract;
     "crashed" if its process died; "did not finish" within its limits of time and memory; "refused"; "did not run".
-    `undetermined` are channels that the motion does not determine; they are not stored.
+    `undetermined` are channels that the motion does not determine, as the engine says; they are not stored.
     """
 
     case: str

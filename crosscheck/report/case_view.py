@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from crosscheck.judging.applicable import Inapplicable
-from crosscheck.judging.outcome import NO_REFERENCE, Absence, SessionOutcome
+from crosscheck.judging.outcome import NO_REFERENCE, Absence, LostControl, SessionOutcome
 from crosscheck.judging.results import CaseResults
 from crosscheck.judging.unjudged import UnjudgedChannels, grouped
 from crosscheck.library.case import Provenance
@@ -38,6 +38,7 @@ class CaseView:
     absences: list[Absence]
     inapplicable: list[Inapplicable]
     unjudged: list[UnjudgedChannels]
+    lost_controls: list[LostControl]
     unreferenced: str
     timings: list[dict[str, Any]]
     mutation: CaseScore | None
@@ -48,6 +49,7 @@ def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, muta
     record = case.case
     verdicts = outcome.verdicts[record.case]
     lost = any(absence.case == record.case for absence in outcome.lost)
+    lost_controls = [each for each in outcome.lost_controls if each.case == record.case]
     return CaseView(
         place=place,
         name=record.case,
@@ -55,11 +57,12 @@ def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, muta
         summary=_first_paragraph(record.readme),
         provenance=record.provenance,
         variants=[_variant_view(case, variant) for variant in record.run.variants],
-        ok=record.case not in outcome.idle and all(verdict.ok for verdict in verdicts) and not lost,
+        ok=record.case not in outcome.idle and all(verdict.ok for verdict in verdicts) and not (lost or lost_controls),
         whole=summary_cell(verdicts),
         comparisons=comparison_blocks(verdicts),
         conservation=conservation_block(verdicts),
         controls=control_block(verdicts),
+        lost_controls=lost_controls,
         absences=[absence for absence in outcome.absences if absence.case == record.case],
         inapplicable=[each for each in outcome.inapplicable if each.case == record.case],
         unjudged=grouped(each for each in outcome.unjudged if each.case == record.case),

@@ -42,6 +42,9 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
         lines += [_row(verdict) for verdict in outcome.unexpected[:SHOWN]]
         if len(outcome.unexpected) > SHOWN:
             lines += ["", f"... and {len(outcome.unexpected) - SHOWN} more, in verdicts.json."]
+    if outcome.lost_controls:
+        lines += ["", "## Deliberate faults that were compared in nothing", ""]
+        lines += [f"- {_flat(str(each))}" for each in outcome.lost_controls]
     lines += _claims(outcome)
     lines += _table("Worse than recorded", outcome.worse, lambda verdict: verdict.worse)
     lines += _table("Beyond stale figures", outcome.outgrown, lambda verdict: verdict.grown)

@@ -52,7 +52,10 @@ def write_junit(outcome: SessionOutcome, file: Path, session: Session = NO_SESSI
         for each in missing:
             name = f"{each.variant} by {each.engine}{_role(each.role)} ran"
             _failed(suite, case, name, each.status, each.reason)
-        tests += ["failure"] * len(missing) + _not_judged(suite, case, outcome)
+        lost = [each for each in outcome.lost_controls if each.case == case]
+        for control in lost:
+            _failed(suite, case, f"{control.control} is noticed", "nothing", str(control))
+        tests += ["failure"] * (len(missing) + len(lost)) + _not_judged(suite, case, outcome)
         suite.set("tests", str(len(tests)))
         suite.set("failures", str(tests.count("failure")))
         suite.set("errors", "0")

@@ -78,6 +78,7 @@ def _row(case: CaseResults, outcome: SessionOutcome, engines: list[str], link: s
     verdicts = outcome.verdicts[name]
     lost = any(absence.case == name for absence in outcome.lost)
     whole = summary_cell(verdicts)
+    lost = lost or any(each.case == name for each in outcome.lost_controls)
     look = "bad" if lost or name in outcome.idle else whole.look
     cells = [_engine_cell(name, engine, outcome) for engine in engines]
     cells += [summary_cell([each for each in verdicts if each.kind == kind]) for kind in ("conservation", "control")]

@@ -234,10 +234,22 @@ def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> Vari
     drawn = case.scene(variant) if variant.transform in TAKES_APART else scene
     drawable = all(not isinstance(body, SidBody) for body in drawn.bodies)  # a SID body's nodes are in its file
     drawing = draw(drawn) if drawable else None
-    info = VariantInfo(level=_levels(scene), drawing=drawing, basis=scene_basis(case, variant))
+    info = VariantInfo(
+        level=_levels(scene), drawing=drawing, basis=scene_basis(case, variant),
+        undetermined=_undetermined(scene, variant.duration_s or case.run.duration_s),
+    )  # fmt: skip
     if not (variant.asks and is_counted(scene)):
         return info
     return msgspec.structs.replace(info, coordinates=coordinate_names(scene))
+
+
+def _undetermined(scene: Scene, t_end: float) -> tuple[str, ...]:
+    """Channels of loads that the motion of a scene leaves open: none of a tree."""
+    if not scene.constraints:
+        return ()
+    from crosscheck.running.undetermined import undetermined  # loads the compiler
+
+    return undetermined(scene, t_end)
 
 
 def scene_basis(case: Case, variant: Variant) -> str:

@@ -63,6 +63,8 @@ def _inventory(outcome: SessionOutcome) -> str:
         parts.append(f"{channels} not offered by {engine}")
     if outcome.unjudged:
         parts.append(f"{len(outcome.unjudged)} offered and judged by nothing")
+    if outcome.undetermined:
+        parts.append(f"{outcome.undetermined} not determined by the motion")
     return f"{count} case{'s' if count > 1 else ''}: {', '.join(parts)}"
 
 
@@ -79,6 +81,8 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         yield marked("–", "yellow", f"{each.case}, {each.variant}, {each.engine} {each.status}: {each.reason}")
     for engine in outcome.uncompared:
         yield marked("✕", "red", f"{engine} was asked for and compared in nothing{_first_reason(outcome, engine)}")
+    for control in outcome.lost_controls:
+        yield marked("✕", "red", str(control))
     for text in outcome.idle_claims:
         yield marked("✕", "red", text)
     for case in outcome.idle:
@@ -149,7 +153,8 @@ def _by_claims(outcome: SessionOutcome) -> Iterator[Text]:
 
 def _first_reason(outcome: SessionOutcome, engine: str) -> str:
     """Why an engine has nothing to compare, if it gave a reason."""
-    reasons = [f": {each.case}: {each.reason}" for each in outcome.inapplicable if each.engine == engine]
+    mine = [each for each in outcome.inapplicable if each.engine == engine]
+    reasons = [f": {each.case}: {each.reason}" for each in sorted(mine, key=lambda each: not each.lies_with_engine)]
     return reasons[0] if reasons else ""
 
 

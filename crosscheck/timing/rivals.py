@@ -17,7 +17,7 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort
 from crosscheck.judging.against_reference import ReferenceSignals, hold, of_record, shared_times
-from crosscheck.judging.results import Result, collect
+from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.verdict import Finding
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
@@ -131,8 +131,7 @@ def find_rivals(
         variant=held.variant,
         reference=reference,
         found=tuple(
-            _rival(job, record.variants[job.variant].level, results.get(job.variant, job.engine), reference, held)
-            for job in jobs
+            _rival(job, record.variants[job.variant].level, results, reference, held) for job in jobs
         ),
     )
 
@@ -160,9 +159,9 @@ def _asked(variant: Variant, engines: Sequence[str]) -> Variant:
     return msgspec.structs.replace(variant, engines=everyone, also=(), efforts=efforts, refined=None)
 
 
-def _rival(job: Job, level: str, result: Result, reference: ReferenceSignals, held: RecordedReference) -> Rival:
-    asked = held.asked.get(job.engine) or _of_all(held)
-    findings = list(hold(result, reference, asked))
+def _rival(job: Job, level: str, case: CaseResults, reference: ReferenceSignals, held: RecordedReference) -> Rival:
+    asked, result = held.asked.get(job.engine) or _of_all(held), case.get(job.variant, job.engine)
+    findings = list(hold(result, reference, asked, case.undetermined(job.variant)))
     scales = {name: finding.scale for name, _, finding in findings if finding.scale is not None and finding.scale > 0.0}
     offered = [finding for _, _, finding in findings if finding.status != "refused"] or [each[2] for each in findings]
     worst = min(offered, key=_place, default=Finding("did not run", "nothing of it can be judged"))

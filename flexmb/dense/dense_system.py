@@ -205,7 +205,7 @@ class DenseSystem:
         bodies = {k: Wrenches(*body.world(body.force(self._gravity))) for k, body in now.first_order.items()}
         found = {}
         for k, member in enumerate(self.tree.members):
-            outboard = self._outboard(k)
+            outboard = self.outboard(k)
             origin = now.seat(k, member.outboard).position.value
             total = inertial.about(origin, np.isin(self.points.member, outboard))
             for i in bodies.keys() & set(outboard):
@@ -285,7 +285,7 @@ class DenseSystem:
     def _prescribed(self) -> list[ScalarSpeed]:
         return [x for x in self.tree.scalars if x.prescribed is not None]
 
-    def _undeformed(self, q: Real) -> Real:
+    def undeformed(self, q: Real) -> Real:
         """q with the modal coordinates of ruthless bodies at zero."""
         q = q.copy()
         for member in self.tree.members:
@@ -299,15 +299,15 @@ class DenseSystem:
         for member in self.tree.members:
             if member.level == "ruthless":
                 u[member.u_modes] = 0.0
-        return Instant(self.tree, self._undeformed(q), u, rates)
+        return Instant(self.tree, self.undeformed(q), u, rates)
 
     def _at(self, q: Real, u: Real | None = None) -> Instant:
         """Configuration and velocities: eta = 0 for ruthless bodies, at rest without u."""
         zero = np.zeros(self.nu)
-        return Instant(self.tree, self._undeformed(q), zero if u is None else u, zero)
+        return Instant(self.tree, self.undeformed(q), zero if u is None else u, zero)
 
     def _unit_motions(self, q: Real) -> Motions:
-        return Motions(self._undeformed(q), np.eye(self.nu), np.zeros((self.nu, self.nu)))
+        return Motions(self.undeformed(q), np.eye(self.nu), np.zeros((self.nu, self.nu)))
 
     def _jacobian(self, q: Real) -> Jacobian:
         """Jacobian of all inertia points."""
@@ -347,7 +347,7 @@ class DenseSystem:
             found[load.name] = Wrenches(torque, force, site.position.value[None])
         return found
 
-    def _outboard(self, k: int) -> list[int]:
+    def outboard(self, k: int) -> list[int]:
         """Member k and all members outboard of it."""
         found = [k]
         for i, member in enumerate(self.tree.members):

@@ -84,12 +84,15 @@ def judged(
     strict: bool = False,
     asked: tuple[str, ...] = (),
     basis: str = "",
+    undetermined: tuple[str, ...] | msgspec.UnsetType = (),
     **others: object,
 ) -> SessionOutcome:
-    """The outcome of a session that left these runs; `others` are more of its case's record, `basis` its scenes'."""
+    """The outcome of a session that left these runs; `others` are more of its case's record, `basis` its scenes',
+    of whose channels the motion leaves some `undetermined`."""
     whole = run_file(text)
     run = select(whole, asked)
-    infos = {variant.name: VariantInfo(level="rigid", drawing=None, basis=basis) for variant in run.variants}
+    info = VariantInfo(level="rigid", drawing=None, basis=basis, undetermined=undetermined)
+    infos = {variant.name: info for variant in run.variants}
     case = CaseRecord(
         case="made/made", run=run, provenance=None, readme="", variants=infos, accepted=accepted or {}, asked=asked,
         joined=joining(whole, asked), **others,

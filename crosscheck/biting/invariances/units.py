@@ -16,6 +16,7 @@ from crosscheck.biting.invariances.counterpart import (
 )
 from crosscheck.biting.invariances.linearised import Item, by_freedom, has_beam_modes, relation
 from crosscheck.library.time_functions import scaled, slowed
+from crosscheck.running.undetermined import undetermined
 from flexmb.scene.bodies import BeamStation, ModalBody, SidBody
 from flexmb.scene.connectors import (
     AlongHinge,
@@ -31,9 +32,6 @@ from flexmb.scene.schema import Coupling, Load, ModalState, Scene, Waiver
 from flexmb.scene.tree import coordinates, coupled
 from flexmb.scene.units import split_unit
 from flexmb.surrogate import modal_points
-from flexmb.system.closed import ClosedSystem
-from flexmb.system.compile import compile
-from flexmb.tables.features import asking
 from flexmb.typing import Real
 
 # Speeds, accelerations, forces, energies and all else have another factor than 1.
@@ -107,7 +105,7 @@ def _rescaled(scene: Scene) -> Counterpart:
             raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')
     if scene.modal_states:  # the unit of a beam's modal coordinates is its modes', which are made with the model
         scene = modal_points(scene)
-    drives, left_out = _drives(scene), _undetermined(scene)
+    drives, left_out = _drives(scene), undetermined(scene)  # the least loads that an engine may take are others then
 
     def back(times: Real, channels: Channels) -> Channels:
         return {name: rows / _factor(name, drives) for name, rows in channels.items() if name not in left_out}
@@ -136,19 +134,6 @@ def _couplings(scene: Scene) -> tuple[Coupling, ...]:
         )
         found.append(msgspec.structs.replace(coupling, terms=terms, offset=coupling.offset * led))
     return tuple(found)
-
-
-def _undetermined(scene: Scene) -> set[str]:
-    """Channels of loads that the motion leaves open, in overconstrained mechanisms: the least ones, which an engine may
-    take, are others in other units."""
-    if not scene.constraints:
-        return set()
-    with asking("general"):
-        system = compile(scene)
-        assert isinstance(system, ClosedSystem)  # it has closures
-        determined = system.determined_loads(system.initial_state)
-    parts = ("torque", slice(0, 3)), ("force", slice(3, 6))
-    return {f"load:{name}.{part}" for name, known in determined.items() for part, at in parts if not known[at].all()}
 
 
 def _factor(channel: str, drives: dict[str, float]) -> float:

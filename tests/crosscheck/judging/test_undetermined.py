@@ -1,4 +1,4 @@
-"""What the motion leaves open is compared with nothing, whoever gives numbers for it."""
+"""What the motion leaves open is compared with nothing, whoever gives numbers for it; what it is, no engine decides."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from crosscheck.engines.native import NativeEngine
 from crosscheck.report.ci import write_summary
 from tests.crosscheck.fake_engines import Fake, Pendulum
 from tests.crosscheck.fake_engines import engines as fakes
+from tests.crosscheck.judging.test_applicable import junit, told
 from tests.crosscheck.made_records import TIP, judged, ladder, way
 from tests.crosscheck.sessions import compare_engines
 from tests.flexmb.closure import mechanisms
@@ -44,13 +45,15 @@ def records(*, said: bool):
     return (without_torque(one) if said else one) + ladder("two", both) + ladder("three", both)
 
 
-def test_nobody_is_compared_in_what_one_says_is_open(tmp_path):
-    outcome = judged(THREE, records(said=True))
+def test_nobody_is_compared_in_what_the_motion_leaves_open(tmp_path):
+    outcome = judged(THREE, records(said=True), undetermined=(TORQUE,))
     assert outcome.ok and {verdict.channel for verdict in outcome.all} == {TIP, FORCE}
     assert {(each.engine, each.channel) for each in outcome.inapplicable} == {
         (engine, TORQUE) for engine in ("one", "two", "three")
     }
-    said = "not determined, as one says: closures are redundant, and infinitely many loads go with the same motion"
+    assert (outcome.not_offered, outcome.undetermined, outcome.never_applicable) == ({}, 1, {})
+    assert "not determined and not judged: 1 channel" in outcome.headline
+    said = "not determined: closures are redundant, and infinitely many loads go with the same motion"
     assert all(each.reason == said for each in outcome.inapplicable)
     write_summary(outcome, tmp_path / "summary.md")
     assert "not determined" in (tmp_path / "summary.md").read_text(encoding="utf-8")
@@ -73,15 +76,61 @@ goals = { "marker:tip.position" = 1e-3, load = 1e-3 }
 """
 
 
-@pytest.mark.parametrize("silent", ["one", "two"])
-def test_across_variants_either_side_may_say_so(silent):
+def test_across_variants_what_either_leaves_open_is_not_compared():
     both = {TIP: way(), FORCE: way(), TORQUE: way()}
-    runs = {"one": ladder("one", both), "two": ladder("two", both, variant="other")}
-    assert {each.channel for each in judged(ACROSS, [*runs["one"], *runs["two"]]).all} == {TIP, FORCE, TORQUE}
-    said = [run for name, each in runs.items() for run in (each if name == silent else without_torque(each))]
-    outcome = judged(ACROSS, said)
+    runs = [*ladder("one", both), *ladder("two", both, variant="other")]
+    assert {each.channel for each in judged(ACROSS, runs).all} == {TIP, FORCE, TORQUE}
+    outcome = judged(ACROSS, runs, undetermined=(TORQUE,))
     assert {verdict.channel for verdict in outcome.all} == {TIP, FORCE}
     assert {each.channel for each in outcome.inapplicable} == {TORQUE}
+
+
+def test_a_contrary_claim_fails_its_author_and_changes_no_verdict_of_others():
+    """As of an older session, whose engines decided: a claim on a tree, or on a load that the closures determine."""
+    others = [*ladder("two", {TIP: way(), FORCE: way(), TORQUE: way()}), *ladder("three", {TIP: way(), FORCE: way()})]
+    outcome, alone = judged(THREE, [*records(said=True)]), judged(THREE, others)
+    assert not outcome.ok and outcome.undetermined == 0
+    mine = [each for each in outcome.all if "one" in (each.engine_a, each.engine_b)]
+    assert {each.status for each in mine} == {"failed"} and all("determine" in each.reason for each in mine)
+    theirs = [each for each in outcome.all if each not in mine]
+    assert {each.channel: each.status for each in theirs} == dict.fromkeys((TIP, FORCE, TORQUE), "agree")
+    assert {each.channel for each in alone.all if each.status == "agree"} == {TIP, FORCE}
+
+
+def test_a_claim_in_a_record_that_does_not_say_what_the_scene_leaves_open_is_not_believed():
+    outcome = judged(THREE, records(said=True), undetermined=msgspec.UNSET)
+    assert not outcome.ok and outcome.undetermined == 0
+    reasons = {each.reason for each in outcome.unexpected}
+    assert len(reasons) == 1 and "run the case again" in reasons.pop()
+    assert judged(THREE, records(said=False)[3:], undetermined=msgspec.UNSET).undetermined == 0
+
+
+CONTROL = THREE + """
+[[control]]
+name = "too heavy"
+mutation = "mass"
+target = "bar"
+a = { variant = "rigid", engine = "two" }
+b = { variant = "rigid", engine = "three" }
+goals = { "load:pin.torque" = 1e-3 }
+"""
+
+
+def test_a_control_that_is_compared_in_nothing_is_lost_and_the_session_red(tmp_path):
+    faulty = ladder("two", {TIP: way(2.0), FORCE: way(2.0), TORQUE: way(2.0)}, role="control:too heavy")
+    one = ladder("one", {TIP: way(), FORCE: way(), TORQUE: way()})
+    seen = judged(CONTROL, [*one, *records(said=False)[3:], *faulty])
+    assert seen.ok and seen.controls() == (1, 1) and not seen.lost_controls
+    lost = judged(CONTROL, [*records(said=True), *faulty], undetermined=(TORQUE,))
+    assert (lost.unexpected, lost.controls(), lost.ok) == ([], (0, 0), False)
+    assert [each.control for each in lost.lost_controls] == ["too heavy"]
+    assert lost.headline == "1 deliberate fault was compared in nothing"
+    shown = told(lost)
+    write_summary(lost, tmp_path / "summary.md")
+    for text in (shown[1], (tmp_path / "summary.md").read_text(encoding="utf-8")):
+        assert 'control "too heavy": none of its channels was compared (load:pin.torque)' in text.replace("\\", "")
+    assert shown[0] == 1 and "1 not determined by the motion" in shown[1]
+    assert [each.get("type") for each in junit(lost, tmp_path).iter("failure")] == ["nothing"]
 
 
 def test_an_engine_that_leaves_it_out_without_a_word_refuses_it():
@@ -91,7 +140,7 @@ def test_an_engine_that_leaves_it_out_without_a_word_refuses_it():
 
 def test_a_goal_of_open_loads_alone_is_no_misspelt_one():
     runs = [run for name in ("one", "two", "three") for run in without_torque(ladder(name, {TIP: way()}))]
-    outcome = judged(THREE, runs)
+    outcome = judged(THREE, runs, undetermined=(TORQUE,))
     assert outcome.ok and {verdict.channel for verdict in outcome.all} == {TIP}
 
 

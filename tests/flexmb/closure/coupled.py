@@ -9,6 +9,7 @@ import numpy as np
 
 import flexmb
 from flexmb.dense import DenseSystem
+from flexmb.dense.closures import relation
 from flexmb.scene import schema as s
 from flexmb.scene.tree import coordinates
 from tests import trees
@@ -42,6 +43,6 @@ def with_couplings(scene: s.Scene, rng: np.random.Generator) -> s.Scene:
     for i, (led, leading) in enumerate(chosen):
         terms = tuple(s.CoupledCoordinate(hinge=name, ratio=float(rng.uniform(0.5, 2.0))) for name in leading)
         coupling = s.Coupling(name=f"k{i}", hinge=led, terms=terms)
-        offset = float(chains.relation(dense, coupling)[0] @ start)
+        offset = float(relation(dense, coupling)[0] @ start)
         found.append(msgspec.structs.replace(coupling, offset=offset))
     return msgspec.structs.replace(scene, couplings=tuple(found))

@@ -13,6 +13,7 @@ import pytest
 
 import flexmb
 from flexmb.dense import DenseSystem
+from flexmb.dense.closures import relation
 from flexmb.scene import schema as s
 from flexmb.scene.tree import coordinates
 from tests.bounds import algebra
@@ -98,7 +99,7 @@ def test_motors_couplings_and_drives_make_up_what_a_hinge_transmits_along_its_ax
                 continue
             supplied, size = 0.0, abs(tau[x.u])
             for coupling in scene.couplings:
-                factor = chains.relation(dense, coupling)[1][x.u]
+                factor = relation(dense, coupling)[1][x.u]
                 load = frames[coupling.name][:3] if angular[coupling.hinge] else frames[coupling.name][3:]
                 supplied += factor * float(load @ np.array(_hinge(scene, coupling.hinge).axis))
                 size += abs(factor) * float(np.linalg.norm(load))

@@ -10,6 +10,8 @@ import pytest
 import flexmb
 from flexmb.closure import closures as closure_system
 from flexmb.closure.null_loads import blocks
+from flexmb.dense import DenseSystem
+from flexmb.dense.closures import open_loads, wrenches
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.shapes import beam_section
@@ -37,7 +39,7 @@ def check(seed: int) -> None:
 
     bound = algebra(system.nu + len(dense.J), len(scene.bodies) + len(scene.point_masses))
     condition = 1.0 / np.min(values[:rank], initial=1.0)  # rows are closed to rounding, redundant ones to this more
-    wrench = chains.wrenches(scene, state.q)
+    wrench = wrenches(DenseSystem(scene), state.q)
     determined = system.determined_loads(state)
     for algorithm in ("articulated", "composite"):
         found = system.evaluate(0.0, state.q, state.u, algorithm)
@@ -60,6 +62,10 @@ def check(seed: int) -> None:
         share = np.max(np.abs(wrench[closure.name] @ U[:, rank:]), axis=1, initial=0.0)
         clear = (share < 1e-10) | (share > 1e-5)
         assert np.array_equal(determined[closure.name][clear], share[clear] < 1e-10), closure
+    by_dense = open_loads(DenseSystem(scene), state.q, ~dense.free)
+    assert {name for name, each in determined.items() if not each.all()} == {
+        name for name, each in by_dense.loads.items() if each.any()
+    }
 
 
 def can_move(scene: s.Scene) -> bool:

@@ -1,0 +1,140 @@
+"""Channels of loads that the motion of a scene does not determine, found from its closures, whatever engines say.
+
+The motion of flexmb gives the states; what is open there follows from the rank of the closures' rows by the dense route
+(`flexmb.dense.closures`), which shares no dynamics with flexmb's algorithms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import assert_never
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.closure.closures import ClosureError
+from flexmb.dense import DenseSystem
+from flexmb.dense.closures import open_loads
+from flexmb.run.simulate import simulate
+from flexmb.run.trajectory import Trajectory
+from flexmb.scene.events import Change, EndRun, Impact, Latch, Release
+from flexmb.scene.schema import Scene
+from flexmb.scene.stops import leaving
+from flexmb.scene.tree import coordinates
+from flexmb.system.compile import compile
+from flexmb.system.tree_system import System
+from flexmb.tables.features import asking
+from flexmb.tables.state import State
+
+PLACES = 12  # in a run: what is open depends on the position, but is the same nearly everywhere
+PARTS = ("torque", slice(0, 3)), ("force", slice(3, 6))
+STEPS = 100_000  # of the run that gives the states: one that needs more is judged by what it reached
+Held = NDArray[np.bool_]
+
+
+def undetermined(scene: Scene, t_end: float | None = None) -> tuple[str, ...]:
+    """The names of channels that are open at the start, or at any time until `t_end` (s).
+
+    Where all loads are determined at the start and no event holds or releases a coordinate, they are determined
+    everywhere but at single instants: rows that are independent somewhere are so nearly everywhere.
+    """
+    if not scene.constraints:
+        return ()
+    with asking("general"):
+        try:
+            found = _open(scene)
+        except NotImplementedError:  # the dense route has no bodies of Standard Input Data
+            return tuple(sorted(_by_flexmb(scene)))
+        if t_end is not None and (found or _holds(scene)):
+            found |= _open_in_run(scene, t_end)
+    return tuple(sorted(found))
+
+
+def _by_flexmb(scene: Scene) -> set[str]:
+    """What flexmb itself finds open at the start, for scenes that the dense route refuses."""
+    system = compile(scene)
+    state = system.initial_state
+    found = system.evaluate(state.t, state.q, state.u)
+    loads = {f"load:{name}.{part}" for name, load in found.loads.items() for part, at in PARTS
+             if np.isnan(load[at]).any()}  # fmt: skip
+    return loads | {f"drive:{name}" for name, drive in found.drives.items() if np.isnan(drive).any()}
+
+
+def _open(scene: Scene) -> set[str]:
+    """At the start; the initial values themselves where flexmb cannot close the scene's closures."""
+    try:
+        state = compile(scene).initial_state
+    except (ClosureError, NotImplementedError):
+        state = System(scene).initial_state
+    dense = DenseSystem(scene)
+    return _at(dense, state, _prescribed(dense))
+
+
+def _open_in_run(scene: Scene, t_end: float) -> set[str]:
+    """At some times of flexmb's run, and after each of its events."""
+    try:
+        run = simulate(scene, t_end, samples=PLACES, rtol=1e-8, atol=1e-10, max_steps=STEPS)
+    except (ClosureError, NotImplementedError):
+        return set()
+    dense, found = DenseSystem(scene), set[str]()
+    for state, held in _states(dense, run):
+        found |= _at(dense, state, held)
+    return found
+
+
+def _states(dense: DenseSystem, run: Trajectory) -> Iterator[tuple[State, Held]]:
+    """States of a run, with the speeds that are held there."""
+    held, rest = _prescribed(dense), list(run.events)
+    for sample in range(len(run.t)):
+        while rest and rest[0].t <= run.t[sample]:
+            held = _held_after(dense, held, rest[0].name, rest[0].after)
+            yield rest.pop(0).after, held
+        yield run.state_at(sample), held
+
+
+def _held_after(dense: DenseSystem, held: Held, name: str, after: State) -> Held:
+    """The speeds that are held after an event; a coordinate that rests on a stop has no speed."""
+    held, place = held.copy(), _places(dense)
+    for event in dense.scene.events:
+        for action in event.actions if name in (event.name, leaving(event)) else ():
+            match action:
+                case Latch():
+                    held[place[action.coordinate]] = True
+                case Release():
+                    held[place[action.coordinate]] = False
+                case Impact():
+                    if action.rests:
+                        stands = after.u[place[action.coordinate]] == 0.0
+                        held[place[action.coordinate]] = stands and name == event.name
+                case Change() | EndRun():
+                    pass
+                case _:
+                    assert_never(action)
+    return held
+
+
+def _holds(scene: Scene) -> bool:
+    """Whether any event changes which coordinates are held."""
+    actions = [action for event in scene.events for action in event.actions]
+    return any(isinstance(each, Latch | Release) or (isinstance(each, Impact) and each.rests) for each in actions)
+
+
+def _places(dense: DenseSystem) -> dict[str, int]:
+    """The number of the speed of each scalar coordinate, by the names that events use."""
+    scene = dense.scene
+    names = {item.name: [name for name, _ in coordinates(item)] for item in (*scene.hinges, *scene.point_masses)}
+    names |= {wheel.name: ["angle"] for wheel in scene.wheels}
+    taken = {owner: iter(own) for owner, own in names.items()}
+    return {f"{x.owner}.{next(taken[x.owner])}": x.u for x in dense.tree.scalars}
+
+
+def _prescribed(dense: DenseSystem) -> Held:
+    held = np.zeros(dense.nu, dtype=bool)
+    held[[x.u for x in dense.tree.scalars if x.prescribed is not None]] = True
+    return held
+
+
+def _at(dense: DenseSystem, state: State, held: Held) -> set[str]:
+    found = open_loads(dense, state.q, held)
+    loads = {f"load:{name}.{part}" for name, is_open in found.loads.items() for part, at in PARTS if is_open[at].any()}
+    return loads | {f"drive:{name}" for name, is_open in found.drives.items() if is_open}
