@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.flexmb.system import public_calls
+from tests.flexmb.system import public_calls, walk
 from tests.flexmb.system.argument_kinds import Call, Variant, W, rows
 from tests.flexmb.system.batch_calls import judge
 from tests.flexmb.system.public_calls import faults
@@ -25,16 +25,24 @@ def test_every_public_call_refuses_what_is_wrong_and_casts_what_is_right():
 
 def test_a_public_name_that_is_not_called_is_found(monkeypatch):
     monkeypatch.setattr(public_calls.fm.System, "novel", lambda self, x: x, raising=False)
-    assert "System.novel" in public_calls.public()
+    assert "System.novel" in walk.public()
+    walk.met()
     monkeypatch.setattr(public_calls, "calls", dict)
-    assert {"System.novel", "System.accelerations", "NestedSystem.reduced"} <= public_calls.unlisted()
+    assert {"System.novel", "System.accelerations", "NestedSystem.reduced"} <= walk.unlisted()
 
 
 def test_a_class_that_an_attribute_leads_to_is_found(monkeypatch):
     """Negative control: a new kind of result, with a method that nobody calls."""
     novel = type("Novel", (), {"__module__": "flexmb.system.novel", "ask": lambda self, x: x})
     monkeypatch.setattr(public_calls.fm.System, "novel", property(lambda self: novel()), raising=False)
-    assert novel in public_calls.reached() and "Novel.ask" in public_calls.unlisted()
+    assert novel in walk.reached() and "Novel.ask" in walk.unlisted()
+
+
+def test_a_class_that_a_call_gives_is_found(monkeypatch):
+    """Negative control: a result with a method that nobody calls, of a call that is public."""
+    novel = type("Novel", (), {"__module__": "flexmb.system.novel", "ask": lambda self, x: x})
+    monkeypatch.setattr(walk, "met", lambda: ({"answers": [novel()]},))
+    assert walk.reached() == {novel} and "Novel.ask" in walk.unlisted()
 
 
 @pytest.mark.parametrize(
