@@ -32,6 +32,8 @@ SECTIONS = chosen(
     None, "root", [0.6], [-0.1], [[0.1]], [np.nan], [0.1j], plain=(([0.25, 0], np.array([0.25, 0.0])),)
 )  # fmt: skip
 
+REFUSED = {"partitions": ("state",), "operators": ("state",), "nested": (), "evaluator": ()}
+"""What a closed chain is always refused, and its arguments."""
 LOOKS: dict[str, Callable[[Any], Any]] = {
     "operators": lambda it: it.M,
     "closure_operators": lambda it: it.Lambda_inverse,
@@ -64,7 +66,7 @@ def of_any(system: fm.System, state: fm.State) -> Calls:
         found.add(f"{kind}.{name}", getattr(system, name), {"state": state, "accelerations": rates},
                   state=at, accelerations=speeds)  # fmt: skip
     asked = {"algorithm": "articulated", "stabilise": 0.0}
-    found.add(f"{kind}.route", system.route, asked, lambda route: None, stabilise=wrong_only_number, **ALGORITHM)
+    found.add(f"{kind}.route", system.route, asked, lambda it: it.rhs, stabilise=wrong_only_number, **ALGORITHM)
     found.add(f"{kind}.scene_state", system.scene_state, {"t": 0.5}, t=numbers)
     for name in ("coordinate", "speed"):
         found.add(f"{kind}.{name}", getattr(system, name), {"name": system.scene.hinges[0].name}, name=names)
@@ -154,9 +156,9 @@ def of_the_chain(w: World) -> Calls:
     chain, start, found = w.chain, w.chain.initial_state, of_any(w.chain, w.chain.initial_state)
     found.add("ClosedSystem.state", chain.state, {"q": start.q.copy(), "u": start.u.copy(), "t": 0.5},
               q=wrong_only, u=wrong_only, t=numbers)  # fmt: skip
-    always: dict[str, tuple[Any, ...]] = {name: (start,) for name in ("partitions", "operators")}
-    for name, given in (always | {"nested": (), "evaluator": ()}).items():
-        found.add(f"ClosedSystem.{name}", lambda name=name, given=given: refused(getattr(chain, name), *given))
+    for name, given in REFUSED.items():
+        found.add(f"ClosedSystem.{name}", lambda name=name, given=given: refused(
+            getattr(chain, name), *(start for _ in given)))  # fmt: skip
     return found
 
 

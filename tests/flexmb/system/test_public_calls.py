@@ -116,3 +116,18 @@ def test_an_integer_time_compiles_nothing(t):
     versions = len(observation.observe.signatures)
     W.tree.evaluate(t, W.state.q, W.state.u)
     assert len(observation.observe.signatures) == versions
+
+
+@pytest.mark.parametrize("t", ["1", None, np.nan, 1j])
+def test_what_observes_for_the_library_itself_refuses_a_time_that_is_none(t):
+    """Users can call it all the same: by numba they would be told that no definition matches."""
+    tree, chain, loads = W.tree, W.chain, W.tree.observation.out.loads.copy()
+    row = np.zeros(1)
+    for observe in (
+        lambda: tree.observe_recursion(t, W.y), lambda: tree.observe_rates(t, W.y, W.rates),
+        lambda: tree.observe_motion(t, W.y, W.rates, W.rates, loads),
+        lambda: tree.observe_row(t, W.y, "articulated", row),
+        lambda: chain.observe_row(t, np.append(chain.initial_state.y, 0.0), "articulated", row),
+    ):  # fmt: skip
+        with pytest.raises((TypeError, ValueError), match="t is"):
+            observe()

@@ -20,14 +20,22 @@ INSIDE = {  # of the mechanics, for numbers that have been examined
     "nested_system", "precision_if_doubtful", "observe_recursion", "observe_rates", "observe_motion", "observe_row",
     "check_status", "check_precision", "all_loads", "referred_loads", "with_numbers", "fault_name",
 }  # fmt: skip
-WORKSPACES = {"workspace", "recursion_workspace", "composite_workspace"}  # new ones, for one thread
+SYSTEMS = "System", "ClosedSystem"
+UNTRIED = {  # what users may ask all the same: docs/threads.md
+    **{f"{system}.{name}": "makes a new workspace, which is for one thread" for system in SYSTEMS
+       for name in ("workspace", "recursion_workspace", "composite_workspace")},
+    "NestedSystem.workspace": "makes a new workspace, which is for one thread",
+    "Parameters.workspace": "makes a new workspace, which is for one thread",
+    "Trajectory.plot": "draws by matplotlib, whose figures are for one thread",
+    "Campbell.plot": "draws by matplotlib, whose figures are for one thread",
+    "Trajectory.to_rerun": "writes by the library rerun",
+    "ClosedSystem.section_loads": "the closed chain of the tests has no beam; as of a System",
+    "ClosedSystem.section_load_derivatives": "the closed chain of the tests has no beam; as of a System",
+}  # fmt: skip
 EXEMPT = {
-    *(f"{system}.{name}" for system in ("System", "ClosedSystem") for name in INSIDE | WORKSPACES),
-    "NestedSystem.workspace", "Parameters.workspace",
+    *UNTRIED,
+    *(f"{system}.{name}" for system in SYSTEMS for name in INSIDE),
     "Batch.tables", "Batch.constants",  # of those who fill lanes
-    "Trajectory.plot", "Campbell.plot",  # matplotlib's figures
-    "Trajectory.to_rerun",  # a recording of rerun's
-    "ClosedSystem.section_loads", "ClosedSystem.section_load_derivatives",  # the closed chain here has no beam
     "open_loop", "user_function", "no_user_code",  # a scene; a function; nothing
     "load_scene", "save_scene", "SceneBuilder",  # files and data, checked where they are compiled
     "ControlledDerivatives", "RunStage", "Restart", "EventRecord",  # what runs are given, or give
