@@ -11,7 +11,9 @@ from __future__ import annotations
 import faulthandler
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -92,6 +94,45 @@ def faults(name: str, call: Call) -> Iterator[str]:
             yield f"{name}: after wrong values of {argument} the right ones give {type(error).__name__}: {error}"
 
 
+HARD = "huge", "short", "short q", "NaN", "nan at 0", "times 1e+308", "times 1e+150", "nan at (0, 0)", "nan", "1e+308"
+"""Variants that overflow, are not finite or too short: what they leave behind may be asked for by any other call."""
+QUICK = 4e-4
+"""Seconds that a right call may take to be asked after each of these."""
+
+
+def left_behind(asked: dict[str, Call]) -> Iterator[str]:
+    """Right calls of an object that give other bits after a hard call of the same object, whatever became of that."""
+    objects: dict[str, dict[str, list[bytes]]] = {}
+    for name, call in asked.items():
+        call.function(**call.arguments)
+        begin = perf_counter()
+        right = bits(call.function(**call.arguments))
+        if perf_counter() - begin < QUICK:
+            objects.setdefault(object_of(name), {})[name] = right
+    for name, call in asked.items():
+        for argument, kind in call.kinds.items():
+            for variant in (each for each in kind(call.arguments[argument]) if each.name in HARD):
+                with suppress(*DOCUMENTED), np.errstate(all="ignore"):
+                    call.function(**call.arguments | {argument: variant.value})
+                for other, right in objects.get(object_of(name), {}).items():
+                    if fault := _another(asked[other], right):
+                        yield f"{other} after {name}({argument}: {variant.name}): {fault}"
+
+
+def object_of(name: str) -> str:
+    """The kind of which there is one object; functions are given the tree."""
+    kind = name.split(",")[0].split(".")[0]
+    return kind if "." in name.split(",")[0] else "System"
+
+
+def _another(call: Call, right: list[bytes]) -> str:
+    """What is not as it was, if anything."""
+    try:
+        return "" if bits(call.function(**call.arguments)) == right else "other numbers"
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+
+
 def bits(result: Any) -> list[bytes]:
     """All numbers in a result, to be compared to the bit."""
     return [each.tobytes() for each in arrays_of(result)]
@@ -120,6 +161,7 @@ def main() -> None:
         print(name, file=sys.stderr, flush=True)
         found += faults(name, call)
         count += sum(len(list(kind(call.arguments[argument]))) for argument, kind in call.kinds.items())
+    found += left_behind(calls())
     print("\n".join(found))
     print(f"{count} calls, {len(found)} faults")
 

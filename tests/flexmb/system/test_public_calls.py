@@ -76,6 +76,26 @@ def test_what_a_refused_call_leaves_behind_is_seen():
         assert len(found) == 1 and fault in found[0]
 
 
+@pytest.mark.parametrize(("kept", "fault"), [(3.0, "other numbers"), (None, "TypeError")])
+def test_what_a_refused_call_leaves_to_another_is_seen(kept, fault):
+    """Negative controls: one call spoils what another reads."""
+    memory = [2.0]
+
+    def spoiling(q):
+        if q == "wrong":
+            memory[0] = kept
+            raise ValueError("q")
+        return 1.0
+
+    asked = {
+        "Object.spoiling": Call(spoiling, {"q": 0.5}, {"q": lambda _: [Variant("NaN", "wrong")]}),
+        "Object.reading": Call(lambda: 1.0 * memory[0], {}, {}),
+        "Other.reading": Call(lambda: 1.0, {}, {}),
+    }
+    found = list(public_calls.left_behind(asked))
+    assert len(found) == 1 and "Object.reading after Object.spoiling(q: NaN)" in found[0] and fault in found[0]
+
+
 @pytest.mark.parametrize(
     ("failed", "rows"),
     [
