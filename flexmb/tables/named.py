@@ -11,7 +11,7 @@ from flexmb.scene.problems import closest
 Value = TypeVar("Value")
 
 
-class Named(dict[str, Value]):
+class PartsByName(dict[str, Value]):
     """A dictionary of which a name that is not there is a KeyError with its place and the remedy.
 
     Each place has a class of its own, `named`: a dictionary that stores its place would take longer to make than an
@@ -31,21 +31,21 @@ class Named(dict[str, Value]):
 
 
 @cache
-def named(place: str) -> type[Named[Any]]:
+def named(place: str) -> type[PartsByName[Any]]:
     """The dictionaries of a place: what the user has written before the bracket, such as "markers"."""
-    return type("Named", (Named,), {"_place": place, "__slots__": (), "__module__": __name__})
+    return type("PartsByName", (PartsByName,), {"_place": place, "__slots__": (), "__module__": __name__})
 
 
-def _again(place: str, values: Mapping[str, Any]) -> Named[Any]:
+def _again(place: str, values: Mapping[str, Any]) -> PartsByName[Any]:
     return named(place)(values)
 
 
-def parts_of(*fields: str) -> tuple[tuple[str, type[Named[Any]]], ...]:
+def parts_of(*fields: str) -> tuple[tuple[str, type[PartsByName[Any]]], ...]:
     """These fields of a result, with the dictionaries that they are to be."""
     return tuple((field, named(field)) for field in fields)
 
 
-def name_parts(result: Any, parts: tuple[tuple[str, type[Named[Any]]], ...]) -> None:
+def name_parts(result: Any, parts: tuple[tuple[str, type[PartsByName[Any]]], ...]) -> None:
     """Make these fields of a frozen dataclass dictionaries of these kinds, where they are dictionaries."""
     held = result.__dict__
     for field, kind in parts:
