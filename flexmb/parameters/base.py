@@ -55,15 +55,19 @@ class BaseParameters(NamedTuple):
         return len(self.names)
 
     def reduced(self, Y: Real) -> Real:
-        """The columns (...,r) of a regressor (...,P) by which the base parameters are multiplied."""
-        found: Real = Y[..., self.chosen]
+        """The columns (...,r) of a regressor (...,P) by which the base parameters are multiplied.
+
+        Raises TypeError or ValueError for what is no such array of finite numbers.
+        """
+        Y = arguments.finite("Y", arguments.array("Y", Y))
+        found: Real = arguments.shaped("Y", Y, (*Y.shape[:-1], self.matrix.shape[1]))[..., self.chosen]
         return found
 
     def fit(self, Y: Real, tau: Real, noise: Real | float | None = None) -> BaseFit:
         """Least squares for measured tau (n,), less what is known, with the rows of Y (n,P).
 
         noise: standard deviation of the measurements, one or (n,); by default it is estimated from what remains. Raises
-        ValueError where the rows determine fewer parameters.
+        ValueError where the rows determine fewer parameters, OverflowError for numbers whose products overflow.
         """
         Y, tau = arguments.array("Y", Y), arguments.array("tau", tau)
         Y, tau = arguments.finite("Y", Y), arguments.finite("tau", arguments.vector("tau", tau, len(Y)))
@@ -82,7 +86,8 @@ class BaseParameters(NamedTuple):
         left = (tau - W @ values) * weight
         deviation = 1.0 if noise is not None else float(np.sqrt(left @ left / (len(tau) - self.rank)))
         half = Vt.T / s / size[:, None] * deviation
-        return BaseFit(values, half @ half.T, float(np.sqrt(np.mean((tau - W @ values) ** 2))))
+        remaining = arguments.representable(np.sqrt(np.mean((tau - W @ values) ** 2)))
+        return BaseFit(arguments.representable(values), arguments.representable(half @ half.T), float(remaining))
 
 
 def base_parameters(parameters: Sequence[str], W: Real) -> BaseParameters:

@@ -14,7 +14,7 @@ from flexmb.run.restart import Restart
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.system.observables import undetermined_loads
 from flexmb.tables import arguments
-from flexmb.tables.named import name_parts
+from flexmb.tables.named import name_parts, parts_of
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -22,6 +22,7 @@ SPATIAL = {"loads": 6, "wheel_loads": 6, "connectors": 6, "hinge_forces": 1}
 """Fields that are dictionaries of arrays by name of an item, with the number of columns."""
 SOME = "drives", "signals", "power"
 """Such fields with any number of columns."""
+_PARTS = parts_of("markers", "energy", *SPATIAL, *SOME)
 PATH = {"position": 3, "quaternion": 4, "velocity": 6, "acceleration": 6}
 
 
@@ -96,7 +97,7 @@ class RunArrays:
     def __post_init__(self) -> None:
         """TypeError or ValueError for inconsistent arrays. Methods that use them check again, as arrays may change."""
         refuse_torn(self)
-        name_parts(self, "markers", "energy", *SPATIAL, *SOME)
+        name_parts(self, _PARTS)
 
     @property
     def undetermined(self) -> dict[str, NDArray[np.bool_]]:

@@ -234,7 +234,7 @@ class ClosedSystem(ChainDerivatives, System):
 
     def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
         """As for a tree, and also at a singular position in a run."""
-        y = self._fitting(y)
+        t, y = arguments.number("t", t), self._fitting(y)
         row[:] = self._row(t, y, self._motion_or_across(t, y, algorithm))
 
     def _row(self, t: float, y: Real, motion: ClosedMotion) -> Real:

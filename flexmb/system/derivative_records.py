@@ -15,7 +15,7 @@ import numpy as np
 from flexmb.entry.observation import parts
 from flexmb.entry.variation import displacement_of
 from flexmb.kept import kept
-from flexmb.system.observables import ENERGIES, Observation
+from flexmb.system.observables import ENERGIES, PARTS, Observation
 from flexmb.tables.named import name_parts
 from flexmb.typing import Real
 
@@ -127,7 +127,7 @@ class EvaluationDerivatives(Generic[By]):
     hinge_forces: dict[str, By]
 
     def __post_init__(self) -> None:
-        name_parts(self, "markers", "loads", "wheel_loads", "drives", "energy", "connectors", "hinge_forces")
+        name_parts(self, PARTS)
 
 
 def by_names(

@@ -41,9 +41,12 @@ class MassProperties:
         return self.rotation.T @ self.inertia @ self.rotation
 
     def about(self, point: Real) -> Real:
-        """Inertia (3,3) kg m² about a point (3,) m of World, World axes; ValueError or TypeError for no point."""
+        """Inertia (3,3) kg m² about a point (3,) m of World, World axes.
+
+        ValueError or TypeError for no point, OverflowError for one that is too far away.
+        """
         arm = cross_matrix(self.centre - arguments.finite("point", arguments.vector("point", point, 3)))
-        return self.inertia - self.mass * arm @ arm
+        return arguments.representable(self.inertia - self.mass * arm @ arm)
 
     @kept
     def principal(self) -> tuple[Real, Real]:

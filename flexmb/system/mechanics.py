@@ -217,12 +217,12 @@ class Mechanics(SceneArrays):
 
     def observe_recursion(self, t: float, y: Real) -> None:
         """Everything observable of the free motion, by the recursion."""
-        self._follow_recursion(t, self._fitting(y))
+        self._follow_recursion(arguments.number("t", t), self._fitting(y))
         self._observe_recursion()
 
     def observe_rates(self, t: float, y: Real, rates: Real) -> None:
         """Everything observable for accelerations (nu,): hinge loads by inverse dynamics, drives from the workspace."""
-        out, y = self.observation.out, self._fitting(y)
+        out, t, y = self.observation.out, arguments.number("t", t), self._fitting(y)
         out.rates[:], out.drives[:] = rates, self.own_workspace.speed["drive"]
         out.loads[:] = self._inverse(t, y, out.rates)[1]
         self._observe_motion(t, y)
@@ -231,7 +231,7 @@ class Mechanics(SceneArrays):
         """Everything observable, from accelerations (nu,), driving loads (nu,) and hinge loads (N,6)."""
         out = self.observation.out
         out.rates[:], out.drives[:], out.loads[:] = rates, drives, loads
-        self._observe_motion(t, self._fitting(y))
+        self._observe_motion(arguments.number("t", t), self._fitting(y))
 
     def _fitting(self, y: Real) -> Real:
         """y = [q, u, work] of a length that kernels can read; its numbers are not checked."""

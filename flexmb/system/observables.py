@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flexmb.entry.observation import Outputs, outputs, parts, places, shapes
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
-from flexmb.tables.named import name_parts
+from flexmb.tables.named import parts_of
 from flexmb.tables.state import finite_result
 from flexmb.typing import Index, Real
 
@@ -37,6 +37,11 @@ class MarkerMotion:
         return angles_of(self.quaternion, sequence)
 
 
+PARTS = parts_of("markers", "loads", "wheel_loads", "drives", "energy", "connectors", "hinge_forces")
+"""What an evaluation and its derivatives hold by names."""
+_MARKERS, _LOADS, _WHEEL_LOADS, _DRIVES, _ENERGY, _CONNECTORS, _HINGE_FORCES = (kind for _, kind in PARTS)
+
+
 @dataclass(frozen=True)
 class Evaluation:
     """Everything observable at one state.
@@ -57,9 +62,6 @@ class Evaluation:
     momentum: Real
     connectors: dict[str, Real] = field(default_factory=dict)
     hinge_forces: dict[str, Real] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        name_parts(self, "markers", "loads", "wheel_loads", "drives", "energy", "connectors", "hinge_forces")
 
     @property
     def undetermined(self) -> dict[str, NDArray[np.bool_]]:
@@ -126,18 +128,19 @@ class Observation:
     def evaluation(self, row: Real) -> Evaluation:
         """A row (width,) by the names of the scene; arrays are parts of it."""
         names, found = self.names, parts(row, self.columns)
+        loads = _LOADS(zip(names.hinges, found["loads"], strict=True))
+        loads.update(zip(names.closures, found["closures"], strict=True))
         return Evaluation(
             accelerations=found["rates"],
-            markers={
-                name: MarkerMotion(row[:3], row[3:12].reshape(3, 3), row[12:18], row[18:24])
+            markers=_MARKERS(
+                (name, MarkerMotion(row[:3], row[3:12].reshape(3, 3), row[12:18], row[18:24]))
                 for name, row in zip(names.markers, found["markers"], strict=True)
-            },
-            loads=dict(zip(names.hinges, found["loads"], strict=True))
-            | dict(zip(names.closures, found["closures"], strict=True)),
-            wheel_loads=dict(zip(names.wheels, found["wheel_loads"], strict=True)),
-            drives={name: found["drives"][places] for name, places in names.driven.items()},
-            energy=dict(zip(ENERGIES, found["energy"].tolist(), strict=True)),
+            ),
+            loads=loads,
+            wheel_loads=_WHEEL_LOADS(zip(names.wheels, found["wheel_loads"], strict=True)),
+            drives=_DRIVES((name, found["drives"][places]) for name, places in names.driven.items()),
+            energy=_ENERGY(zip(ENERGIES, found["energy"].tolist(), strict=True)),
             momentum=found["momentum"],
-            connectors=dict(zip(names.connectors, found["connectors"], strict=True)),
-            hinge_forces=dict(zip(names.hinge_forces, found["hinge_forces"][:, None], strict=True)),
+            connectors=_CONNECTORS(zip(names.connectors, found["connectors"], strict=True)),
+            hinge_forces=_HINGE_FORCES(zip(names.hinge_forces, found["hinge_forces"][:, None], strict=True)),
         )

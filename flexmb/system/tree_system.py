@@ -271,7 +271,7 @@ class System(DifferentiableMotion):
 
         The numbers of y are not checked, its length is. Raises DynamicsError as `evaluate` does.
         """
-        self._observe(t, self._fitting(y), algorithm)
+        self._observe(arguments.number("t", t), self._fitting(y), algorithm)
         row[:] = self.observation.row(t, _NO_CLOSURES)
 
 def copied(kind: type[System], kernels: Kernels, *given: Any) -> System:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NoReturn, TypeVar
+from functools import cache
+from typing import Any, ClassVar, NoReturn, TypeVar
 
 from flexmb.scene.problems import closest
 
 Value = TypeVar("Value")
 
 
-class Named(dict[str, Value]):
-    """A dictionary of which a name that is not there is a KeyError with its place and the remedy."""
+class PartsByName(dict[str, Value]):
+    """A dictionary of which a name that is not there is a KeyError with its place and the remedy.
 
-    def __init__(self, place: str, values: Mapping[str, Value]) -> None:
-        """`place`: what the user has written before the bracket, such as "markers"."""
-        super().__init__(values)
-        self._place = place
+    Each place has a class of its own, `named`: a dictionary that stores its place would take longer to make than an
+    evaluation has time for.
+    """
+
+    __slots__ = ()
+    _place: ClassVar[str] = ""
 
     def __missing__(self, name: Any) -> NoReturn:
         asked = f'"{name}"' if isinstance(name, str) else repr(name)
@@ -24,12 +27,27 @@ class Named(dict[str, Value]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy is made like a new one."""
-        return type(self), (self._place, dict(self))
+        return _again, (self._place, dict(self))
 
 
-def name_parts(result: Any, *fields: str) -> None:
-    """Make these fields of a frozen dataclass dictionaries of this kind, where they are dictionaries."""
-    for field in fields:
-        values = getattr(result, field)
-        if type(values) is dict:
-            object.__setattr__(result, field, Named(field, values))
+@cache
+def named(place: str) -> type[PartsByName[Any]]:
+    """The dictionaries of a place: what the user has written before the bracket, such as "markers"."""
+    return type("PartsByName", (PartsByName,), {"_place": place, "__slots__": (), "__module__": __name__})
+
+
+def _again(place: str, values: Mapping[str, Any]) -> PartsByName[Any]:
+    return named(place)(values)
+
+
+def parts_of(*fields: str) -> tuple[tuple[str, type[PartsByName[Any]]], ...]:
+    """These fields of a result, with the dictionaries that they are to be."""
+    return tuple((field, named(field)) for field in fields)
+
+
+def name_parts(result: Any, parts: tuple[tuple[str, type[PartsByName[Any]]], ...]) -> None:
+    """Make these fields of a frozen dataclass dictionaries of these kinds, where they are dictionaries."""
+    held = result.__dict__
+    for field, kind in parts:
+        if type(held[field]) is dict:
+            held[field] = kind(held[field])

@@ -1,4 +1,4 @@
-"""The documentation site builds without a warning, and every page is in it; the catalogue of cases is up to date."""
+"""The documentation site builds without a warning, and every page is in it; generated pages are up to date."""
 
 from __future__ import annotations
 
@@ -9,13 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from tests.repo import catalogue
+from tests.repo import catalogue, threads
 from tests.repo.project import ROOT
 from tests.repo.snippets import PAGES
 
 
 def test_the_catalogue_is_what_the_generator_writes() -> None:
     assert catalogue.PAGE.read_text(encoding="utf-8") == catalogue.page(), "run `python -m tests.repo.catalogue`"
+
+
+def test_the_page_of_what_threads_may_share_is_what_the_generator_writes() -> None:
+    assert threads.PAGE.read_text(encoding="utf-8") == threads.page(), "run `python -m tests.repo.threads`"
 
 
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from flexmb.scene import schema
 from flexmb.scene.shapes import beam_section
 from flexmb.system.closed import ClosedSystem
 
+COPIES = 3
 SECTION = beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=1.7e-10, Iz=1.7e-10, rho=2700.0)
 
 
@@ -67,8 +68,21 @@ class World:
         return fm.linearize(self.tree, self.state)
 
     @cached_property
+    def modes(self) -> Any:
+        """Of another model, so that nobody has asked this one for them."""
+        return fm.linearize(self.tree, self.state).modes
+
+    @cached_property
     def run(self) -> fm.Trajectory:
         return fm.simulate(self.tree, 0.01, samples=3)
+
+    @cached_property
+    def batch(self) -> fm.Batch:
+        """Of scenes of one structure, with gravity of their own."""
+        copies = range(COPIES)
+        return fm.compile_batch(
+            [msgspec.structs.replace(self.scene, gravity_m_s2=(0.0, 0.0, -float(i))) for i in copies]
+        )
 
     @property
     def rates(self) -> np.ndarray:
@@ -228,13 +242,43 @@ def chosen(*wrong: Any, plain: tuple[tuple[Any, Any], ...] = ()) -> Callable[[An
     return variants
 
 
+Kind = Callable[[Any], Iterator[Variant]]
+
+
+def itself(result: Any) -> Any:
+    """The result tells all by itself."""
+    return result
+
+
 @dataclass
 class Call:
-    """A public call, its sound arguments by name, and by argument the kind of its variants."""
+    """A public call, its sound arguments by name, by argument the kind of its variants, and what its result tells."""
 
-    function: Callable[..., Any]
+    ask: Callable[..., Any]
     arguments: dict[str, Any]
-    kinds: dict[str, Callable[[Any], Iterator[Variant]]]
+    kinds: dict[str, Kind]
+    look: Callable[[Any], Any] = itself
+
+    def function(self, **given: Any) -> Any:
+        """What is compared: the result, or what is asked of it."""
+        return self.look(self.ask(**given))
+
+
+class Calls(dict[str, Call]):
+    """Public calls by name, which may end in a comma and more words."""
+
+    def add(
+        self, called: str, ask: Callable[..., Any], arguments: dict[str, Any] | None = None,
+        look: Callable[[Any], Any] = itself, /, **kinds: Kind,
+    ) -> None:  # fmt: skip
+        arguments = arguments or {}
+        assert set(kinds) == set(arguments) and called not in self, called
+        self[called] = Call(ask, arguments, kinds, look)
+
+    def ask(self, thing: Any, *names: str, called: str = "") -> None:
+        """Methods that need no argument."""
+        for name in names:
+            self.add(f"{called or type(thing).__name__}.{name}", getattr(thing, name))
 
 
 NO_NUMBER = (None, "1", 1j, np.nan, np.inf, -np.inf, True, [1.0], 10**400)
@@ -294,3 +338,17 @@ def series(v: np.ndarray) -> Iterator[Variant]:
 
 def not_a_mode(_: Any) -> Iterator[Variant]:
     yield from (Variant(repr(value), value) for value in (None, 5, "first"))
+
+
+def seen(run: fm.Trajectory) -> tuple[Any, ...]:
+    """Of a run that finished."""
+    if not run.finished:
+        raise ArithmeticError(run.message)
+    return run.q, run.u, run.momentum
+
+
+def attributes(thing: Any) -> dict[str, Any]:
+    """What is found when it is first asked for, by name; not the fields of a dataclass, which were given."""
+    kind = type(thing)
+    names = [name for name in dir(kind) if not name.startswith("_") and not callable(getattr(kind, name))]
+    return {name: getattr(thing, name) for name in names if name not in getattr(kind, "__dataclass_fields__", ())}

@@ -9,24 +9,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import msgspec
 import numpy as np
 
 import flexmb as fm
 from tests.flexmb.system.argument_kinds import (
+    COPIES,
     NO_NUMBER,
     RUN,
     SAMPLES,
-    Call,
+    Calls,
     Variant,
-    W,
+    World,
+    attributes,
     but_none,
     chosen,
     numbers,
     vectors,
 )  # fmt: skip
 
-COPIES = 3
 THREADS = chosen("1", 1.0, 1j, True, 0, -1, np.nan, [1], plain=((None, 1), (np.int64(2), 1), (10**30, 1)))
 
 
@@ -128,65 +128,61 @@ def judge(failed: np.ndarray, rows: np.ndarray, *given: Any) -> None:
         raise ArithmeticError(f"copies {failed} failed")
 
 
-def varied() -> list[fm.Scene]:
-    """Scenes of one structure, with gravity of their own."""
-    return [msgspec.structs.replace(W.scene, gravity_m_s2=(0.0, 0.0, -float(i))) for i in range(COPIES)]
-
-
-def batch_calls() -> dict[str, Call]:
-    """By name."""
-    tree, chain, start = W.tree, W.chain, W.chain.initial_state
-    found: dict[str, Call] = {}
-
-    def add(called: str, function: Callable[..., Any], arguments: dict[str, Any], **kinds: Any) -> None:
-        assert set(kinds) == set(arguments), called
-        found[called] = Call(function, arguments, kinds)
-
-    q, u = (np.repeat(each[None], COPIES, axis=0) for each in (W.state.q, W.state.u))
+def of_batches(w: World) -> Calls:
+    """All of them."""
+    tree, chain, start, batch, found = w.tree, w.chain, w.chain.initial_state, w.batch, Calls()
+    q, u = (np.repeat(each[None], COPIES, axis=0) for each in (w.state.q, w.state.u))
     q[:, 4:] *= np.array([[0.5], [1.0], [1.5]])
-    scenes = varied()
-    batch = fm.compile_batch(scenes)
+    scenes = [system.scene for system in batch.systems]
     state = {"q": q, "u": u}
     at = {**state, "t": 0.5, "threads": 1}
     of_copies: dict[str, Any] = {"q": coordinates, "u": tables, "t": times, "threads": THREADS}
-    add("System.accelerations_batch", evaluated(tree.accelerations_batch), at, **of_copies)
-    add("Batch.accelerations", evaluated(batch.accelerations), at, **of_copies)
+    found.add("System.accelerations_batch", evaluated(tree.accelerations_batch), at, **of_copies)
+    found.add("Batch.accelerations", evaluated(batch.accelerations), at, **of_copies)
     closed = {"q": np.array([start.q] * COPIES), "u": np.array([start.u] * COPIES), "t": 0.5, "threads": 1}
-    add(
+    found.add(
         "ClosedSystem.accelerations_batch", evaluated(chain.accelerations_batch), closed,
         q=closing, u=closing, t=times, threads=THREADS,
     )  # fmt: skip
-    others = [[*scenes, W.renamed.scene], [scenes[0], chain.scene], [chain.scene, scenes[0]], batch, [tree]]
-    add(
+    others = [[*scenes, w.renamed.scene], [scenes[0], chain.scene], [chain.scene, scenes[0]], batch, [tree]]
+    found.add(
         "compile_batch",
-        lambda scenes: fm.compile_batch(scenes).accelerations(q, u).accelerations,
+        fm.compile_batch,
         {"scenes": scenes},
+        lambda it: it.accelerations(q, u).accelerations,
         scenes=lists(*others, right=scenes),
     )
     systems = list(batch.systems)
-    add(
+    found.add(
         "Batch",
-        lambda systems: fm.Batch(systems).accelerations(q, u).accelerations,
+        fm.Batch,
         {"systems": systems},
-        systems=lists([tree, W.renamed], [tree, chain], [chain, tree], scenes, batch, right=systems),
+        lambda it: it.accelerations(q, u).accelerations,
+        systems=lists([tree, w.renamed], [tree, chain], [chain, tree], scenes, batch, right=systems),
     )
-    add("Batch.states", sound(batch.states), state, q=finite_tables, u=finite_tables)
-    add("Batch.rows", lambda x: batch.rows("q", x), {"x": q}, x=finite_tables)
+    found.add("Batch.states", sound(batch.states), state, q=finite_tables, u=finite_tables)
+    found.add("Batch.rows", lambda x: batch.rows("q", x), {"x": q}, x=finite_tables)
     which = chosen(None, "1", 1.0, True, -1, COPIES, 10**30, plain=((np.int64(1), 1), (np.uint8(2), 2)))
-    add("Batch.system", lambda copy: batch.system(copy).scene.gravity_m_s2, {"copy": 1}, copy=which)
-    add("Batch.system, of one", lambda copy: tree.batch.system(copy).nu, {"copy": 1}, copy=chosen(None, "1", -1, 1.0))
+    found.add("Batch.system", lambda copy: batch.system(copy).scene.gravity_m_s2, {"copy": 1}, copy=which)
+    found.add("Batch.system, of one", lambda copy: tree.batch.system(copy).nu, {"copy": 1},
+              copy=chosen(None, "1", -1, 1.0))  # fmt: skip
+    found.ask(batch, "initial_states")
+    found.add("Batch.accelerations, as they are", lambda: batch.accelerations(q, u), {}, attributes)
     run = fm.simulate_batch(batch, 0.01, "rk4", step=1e-3, samples=3)
-    add("BatchTrajectory.message", lambda copy: len(run.message(copy)), {"copy": 1}, copy=which)
+    found.add("BatchTrajectory, attributes", lambda: attributes(run))
+    found.add("simulate_batch, as it is", lambda: fm.simulate_batch(batch, 0.01, "rk4", step=1e-3, samples=3), {},
+              attributes)  # fmt: skip
+    found.add("BatchTrajectory.message", lambda copy: len(run.message(copy)), {"copy": 1}, copy=which)
 
     def simulated(copies: Any, t_end: Any, method: Any, *, q: Any, u: Any, **settings: Any) -> tuple[np.ndarray, ...]:
         return finished(fm.simulate_batch(copies, t_end, method, q=q, u=u, **settings), q, u)
 
     one_for_all = chosen(
-        None, 5, "scene.toml", [], W.scene, np.zeros(3), fm.System, [tree],
-        plain=((tree.batch, tree), ([W.scene] * COPIES, tree), (tuple([W.scene] * COPIES), tree)),
+        None, 5, "scene.toml", [], w.scene, np.zeros(3), fm.System, [tree],
+        plain=((tree.batch, tree), ([w.scene] * COPIES, tree), (tuple([w.scene] * COPIES), tree)),
     )  # fmt: skip
     settings = {"rtol": 1e-6, "atol": 1e-8, "samples": 3, "max_steps": 100}
-    add(
+    found.add(
         "simulate_batch",
         simulated,
         {"copies": tree, "t_end": 0.01, "method": "dop853", **state, "threads": 1, **settings},
@@ -202,7 +198,7 @@ def batch_calls() -> dict[str, Call]:
         **RUN,
     )
     steps = chosen(*NO_NUMBER, 0.0, -1.0, 1e-300, plain=((np.float64(1e-3), 1e-3),))
-    add(
+    found.add(
         "simulate_batch, in steps",
         lambda step, **given: simulated(batch, 0.01, "rk4", step=step, samples=3, **given),
         {"step": 1e-3, **state},
@@ -211,7 +207,7 @@ def batch_calls() -> dict[str, Call]:
         u=but_none(tables),
     )
     for name, scarce in (("q", q), ("u", u)):
-        add(
+        found.add(
             f"simulate_batch, {name} alone",
             lambda rows, name=name: fm.simulate_batch(tree, 0.01, "rk4", step=1e-3, samples=2, **{name: rows}).q,
             {"rows": scarce},

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.flexmb.system import public_calls
+from tests.flexmb.system import public_calls, walk
 from tests.flexmb.system.argument_kinds import Call, Variant, W, rows
 from tests.flexmb.system.batch_calls import judge
 from tests.flexmb.system.public_calls import faults
@@ -25,16 +25,24 @@ def test_every_public_call_refuses_what_is_wrong_and_casts_what_is_right():
 
 def test_a_public_name_that_is_not_called_is_found(monkeypatch):
     monkeypatch.setattr(public_calls.fm.System, "novel", lambda self, x: x, raising=False)
-    assert "System.novel" in public_calls.public()
+    assert "System.novel" in walk.public()
+    walk.met()
     monkeypatch.setattr(public_calls, "calls", dict)
-    assert {"System.novel", "System.accelerations", "NestedSystem.reduced"} <= public_calls.unlisted()
+    assert {"System.novel", "System.accelerations", "NestedSystem.reduced"} <= walk.unlisted()
 
 
 def test_a_class_that_an_attribute_leads_to_is_found(monkeypatch):
     """Negative control: a new kind of result, with a method that nobody calls."""
     novel = type("Novel", (), {"__module__": "flexmb.system.novel", "ask": lambda self, x: x})
     monkeypatch.setattr(public_calls.fm.System, "novel", property(lambda self: novel()), raising=False)
-    assert novel in public_calls.reached() and "Novel.ask" in public_calls.unlisted()
+    assert novel in walk.reached() and "Novel.ask" in walk.unlisted()
+
+
+def test_a_class_that_a_call_gives_is_found(monkeypatch):
+    """Negative control: a result with a method that nobody calls, of a call that is public."""
+    novel = type("Novel", (), {"__module__": "flexmb.system.novel", "ask": lambda self, x: x})
+    monkeypatch.setattr(walk, "met", lambda: ({"answers": [novel()]},))
+    assert walk.reached() == {novel} and "Novel.ask" in walk.unlisted()
 
 
 @pytest.mark.parametrize(
@@ -66,6 +74,26 @@ def test_what_a_refused_call_leaves_behind_is_seen():
 
         found = list(faults("call", Call(call, {"q": 0.5}, {"q": lambda _: [Variant("text", "wrong")]})))
         assert len(found) == 1 and fault in found[0]
+
+
+@pytest.mark.parametrize(("kept", "fault"), [(3.0, "other numbers"), (None, "TypeError")])
+def test_what_a_refused_call_leaves_to_another_is_seen(kept, fault):
+    """Negative controls: one call spoils what another reads."""
+    memory = [2.0]
+
+    def spoiling(q):
+        if q == "wrong":
+            memory[0] = kept
+            raise ValueError("q")
+        return 1.0
+
+    asked = {
+        "Object.spoiling": Call(spoiling, {"q": 0.5}, {"q": lambda _: [Variant("NaN", "wrong")]}),
+        "Object.reading": Call(lambda: 1.0 * memory[0], {}, {}),
+        "Other.reading": Call(lambda: 1.0, {}, {}),
+    }
+    found = list(public_calls.left_behind(asked))
+    assert len(found) == 1 and "Object.reading after Object.spoiling(q: NaN)" in found[0] and fault in found[0]
 
 
 @pytest.mark.parametrize(
@@ -108,3 +136,18 @@ def test_an_integer_time_compiles_nothing(t):
     versions = len(observation.observe.signatures)
     W.tree.evaluate(t, W.state.q, W.state.u)
     assert len(observation.observe.signatures) == versions
+
+
+@pytest.mark.parametrize("t", ["1", None, np.nan, 1j])
+def test_what_observes_for_the_library_itself_refuses_a_time_that_is_none(t):
+    """Users can call it all the same: by numba they would be told that no definition matches."""
+    tree, chain, loads = W.tree, W.chain, W.tree.observation.out.loads.copy()
+    row = np.zeros(1)
+    for observe in (
+        lambda: tree.observe_recursion(t, W.y), lambda: tree.observe_rates(t, W.y, W.rates),
+        lambda: tree.observe_motion(t, W.y, W.rates, W.rates, loads),
+        lambda: tree.observe_row(t, W.y, "articulated", row),
+        lambda: chain.observe_row(t, np.append(chain.initial_state.y, 0.0), "articulated", row),
+    ):  # fmt: skip
+        with pytest.raises((TypeError, ValueError), match="t is"):
+            observe()

@@ -1,0 +1,115 @@
+"""What users can reach: public names, and the classes of all that public calls give and take, by walking along them.
+
+Results are had by calling: `public_calls.calls`. A public method that is found must be among these calls, whose results
+are followed in turn.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import flexmb as fm
+from flexmb.scene import schema
+from tests.flexmb.system import public_calls
+
+# What is not called here, and why. Whatever else is public must be among the calls.
+INSIDE = {  # of the mechanics, for numbers that have been examined
+    "nested_system", "precision_if_doubtful", "observe_recursion", "observe_rates", "observe_motion", "observe_row",
+    "check_status", "check_precision", "all_loads", "referred_loads", "with_numbers", "fault_name",
+}  # fmt: skip
+SYSTEMS = "System", "ClosedSystem"
+UNTRIED = {  # what users may ask all the same: docs/threads.md
+    **{f"{system}.{name}": "makes a new workspace, which is for one thread" for system in SYSTEMS
+       for name in ("workspace", "recursion_workspace", "composite_workspace")},
+    "NestedSystem.workspace": "makes a new workspace, which is for one thread",
+    "Parameters.workspace": "makes a new workspace, which is for one thread",
+    "Trajectory.plot": "draws by matplotlib, whose figures are for one thread",
+    "Campbell.plot": "draws by matplotlib, whose figures are for one thread",
+    "Trajectory.to_rerun": "writes by the library rerun",
+    "ClosedSystem.section_loads": "the closed chain of the tests has no beam; as of a System",
+    "ClosedSystem.section_load_derivatives": "the closed chain of the tests has no beam; as of a System",
+}  # fmt: skip
+EXEMPT = {
+    *UNTRIED,
+    *(f"{system}.{name}" for system in SYSTEMS for name in INSIDE),
+    "Batch.tables", "Batch.constants",  # of those who fill lanes
+    "open_loop", "user_function", "no_user_code",  # a scene; a function; nothing
+    "load_scene", "save_scene", "SceneBuilder",  # files and data, checked where they are compiled
+    "ControlledDerivatives", "RunStage", "Restart", "EventRecord",  # what runs are given, or give
+    "AccelerationDerivatives", "EvaluationDerivatives", "InverseDynamicsDerivatives",  # results
+    "EventSensitivity", "Fit", "Gradient", "Sensitivities", "Uncertainties",  # results
+    "FinalValue", "Misfit", "TimeIntegral",  # data, checked by the call of `gradient` and in tests of it
+    "Advice", "Campbell", "Evaluation", "LinearModel", "SteadySpin", "System", "Trajectory", "Status",  # results
+    "BatchTrajectory",  # a result
+    "ClosureError", "DynamicsError", "EquilibriumError", "EventError", "Interrupted",
+    "NotDifferentiableError", "PrecisionWarning", "SceneError", "SceneWarning",
+}  # fmt: skip
+INNER = {  # classes of the mechanics and of runs, which users meet only behind what they are given
+    "Closures", "ClosureConstants", "NestedConstants", "DualConstants", "Constants", "Layout", "Timing", "Integration",
+    "BodyLink", "FlexibleNode", "HingeKind", "Models", "Observation", "Settings", "Integrator",
+    "Equations",  # of what derivatives are taken of
+    "RunMethod",  # of the advisor's
+    "FinalValue",  # data
+    "Restart",  # its files: tests/flexmb/run/test_damaged_restarts.py
+}  # fmt: skip
+DEEP = 4  # attributes in a row
+
+
+@cache
+def met() -> tuple[Any, ...]:
+    """What is asked, what it is given, and what it gives, of every call."""
+    found: list[Any] = []
+    for call in public_calls.calls().values():
+        found += [getattr(call.ask, "__self__", call.ask), call.arguments, call.ask(**call.arguments)]
+    return tuple(found)
+
+
+def reached() -> set[type]:
+    """The classes of this library, with public methods, of all that public calls lead to."""
+    found: set[type] = set()
+    for root in met():
+        _follow(root, found, 0)
+    return {each for each in found if _methods(each)}
+
+
+def _follow(thing: Any, found: set[type], depth: int) -> None:
+    for each in _parts(thing):
+        _follow(each, found, depth)
+    kind = type(thing)
+    inside = kind.__module__.startswith(("flexmb.scene", "flexmb.jit"))  # data; kernels
+    if kind in found or inside or not kind.__module__.startswith("flexmb") or depth > DEEP:
+        return
+    found.add(kind)
+    for name in {*dir(kind), *getattr(thing, "__dict__", ())}:
+        if not name.startswith("_") and not inspect.isroutine(getattr(kind, name, None)):
+            try:
+                part = getattr(thing, name)
+            except public_calls.DOCUMENTED:
+                continue  # what this object has not
+            _follow(part, found, depth + 1)
+
+
+def _parts(thing: Any) -> Iterator[Any]:
+    """The first ones of a collection."""
+    if type(thing) in (list, tuple) or isinstance(thing, dict):
+        yield from list(thing.values() if isinstance(thing, dict) else thing)[:DEEP]
+
+
+def _methods(kind: type) -> list[str]:
+    return [name for name, _ in inspect.getmembers(kind, inspect.isfunction) if not name.startswith("_")]
+
+
+def public() -> set[str]:
+    """Names of everything public that can be called; of a class, and of those that it leads to, its methods too."""
+    found = set(fm.__all__) - set(schema.__all__)
+    for each in (kind for kind in reached() if kind.__name__ not in INNER):
+        found |= {f"{each.__name__}.{name}" for name in _methods(each)}
+    return found
+
+
+def unlisted() -> set[str]:
+    """Public names that are neither called nor exempt."""
+    return public() - EXEMPT - {name.split(",")[0] for name in public_calls.calls()}
