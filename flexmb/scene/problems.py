@@ -8,6 +8,7 @@ from difflib import get_close_matches
 
 LISTED = 24  # known words that a message lists; of more it names the nearest
 
+
 @dataclass(frozen=True)
 class Place:
     """A place in a scene: its path ("$.bodies[0].mass_kg") and the names on the way there (`body "hub"`)."""

@@ -62,7 +62,7 @@ def test_without_its_library_an_engine_says_how_to_install_it(installed: Path, t
         pytest.skip("both libraries are installed")
     for name in missing:
         run = crosscheck(installed, tmp_path, "contract", name)
-        assert run.returncode == 1 and "is not installed: pip install" in run.stdout, run.stdout + run.stderr
+        assert run.returncode == 2 and "is not installed: pip install" in run.stderr, run.stdout + run.stderr
 
 
 @pytest.mark.slow

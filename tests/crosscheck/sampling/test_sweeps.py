@@ -229,6 +229,6 @@ def test_the_command_says_what_came_out(tmp_path: Path, monkeypatch: pytest.Monk
     summary = msgspec.json.decode((out / "summary.json").read_bytes())
     assert summary["distributions"][0]["mean"]["standard_error"] > 0.0
     bad = CliRunner().invoke(cli.app, ["sweep", str(write(tmp_path, "absent")), "--out", str(out)])
-    assert bad.exit_code == 1 and "install the extra `absent`" in " ".join(bad.output.split()), bad.output
+    assert bad.exit_code == 2 and "install the extra `absent`" in " ".join(bad.output.split()), bad.output
     nothing = CliRunner().invoke(cli.app, ["sweep", str(tmp_path / "none.toml"), "--out", str(out)])
     assert nothing.exit_code == 2 and "none.toml" in nothing.output
