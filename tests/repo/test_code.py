@@ -67,3 +67,10 @@ def test_what_is_compiled_asserts_nothing() -> None:
             compiling += 1
             assert not any(isinstance(node, ast.Assert) for node in nodes), file
     assert compiling > 100
+
+
+def test_kept_values_take_no_lock() -> None:
+    """Only kernels' keys do in Python 3.11, and forks wait for these (`flexmb.jit.once`)."""
+    files = [file for name in ("flexmb", "crosscheck") for file in (ROOT / name).rglob("*.py")]
+    found = {file.relative_to(ROOT).as_posix() for file in files if "import cached_property" in file.read_text("utf-8")}
+    assert len(files) > 100 and found == {"flexmb/jit/cache.py"}

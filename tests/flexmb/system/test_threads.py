@@ -385,13 +385,6 @@ def test_fifteen_processes_that_are_forked_off_while_threads_compile_scenes():
             each.join()
 
 
-def test_kept_values_take_no_lock():
-    """Only kernels' keys do in Python 3.11, and forks wait for these (`flexmb.jit.once`)."""
-    files = [file for name in ("flexmb", "crosscheck") for file in (ROOT / name).rglob("*.py")]
-    found = {str(file.relative_to(ROOT)) for file in files if "import cached_property" in file.read_text()}
-    assert len(files) > 100 and found == {str(Path("flexmb", "jit", "cache.py"))}
-
-
 def _compile_in_a_child() -> None:
     with global_compiler_lock:
         pass
