@@ -13,8 +13,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from flexmb import forks as forks  # from now on forks wait for imports by other threads
-
 # The public names are those of `flexmb.scene.schema.__all__`, and these of other modules.
 _HOME = {
     "flexmb.advisor.advice": "Advice advise",
@@ -126,6 +124,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
 
 
 def __getattr__(name: str) -> Any:
+    import_module("flexmb.forks")  # from now on forks wait for imports by other threads
     if name in _MODULES:
         import_module("flexmb.scene.build")  # imports all modules of the room
         return import_module(_MODULES[name])

@@ -6,17 +6,17 @@ one of them was importing is never finished there: whoever needs it waits withou
 
 from __future__ import annotations
 
+import _frozen_importlib
 import _imp
 import concurrent.futures.thread  # noqa: F401  (its hook and that of logging must be there before ours waits)
 import os
 import time
-from importlib import _bootstrap
 from threading import get_ident
 from typing import Any
 
 _OURS = {"flexmb", "numpy", "scipy", "msgspec"}  # what flexmb imports when it is needed; numba's imports have its lock
 # Locks of modules are not public; should they move in a later version, forks do not wait for imports.
-_importing: dict[str, Any] = getattr(_bootstrap, "_module_locks", {})
+_importing: dict[str, Any] = getattr(_frozen_importlib, "_module_locks", {})
 _locks: list[Any] = []
 _held: list[Any] = []  # by the thread that forks
 

@@ -25,6 +25,7 @@ Method = Literal["spawn", "forkserver"]  # of multiprocessing
 SPAWN: Method = "spawn"  # a new interpreter for each process, which inherits no state
 START_LIMIT_S = 120.0  # for a worker to start and to read its job
 TICK_S = 0.25
+DEATH_S = 2.0  # between the end of a process's pipe and its exit code, at most
 LOG_LIMIT_BYTES = 64 * 2**20
 THREAD_LIMITS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 KERNELS = "FLEXMB_KERNELS"  # flexmb compiles kernels for each scene unless it is "general"
@@ -139,7 +140,7 @@ class Worker:
 
     def _death(self) -> Event:
         assert self.job is not None and self._process is not None
-        until = time.monotonic() + TICK_S
+        until = time.monotonic() + DEATH_S
         while self._process.exitcode is None and time.monotonic() < until:  # `join` could wait forever
             time.sleep(0.01)
         code = self._process.exitcode

@@ -114,6 +114,7 @@ def test_a_report_on_a_full_disk_is_one_line(runner, tmp_path, monkeypatch) -> N
     is_one_line(runner.invoke(cli.app, words, env=WIDE), str(tmp_path))
 
 
+@pytest.mark.filterwarnings("default")  # what a command warns of is printed, no error
 def test_a_broken_record_is_named_and_run_again(runner: CliRunner, tmp_path: Path) -> None:
     run = ["run", str(CASE), "--out", str(tmp_path)]
     runner.invoke(cli.app, run, env=WIDE)

@@ -31,6 +31,7 @@ def test_it_is_planned_with_a_warning(doubtful: Case) -> None:
     assert jobs and all(not job.error for job in jobs)
 
 
+@pytest.mark.filterwarnings("default")  # what a command warns of is printed, no error
 def test_strictly_its_runs_are_errors(doubtful: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with sole_writer(tmp_path / "strict", strict=True):
         _, jobs = plan(doubtful, (), PROVIDER)

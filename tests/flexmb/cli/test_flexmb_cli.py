@@ -59,6 +59,7 @@ def test_methods_for_stiff_scenes_tell_their_jacobians(scene_file, tmp_path):
     assert 'spectral_radius is for method "generalised_alpha"' in result.output
 
 
+@pytest.mark.filterwarnings("default")  # what a command warns of is printed, no error
 def test_a_doubtful_scene_is_warned_of_and_with_strict_an_error(scene_file, tmp_path):
     """By check and by simulate; not where the scene says that it is meant."""
     text = scene_file.read_text().replace("child = ", "rotation = { damping_Nms_rad = -0.1 }\nchild = ", 1)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexmb import jit
+from flexmb import forks, jit
 from flexmb.jit import folder as folders
 from flexmb.jit import hooks
 from flexmb.jit.cache import _digest
@@ -297,6 +297,7 @@ def test_an_edited_helper_in_another_file_is_compiled_and_edited_words_are_not(t
     shutil.copytree(Path(jit.__file__).parent, package / "jit")
     (package / "scene").mkdir()
     shutil.copy(collector.__file__, package / "scene")
+    shutil.copy(forks.__file__, package)
     (package / "__init__.py").write_text("")
     (package / "entry.py").write_text(ENTRY)
     # Python takes its own compiled text of a file that was edited within a second and is as long as before.
