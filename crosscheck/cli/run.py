@@ -77,7 +77,8 @@ def run(
     **Exit code**: 0 every verdict is as the case expects, and everything asked for gave its result; 1 something is not
     as expected, failed or did not run, an engine asked for was compared in nothing, or `--accept` wrote nothing; 2 the
     request makes no sense. With `--strict` also 1 where figures are worse than recorded or missing, a reference was
-    never made, or a scene is doubtful. `docs/verdicts.md` has the rules.
+    never made, a channel is offered that the case neither judges nor leaves open, or a scene is doubtful.
+    `docs/verdicts.md` has the rules.
 
     **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
     `crosscheck run all -e mycode --alone --out results` · `crosscheck run ./my_case --accept` ·

@@ -74,8 +74,8 @@ class Result:
     def uncertainty(self, channel: str) -> Uncertainty:
         """Numerical U of a channel of the finest run, from the last efforts of its method.
 
-        A coarse effort may diverge and is left out. If one is not recorded, or one of the last lacks the channel, nothing
-        is known about convergence, and U is unknown.
+        A coarse effort may diverge and is left out. If one is not recorded, or one of the last lacks the channel,
+        nothing is known about convergence, and U is unknown.
         """
         if channel not in self._estimates:
             self._estimates[channel] = self._estimate(channel)

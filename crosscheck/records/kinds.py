@@ -62,7 +62,8 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     figures, its stored reference if it has one, and digests of the `files` in its folder.
 
     `asked` are the engines asked for by name, `joined` those of them that the case does not name. `unreferenced`: it
-    has a recipe of a reference, but the reference was never made. `claims` are the user's own on the engines that run.
+    has a recipe of a reference, but the reference was never made. `whole`: all its engines and comparisons are there,
+    as none was asked for alone. `claims` are the user's own on the engines that run.
     """
 
     case: str
@@ -76,6 +77,7 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     asked: tuple[str, ...] = ()
     joined: tuple[str, ...] = ()
     unreferenced: bool = False
+    whole: bool = False
     claims: Claims = Claims()
 
 

@@ -24,7 +24,8 @@ The file is one JSON object. Every key:
     where it is one channel, of engines that the case names nowhere; ``unreferenced`` (left out: false): it has a recipe
     of a reference and no reference;
   - ``unjudged`` (left out if empty): the reason by "variant | engine | channel" of channels that are offered and judged
-    by nothing; a strict session demands of engines that joined that they are as others have them;
+    by nothing, as `[[open]]` of the case gives it; a strict session demands one for each channel of the case's engines,
+    and of engines that joined that theirs are as others have them;
   - ``runs``: by "variant | engine | role": ``status``, ``effort``, ``wall_s`` and ``compile_s`` of the finest effort.
 
 Figures have four digits, times three.

@@ -24,8 +24,8 @@ from tests.crosscheck.fake_engines import STEPS, Fake
 EFFORTS = tuple(Effort("tolerance", 10.0**-n, "dop853") for n in (6, 8, 10))
 PARTS = ("torque", "force")
 Spoil = Callable[[Trajectory, int], Any]
-"""(sound run, number of the effort from coarse to fine) -> answer. Number 1 is one of the last three in all ladders, 0 not
-in that of the pendulum."""
+"""(sound run, number of the effort from coarse to fine) -> answer. Number 1 is one of the last three in all ladders,
+0 not in that of the pendulum."""
 GROUPS = ("loads", "drives", "energy", "wheel_loads", "connectors", "hinge_forces")
 _calls = count()
 

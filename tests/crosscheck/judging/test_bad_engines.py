@@ -87,7 +87,9 @@ KINDS = {
     ),
 }  # fmt: skip
 BY_DEFAULT = {
-    "tree": ("claims-all-void", "raises-when-coarsest", "nan-later", "no-loads", "a-sample-late", "modest", "minus-force"),
+    "tree": (
+        "claims-all-void", "raises-when-coarsest", "nan-later", "no-loads", "a-sample-late", "modest", "minus-force",
+    ),
     "chain": ("claims-all", "minus-force", "boastful", "any-open-loads"),
 }
 
