@@ -45,11 +45,11 @@ def contract(
     **Examples**: `crosscheck contract native` · `crosscheck contract mycode --verbose` ·
     `crosscheck contract mycode --clause '*tree*' --jobs 2`
     """
+    shown = verbosity(quiet, verbose)
+    common.require_engines(names, broken=True)  # before clauses are imported, and with them all that they call
     from crosscheck.conformance.trial import try_engine, verdict_on
     from crosscheck.terminal.clauses import clauses_bar, print_clauses
 
-    shown = verbosity(quiet, verbose)
-    common.require_engines(names, broken=True)
     chosen = _chosen(clause or ())
     kept, tried = [], {}
     for name in names:

@@ -133,8 +133,8 @@ def _chosen(cases: list[str], engines: list[str] | None, alone: bool) -> tuple[C
     """The cases asked for; refuses engines that are not there, or have no part in any of them."""
     from crosscheck.library.selection import without_part
 
+    common.require_engines(engines or ())  # before cases are read: that of all of them takes seconds
     chosen = common.found(tuple(cases))
-    common.require_engines(engines or ())
     chosen = _alone(chosen) if alone else chosen
     if idle := without_part((case.run for case in chosen), tuple(engines or ())):
         common.refuse(idle)
