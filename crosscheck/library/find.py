@@ -64,7 +64,7 @@ def shipped_names() -> tuple[str, ...]:
 
 
 def shipped_tags() -> dict[str, tuple[str, ...]]:
-    """The tags of the shipped cases by name; nothing else of them is checked, so that a wrong word is refused at once."""
+    """The tags of the shipped cases by name; nothing else of them is checked, and a wrong word is refused at once."""
     run_files = {name: parse_toml(_text(shipped_folder() / name / "run.toml")) for name in shipped_names()}
     return {name: tuple(run_file.get("tags", ())) for name, run_file in run_files.items()}
 
