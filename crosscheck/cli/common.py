@@ -162,8 +162,8 @@ Strict = Annotated[
     bool,
     typer.Option(
         "--strict",
-        help="Figures worse than recorded, beyond stale ones or not recorded, references never made, doubtful scenes: "
-        "errors.",
+        help="Figures worse than recorded, beyond stale ones or not recorded, references never made, channels that "
+        "nothing judges, doubtful scenes: errors.",
     ),
 ]
 NoUserCode = Annotated[

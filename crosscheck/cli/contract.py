@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -25,6 +26,7 @@ def contract(
     clause: Annotated[
         list[str] | None, typer.Option("--clause", metavar="PATTERN", help="Only clauses of such names (repeat it).")
     ] = None,
+    out: common.Out = Path("out"),
     as_json: common.Json = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
@@ -38,6 +40,9 @@ def contract(
     scene that the engine refuses, or an output that it leaves out, counts as *not offered*; a line says what to offer
     for it, and which clauses would then be tried.
 
+    **Writes** of an engine of another distribution, if all clauses were tried, `contract.json` into `--out`: sessions
+    in that folder say whether its contract is kept, and by which sources.
+
     **Exit code**: 0 every clause that is offered holds, among them all on the form of an answer and a run that is known
     in closed form; 1 a clause is broken, or too little was shown; 2 there is no such engine, or its library is not
     installed.
@@ -45,11 +50,12 @@ def contract(
     **Examples**: `crosscheck contract native` · `crosscheck contract mycode --verbose` ·
     `crosscheck contract mycode --clause '*tree*' --jobs 2`
     """
+    shown = verbosity(quiet, verbose)
+    common.require_engines(names, broken=True)  # before clauses are imported, and with them all that they call
     from crosscheck.conformance.trial import try_engine, verdict_on
+    from crosscheck.records import contracts
     from crosscheck.terminal.clauses import clauses_bar, print_clauses
 
-    shown = verbosity(quiet, verbose)
-    common.require_engines(names, broken=True)
     chosen = _chosen(clause or ())
     kept, tried = [], {}
     for name in names:
@@ -62,6 +68,9 @@ def contract(
             "clauses": [asdict(outcome) for outcome in outcomes],
         }  # fmt: skip
         print_clauses(console, name, outcomes, shown, bool(clause))
+        if not clause and contracts.is_outside(name):
+            with common.in_one_line():
+                contracts.keep(out, name, contracts.tried(name, verdict.kept, verdict.text))
     if as_json:
         print_json(tried)
     raise typer.Exit(0 if all(kept) else 1)

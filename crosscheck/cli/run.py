@@ -77,7 +77,8 @@ def run(
     **Exit code**: 0 every verdict is as the case expects, and everything asked for gave its result; 1 something is not
     as expected, failed or did not run, an engine asked for was compared in nothing, or `--accept` wrote nothing; 2 the
     request makes no sense. With `--strict` also 1 where figures are worse than recorded or missing, a reference was
-    never made, or a scene is doubtful. `docs/verdicts.md` has the rules.
+    never made, a channel is offered that the case neither judges nor leaves open, or a scene is doubtful.
+    `docs/verdicts.md` has the rules.
 
     **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
     `crosscheck run all -e mycode --alone --out results` · `crosscheck run ./my_case --accept` ·
@@ -132,8 +133,8 @@ def _chosen(cases: list[str], engines: list[str] | None, alone: bool) -> tuple[C
     """The cases asked for; refuses engines that are not there, or have no part in any of them."""
     from crosscheck.library.selection import without_part
 
+    common.require_engines(engines or ())  # before cases are read: that of all of them takes seconds
     chosen = common.found(tuple(cases))
-    common.require_engines(engines or ())
     chosen = _alone(chosen) if alone else chosen
     if idle := without_part((case.run for case in chosen), tuple(engines or ())):
         common.refuse(idle)

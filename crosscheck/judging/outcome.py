@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 
 from crosscheck.engines.registry import BUILT_IN
 from crosscheck.judging.applicable import Inapplicable, set_apart
@@ -14,6 +14,7 @@ from crosscheck.judging.figures import recordable
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.unjudged import Unjudged, unjudged
 from crosscheck.judging.verdict import Verdict
+from crosscheck.records.kinds import ContractState
 from flexmb.kept import kept
 
 NO_REFERENCE = "has a recipe of a reference, no reference yet: crosscheck regenerate {}"
@@ -55,7 +56,8 @@ class SessionOutcome:
     judged by nothing, which a strict session forbids unless they are excused. `asked`: the engines asked for by name.
     `unreferenced`: the cases with a recipe of a reference but no reference. `made_with`: versions and processor of the
     last session in the records. `unfinished`: the session has not ended, so nothing is judged. `idle_claims`: the
-    user's claims that name nothing, in words. `lost_controls`: controls that were compared in no channel.
+    user's claims that name nothing, in words. `lost_controls`: controls that were compared in no channel. `contracts`:
+    of outside engines, whether they keep the contract.
     """
 
     verdicts: dict[str, list[Verdict]]
@@ -70,6 +72,7 @@ class SessionOutcome:
     idle_claims: tuple[str, ...] = ()
     unjudged: tuple[Unjudged, ...] = ()
     lost_controls: tuple[LostControl, ...] = ()
+    contracts: Mapping[str, ContractState] = field(default_factory=dict)
 
     @property
     def all(self) -> list[Verdict]:
@@ -266,6 +269,7 @@ def conclude(session: Session, strict: bool = False) -> SessionOutcome:
         idle_claims=idle_claims(session.cases, verdicts, inapplicable),
         unjudged=left,
         lost_controls=lost_controls,
+        contracts={name: state for each in session.environments for name, state in each.contracts.items()},
     )
 
 

@@ -74,8 +74,8 @@ class Result:
     def uncertainty(self, channel: str) -> Uncertainty:
         """Numerical U of a channel of the finest run, from the last efforts of its method.
 
-        A coarse effort may diverge and is left out. If one of the last efforts is missing for any other reason, nothing
-        is known about convergence, and U is unknown.
+        A coarse effort may diverge and is left out. If one is not recorded, or one of the last lacks the channel,
+        nothing is known about convergence, and U is unknown.
         """
         if channel not in self._estimates:
             self._estimates[channel] = self._estimate(channel)
@@ -130,8 +130,6 @@ class Result:
         if missing:
             return f"effort {missing[0] + 1} of {self.finest.rungs} is not recorded"
         for run in self._ladder()[-NEEDED:]:
-            if run.status not in ("finished", "diverged"):
-                return f"effort {run.effort} {_past(run.status)}: {run.message}"
             if run.status == "finished" and channel not in run.channels:
                 return f"effort {run.effort} does not offer the channel"
         return ""
@@ -323,6 +321,10 @@ def _result(key: Key, group: list[RunRecord], claim: str) -> Result:
     rungs = {run.rung: run for run in same}  # of two ladders of the same length the later runs count
     runs = tuple(rungs[rung] for rung in sorted(rungs))
     finest = runs[-1]
+    ending = next((run for run in runs[:-1] if run.status not in ("finished", "diverged")), None)
+    if ending is not None:  # whatever its place on the ladder: a code that fails a coarse effort is not in order
+        message = f"effort {ending.effort} {_past(ending.status)}: {ending.message}"
+        return Result(variant, engine, ending.status, message, runs)
     if finest.rung < finest.rungs - 1:
         message = "the finest effort is not recorded: the session was cut short"
         return Result(variant, engine, "did not run", message, runs)

@@ -1,9 +1,10 @@
 """Channels that an engine offers and nothing judges: no comparison, conservation or reference with a goal names them.
 
 A verdict *agree*, *differ* or *unresolved* accounts for a channel, and so does being told as not applicable. Of an
-engine that the case names, the rest is the choice of whoever wrote the case. Of an engine that joins nobody has looked
-at it: it is held against the stored reference, or another engine of the variant, and excused if it agrees by the
-loosest goal that the case has for the variant, or is the same to rounding where uncertainties are unknown.
+engine that the case names, the case leaves the rest open by `[[open]]` and says why; what it does not name is excused
+only where some of its engines were asked for alone. Of an engine that joins nobody has looked at it: it is held against
+the stored reference, or another engine of the variant, and excused if it agrees by the loosest goal that the case has
+for the variant, or is the same to rounding where uncertainties are unknown.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ from flexmb.run.channels import distance
 ACCOUNTING: tuple[Status, ...] = ("agree", "differ", "unresolved")
 ROUNDING = 1e-9  # relative, and in SI units: a distance within it is none, whatever is known of the uncertainties
 OPEN = "the case has no goal for it"
+UNSAID = f"{OPEN}, and no [[open]] with a reason"
+TOLD_BY = {"energy.total": "work"}
+"""What the drift of a conserved quantity judges besides the channel of its verdict."""
 
 
 @dataclass(frozen=True)
@@ -77,12 +81,14 @@ def unjudged(
     case: CaseResults, verdicts: Iterable[Verdict], inapplicable: Iterable[Inapplicable] = ()
 ) -> tuple[Unjudged, ...]:
     """Every channel that nothing judges, of every finished result of the case's variants. Never raises."""
+    verdicts = tuple(verdicts)
     told = {
         (*side, verdict.channel)
         for verdict in verdicts
         if verdict.kind != "control" and verdict.status in ACCOUNTING
         for side in verdict.sides
     }
+    told |= {(variant, engine, TOLD_BY[channel]) for variant, engine, channel in _conserved(verdicts)}
     told |= {(each.variant, each.engine, each.channel) for each in inapplicable}
     results = [case.get(variant.name, engine) for variant in case.case.run.variants for engine in variant.engines]
     left = _Left(case)
@@ -92,6 +98,13 @@ def unjudged(
         for channel in result.channels
         if (result.variant, result.engine, channel) not in told and channel not in case.undetermined(result.variant)
     )
+
+
+def _conserved(verdicts: Iterable[Verdict]) -> Iterator[tuple[str, str, str]]:
+    """Variant, engine and channel of each conserved quantity that accounts for another channel."""
+    for each in verdicts:
+        if each.kind == "conservation" and each.status in ACCOUNTING and each.channel in TOLD_BY:
+            yield each.variant_a, each.engine_a, each.channel
 
 
 @dataclass(frozen=True)
@@ -106,14 +119,23 @@ class _Left:
         return None if recorded is None or recorded.fault else of_record(recorded)
 
     def open(self, result: Result, channel: str) -> Unjudged:
-        """The channel, with what others say of it if the engine joined the case."""
+        """The channel, with why the case leaves it open, or what others say of it if the engine joined the case."""
         record = self.case.case
         if result.engine not in record.joined:
-            return Unjudged(record.case, result.variant, result.engine, channel, OPEN, excused=True)
+            reason = self._why_open(result, channel)
+            said = reason or (UNSAID if record.whole else OPEN)
+            return Unjudged(record.case, result.variant, result.engine, channel, said, bool(reason) or not record.whole)
         reason, excused = self._held(result, channel)
         expected = [each.channels for each in record.claims.failures if each.engine == result.engine]
         excused = excused or any(most_specific(patterns, channel) is not None for patterns in expected)
         return Unjudged(record.case, result.variant, result.engine, channel, f"{OPEN}; {reason}", excused)
+
+    def _why_open(self, result: Result, channel: str) -> str:
+        """The reason that the case gives; "" if it gives none."""
+        for each in self.case.case.run.open:
+            if each.concerns(result.variant, result.engine) and most_specific(each.channels, channel) is not None:
+                return each.reason
+        return ""
 
     def _held(self, result: Result, channel: str) -> tuple[str, bool]:
         """What the first of those who have the channel says of it, and whether that is the same."""

@@ -62,6 +62,11 @@ A case is a folder ``cases/<family>/<case>/`` with ``scene.toml`` (and further s
     quantity = "energy"
     limit = 1e-9
 
+    [[open]]                          # what is offered and judged by nothing
+    variants = ["segments"]
+    channels = ["momentum"]
+    reason = "it is that of the rods, without the rotors at their middles"
+
     [[chart]]                         # work-precision chart
     observable = "marker:tip.position"
     variants = ["rigid", "segments"]
@@ -74,6 +79,9 @@ Channels are named ``marker:<name>.position | orientation | velocity | angular_v
 channel, a shell pattern of one (``marker:*.position``), or its beginning (``load``, ``load:elbow``, ``energy``); the
 longest that names a channel counts. A goal is the largest uncertainty, relative to the channel's range, with which a
 comparison still counts as resolved.
+
+Every channel that an engine of the case offers is named by a goal or a conserved quantity, is in the stored reference
+with a goal, or is left ``open`` with the reason; otherwise a strict session of the case is not green.
 
 An expectation other than *agree* needs its reason in words, and bounds within which it is as expected:
 ``band`` for E (*differ*) or U (*unresolved*), for each pattern of channels ``[low, high]`` with high at
@@ -102,6 +110,7 @@ All keys, with defaults in brackets; the structs below explain them:
 - ``conservation``: ``variant``; ``quantity`` ("energy", "linear_momentum" or "angular_momentum"); ``limit``;
   ``engines`` [the variant's, less ``also``]; ``scale`` [the largest magnitude] (SI); ``expect``, ``band`` (for it all),
   ``diverged_s``, ``because`` and ``reason``, as above;
+- ``open``: ``channels``, patterns; ``variants`` [all]; ``engines`` [all of these]; ``reason``;
 - ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``;
 - ``reference``: what ``reference.csv`` holds and how it is made, explained in `crosscheck.library.recipe`.
 
@@ -293,6 +302,22 @@ class Conservation(_CasePart, frozen=True, kw_only=True):
     reason: str = ""
 
 
+class OpenChannels(_CasePart, frozen=True, kw_only=True):
+    """Channels, by patterns, of some `variants` and `engines` (by default all) that nothing judges, and why not.
+
+    It concerns engines that the case names. What an engine that joins offers there is held against others all the same.
+    """
+
+    channels: tuple[str, ...]
+    variants: tuple[str, ...] = ()
+    engines: tuple[str, ...] = ()
+    reason: str
+
+    def concerns(self, variant: str, engine: str) -> bool:
+        """Whether it is about an engine's run of a variant."""
+        return variant in (self.variants or (variant,)) and engine in (self.engines or (engine,))
+
+
 class Chart(_CasePart, frozen=True, kw_only=True):
     """A work-precision chart: error of `observable` against the most certain result of variant `reference`."""
 
@@ -318,6 +343,7 @@ class RunFile(_CasePart, frozen=True, kw_only=True):
     comparisons: tuple[Comparison, ...] = msgspec.field(name="comparison", default=())
     controls: tuple[Control, ...] = msgspec.field(name="control", default=())
     conservations: tuple[Conservation, ...] = msgspec.field(name="conservation", default=())
+    open: tuple[OpenChannels, ...] = ()
     charts: tuple[Chart, ...] = msgspec.field(name="chart", default=())
     reference: ReferenceRecipe | None = None
 

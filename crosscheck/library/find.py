@@ -63,6 +63,12 @@ def shipped_names() -> tuple[str, ...]:
     return tuple(f"{folder.parent.name}/{folder.name}" for folder in folders)
 
 
+def shipped_tags() -> dict[str, tuple[str, ...]]:
+    """The tags of the shipped cases by name; nothing else of them is checked, and a wrong word is refused at once."""
+    run_files = {name: parse_toml(_text(shipped_folder() / name / "run.toml")) for name in shipped_names()}
+    return {name: tuple(run_file.get("tags", ())) for name, run_file in run_files.items()}
+
+
 def resolve(words: tuple[str, ...]) -> tuple[Case, ...]:
     """The cases that a user asks for: by words (`crosscheck.library.case_words`), or by folders with a run.toml.
 
@@ -87,14 +93,7 @@ def _resolve_one(word: str) -> tuple[Case, ...]:
     folder = Path(word)
     if os.path.isfile(folder / "run.toml"):  # False also for words that cannot be a path
         return (load_case(folder),)
-    read: dict[str, Case] = {}
-
-    def tags() -> dict[str, tuple[str, ...]]:
-        read.update((case.name, case) for case in shipped_cases())
-        return {name: case.run.tags for name, case in read.items()}
-
-    names = meant(word, shipped_names(), tags)  # cases that are not meant are read only where tags must be known
-    return tuple(read[name] if name in read else load_case(shipped_folder() / name) for name in names)
+    return tuple(load_case(shipped_folder() / name) for name in meant(word, shipped_names(), shipped_tags))
 
 
 def load_case(folder: Path) -> Case:

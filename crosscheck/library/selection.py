@@ -9,7 +9,8 @@ variant whose engines are compared with each other, and the variant of the store
 the case names runs only its variants.
 
 A comparison that lists engines does so since other ones of the case lack a channel, or come less near. Where it expects
-agreement an engine that joins is compared with those listed, in the channels that no comparison of all engines has.
+agreement an engine that joins is compared with those listed, in the channels that no comparison of all engines has. So
+is its conserved quantity, where the case lists engines and expects them to conserve it.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     comparisons = [pair for comparison in run.comparisons for pair in _pairs(run, comparison, foreign)]
     kept = tuple(pair for pair in comparisons if _wanted(asked, pair.sides))
     controls = tuple(control for control in run.controls if _wanted(asked, control.sides))
-    conservations = tuple(each for item in run.conservations if (each := _narrowed(run, item, asked)) is not None)
+    conserved = (_narrowed(run, item, asked, foreign) for item in run.conservations)
+    conservations = tuple(item for item in conserved if item is not None)
     pairs: tuple[Comparison | Control, ...] = (*kept, *controls)
     needed = {(side.variant, side.engine) for pair in pairs for side in pair.sides}
     needed |= {(item.variant, engine) for item in conservations for engine in item.engines}
@@ -53,11 +55,12 @@ def alone(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     Without any these are all that are compared with it. There are no comparisons of engines with each other.
     """
     of = run.reference.variant if run.reference is not None else ""
+    foreign = joining(run, asked)
     run = _joined(run, asked)
     running = [engine for variant in run.variants if variant.name == of for engine in _all(variant)]
     kept = tuple(engine for engine in running if engine in (asked or held(run, running)))
     needed = {(of, engine) for engine in kept}
-    conserved = (_narrowed(run, item, kept) for item in run.conservations if item.variant == of and kept)
+    conserved = (_narrowed(run, item, kept, foreign) for item in run.conservations if item.variant == of and kept)
     return msgspec.structs.replace(
         run,
         variants=tuple(variant for each in run.variants if (variant := _keep(each, needed)).engines),
@@ -191,8 +194,13 @@ def _wanted(asked: tuple[str, ...], sides: tuple[ComparisonSide, ComparisonSide]
     return involved <= set(asked)
 
 
-def _narrowed(run: RunFile, item: Conservation, asked: tuple[str, ...]) -> Conservation | None:
-    engines = item.engines or run.variant(item.variant).engines
+def _narrowed(
+    run: RunFile, item: Conservation, asked: tuple[str, ...], foreign: tuple[str, ...]
+) -> Conservation | None:
+    """A conserved quantity of the engines asked for; `run` has the `foreign` ones in the variants that they join."""
+    engines = run.variant(item.variant).engines
+    if item.engines:
+        engines = (*item.engines, *(each for each in foreign if each in engines and item.expect == "agree"))
     kept = tuple(engine for engine in engines if not asked or engine in asked)
     return msgspec.structs.replace(item, engines=kept) if kept else None
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from crosscheck.engines.registry import BUILT_IN, plug_ins
 from crosscheck.library.claims import claims_on
 from crosscheck.library.expect_file import NAME, efforts_option, goal_option, read_expect_file
-from crosscheck.library.find import Case, shipped_cases, shipped_names
+from crosscheck.library.find import Case, shipped_names, shipped_tags
 
 
 def expect_file(given: Path | None) -> Path | None:
@@ -39,7 +39,7 @@ def with_claims(
 
     @cache
     def tags() -> dict[str, tuple[str, ...]]:
-        return {case.name: case.run.tags for case in shipped_cases()} | own
+        return shipped_tags() | own
 
     of_cases = (engine for case in cases for variant in case.run.variants for engine in variant.engines + variant.also)
     claims = claims_on(

@@ -21,10 +21,40 @@ class _OneRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Base of all records."""
 
 
+class ContractState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the contract of an outside engine stood in a session, by the last `crosscheck contract` in its folder.
+
+    `sources` is the digest of the engine's sources in the session. `kept` is None if all clauses were never tried, else
+    whether they held `at` that time, with the `headline` of the trial. `changed`: what has changed since, if anything.
+    """
+
+    sources: str
+    kept: bool | None = None
+    headline: str = ""
+    at: str = ""
+    changed: str = ""
+
+    @property
+    def good(self) -> bool:
+        """Whether these very sources kept it."""
+        return self.kept is True and not self.changed
+
+    def words(self, engine: str) -> str:
+        """One line on it, with the remedy."""
+        remedy = f"crosscheck contract {engine}, with the same --out"
+        if self.kept is None:
+            return f"{engine} (sources {self.sources}): it is not known whether its contract is kept: {remedy}"
+        outcome = f"contract {'kept' if self.kept else 'broken'} on {self.at[:10]}: {self.headline}"
+        if self.changed:
+            return f"{engine} (sources {self.sources}): {self.changed} have changed since; {outcome}: {remedy}"
+        return f"{engine} (sources {self.sources}): {outcome}"
+
+
 class Environment(_OneRecord, frozen=True, kw_only=True, tag="environment"):
     """Machine and versions of one session, and the cases and engines asked for; no engines means all.
 
     A session that `confirms` writes a `Confirmed` for each earlier result that it reuses; older versions did not.
+    `contracts`: of outside engines, by name, whether they keep the contract.
     """
 
     started: str
@@ -36,6 +66,7 @@ class Environment(_OneRecord, frozen=True, kw_only=True, tag="environment"):
     cases: tuple[str, ...] = ()
     engines: tuple[str, ...] = ()
     confirms: bool = False
+    contracts: dict[str, ContractState] = {}
 
 
 class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -62,7 +93,8 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     figures, its stored reference if it has one, and digests of the `files` in its folder.
 
     `asked` are the engines asked for by name, `joined` those of them that the case does not name. `unreferenced`: it
-    has a recipe of a reference, but the reference was never made. `claims` are the user's own on the engines that run.
+    has a recipe of a reference, but the reference was never made. `whole`: all its engines and comparisons are there,
+    as none was asked for alone. `claims` are the user's own on the engines that run.
     """
 
     case: str
@@ -76,6 +108,7 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     asked: tuple[str, ...] = ()
     joined: tuple[str, ...] = ()
     unreferenced: bool = False
+    whole: bool = False
     claims: Claims = Claims()
 
 

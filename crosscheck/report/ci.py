@@ -45,6 +45,9 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
     if outcome.lost_controls:
         lines += ["", "## Deliberate faults that were compared in nothing", ""]
         lines += [f"- {_flat(str(each))}" for each in outcome.lost_controls]
+    if outcome.contracts:
+        lines += ["", "## Contracts of outside engines", ""]
+        lines += [f"- {_flat(state.words(name))}" for name, state in outcome.contracts.items()]
     lines += _claims(outcome)
     lines += _table("Worse than recorded", outcome.worse, lambda verdict: verdict.worse)
     lines += _table("Beyond stale figures", outcome.outgrown, lambda verdict: verdict.grown)

@@ -80,6 +80,7 @@ def plan(
         asked=asked,
         joined=joining(case.run, asked),
         unreferenced=case.run.reference is not None and not has_reference(case.folder),
+        whole=not asked and not case.alone,
         claims=case.claims,
     )
     return record, jobs

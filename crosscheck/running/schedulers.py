@@ -19,7 +19,7 @@ def scheduler_at(address: str) -> Scheduler:
     try:
         from crosscheck.running.dask_cluster import DaskCluster
     except ModuleNotFoundError as error:
-        raise ValueError(f'--scheduler {address} needs Dask: pip install "flexmb[dask]" ({error})') from None
+        raise ValueError(f'--scheduler {address} needs Dask: pip install "dask[distributed]" ({error})') from None
     cluster = DaskCluster(address)
     cluster.check()
     return cluster

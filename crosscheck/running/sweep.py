@@ -13,6 +13,7 @@ from crosscheck.engines.answers import clean
 from crosscheck.engines.registry import SERVED_WITH
 from crosscheck.library.find import Case
 from crosscheck.records.archive import Archive, read
+from crosscheck.records.contracts import contracts
 from crosscheck.records.kinds import CaseRecord, Confirmed, Record, RunRecord
 from crosscheck.records.machine import environment
 from crosscheck.running.execute import execute
@@ -74,7 +75,8 @@ def run_planned(
         closing(Archive(records)) as archive,
         closing(scheduler(work)) as events,
     ):
-        archive.write(environment(tuple(record.case for record, _ in plans), asked, confirms=True))
+        here = environment(tuple(record.case for record, _ in plans), asked, confirms=True)
+        archive.write(msgspec.structs.replace(here, contracts=contracts(records.parent, (job.engine for job in jobs))))
         for record, _ in plans:
             archive.write(record)
         for event in events:

@@ -7,6 +7,8 @@ The file is one JSON object. Every key:
 - ``unfinished`` (left out: false): the session has not ended, and the file contains no verdicts;
 - ``exit_code`` of the session (0 or 1), ``headline`` in words, ``strict``, the ``engines`` asked for (none: all);
 - ``made``: ``at`` (UTC), ``python``, ``system``, ``processor``, ``packages`` and ``engines`` with their versions;
+- ``contracts`` (left out if empty): of outside engines by name whether they keep the contract: digest of their
+  ``sources``, ``kept`` (left out: all clauses were never tried), ``at``, ``headline`` and what has ``changed`` since;
 - ``records``: SHA-256 of the records.jsonl that was judged, "" if there was none; ``broken``: the number of its invalid
   lines;
 - ``cases``, by name, each with
@@ -24,7 +26,8 @@ The file is one JSON object. Every key:
     where it is one channel, of engines that the case names nowhere; ``unreferenced`` (left out: false): it has a recipe
     of a reference and no reference;
   - ``unjudged`` (left out if empty): the reason by "variant | engine | channel" of channels that are offered and judged
-    by nothing; a strict session demands of engines that joined that they are as others have them;
+    by nothing, as `[[open]]` of the case gives it; a strict session demands one for each channel of the case's engines,
+    and of engines that joined that theirs are as others have them;
   - ``runs``: by "variant | engine | role": ``status``, ``effort``, ``wall_s`` and ``compile_s`` of the finest effort.
 
 Figures have four digits, times three.
@@ -43,7 +46,7 @@ from crosscheck.judging.results import CaseResults, Result, Session
 from crosscheck.judging.verdict import Status, Verdict, VerdictKind
 from crosscheck.library.claims import Claims
 from crosscheck.library.digests import file_digest
-from crosscheck.records.kinds import RunStatus
+from crosscheck.records.kinds import ContractState, RunStatus
 
 FORMAT, VERSION = "crosscheck results", 1
 
@@ -113,6 +116,7 @@ class SealedResults(_SealedPart, frozen=True, kw_only=True):
     strict: bool = False
     engines: tuple[str, ...] = ()
     made: Origin
+    contracts: dict[str, ContractState] = {}
     records: str
     broken: int = 0
     cases: dict[str, SealedCase]
@@ -140,6 +144,7 @@ def results_of(session: Session, outcome: SessionOutcome, records: Path) -> Seal
         strict=outcome.strict,
         engines=() if latest is None else latest.engines,
         made=made,
+        contracts=dict(outcome.contracts),
         records=file_digest(records) if records.exists() else "",
         broken=len(outcome.broken),
         cases={case.case.case: _case(case, outcome) for case in session.cases},

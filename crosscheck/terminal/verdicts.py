@@ -32,6 +32,9 @@ def print_outcome(console: Console, outcome: SessionOutcome, verbosity: Verbosit
     if verbosity is not Verbosity.QUIET:
         if outcome.all:
             console.print(words(_inventory(outcome)), soft_wrap=True)
+        for name, state in outcome.contracts.items():
+            mark = ("✓", "green") if state.good else ("!", "yellow")
+            console.print(marked(*mark, state.words(name)), soft_wrap=True)
         lines = list(_not_in_order(outcome))
         shown = lines if verbosity is Verbosity.VERBOSE else lines[:LINES]
         for line in shown:

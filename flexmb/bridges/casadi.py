@@ -19,7 +19,7 @@ from flexmb.system.tree_system import System
 try:
     import casadi
 except ImportError as error:  # pragma: no cover
-    raise ImportError("CasADi is missing: pip install 'flexmb[casadi]'") from error
+    raise ImportError("CasADi is missing: pip install casadi") from error
 
 
 def accelerations(system: System) -> casadi.Callback:

@@ -24,7 +24,7 @@ try:
     import jax
     import jax.numpy as jnp
 except ImportError as error:  # pragma: no cover
-    raise ImportError("JAX is missing: pip install 'flexmb[jax]'") from error
+    raise ImportError("JAX is missing: pip install jax") from error
 
 
 def accelerations(system: System) -> Callable[..., jax.Array]:

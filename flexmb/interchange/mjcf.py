@@ -41,7 +41,7 @@ def read_mjcf(path: str | os.PathLike[str]) -> ImportedScene:
     try:
         import mujoco
     except ImportError:
-        raise ImportError("MJCF is read by MuJoCo's own compiler: pip install 'flexmb[peers]'") from None
+        raise ImportError("MJCF is read by MuJoCo's own compiler: pip install mujoco") from None
     refuse_bad_text(Path(path))
     try:
         model = mujoco.MjModel.from_xml_path(str(path))

@@ -53,7 +53,7 @@ def write_npz(trajectory: RunArrays, path: Path) -> None:
 
 def data_frame(trajectory: RunArrays) -> pandas.DataFrame:
     """A table with one column per channel and time as the index; `attrs` has the units by name, and the scene."""
-    with _optional("pandas", "dataframe"):
+    with _optional("pandas"):
         import pandas
     columns = list(trajectory.columns())
     frame = pandas.DataFrame(
@@ -65,7 +65,7 @@ def data_frame(trajectory: RunArrays) -> pandas.DataFrame:
 
 def write_parquet(trajectory: RunArrays, path: Path) -> None:
     """Write one column per channel, its unit in the metadata of its field, the scene in the metadata of the file."""
-    with _optional("pyarrow", "dataframe"):
+    with _optional("pyarrow"):
         import pyarrow
         from pyarrow import parquet
     columns = list(trajectory.columns())
@@ -79,7 +79,7 @@ def write_parquet(trajectory: RunArrays, path: Path) -> None:
 def dataset(trajectory: RunArrays) -> xarray.Dataset:
     """One variable per channel, (t), (t, axis) or, for quaternions, (t, component); units in `attrs` (the convention of
     xarray)."""
-    with _optional("xarray", "dataframe"):
+    with _optional("xarray"):
         import xarray
     found: dict[str, Any] = {}
     for name, units, values in _channels(trajectory):
@@ -97,7 +97,7 @@ def dataset(trajectory: RunArrays) -> xarray.Dataset:
 
 def write_recording(trajectory: RunArrays, path: Path) -> None:
     """Write a recording for the viewer rerun: markers are moving frames with paths, all other channels are curves."""
-    with _optional("rerun-sdk", "viewer"):
+    with _optional("rerun-sdk"):
         import rerun
     with whole_file(path) as beside:
         recording = rerun.RecordingStream("flexmb", recording_id=None)
@@ -156,9 +156,9 @@ def _channels(trajectory: RunArrays) -> Iterator[tuple[str, str, Real]]:
 
 
 @contextmanager
-def _optional(package: str, extra: str) -> Iterator[None]:
-    """Imports of an optional package; an ImportError names the extra that installs it."""
+def _optional(package: str) -> Iterator[None]:
+    """Imports of an optional package; an ImportError says how to install it."""
     try:
         yield
     except ImportError:
-        raise ImportError(f"{package} is not installed: pip install 'flexmb[{extra}]'") from None
+        raise ImportError(f"{package} is not installed: pip install {package}") from None

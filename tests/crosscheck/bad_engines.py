@@ -24,7 +24,8 @@ from tests.crosscheck.fake_engines import STEPS, Fake
 EFFORTS = tuple(Effort("tolerance", 10.0**-n, "dop853") for n in (6, 8, 10))
 PARTS = ("torque", "force")
 Spoil = Callable[[Trajectory, int], Any]
-"""(sound run, number of the effort from coarse to fine) -> answer. Number 1 is one of the last three in all ladders."""
+"""(sound run, number of the effort from coarse to fine) -> answer. Number 1 is one of the last three in all ladders,
+0 not in that of the pendulum."""
 GROUPS = ("loads", "drives", "energy", "wheel_loads", "connectors", "hinge_forces")
 _calls = count()
 
@@ -189,6 +190,9 @@ WRONG: dict[str, Spoil] = {
     "raises-when-fine": raising(lambda: ValueError("\ud800"), effort=2),
     "exits": raising(lambda: SystemExit(0)),
     "exits-when-coarse": raising(lambda: SystemExit(3), effort=1),
+    "raises-when-coarsest": raising(lambda: RuntimeError("the solver gave up"), effort=0),
+    "nan-when-coarsest": lambda run, n: paths("position", at(3, np.nan))(run, n) if n == 0 else run,
+    "nothing-when-coarsest": lambda run, n: None if n == 0 else run,
 }
 HARMLESS: dict[str, Spoil] = {
     "sound": lambda run, n: run,
@@ -206,11 +210,15 @@ def _crash(run: Trajectory, n: int) -> Trajectory:
 
 
 def _hang(run: Trajectory, n: int) -> Trajectory:
-    time.sleep(60.0 if n == 1 else 0.0)
+    time.sleep(600.0 if n == 1 else 0.0)
     return run
 
 
-FATAL: dict[str, Spoil] = {"crashes": _crash, "hangs": _hang}
+def _crash_at_first(run: Trajectory, n: int) -> Trajectory:
+    return run if n else os._exit(0)
+
+
+FATAL: dict[str, Spoil] = {"crashes": _crash, "hangs": _hang, "crashes-when-coarsest": _crash_at_first}
 ALL = WRONG | HARMLESS | FATAL
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -17,6 +19,8 @@ from crosscheck.engines.registry import BUILT_IN, OWN_CODE
 from crosscheck.library.find import shipped_folder
 from flexmb.scene.problems import LISTED, closest
 from tests.repo.project import ROOT
+
+resource = pytest.importorskip("resource", reason="only Unix tells the processor time of other processes")
 
 CASE = "pendulums/compound"
 SCENE = str(shipped_folder() / "beams" / "cantilever" / "scene.toml")
@@ -182,3 +186,24 @@ def test_long_lists_of_names_are_no_suggestion() -> None:
     assert closest("nowhere", many[:3]) == "use one of: case_0, case_1, case_2"
     told = f'none of the {len(many)} that there are is near; the nearest is "case_\\d+"'
     assert re.fullmatch(told, closest("zz", many))
+
+
+def cpu_seconds(*words: str) -> tuple[float, int, str]:
+    """Processor time (s) of a command in a process of its own, which other processes do not lengthen; its exit code and
+    what it says on stderr."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run([sys.executable, "-m", "crosscheck", *words], capture_output=True, text=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return spent, done.returncode, done.stderr
+
+
+def test_a_refused_request_takes_little_longer_than_help(tmp_path: Path) -> None:
+    """Nothing is planned, compiled or run before names are looked up: a second of an idle core, three of a busy one."""
+    helping, code, _ = cpu_seconds("--help")
+    assert code == 0
+    for words in (("run", "all", "-e", "pinochio"), ("run", "pendulums/compund"), ("contract", "natve")):
+        taken, code, said = cpu_seconds(*words, *(("--out", str(tmp_path / "out")) if words[0] == "run" else ()))
+        assert (code, len(said.strip().splitlines())) == (2, 1), said
+        assert taken <= helping + 3.0, f"{' '.join(words)}: {taken:.2f} s, and help {helping:.2f} s"
+    assert list(tmp_path.glob("*")) == []

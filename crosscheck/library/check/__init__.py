@@ -10,7 +10,13 @@ from collections.abc import Iterator
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import CaseError, Provenance, RunFile
 from crosscheck.library.check.figures import check_figures
-from crosscheck.library.check.judged import check_chart, check_comparison, check_conservation, check_control
+from crosscheck.library.check.judged import (
+    check_chart,
+    check_comparison,
+    check_conservation,
+    check_control,
+    check_open,
+)
 from crosscheck.library.check.ranges import (
     ROOT,
     check_duration,
@@ -82,6 +88,8 @@ def _run(run: RunFile) -> Iterator[Defect]:
     seen: set[tuple[str, str, str]] = set()
     for i, conservation in enumerate(run.conservations):
         yield from check_conservation(run, conservation, ROOT.key("conservation", i), seen)
+    for i, item in enumerate(run.open):
+        yield from check_open(run, item, ROOT.key("open", i))
     for i, chart in enumerate(run.charts):
         yield from check_chart(run, chart, ROOT.key("chart", i))
     if run.reference is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from crosscheck.library.case import Chart, Comparison, Conservation, Control, RunFile
+from crosscheck.library.case import Chart, Comparison, Conservation, Control, OpenChannels, RunFile
 from crosscheck.library.check.bounds import check_band, check_expectation
 from crosscheck.library.check.ranges import SIZES, check_fraction, check_within, problem
 from crosscheck.library.check.runs import (
@@ -15,7 +15,7 @@ from crosscheck.library.check.runs import (
     no_variant,
 )
 from crosscheck.library.patterns import fault
-from flexmb.scene.problems import Defect, Place
+from flexmb.scene.problems import Defect, Place, closest
 
 
 def check_comparison(run: RunFile, item: Comparison, place: Place) -> Iterator[Defect]:
@@ -70,6 +70,25 @@ def check_conservation(
         if (item.variant, item.quantity, engine) in seen:
             yield problem(place, f"{item.quantity} of {engine} is judged above already", "take one of them out")
         seen.add((item.variant, item.quantity, engine))
+
+
+def check_open(run: RunFile, item: OpenChannels, place: Place) -> Iterator[Defect]:
+    if not item.channels:
+        yield problem(place.key("channels"), "name at least one channel", '["momentum"]')
+    for pattern in item.channels:
+        yield from check_pattern(pattern, place.key("channels"))
+    if not item.reason.strip():
+        yield problem(place.key("reason"), "nothing says why these channels are judged by nothing", "give the reason")
+    names = [variant.name for variant in run.variants]
+    for name in item.variants:
+        if name not in names:
+            yield no_variant(name, names, place.key("variants"))
+    yield from check_engines_once(item.engines, place.key("engines"))
+    there = [variant for variant in run.variants if variant.name in (item.variants or names)]
+    known = {engine for variant in there for engine in (*variant.engines, *variant.also)}
+    for engine in item.engines:
+        if engine not in known:
+            yield problem(place.key("engines"), f'engine "{engine}" runs none of the variants', closest(engine, known))
 
 
 def check_chart(run: RunFile, chart: Chart, place: Place) -> Iterator[Defect]:

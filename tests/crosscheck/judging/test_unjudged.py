@@ -1,4 +1,5 @@
-"""What an engine offers and nothing judges is told everywhere; of a guest it must be as others have it, if strict."""
+"""What an engine offers and nothing judges is told everywhere. In a strict session of an engine that the case names the
+case must say why, and of a guest it must be as others have it."""
 
 from __future__ import annotations
 
@@ -38,7 +39,72 @@ def told(outcome: SessionOutcome, verbosity: Verbosity = Verbosity.NORMAL) -> tu
     return print_outcome(Console(file=text, width=300), outcome, verbosity), text.getvalue()
 
 
-def test_what_engines_of_the_case_offer_beyond_its_goals_is_told_and_is_no_error(tmp_path: Path) -> None:
+OPEN = """
+[[open]]
+channels = ["marker:*.velocity"]
+reason = "it follows from the positions"
+"""
+OF_ONE = """
+[[open]]
+channels = ["momentum"]
+engines = ["one"]
+reason = "it rests"
+"""
+
+
+def whole(more: str = "", goals: str = "", **options: object) -> SessionOutcome:
+    """The outcome of a session of the whole case, with more in its run file."""
+    text = ONE_PAIR.replace("1e-3 }", f"1e-3{goals} }}") + more
+    return judged(text, NAMED, whole=True, **options)
+
+
+def test_a_strict_session_of_the_whole_case_fails_by_what_the_case_neither_judges_nor_leaves_open() -> None:
+    outcome = whole(strict=True)
+    offered = [("one", VELOCITY), ("one", "momentum.linear"), ("two", VELOCITY)]
+    assert [(each.engine, each.channel) for each in outcome.unaccounted] == offered
+    assert not outcome.ok and outcome.headline == "3 channels are offered and judged by nothing"
+    code, text = told(outcome)
+    assert code == 1 and f"one offers what nothing judges: {VELOCITY}, momentum.linear" in text
+    assert "no [[open]] with a reason" in text
+    lax = whole()
+    assert lax.ok and "! made/made, rigid, two offers what nothing judges" in told(lax)[1]
+
+
+def test_what_the_case_leaves_open_with_a_reason_is_told_with_it_and_is_no_error() -> None:
+    outcome = whole(OPEN + OF_ONE, strict=True)
+    assert outcome.ok and outcome.unaccounted == []
+    assert {each.channel: each.reason for each in outcome.unjudged} == {
+        VELOCITY: "it follows from the positions", "momentum.linear": "it rests",
+    }  # fmt: skip
+    assert "judged by nothing" in told(outcome)[1]
+
+
+@pytest.mark.parametrize("more", [OPEN, OF_ONE, OPEN + OF_ONE.replace('"one"', '"two"')])
+def test_what_is_left_open_is_open_for_these_channels_and_engines_alone(more: str) -> None:
+    assert not whole(more, strict=True).ok
+
+
+def test_a_goal_accounts_for_a_channel() -> None:
+    outcome = whole(OF_ONE, ', "marker:tip.velocity" = 1e-3', strict=True)
+    assert outcome.ok and [each.channel for each in outcome.unjudged] == ["momentum.linear"]
+
+
+def test_what_a_case_leaves_open_is_held_against_others_where_a_guest_offers_it() -> None:
+    offered = {TIP: way(), VELOCITY: -way(axis=1)}
+    outcome = judged(ONE_PAIR + OPEN, [*NAMED, *ladder("guest", offered)], asked=ASKED, strict=True)
+    assert [(each.engine, each.channel) for each in outcome.unaccounted] == [("guest", VELOCITY)]
+
+
+def test_the_drift_of_the_energy_accounts_for_the_work_that_is_taken_off_it() -> None:
+    energies = {"energy.total": np.ones((len(TIMES), 1)), "work": np.zeros((len(TIMES), 1))}
+    text = ONE_PAIR.replace("1e-3 }", '1e-3, energy = 1e-3 }')
+    conserved = '[[conservation]]\nvariant = "rigid"\nquantity = "energy"\nlimit = 1e-9\n'
+    runs = [*ladder("one", {TIP: way()} | energies), *ladder("two", {TIP: way()} | energies)]
+    left = [each.channel for each in judged(text, runs, whole=True).unjudged]
+    assert left == ["work", "work"] and judged(text + conserved, runs, whole=True).unjudged == ()
+
+
+def test_what_engines_of_the_case_offer_is_no_error_where_some_were_asked_for_alone(tmp_path: Path) -> None:
     outcome = session(None, strict=True)
     offered = {(each.engine, each.channel): each.excused for each in outcome.unjudged}
     assert offered == dict.fromkeys([("one", VELOCITY), ("one", "momentum.linear"), ("two", VELOCITY)], True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 import tomllib
 from pathlib import Path
@@ -10,7 +11,16 @@ import msgspec
 import pytest
 
 from crosscheck.library import case as case_module
-from crosscheck.library.case import CaseError, Comparison, ComparisonSide, Refined, RunFile, Variant
+from crosscheck.library.case import (
+    CaseError,
+    Comparison,
+    ComparisonSide,
+    Conservation,
+    OpenChannels,
+    Refined,
+    RunFile,
+    Variant,
+)
 from crosscheck.library.check import check_run_file
 from crosscheck.library.find import load_case, resolve
 from crosscheck.library.selection import select
@@ -154,6 +164,41 @@ def test_a_foreign_engine_joins_a_variant_of_which_only_listed_engines_are_compa
 def test_a_foreign_engine_is_not_expected_to_differ_as_listed_ones_are() -> None:
     run = listing(expect="refused", because="no momentum", reason="they have none")
     assert not [each for each in select(run, ("mine",)).comparisons if each.name == "listed"]
+
+
+def conserving(**changes: object) -> Conservation:
+    return Conservation(**{"variant": "rigid", "quantity": "energy", "limit": 1e-9, "engines": ("native",)} | changes)
+
+
+@pytest.mark.parametrize("item, engines", [
+    (conserving(), ("native", "mine")),
+    (conserving(engines=()), ("native", "pinocchio", "mujoco", "exudyn", "mine")),
+    (conserving(expect="differ", band=(1e-8, 1e-7), reason="it is lost"), ("native",)),
+])
+def test_a_foreign_engine_joins_those_that_a_conserved_quantity_lists(item: Conservation, engines: tuple[str]) -> None:
+    run = msgspec.structs.replace(example(), conservations=(item,))
+    check_run_file(run)
+    (found,) = select(run, (*example().variant("rigid").engines, "mine")).conservations
+    assert found.engines == engines
+    (alone,) = select(run, ("mine",)).conservations if "mine" in engines else ((),)
+    assert alone == () or alone.engines == ("mine",)
+    assert select(run, ()).conservations[0].engines == tuple(each for each in engines if each != "mine")
+
+
+@pytest.mark.parametrize("changes, text", [
+    ({"channels": ()}, "name at least one channel"),
+    ({"channels": ("markr",)}, '"markr" can name no channel'),
+    ({"variants": ("rigd",)}, 'did you mean "rigid"'),
+    ({"engines": ("natve",)}, 'did you mean "native"'),
+    ({"engines": ("native", "native")}, "listed twice"),
+    ({"reason": " "}, "give the reason"),
+])
+def test_what_a_case_leaves_open_is_checked_with_its_place(changes: dict[str, object], text: str) -> None:
+    item = OpenChannels(**{"channels": ("momentum",), "variants": ("rigid",), "reason": "it is zero"} | changes)
+    check_run_file(msgspec.structs.replace(example(), open=(OpenChannels(channels=("work",), reason="it is zero"),)))
+    with pytest.raises(CaseError, match=re.escape(text)) as error:
+        check_run_file(msgspec.structs.replace(example(), open=(item,)))
+    assert "$.open[0]" in str(error.value)
 
 
 def left_out(engine: str, variants: tuple[str, ...]) -> RunFile:

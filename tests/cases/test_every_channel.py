@@ -1,0 +1,34 @@
+"""No channel of a case is silent: each is judged, or the case says why not. By the run files alone: no engine runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import msgspec
+import pytest
+
+from crosscheck.library.case import OpenChannels
+from crosscheck.library.find import load_case, shipped_folder, shipped_names
+from tests.cases.declared import idle, left
+
+MADE_OF_ALL = "linearised/hanging_pendulum", "closed_chains/geared_hoist", "spacecraft/slosh"
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_every_channel_that_an_engine_may_offer_is_judged_or_left_open_with_a_reason(name: str) -> None:
+    case = load_case(shipped_folder() / name)
+    silent = sorted({f"{each.variant}, {each.engine}: {each.channel}" for each in left(case) if not each.open})
+    assert not silent, "give it a goal, or name it in [[open]] of run.toml with the reason"
+    assert idle(case) == [], "it names nothing that is left: take it out"
+
+
+@pytest.mark.parametrize("name", MADE_OF_ALL)
+def test_a_channel_that_loses_its_goal_or_its_reason_is_noticed(name: str) -> None:
+    case = load_case(shipped_folder() / name)
+    assert any(each.open for each in left(case))
+    unsaid = replace(case, run=msgspec.structs.replace(case.run, open=()))
+    assert not any(each.open for each in left(unsaid)) and list(left(unsaid))
+    without = replace(case, run=msgspec.structs.replace(case.run, comparisons=(), conservations=(), reference=None))
+    assert {each.channel for each in left(without) if not each.open}
+    more = OpenChannels(channels=("marker:nowhere",), reason="made up")
+    assert idle(replace(case, run=msgspec.structs.replace(case.run, open=(*case.run.open, more))))
