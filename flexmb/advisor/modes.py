@@ -6,6 +6,8 @@ A beam of level exact has strains in their place.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -18,10 +20,11 @@ from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import BeamBody, Level, ModalBody, ModalNode, Modes, StrainPolynomials
 from flexmb.scene.modal_data import inertia_points, modal_arrays, node_arrays
+from flexmb.scene.pieces import AT_END, across
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import ModalState, Scene
 from flexmb.scene.strains import points_of_piece, twists
-from flexmb.surrogate import substructured
+from flexmb.surrogate import cut_where_loaded, substructured
 from flexmb.surrogate.lumping import vector
 from flexmb.typing import Real
 
@@ -49,7 +52,8 @@ def with_modes(scene: Scene, name: str, count: int, level: Level, static: bool, 
 def with_strains(
     scene: Scene, name: str, polynomials: int, pieces: int, stretching: bool, families: tuple[str, ...]
 ) -> Scene:
-    """The scene with the beam `name` in `pieces` of level exact, welded to one another.
+    """The scene with the beam `name` in `pieces` of level exact, welded to one another; where its strains jump, it is
+    cut too.
 
     They have `polynomials` of each curvature of `families` (of the beam's own if empty); if `stretching` two fewer, but
     one at least, of the stretch if "axial" is among its families, and of the shears in bending if its theory is
@@ -60,15 +64,37 @@ def with_strains(
     if not isinstance(body, BeamBody):
         raise ValueError(f'body "{name}" is no beam, and has no strains')
     strains = _strains(body, polynomials, stretching, families or body.modes.families)
-    if pieces > 1:
-        return substructured(scene, name, pieces, level="exact", polynomials=strains)
+    bent = any(state.body == name for state in scene.modal_states)
+    ends = _between(scene, body, pieces)
+    if pieces > 1 or (ends != 1 and not bent):
+        return substructured(scene, name, ends, level="exact", polynomials=strains)
     modes = replace(
         body.modes, count=0, polynomials=strains, static=False, boundary="clamped-free", pieces=1, points=None
     )
-    new = _damped(replace(body, level="exact", mass="consistent"), modes)
+    new = _cut(scene, replace(body, level="exact", mass="consistent", modes=modes))
+    new = _damped(new, new.modes)
     bodies = tuple(new if each.name == name else each for each in scene.bodies)
     states = tuple(_projected(body, new, each) if each.body == name else each for each in scene.modal_states)
     return replace(scene, bodies=bodies, modal_states=states)
+
+
+def _cut(scene: Scene, beam: BeamBody) -> BeamBody:
+    """The beam cut where its strains jump in this scene."""
+    bodies = tuple(beam if each.name == beam.name else each for each in scene.bodies)
+    found = cut_where_loaded(replace(scene, bodies=bodies, modal_states=()), beam.name)
+    return next(each for each in found.bodies if isinstance(each, BeamBody) and each.name == beam.name)
+
+
+def _between(scene: Scene, beam: BeamBody, pieces: int) -> int | list[float]:
+    """`pieces`, or, if strains jump inside, the places (m) that cut the beam there and in parts as short as these."""
+    jumps = across(scene, replace(beam, modes=replace(beam.modes, pieces=1, cuts=())))
+    if not jumps:
+        return pieces
+    ends: list[float] = []
+    for left, right in pairwise((0.0, *jumps, beam.length_m)):
+        count = max(1, ceil(pieces * (right - left) / beam.length_m - AT_END))
+        ends += np.linspace(left, right, count + 1)[1:].tolist()
+    return ends[:-1]
 
 
 def _strains(beam: BeamBody, count: int, stretching: bool, families: tuple[str, ...]) -> StrainPolynomials:
@@ -96,7 +122,7 @@ def _beam(beam: BeamBody, count: int, level: Level, static: bool, families: tupl
         raise ValueError(f'beam "{beam.name}": level "exact" has strains, and other levels have straight beams only')
     modes = replace(
         beam.modes, count=count, static=static, families=families or beam.modes.families,
-        polynomials=None, pieces=1, points=None,
+        polynomials=None, pieces=1, cuts=(), points=None,
     )  # fmt: skip
     return _damped(replace(beam, level=level), modes)
 

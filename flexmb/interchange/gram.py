@@ -34,10 +34,10 @@ class NoMasses(ValueError):
         super().__init__(f"no distribution of mass has these sums; the largest defect is that of field {field}")
 
 
-def equivalent_masses(gram: Real) -> EquivalentMasses:
+def equivalent_masses(gram: Real, nearest: bool = False) -> EquivalentMasses:
     """Points whose fields have the Gram matrix `gram` (4+3m, 4+3m), of which the upper triangle is read.
 
-    Raises NoMasses if it is not positive semidefinite.
+    Raises NoMasses if it is not positive semidefinite; with `nearest` the points have the nearest one that is.
     """
     gram = np.triu(gram) + np.triu(gram, 1).T
     size = _sizes(np.diag(gram))
@@ -47,11 +47,11 @@ def equivalent_masses(gram: Real) -> EquivalentMasses:
     if not np.all(np.isfinite(largest)):  # in a positive semidefinite matrix scaled elements are at most 1
         raise NoMasses(int(np.argmin(np.isfinite(largest))))
     values, vectors = np.linalg.eigh(scaled)
-    if values[0] < -NEGATIVE * values[-1]:
+    if values[0] < -NEGATIVE * values[-1] and not nearest:
         raise NoMasses(int(np.argmax(np.abs(vectors[:, 0]))))
     kept = values > ROUNDING * values[-1]
     X = np.sqrt(values[kept])[:, None] * vectors[:, kept].T * size
-    n, mass = len(X), gram[0, 0]
+    n, mass = len(X), float(X[:, 0] @ X[:, 0])
     normal = X[:, 0] - np.sqrt(mass / n)
     if np.any(normal):
         X = X - 2.0 * np.outer(normal, normal @ X) / (normal @ normal)

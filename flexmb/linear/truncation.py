@@ -23,6 +23,7 @@ from flexmb.modal.flexible import flexible_model
 from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody, StrainPolynomials
 from flexmb.scene.check.beams import available_modes, mode_count
 from flexmb.scene.check.exact_beams import MOST_POLYNOMIALS
+from flexmb.scene.pieces import piece_count
 from flexmb.scene.schema import ModalState, Scene
 from flexmb.scene.strains import polynomials
 from flexmb.system.compile import compile
@@ -107,7 +108,7 @@ def _more_strains(body: BeamBody) -> BeamBody:
     modes = msgspec.structs.replace(body.modes, polynomials=StrainPolynomials(**more), points=None)
     ratio = modes.damping_ratio
     if isinstance(ratio, tuple):
-        count = sum(more.values()) * modes.pieces
+        count = sum(more.values()) * piece_count(body)
         modes = msgspec.structs.replace(modes, damping_ratio=(*ratio, *[ratio[-1]] * (count - len(ratio))))
     return msgspec.structs.replace(body, modes=modes)
 

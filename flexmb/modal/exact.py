@@ -21,6 +21,8 @@ from flexmb.modal.section import section_table
 from flexmb.modal.stations import Lump, lumps, section_masses
 from flexmb.modal.strain_field import Hung, StrainField, gauss_weights, hung, strain_field, strain_stiffness
 from flexmb.scene.bodies import IDENTITY, BeamBody, Quaternion
+from flexmb.scene.pieces import edges as piece_edges
+from flexmb.scene.pieces import piece_count
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.strains import points_of_piece, polynomials
@@ -150,7 +152,7 @@ def _modal_masses(field: StrainField, points: BeamPoints) -> Real:
 def _stiffness(body: BeamBody) -> Real:
     """K (m,m) of the polynomials, by Gauss points that are exact for sections that vary linearly."""
     table = section_table(body)
-    edges = np.unique(np.concatenate([np.linspace(0.0, body.length_m, body.modes.pieces + 1), table.x]))
+    edges = np.unique(np.concatenate([piece_edges(body), table.x]))
     edges = edges[edges <= body.length_m]
     xi, w = np.polynomial.legendre.leggauss(max(polynomials(body).values()) + 1)
     half = np.diff(edges) / 2.0
@@ -163,7 +165,7 @@ def _modes(body: BeamBody, field: StrainField, K: Real, M: Real) -> BeamModes:
 
     Strains that neither matrix couples are solved separately, so that modes of one frequency each have their own.
     """
-    strain = np.repeat(*np.array([(i, n * body.modes.pieces) for i, n in enumerate(polynomials(body).values())]).T)
+    strain = np.repeat(*np.array([(i, n * piece_count(body)) for i, n in enumerate(polynomials(body).values())]).T)
     columns, compliance = np.zeros_like(K), np.zeros(len(K))
     sets = [np.ix_(own, own) for own in _uncoupled(strain, K, M)]
     for own in sets:

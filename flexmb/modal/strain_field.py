@@ -21,6 +21,7 @@ import numpy as np
 from flexmb.modal.section import section_table
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.collocation import partial_integrals
+from flexmb.scene.pieces import edges
 from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.strains import STRAINS, points_of_piece, polynomials
 from flexmb.typing import Index, Real
@@ -153,16 +154,15 @@ class _Polynomials:
     """Legendre's polynomials of all strains on the pieces of a beam."""
 
     def __init__(self, body: BeamBody) -> None:
-        self._counts, self._pieces = polynomials(body), body.modes.pieces
-        self._edges = np.linspace(0.0, body.length_m, self._pieces + 1)
+        self._counts, self._edges = polynomials(body), edges(body)
+        self._pieces = len(self._edges) - 1
 
     def at(self, x: Real, within: Real | None = None) -> Real:
         """(n,6,m) [stretch, shears; twist, curvatures] of each mode at x (n,) m, in the pieces of the points `within`:
         at an edge there are two."""
         inside = x if within is None else within
         piece = np.clip(np.searchsorted(self._edges, inside, side="right") - 1, 0, self._pieces - 1)
-        width = self._edges[1] - self._edges[0]
-        xi = 2.0 * (x - self._edges[piece]) / width - 1.0
+        xi = 2.0 * (x - self._edges[piece]) / np.diff(self._edges)[piece] - 1.0
         found = np.zeros((len(x), 6, sum(self._counts.values()) * self._pieces))
         column = 0
         for strain, count in self._counts.items():
@@ -193,14 +193,14 @@ def _grid(body: BeamBody) -> tuple[list[tuple[float, float, int]], Real, Real]:
     The intervals end where pieces do and where the section's data have a kink. One that is shorter than a piece has
     fewer points, because the strains vary less along it.
     """
-    pieces, length = body.modes.pieces, body.length_m
-    width = length / pieces
-    breaks = np.unique(np.concatenate([np.linspace(0.0, length, pieces + 1), _kinks(body)]))
-    breaks = breaks[np.concatenate([[True], np.diff(breaks) > 1e-12 * length])]
+    ends = edges(body)
+    breaks = np.unique(np.concatenate([ends, _kinks(body)]))
+    breaks = breaks[np.concatenate([[True], np.diff(breaks) > 1e-12 * body.length_m])]
     whole = points_of_piece(body)
     intervals = []
     for left, right in zip(breaks[:-1], breaks[1:], strict=True):
-        share = (right - left) / width
+        piece = np.searchsorted(ends, 0.5 * (left + right)) - 1
+        share = (right - left) / (ends[piece + 1] - ends[piece])
         count = whole if share > 1.0 - 1e-9 else min(whole, max(3, int(np.ceil(whole * share)) + 1))
         intervals.append((float(left), float(right), count))
     gauss = np.concatenate(

@@ -118,7 +118,9 @@ class Modes(SceneStruct, frozen=True, kw_only=True):
     `static` adds attachment modes (unit tip force and moment in the chosen families) to the eigenmodes; with `count` 0
     they are the only modes.
 
-    At level "exact" the strains are polynomials along each of `pieces` equal parts of the beam: `count` of them for
+    At level "exact" the strains are polynomials along each of `pieces` equal parts of the beam, or, if `cuts` names
+    nodes, of its parts between these; strains may jump from one part to the next, as they do at a node with a load, a
+    hinge or a lump, and where the section does (`flexmb.surrogate.cut_where_loaded`). There are `count` of them for
     each curvature of the chosen families and for torsion, and in theory "timoshenko" two fewer, but one at least, for
     the shear of each; or as many as `polynomials` says, which alone allows stretch. Attachment modes are contained in
     them. `points`: Gauss points of a piece, three more than the largest number of its polynomials if not given, and six
@@ -136,6 +138,7 @@ class Modes(SceneStruct, frozen=True, kw_only=True):
     static: bool = False
     polynomials: StrainPolynomials | None = None
     pieces: int = 1
+    cuts: tuple[str, ...] = ()
     points: int | None = None
     viscosity_s: float = 0.0
     damping_ratio: float | tuple[float, ...] = 0.0

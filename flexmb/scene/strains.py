@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from flexmb.scene.bodies import BeamBody
+from flexmb.scene.pieces import piece_count
 from flexmb.scene.sections import twists_with_inertia
 
 Strain = Literal["axial", "shear_y", "shear_z", "torsion", "bending_z", "bending_y"]
@@ -34,7 +35,7 @@ def polynomials(body: BeamBody) -> dict[Strain, int]:
 
 def strain_count(body: BeamBody) -> int:
     """Number of coordinates of a beam of level "exact"."""
-    return sum(polynomials(body).values()) * body.modes.pieces
+    return sum(polynomials(body).values()) * piece_count(body)
 
 
 def points_of_piece(body: BeamBody) -> int:

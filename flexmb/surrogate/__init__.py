@@ -4,6 +4,7 @@ A surrogate is an ordinary scene, and all engines get the same one, so that the 
 mistaken for a difference between codes.
 """
 
+from flexmb.surrogate.cuts import cut_where_loaded as cut_where_loaded
 from flexmb.surrogate.points import modal_points as modal_points
 from flexmb.surrogate.rigidified import rigidify as rigidify
 from flexmb.surrogate.segments import finite_segments as finite_segments

@@ -11,6 +11,7 @@ two lowest of each curvature are those under forces and moments at the tip.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from msgspec.structs import replace
 
 from flexmb.modal import flexible_model
 from flexmb.scene.check.beams import twisting_points
+from flexmb.scene.problems import closest
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import BeamBody, BeamStation, Hinge, Level, Modes, Scene, StrainPolynomials, Weld
 from flexmb.scene.sections import (
@@ -49,13 +51,14 @@ _NUMBERS = (*STIFFNESS_KEYS, *SHEAR_KEYS, *INERTIA_KEYS, "curvature_1_m")
 def substructured(
     scene: Scene,
     body: str | None,
-    pieces: int,
+    pieces: int | Sequence[str | float],
     *,
     level: Level | None = None,
     eigenmodes: int = 0,
     polynomials: int | StrainPolynomials | None = None,
 ) -> Scene:
-    """The beam `body` (all beams if None) as `pieces` equal flexible pieces, welded section to section.
+    """The beam `body` (all beams if None) as `pieces` flexible pieces, welded section to section: as many equal ones,
+    or those between the given nodes (names) and places (m) inside the beam.
 
     A piece is clamped at its own root. It has the attachment modes of its beam's mode families (unit forces and moments
     at its tip: one mode for axial motion, one for torsion, two for each plane of bending) and, in addition,
@@ -72,11 +75,12 @@ def substructured(
     proportional to stiffness, exact for the beam's first mode.
 
     Pieces are named `<beam>.p00` ... and welds `<beam>.w01` ... from the root; a node or a tip mass at a cut belongs to
-    the outer piece. Raises ValueError for a body that is not a beam or is rigid, for fewer than one piece, for an
+    the outer piece. Raises ValueError for a body that is not a beam or is rigid, for fewer than one piece, for a
+    place that is not inside the beam, for an
     initial modal state, for torsion of pieces without rotary inertia, and for `eigenmodes` or `polynomials` that
     pieces of the level do not have.
     """
-    if pieces < 1:
+    if isinstance(pieces, int) and pieces < 1:
         raise ValueError(f"a beam is divided into at least one piece, got {pieces}")
     if eigenmodes < 0:
         raise ValueError(f"the number of eigenmodes of a piece is {eigenmodes}: give zero or more")
@@ -84,7 +88,7 @@ def substructured(
         of_piece = level or beam.level
         _refuse(beam, of_piece, eigenmodes, polynomials)
         modes = _strains(beam, polynomials) if of_piece == "exact" else _eigenmodes(beam, eigenmodes)
-        scene = _split(scene, beam, pieces, of_piece, modes)
+        scene = _split(scene, beam, _ends(beam, pieces), of_piece, modes)
     return scene
 
 
@@ -114,8 +118,23 @@ def _strains(beam: BeamBody, polynomials: int | StrainPolynomials | None) -> Mod
     return Modes(count=CURVATURES if polynomials is None else polynomials, families=own.families)
 
 
-def _split(scene: Scene, beam: BeamBody, count: int, level: Level, modes: Modes) -> Scene:
-    ends = [float(x) for x in np.linspace(0.0, beam.length_m, count + 1)]
+def _ends(beam: BeamBody, pieces: int | Sequence[str | float]) -> list[float]:
+    """The ends (m) of the pieces, ascending. ValueError for a place that is not inside the beam."""
+    if isinstance(pieces, int):
+        return [float(x) for x in np.linspace(0.0, beam.length_m, pieces + 1)]
+    along, inside = nodes_along(beam), set()
+    for each in pieces:
+        if isinstance(each, str) and each not in along:
+            raise ValueError(f'beam "{beam.name}" has no node "{each}": {closest(each, along)}')
+        x = along[each] if isinstance(each, str) else float(each)
+        if not 0.0 < x < beam.length_m:
+            raise ValueError(f'beam "{beam.name}" cannot be cut at x = {x:g} m: give places inside its length')
+        inside.add(x)
+    return [0.0, *sorted(inside), beam.length_m]
+
+
+def _split(scene: Scene, beam: BeamBody, ends: list[float], level: Level, modes: Modes) -> Scene:
+    count = len(ends) - 1
     places = {}
     for name, x in nodes_along(beam).items():
         piece = piece_at(ends, x)

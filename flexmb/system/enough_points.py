@@ -17,6 +17,7 @@ import numpy as np
 from flexmb.modal.exact import field_of_points
 from flexmb.modal.strain_field import WHOLE, StrainField
 from flexmb.scene.bodies import BeamBody
+from flexmb.scene.pieces import piece_count
 from flexmb.scene.strains import points_of_piece
 from flexmb.system.moved_sections import moved_sections
 from flexmb.system.scene_arrays import SceneArrays
@@ -80,7 +81,7 @@ def _error(body: BeamBody, eta: Real, t: float) -> Unfollowed | None:
     """What the points of the beam leave of these strains (m,), if it is more than ALLOWED."""
     points = points_of_piece(body)
     finest = 2 * points + 8
-    if 12.0 * finest * body.modes.pieces * len(eta) > _MOST:
+    if 12.0 * finest * piece_count(body) * len(eta) > _MOST:
         return None
     truth = _seen(body, finest, eta)
     position, rotation = _apart(_seen(body, points, eta), truth)

@@ -1,125 +1,49 @@
-"""The structure of a mass matrix: one kernel for all directions, or lumps at the nodes."""
+"""The inertia of a finite-element structure as masses that its nodes carry.
+
+Node i moves masses by N_i u_i + theta_i x A_i, with a share N_i and arms A_i at every mass: at one place N_i = 1 and
+A_i = 0 for a lump, shape functions for solids, and for a surface that is tied to a node its masses with their arms. The
+sums of products of shares and arms are a kernel, which M contains: the block of two displacements is int N_i N_j 1,
+that of a displacement and a rotation -int N_i A_j~, and that of two rotations int A_i~' A_j~.
+
+Mass matrices with this structure are those of lumps with tensors and offsets, of solids, of shells, and of whatever of
+these is tied rigidly. Others, as of consistent beams, have the nearest kernel: that of their symmetric and skew parts.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from numpy.typing import NDArray
 
-from flexmb.interchange.superelement.element import ALIKE, SuperElement, SuperElementError
+from flexmb.interchange.superelement.element import SuperElement
 from flexmb.modal.cross import cross_matrix
 from flexmb.typing import Real
 
 
-@dataclass(frozen=True, eq=False)
-class NodalInertia:
-    """Inertia of a structure with n nodes, and the mass matrix M (N,N) that belongs to it.
+def carried_sums(element: SuperElement, position: Real, translation: Real, rotation: Real) -> Real:
+    """Sums (4+3m, 4+3m) over the masses of products of the fields 1, r, phi_n.
 
-    kernel (n,n) kg: sum m f g = f' kernel g for two fields with values f and g at the nodes. This is exact for solids,
-    whose shape functions are the same in all directions. second_moment (n,3,3) kg m²: sum m a a' of masses at arms a
-    from the mass centres, turning with the nodes; offset (n,3) m: these mass centres. `note` describes changes to M.
+    position (n,3) m of the nodes, translation and rotation modes (n,3,m).
     """
-
-    kernel: Real
-    offset: Real
-    second_moment: Real
-    M: Real
-    note: str = ""
-
-    def gram(self, position: Real, translation: Real, rotation: Real) -> Real:
-        """Sums of products (4+3m, 4+3m) of the fields 1, r, phi_n for modes (n,3,m) of nodes at `position` (n,3)."""
-        n, _, m = translation.shape
-        shapes = translation + np.cross(rotation, self.offset[:, :, None], axis=1)
-        fields = np.column_stack([np.ones(n), position + self.offset, shapes.transpose(0, 2, 1).reshape(n, 3 * m)])
-        turned = cross_matrix(rotation.transpose(0, 2, 1)).reshape(n, 3 * m, 3)  # of masses at unit arms
-        arms = np.concatenate([np.zeros((n, 1, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)), turned], axis=1)
-        return fields.T @ self.kernel @ fields + np.einsum(
-            "iac,icd,ibd->ab", arms, self.second_moment, arms, optimize=True
-        )
+    n, _, m = translation.shape
+    shares = np.column_stack([np.ones(n), position, translation.transpose(0, 2, 1).reshape(n, 3 * m)])
+    arms = np.zeros((3, n, 4 + 3 * m))
+    arms[:, :, 1:4] = np.eye(3)[:, None]
+    arms[:, :, 4:] = np.moveaxis(cross_matrix(rotation.transpose(0, 2, 1)).reshape(n, 3 * m, 3), 2, 0)
+    turns = np.any(element.place[:, 3:] >= 0, axis=1)
+    fields = np.concatenate([shares, *arms[:, turns]])
+    return np.asarray(fields.T @ _kernel(element, turns) @ fields)
 
 
-def nodal_inertia(element: SuperElement) -> NodalInertia:
-    """The inertia of M: exact if M has one kernel or lumps at nodes; otherwise lumped, with a note.
+def _kernel(element: SuperElement, turns: NDArray[np.bool_]) -> Real:
+    """Sums (n+3k, n+3k) of products of the shares of all nodes and the arms along x, y and z of the k that turn."""
+    padded = np.pad(element.M, ((0, 1), (0, 1)))  # index -1 selects zeros
+    move, turn = element.place[:, :3].T, element.place[turns, 3:].T
 
-    Lumping conserves the mass and the mass centre of the structure. SuperElementError for a node with mass in some
-    directions only.
-    """
-    full, blocks = _by_nodes(element)
-    largest = _max(element.M)
-    kernel = _kernel(full, largest)
-    if kernel is not None:
-        nothing = np.zeros((len(kernel), 3, 3))
-        return NodalInertia(kernel, nothing[:, 0], nothing, element.M)
-    coupled = full.copy()
-    coupled[np.arange(len(full)), :, np.arange(len(full)), :] = 0.0
-    if _max(coupled) <= ALIKE * largest:
-        return _lumps(element, blocks, "")
-    rows = np.sum(full, axis=2)
-    rows[:, :3, 3:] = rows[:, 3:, :3] = 0.0
-    return _lumps(element, rows, "M couples rotations of different nodes, so it was lumped at the nodes")
+    def block(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Real:
+        return padded[np.ix_(rows, columns)]
 
-
-def _by_nodes(element: SuperElement) -> tuple[Real, Real]:
-    """M as (n,6,n,6), with zeros for displacements without a row, and its diagonal blocks (n,6,6)."""
-    n = len(element.ids)
-    there = element.place >= 0
-    full = np.zeros((6 * n, 6 * n))
-    full[np.ix_(np.flatnonzero(there), np.flatnonzero(there))] = element.M[
-        np.ix_(element.place[there], element.place[there])
-    ]
-    by_nodes = full.reshape(n, 6, n, 6)
-    return by_nodes, by_nodes[np.arange(n), :, np.arange(n), :]
-
-
-def _kernel(full: Real, largest: float) -> Real | None:
-    """The common kernel (n,n) of all three directions, or None if there is none or rotations have inertia."""
-    if _max(full[:, 3:]) > 0.0:
-        return None
-    kernel = np.einsum("iaja->ij", full[:, :3, :, :3]) / 3.0
-    rest = full[:, :3, :, :3] - kernel[:, None, :, None] * np.eye(3)[:, None, :]
-    return kernel if _max(rest) <= ALIKE * largest else None
-
-
-def _lumps(element: SuperElement, blocks: Real, note: str) -> NodalInertia:
-    """Lumps from the blocks (n,6,6) [m, -m c~; m c~, J] of single nodes.
-
-    Negative second moments, which no mass has, are set to zero; this increases the inertia.
-    """
-    mass = np.einsum("iaa->i", blocks[:, :3, :3]) / 3.0
-    slack = ALIKE * float(np.max(mass))
-    uneven = np.max(np.abs(blocks[:, :3, :3] - mass[:, None, None] * np.eye(3)), axis=(1, 2))
-    if np.max(uneven) > slack:
-        worst = element.ids[int(np.argmax(uneven))]
-        raise SuperElementError(
-            f"node {worst} has other mass in x than in y or z: give mass that acts in all directions"
-        )
-    first = 0.5 * (blocks[:, 3:, :3] - blocks[:, :3, 3:])
-    moment = np.stack([first[:, 2, 1], first[:, 0, 2], first[:, 1, 0]], axis=1)
-    offset = np.where(mass[:, None] > slack, moment / np.where(mass > slack, mass, 1.0)[:, None], 0.0)
-    c = cross_matrix(offset)
-    J = blocks[:, 3:, 3:] + mass[:, None, None] * c @ c
-    S = 0.5 * np.trace(J, axis1=1, axis2=2)[:, None, None] * np.eye(3) - 0.5 * (J + J.transpose(0, 2, 1))
-    values, axes = np.linalg.eigh(S)
-    second = np.einsum("iac,ic,ibc->iab", axes, np.maximum(values, 0.0), axes)
-    if np.min(values, initial=0.0) < -ALIKE * np.max(np.abs(J), initial=0.0):
-        note = f"{note}; " if note else ""
-        note += "rotary inertia about one axis only was completed to that of a mass"
-    return NodalInertia(np.diag(mass), offset, second, _mass_matrix(element, mass, offset, second), note)
-
-
-def _mass_matrix(element: SuperElement, mass: Real, offset: Real, second: Real) -> Real:
-    """M (N,N) of the lumps."""
-    c = cross_matrix(offset)
-    J = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second - mass[:, None, None] * c @ c
-    first = mass[:, None, None] * c
-    upper = np.concatenate([mass[:, None, None] * np.broadcast_to(np.eye(3), c.shape), -first], axis=2)
-    blocks = np.concatenate([upper, np.concatenate([first, J], axis=2)], axis=1)
-    M = np.zeros_like(element.M)
-    for rows, block in zip(element.place, blocks, strict=True):
-        there = rows >= 0
-        M[np.ix_(rows[there], rows[there])] = block[np.ix_(there, there)]
-    return M
-
-
-def _max(a: Real) -> float:
-    return float(np.max(np.abs(a), initial=0.0))
+    share = sum(block(rows, rows) for rows in move) / 3.0
+    mixed = [0.5 * (block(move[b], turn[c]) - block(move[c], turn[b])) for b, c in ((1, 2), (2, 0), (0, 1))]
+    half = 0.5 * sum(block(rows, rows) for rows in turn)
+    own = [[(half if a == b else 0.0) - block(turn[b], turn[a]) for b in range(3)] for a in range(3)]
+    return np.block([[share, *mixed], *([mixed[a].T, *own[a]] for a in range(3))])

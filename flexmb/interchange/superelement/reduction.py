@@ -14,9 +14,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.interchange.gram import NoMasses, equivalent_masses
-from flexmb.interchange.superelement.element import MOTIONS, SuperElement, SuperElementError
-from flexmb.interchange.superelement.inertia import NodalInertia, nodal_inertia
+from flexmb.interchange.gram import NoMasses
+from flexmb.interchange.superelement.element import ALIKE, MOTIONS, SuperElement, SuperElementError
+from flexmb.interchange.superelement.inertia import carried_sums
+from flexmb.interchange.superelement.points import RigidBlock, points_with
 from flexmb.scene.bodies import Level, ModalBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
@@ -26,6 +27,8 @@ LOOSE = 1e-12
 """Pivots of K below this fraction of the diagonal are zero: there is a mechanism, or an unconnected part."""
 DENSE = 1000
 """Number of rows up to which the dense eigensolver is used."""
+FARTHEST = 0.25
+"""Relative difference of frequencies up to which masses that nodes carry are near to M."""
 MASSLESS = 1e-13  # a mode has no mass if 1/omega^2 is below this fraction of the largest
 
 
@@ -34,8 +37,9 @@ class ReducedBody:
     """`body` in axes of the structure, with its origin at `origin` (3,) m; frequencies (m,) Hz of its modes.
 
     mass kg, mass centre (3,) m and inertia (3,3) kg m² about the origin, both in the body frame, from the rigid-body
-    motions of M. shapes (n,6,m): displacements and rotations of all nodes of the structure at unit modal coordinates,
-    to recover its motion. `notes` describe changes to the data.
+    motions of M; the body has just these, and the modal masses and coupling of M, at every level. shapes (n,6,m):
+    displacements and rotations of all nodes of the structure at unit modal coordinates, to recover its motion. `notes`
+    say what of the body is not determined by M.
     """
 
     body: ModalBody
@@ -60,24 +64,24 @@ def reduced(
     """
     if not 0.0 <= damping_ratio < 1.0:
         raise SuperElementError(f"the damping ratio is {damping_ratio:g}: give a number from 0 to 1, such as 0.005")
-    inertia = nodal_inertia(element)
     nodes = [element.node(number) for number in dict.fromkeys(interface)]
     held = _interface_rows(element, nodes)
     if len(held) + modes <= 6:
         raise SuperElementError("one interface node without modes is a rigid body: give modes, or more nodes")
-    T = _shapes(element.K, inertia.M, held, modes)
+    T = _shapes(element.K, element.M, held, modes)
     clamped = boundary == "clamped-free"
-    R = element.rigid(np.zeros(3))
-    rigid_mass = R.T @ inertia.M @ R
-    mass = float(np.trace(rigid_mass[:3, :3])) / 3.0
-    centre = np.array([rigid_mass[5, 1], rigid_mass[3, 2], rigid_mass[4, 0]]) / mass
+    whole = element.rigid(np.zeros(3))
+    centre = RigidBlock.of(whole.T @ element.M @ whole).centre
     origin = element.position[nodes[0]] if clamped else centre
-    frequencies, V = _modes(element.K, inertia.M, T[:, 6:] if clamped else T, None if clamped else R)
+    frequencies, V = _modes(element.K, element.M, T[:, 6:] if clamped else T, None if clamped else whole)
     shapes = _at_nodes(element, V)
     translation, rotation = shapes[:, :3], shapes[:, 3:]
     omega = 2.0 * np.pi * frequencies
+    motions = np.column_stack([element.rigid(origin), V])
+    spatial = motions.T @ element.M @ motions
     try:
-        points = equivalent_masses(inertia.gram(element.position - origin, translation, rotation))
+        sums = carried_sums(element, element.position - origin, translation, rotation)
+        points, distance = points_with(spatial, sums, omega)
     except NoMasses as error:
         raise SuperElementError(f"M is not a mass matrix ({error}): its eigenvalues have to be zero or more") from None
     body = {
@@ -97,10 +101,26 @@ def reduced(
             for i in nodes
         ],
     }
-    about = element.rigid(origin)
-    J = (about.T @ inertia.M @ about)[3:, 3:]
-    notes = _notes(element, inertia)
-    return ReducedBody(to_struct(plain(body), ModalBody), origin, frequencies, mass, centre - origin, J, shapes, notes)
+    mass, mass_centre, J = RigidBlock.of(spatial)
+    notes = _notes(distance)
+    return ReducedBody(to_struct(plain(body), ModalBody), origin, frequencies, mass, mass_centre, J, shapes, notes)
+
+
+def _notes(distance: float) -> tuple[str, ...]:
+    """What to say about masses that have M at rest only. SuperElementError above FARTHEST."""
+    if not distance <= FARTHEST:
+        raise SuperElementError(
+            f"M is far from that of masses which its nodes carry: with the nearest ones, frequencies are off by "
+            f"{distance:.2g}, and the limit is {FARTHEST:g}: write a lumped M, or with the same shape functions in all "
+            "directions, or divide the structure into more elements"
+        )
+    if distance <= ALIKE:
+        return ()
+    return (
+        "M is not that of masses which its nodes carry: frequencies, mass and inertia at rest are those of M, and "
+        "inertia changes with the deformation as that of near masses, which have frequencies that are off by "
+        f"{distance:.2g}",
+    )
 
 
 def _interface_rows(element: SuperElement, nodes: list[int]) -> NDArray[np.int64]:
@@ -148,11 +168,17 @@ def _modes(K: Real, M: Real, T: Real, rigid: Real | None) -> tuple[Real, Real]:
     """
     from scipy.linalg import eigh, solve_triangular
 
-    T = T / np.sqrt(np.einsum("im,ij,jm->m", T, K, T, optimize=True))
+    energy, terms = np.einsum("im,ij,jm->m", T, K, T, optimize=True), np.diag(K) @ T**2
+    T = T / np.sqrt(np.where(energy > LOOSE * terms, energy, terms))  # rigid-body motions have no energy
     k, m = T.T @ K @ T, T.T @ M @ T
     elastic = m
     if rigid is not None:
-        R = solve_triangular(np.linalg.cholesky(rigid.T @ M @ rigid), rigid.T, lower=True).T
+        try:
+            R = solve_triangular(np.linalg.cholesky(rigid.T @ M @ rigid), rigid.T, lower=True).T
+        except np.linalg.LinAlgError:
+            raise SuperElementError(
+                "M gives a rigid-body motion no inertia, so that there is no mean frame: clamp the first interface node"
+            ) from None
         held = T.T @ (M @ R)
         k = k + np.trace(k) / np.trace(held @ held.T) * held @ held.T
         elastic = m - held @ held.T
@@ -207,11 +233,3 @@ def _at_nodes(element: SuperElement, V: Real) -> Real:
     """Translations and rotations (n,6,m) of the nodes, zero for those without a row."""
     padded = np.concatenate([V, np.zeros((1, V.shape[1]))])  # index -1 selects the row of zeros
     return padded[element.place]
-
-
-def _notes(element: SuperElement, inertia: NodalInertia) -> tuple[str, ...]:
-    if not inertia.note:
-        return ()
-    R = element.rigid(element.position.mean(axis=0))
-    before, after = (np.trace((R.T @ M @ R)[3:, 3:]) for M in (element.M, inertia.M))
-    return (f"{inertia.note}; the moments of inertia changed by {abs(after / before - 1.0):.2g} of their sum",)

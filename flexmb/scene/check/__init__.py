@@ -11,6 +11,7 @@ from flexmb.scene.check.connectors import connectors
 from flexmb.scene.check.control import control
 from flexmb.scene.check.couplings import couplings
 from flexmb.scene.check.events import events
+from flexmb.scene.check.exact_beams import jumps
 from flexmb.scene.check.hinges import closures, hinges, point_masses, wheels
 from flexmb.scene.check.inertia import rigid_bodies
 from flexmb.scene.check.modal import modal_bodies, modal_states
@@ -66,7 +67,7 @@ def _problems(scene: Scene, t_end: float | None, t_start: float) -> list[Defect]
     problems += [problem for check in EVERYWHERE + STRUCTURE + PHYSICS for problem in check(scene)]
     problems += functions(scene, t_end, t_start)
     if all(isinstance(each, Doubt) for each in problems):  # it needs valid numbers and names, and a tree
-        problems += moved_inertia(scene)
+        problems += [*moved_inertia(scene), *jumps(scene)]
     return problems
 
 

@@ -6,8 +6,11 @@ from collections.abc import Iterator
 from math import hypot
 
 from flexmb.scene.bodies import BeamBody, Modes
-from flexmb.scene.problems import Defect, Doubt, Place
+from flexmb.scene.convert import ROOT
+from flexmb.scene.pieces import across, piece_count
+from flexmb.scene.problems import Defect, Doubt, Place, closest
 from flexmb.scene.rest_curve import MOST_TURN, turn_at_rest
+from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import MOST_MODES
 from flexmb.scene.strains import FEWEST_POINTS, MORE_POINTS, STRAINS, points_of_piece, polynomials
 
@@ -48,7 +51,7 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
         if shear in found and any(each.stiffness is None and getattr(each, key) is None for each in body.stations):
             spot = str(place.key("stations"))
             yield Defect(spot, f"{shear} has polynomials, and a station no {key}", f"give {key} at every station")
-    if (count := sum(found.values()) * max(body.modes.pieces, 1)) > MOST_MODES:
+    if (count := sum(found.values()) * max(piece_count(body), 1)) > MOST_MODES:
         what = f"{count} polynomials in all its pieces: one body with so many takes minutes and gigabytes to make"
         remedy = f"give {MOST_MODES} at most; several bodies that are welded together cost O(N)"
         yield Defect(str(modes.key("pieces")), what, remedy)
@@ -66,12 +69,35 @@ def _numbers(place: Place, body: BeamBody) -> Iterator[Defect]:
             yield Defect(str(place.key(key)), f"{count} polynomials", remedy)
     if not 1 <= modes.pieces <= MOST_PIECES:
         yield Defect(str(place.key("pieces")), f"{modes.pieces} pieces", f"give 1 to {MOST_PIECES}")
+    places = {node.name: node.x_m for node in body.nodes}
+    for i, name in enumerate(modes.cuts):
+        spot = str(place.key("cuts", i))
+        if name not in places:
+            yield Defect(spot, f'the beam lists no node "{name}"', closest(name, places))
+        elif not 0.0 < places[name] < body.length_m:
+            yield Defect(spot, f'node "{name}" is at the end of the beam', "leave it out: the beam ends there anyway")
+        elif any(places.get(other) == places[name] for other in modes.cuts[:i]):
+            yield Defect(spot, f'the beam is already cut where node "{name}" is', "leave one of them out")
+
+
+def jumps(scene: Scene) -> Iterator[Doubt]:
+    """Where strains jump inside the pieces of beams of level exact, of a scene that has no defects."""
+    for i, body in enumerate(scene.bodies):
+        if isinstance(body, BeamBody) and body.level == "exact" and (found := across(scene, body)):
+            x, what = next(iter(found.items()))
+            more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+            yield Doubt(
+                str(ROOT.key("bodies", i, "modes", "cuts").named(f'body "{body.name}"')),
+                f"strains jump at x = {x:g} m ({what}){more}, where one polynomial goes on: it converges slowly there",
+                "cut the beam there: cuts = [its node], or flexmb.surrogate.cut_where_loaded",
+                "uncut_beam",
+            )
 
 
 def without_strains(place: Place, body: BeamBody) -> Iterator[Defect]:
     """A beam of another level is not given what only level exact has."""
     standard = Modes(count=1)
-    for key in ("polynomials", "pieces", "points"):
+    for key in ("polynomials", "pieces", "cuts", "points"):
         if body.level != "rigid" and getattr(body.modes, key) != getattr(standard, key):
             what = f'{key} is for strains, which level "{body.level}" does not have'
             yield Defect(str(place.key("modes", key)), what, 'leave it out, or make the level "exact"')

@@ -35,7 +35,7 @@ def stations(length: float = 1.0, curvature: Any = (0.0, 0.0, 0.0), more: Any = 
 def beam(modes: s.Modes, length: float = 1.0, section: list[s.BeamStation] | None = None, name: str = "rod",
          **more: Any) -> SceneBuilder:  # fmt: skip
     """A scene without gravity of one beam that is not hinged yet; it is soft, so that stretch matters."""
-    builder = SceneBuilder("exact", gravity=more.pop("gravity", (0.0, 0.0, 0.0)), allow=("wave_speed",))
+    builder = SceneBuilder("exact", gravity=more.pop("gravity", (0.0, 0.0, 0.0)), allow=("wave_speed", "uncut_beam"))
     return builder.beam(name, length=length, elements=4, section=section or stations(length), modes=modes,
                         **{"level": "exact", "points": "section"} | more)  # fmt: skip
 

@@ -374,4 +374,9 @@ DOUBTFUL = {
                          ["$.hinges[4].translation.damping_Ns_m"], ["negative damping"], ["zero"], "negative_damping"),
     "negative bearing friction": (put("wheels", 0, "friction_Nms_rad", -0.1), ["$.wheels[0].friction_Nms_rad"],
                                   ["negative friction"], ["zero"], "negative_damping"),
+    "a port inside a piece": (
+        both(put("bodies", 1, "level", "exact"), put(*MODES, "families", ["bending_y"]),
+             put("hinges", 2, "parent_node", "middle")),
+        ["$.bodies[1].modes.cuts", 'body "boom"'], ["strains jump at x = 1.5 m", 'hinge "cardan" at node "middle"'],
+        ["cut the beam there"], "uncut_beam"),
 }  # fmt: skip

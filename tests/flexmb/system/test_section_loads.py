@@ -31,7 +31,7 @@ def everything(closed: bool = False, connected: bool = False, node: str = "origi
                       inertia_kg_m2=((2e-3, 0.0, 0.0), (0.0, 1e-3, 0.0), (0.0, 0.0, 1.5e-3)))  # fmt: skip
     modes = beam.pop("modes", fm.Modes(count=5, static=True))
     builder = (
-        fm.SceneBuilder("everything", gravity=(0.3, -9.81, 1.0))
+        fm.SceneBuilder("everything", gravity=(0.3, -9.81, 1.0), allow=("uncut_beam",))
         .rigid_body("hub", mass=3.0, inertia=(1.0, 1.0, 1.0))
         .beam("beam", length=LENGTH, elements=4, section=section, modes=modes, nodes={"middle": 0.7},
               tip_masses=[lump], **beam)

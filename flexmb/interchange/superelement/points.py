@@ -1,0 +1,101 @@
+"""Point masses whose kinetic energy at rest is exactly that of a mass matrix.
+
+The spatial mass S = [R Phi]' M [R Phi] of rigid-body motions R and modes Phi has mass, mass centre, inertia, coupling
+and modal masses: all that vibrations about the undeformed shape need. How they change with the deformation is in sums
+over masses that M does not contain unless it is that of masses which its nodes carry. The points start from those, and
+their fields move as little as possible, in the least-squares sense, until they have S.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.interchange.gram import NEGATIVE, EquivalentMasses, NoMasses, equivalent_masses
+from flexmb.modal.cross import cross_matrix
+from flexmb.typing import Real
+
+MASSLESS = 1e-12  # share of the inertia below which there is none, as that of a line of points about itself
+SLIGHT = 1e-9  # share of the largest 1/omega^2 of the body below which a motion has next to no mass
+ROUNDING = 1e-9
+
+
+class RigidBlock(NamedTuple):
+    """mass kg, mass centre (3,) m and inertia (3,3) kg m² about the origin."""
+
+    mass: float
+    centre: Real
+    J: Real
+
+    @classmethod
+    def of(cls, S: Real) -> RigidBlock:
+        """From a spatial mass, in the order translations, rotations, modes."""
+        mass = float(np.trace(S[:3, :3])) / 3.0
+        return cls(mass, np.array([S[5, 1], S[3, 2], S[4, 0]]) / mass, S[3:6, 3:6])
+
+
+class NearPoints(NamedTuple):
+    """The points, and by how much the frequencies of the free structure were off before their fields moved."""
+
+    points: EquivalentMasses
+    distance: float
+
+
+def points_with(S: Real, sums: Real, omega: Real) -> NearPoints:
+    """Points with the spatial mass S (6+m,6+m), near to those with the sums (4+3m,4+3m) of products of 1, r and phi_n.
+
+    omega (m,) rad/s of the modes, which have unit mass. Raises NoMasses if no points have S.
+    """
+    start = equivalent_masses(sums, nearest=True)
+    count, _, m = start.translation_modes.shape
+    rigid = RigidBlock.of(S)
+    each = rigid.mass / count
+    second = 0.5 * np.trace(rigid.J) * np.eye(3) - rigid.J - rigid.mass * np.outer(rigid.centre, rigid.centre)
+    spread = start.position - start.position.mean(axis=0)
+    position = rigid.centre + _nearest(spread, second / each, np.ones((count, 1)), 1)
+    R = np.concatenate([np.broadcast_to(np.eye(3), (count, 3, 3)), -cross_matrix(position)], axis=2).reshape(-1, 6)
+    follow = _inverse(S[:6, :6]) @ S[:6, 6:]
+    elastic = S[6:, 6:] - S[6:, :6] @ follow
+    phi = start.translation_modes.reshape(-1, m)
+    phi = phi - R @ (_inverse(each * R.T @ R) @ (each * R.T @ phi))
+    moved = R @ follow + _nearest(phi, elastic / each, R, 4)
+    points = EquivalentMasses(np.full(count, each), position, moved.reshape(count, 3, m))
+    return NearPoints(points, _distance(elastic, each * phi.T @ phi, omega))
+
+
+def _distance(elastic: Real, start: Real, omega: Real) -> float:
+    """The largest relative difference of the frequencies that these modal masses (m,m) of the free structure give."""
+    exact, near = (np.linalg.eigvalsh(each / np.outer(omega, omega))[::-1] for each in (elastic, start))
+    there = exact > SLIGHT / np.min(omega) ** 2
+    if np.any(near[there] <= 0.0):
+        return float("inf")
+    return float(np.max(np.abs(np.sqrt(exact[there] / near[there]) - 1.0), initial=0.0))
+
+
+def _inverse(inertia: Real) -> Real:
+    """Pseudo-inverse of a rigid mass (6,6), whose translations and rotations have different units."""
+    size = np.sqrt(np.repeat([np.trace(inertia[:3, :3]), np.trace(inertia[3:, 3:])], 3))
+    size = np.where(size > 0.0, size, 1.0)
+    return np.asarray(np.linalg.pinv(inertia / np.outer(size, size), MASSLESS, hermitian=True) / np.outer(size, size))
+
+
+def _nearest(fields: Real, products: Real, others: Real, number: int) -> Real:
+    """Fields (p,k) nearest to the given ones with these products (k,k), orthogonal to the `others` (p,b).
+
+    An orthogonal Procrustes problem. Raises NoMasses, which names the field `number` and so on, if there are none.
+    """
+    from scipy.linalg import qr
+
+    values, axes = np.linalg.eigh(0.5 * (products + products.T))
+    if values[0] < -NEGATIVE * np.abs(values).max():
+        raise NoMasses(number + int(np.argmax(np.abs(axes[:, 0]))))
+    root = axes * np.sqrt(np.maximum(values, 0.0)) @ axes.T
+    size = np.linalg.norm(others, axis=0)
+    Q, R, _ = qr(others / np.where(size > 0.0, size, 1.0), pivoting=True)
+    free = Q[:, np.count_nonzero(np.abs(np.diag(R)) > MASSLESS) :]
+    left, _, right = np.linalg.svd(free.T @ fields @ root, full_matrices=False)
+    found = np.asarray(free @ (left @ right) @ root)
+    if not np.max(np.abs(found.T @ found - products)) <= ROUNDING * np.abs(values).max():  # fewer points than fields
+        raise NoMasses(number)
+    return found

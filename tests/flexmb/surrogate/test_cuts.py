@@ -1,0 +1,142 @@
+"""Beams of level exact that are cut at nodes: where their strains jump, and that it is said where they are not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+from numpy.testing import assert_allclose
+
+import flexmb as fm
+from flexmb.advisor.modes import with_strains
+from flexmb.scene.pieces import across, edges
+from flexmb.surrogate import cut_where_loaded, substructured
+
+SECTION = fm.BeamStation(
+    x_m=0.0, EA_N=1e6, EIy_Nm2=1.0, EIz_Nm2=1.0, GJ_Nm2=0.8, mass_per_length_kg_m=1.0, rotary_y_kg_m=1e-4,
+    rotary_z_kg_m=1e-4,
+)  # fmt: skip
+PLANE = ("bending_y",)
+PORT = 0.37
+UPRIGHT = (float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5)))
+
+
+def stem(modes: fm.Modes, **more: Any) -> fm.SceneBuilder:
+    """A clamped beam of 1 m with a node inside; its builder."""
+    builder = fm.SceneBuilder("T", allow=("wave_speed", "thick_section"))
+    nodes = [fm.BeamNode(name="port", x_m=PORT), fm.BeamNode(name="free", x_m=0.8)]
+    section = more.pop("section", SECTION)
+    builder.beam("stem", length=1.0, elements=8, section=section, modes=modes, level="exact", nodes=nodes, **more)
+    return builder.weld("clamp", "ground", "stem").marker("tip", "stem", node="tip").marker("at", "stem", node="free")
+
+
+def frame(count: int, **modes: Any) -> fm.Scene:
+    """A T-frame: a branch of 0.5 m across the stem at the port, with a force at its end."""
+    own = fm.Modes(count=count, families=PLANE)
+    return (
+        stem(replace(own, **modes))
+        .beam("branch", length=0.5, elements=8, section=SECTION, modes=own, level="exact")
+        .weld("fork", "stem", "branch", parent_node="port", parent_quaternion=UPRIGHT)
+        .force("pull", "branch", node="tip", direction=(1, 0, 0), function=fm.Constant(value=8.0))
+        .marker("end", "branch", node="tip")
+        .scene()
+    )
+
+
+def at_rest(scene: fm.Scene) -> np.ndarray:
+    """Markers (3,3) at the equilibrium."""
+    system = fm.compile(scene)
+    found = fm.equilibrium(system)
+    markers = system.evaluate(0.0, found.q, found.u).markers
+    return np.array([markers[name].position for name in ("tip", "at", "end") if name in markers])
+
+
+def test_a_frame_cut_at_its_port_converges_as_fast_as_a_smooth_beam() -> None:
+    """Uncut, four polynomials leave 2.9e-2 L and ten 1.0e-2 L, and the scene says so."""
+    truth = at_rest(substructured(frame(9), "stem", ["port"]))
+    with pytest.warns(fm.SceneWarning, match=r'strains jump at x = 0.37 m \(hinge "fork" at node "port"\)'):
+        uncut = at_rest(frame(4))
+    assert np.max(np.abs(uncut - truth)) > 1e-2
+    for count, error in ((4, 1e-6), (6, 1e-8)):
+        one = at_rest(cut_where_loaded(frame(count)))
+        assert_allclose(one, truth, atol=error)
+        assert_allclose(at_rest(frame(count, cuts=("port",))), one, atol=1e-12)
+        assert_allclose(at_rest(substructured(frame(count), "stem", [PORT])), one, atol=1e-9)
+        assert_allclose(at_rest(with_strains(frame(count), "stem", count, 1, False, ())), one, atol=1e-9)
+
+
+def test_a_cut_where_nothing_happens_changes_nothing() -> None:
+    """The strains of two pieces contain those of one: frequencies of the straight beam, and its motion."""
+    modes = fm.Modes(count=8, families=PLANE)
+    whole, cut = (fm.linearize(stem(each).scene()).modes for each in (modes, replace(modes, cuts=("free", "port"))))
+    for a, b in zip(whole[:3], cut[:3], strict=True):
+        assert b.frequency_hz == pytest.approx(a.frequency_hz, rel=1e-5)
+
+
+def test_pieces_lie_between_the_cuts() -> None:
+    body = stem(fm.Modes(count=1, families=PLANE, cuts=("free", "port"), pieces=2)).scene().bodies[0]
+    assert isinstance(body, fm.BeamBody)
+    assert_allclose(edges(body), [0.0, PORT / 2, PORT, (PORT + 0.8) / 2, 0.8, 0.9, 1.0])
+    equal = replace(body, modes=fm.Modes(count=1, pieces=3))
+    assert np.array_equal(edges(equal), np.linspace(0.0, 1.0, 4))
+
+
+LUMP = fm.TipMass(x_m=0.6, mass_kg=0.1)
+STEPPED = [SECTION, replace(SECTION, x_m=0.25), replace(SECTION, x_m=0.25, EIy_Nm2=3.0), replace(SECTION, x_m=1.0)]
+PORTS = {
+    "hinge": lambda b: b.rigid_body("r", mass=1.0, inertia=(1, 1, 1)).revolute("h", "stem", "r", parent_node="port"),
+    "load": lambda b: b.force("f", "stem", node="port", direction=(0, 1, 0), function=fm.Constant(value=1.0)),
+    "wheel": lambda b: b.wheel(
+        "w", "stem", node="port", axis=(0, 0, 1), mass=0.1, axial_inertia=1e-3, transverse_inertia=1e-3
+    ),
+    "connector": lambda b: b.spring_damper("s", "ground", "stem", node_b="port", position_a=(0, 1, 0), stiffness=1.0),
+    "closure": lambda b: b.closure("c", "spherical", "stem", "ground", node_a="port", position_b=(PORT, 0, 0)),
+    "point mass": lambda b: b.point_mass("p", "stem", mass=0.1, node="port"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", PORTS)
+def test_whatever_is_joined_to_a_node_inside_is_found_and_cut(kind: str) -> None:
+    builder = stem(fm.Modes(count=2, families=PLANE))
+    assert across(builder.scene(), builder.scene().bodies[0]) == {}
+    scene = PORTS[kind](builder).scene()
+    assert list(across(scene, scene.bodies[0])) == [PORT]
+    cut = cut_where_loaded(scene)
+    assert cut.bodies[0].modes.cuts == ("port",)
+    assert across(cut, cut.bodies[0]) == {} and cut_where_loaded(cut) is cut
+
+
+def test_lumps_and_steps_of_the_section_are_found_and_get_nodes() -> None:
+    scene = stem(fm.Modes(count=2, families=PLANE), section=STEPPED, tip_masses=[LUMP]).scene()
+    doubts = [each for each in fm.check_scene(scene) if each.waiver == "uncut_beam"]
+    assert len(doubts) == 1 and "x = 0.25 m (a step of the section) and 1 more" in str(doubts[0])
+    cut = cut_where_loaded(scene).bodies[0]
+    assert isinstance(cut, fm.BeamBody)
+    assert cut.modes.cuts == ("cut_1", "cut_2") and [node.x_m for node in cut.nodes[2:]] == [0.25, 0.6]
+
+
+@pytest.mark.parametrize(("cuts", "words"), [
+    (("prot",), 'no node "prot"'), (("port", "port"), "already cut"), (("tip",), 'no node "tip"'),
+])  # fmt: skip
+def test_what_cannot_be_cut_is_refused(cuts: tuple[str, ...], words: str) -> None:
+    with pytest.raises(fm.SceneError, match=words):
+        fm.check_scene(stem(fm.Modes(count=2, families=PLANE, cuts=cuts)).scene())
+
+
+def test_refusals() -> None:
+    scene = frame(2)
+    with pytest.raises(ValueError, match='cannot be cut at x = 1 m: give places inside'):
+        substructured(scene, "stem", ["port", 1.0])
+    with pytest.raises(ValueError, match='has no node "prot"'):
+        substructured(scene, "stem", ["prot"])
+    full = replace(scene, bodies=tuple(replace(body, level="full") for body in scene.bodies))
+    with pytest.raises(ValueError, match='has level "full", which has no pieces'):
+        cut_where_loaded(full, "stem")
+    bent = replace(scene, modal_states=(fm.ModalState(body="stem", coordinates=(0.1, 0.0)),))
+    with pytest.raises(ValueError, match="its modal state is for other strains"):
+        cut_where_loaded(bent)
+    wrong = replace(full, bodies=(replace(full.bodies[0], modes=fm.Modes(count=2, cuts=("port",))), full.bodies[1]))
+    with pytest.raises(fm.SceneError, match="cuts is for strains"):
+        fm.check_scene(wrong)
