@@ -20,7 +20,8 @@ _HOME = {
     "flexmb.control.user": "user_function",
     "flexmb.linear.campbell": "Campbell campbell",
     "flexmb.linear.controlled_motion": "ControlledDerivatives ControlledMotion",
-    "flexmb.linear.equilibrium": "equilibrium",
+    "flexmb.linear.equilibrium": "Equilibrium equilibrium",
+    "flexmb.linear.equilibrium_path": "CriticalPoint EquilibriumPath equilibrium_path",
     "flexmb.linear.linear_model": "LinearModel",
     "flexmb.linear.linearize": "linearize",
     "flexmb.linear.newton": "EquilibriumError",
@@ -68,7 +69,11 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.linear.campbell import campbell as campbell
     from flexmb.linear.controlled_motion import ControlledDerivatives as ControlledDerivatives
     from flexmb.linear.controlled_motion import ControlledMotion as ControlledMotion
+    from flexmb.linear.equilibrium import Equilibrium as Equilibrium
     from flexmb.linear.equilibrium import equilibrium as equilibrium
+    from flexmb.linear.equilibrium_path import CriticalPoint as CriticalPoint
+    from flexmb.linear.equilibrium_path import EquilibriumPath as EquilibriumPath
+    from flexmb.linear.equilibrium_path import equilibrium_path as equilibrium_path
     from flexmb.linear.linear_model import LinearModel as LinearModel
     from flexmb.linear.linearize import linearize as linearize
     from flexmb.linear.newton import EquilibriumError as EquilibriumError

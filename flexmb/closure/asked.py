@@ -65,14 +65,17 @@ class AskedFor(NamedTuple):
         return self.names[value[0][0]]
 
     def broken(self, before: Real, after: Real) -> str:
-        """The given values that differ between two [q, u, work], as "<name> from ... to ..."; "" if none does.
+        """The given values that differ between two [q, u, work], as "<name> from ... to ..."; "" if none does; of
+        many, those that moved most.
 
         If insisted coordinates were kept, the other coordinates count as guesses that select the assembly branch.
         """
         of_coordinates = self.coordinates.insisted or self.coordinates.given
         asked = [place for value, _ in (*of_coordinates, *self.speeds.given) for place in value]
-        moved = [i for i in asked if abs(after[i] - before[i]) > MOVED * max(1.0, abs(before[i]))]
-        told = [f'"{self.names[i]}" from {before[i]:.6g} to {after[i]:.6g}' for i in moved[:MOST_NAMES]]
+        by = np.abs(after - before) / np.maximum(1.0, np.abs(before))
+        moved = [i for i in asked if by[i] > MOVED]
+        most = sorted(moved, key=lambda i: -by[i])[:MOST_NAMES]
+        told = [f'"{self.names[i]}" from {before[i]:.6g} to {after[i]:.6g}' for i in moved if i in most]
         left = len(moved) - len(told)
         return ", ".join(told) + (f", and {left} more" if left else "")
 

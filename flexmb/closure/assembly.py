@@ -1,13 +1,14 @@
 """Assembly: consistent initial conditions from a user's approximate ones, or an error that says why there are none.
 
-Coordinates are corrected by damped Gauss-Newton steps (Levenberg-Marquardt), then the speeds. Each correction is the
-smallest in the metric of kinetic energy, in which modal masses are increased in proportion to the modal stiffness, so
-that modes change only where hinges cannot close the loop. Prescribed coordinates and speeds are not changed. Rows are
-weighted with a length of the scene, and compared with the size of their closure.
+Coordinates are corrected by damped Gauss-Newton steps (Levenberg-Marquardt), then the speeds. Modes keep their values
+where hinges alone can close the loops. Elsewhere each correction is the smallest in the metric of kinetic energy, to
+which modes add their strain energy with so large a factor that they do only what hinges cannot; the result is then
+moved along the closed states to the least strain energy of the change. Prescribed coordinates and speeds are not
+changed. Rows are weighted with a length of the scene, and compared with the size of their closure.
 
 Values that the user asked for (`flexmb.closure.asked`) are held if the remaining ones can close the loops. These are
-tried in turn: all given values and all modes are held; all given values are held and modes may change; only insisted
-values are held; nothing is held.
+tried in turn: all given values are held; only insisted values are held; nothing is held. Only if all of this fails
+with the modes held, it is tried with modes that may change.
 """
 
 from __future__ import annotations
@@ -17,17 +18,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.closure.asked import NO_HOLD, NOTHING_ASKED, AskedFor, KeptValues, Value, Wishes
+from flexmb.closure.asked import NO_HOLD, NOTHING_ASKED, AskedFor, KeptValues, Wishes
 from flexmb.closure.closures import ClosureError, Closures
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.null_loads import GroupResponse
 from flexmb.closure.projection import CLOSED, MOVING_APART, OPEN
-from flexmb.tables.status import OK
+from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 
 STEPS = 200
 NEARLY_CLOSED = 2.0**-40  # gap that counts as closed if values are held: few free speeds amplify rounding
 STRONGEST = 1e12  # damping at which the iteration gives up
+FARTHEST = 2.0**20  # growth of a closure at which it counts as open: gaps relative to its size vanish by themselves
+RELAXATIONS = 20  # steps to the least strain energy ...
+RELAXED = 1e-6  # ... which end when one reduces it by less than this part
 
 
 def consistent(closures: Closures, t: float, y: Real, asked: AskedFor = NOTHING_ASKED) -> Real:
@@ -36,7 +40,7 @@ def consistent(closures: Closures, t: float, y: Real, asked: AskedFor = NOTHING_
     If these cannot be kept, the nearest closed state. ClosureError if there is none, or if values that the scene marks
     as given cannot be kept.
     """
-    y = _as_asked(closures, t, y.copy(), asked.coordinates, asked, _closed, _errors)
+    y = _as_asked(closures, t, y.copy(), asked.coordinates, asked, _closed, _gaps)
     closures.linearise(t, y)
     closures.count_rows()
     _refuse_half_a_turn(closures)
@@ -56,61 +60,77 @@ def _as_asked(
     """
     if opening(closures, t, y, y) <= CLOSED:
         return y
-    for wish in dict.fromkeys((wishes.given, wishes.insisted)):
-        for hold in _holds(closures, t, y, wish, asked, closing) if wish else ():
-            try:
-                kept = closing(closures, t, y, hold)
-            except ClosureError:
-                continue
-            turned = any(turned for _, turned in closures.half_turned())
-            if opening(closures, t, kept, y) <= NEARLY_CLOSED and not turned:
-                return kept
-    nearest = closing(closures, t, y, NO_HOLD)
-    if wishes.insisted and asked.is_marked:
-        names = ", ".join(f'"{asked.name(each)}"' for each in wishes.insisted)
-        raise ClosureError(
-            f"marked as given, but closures do not allow these values: {names}. Correct them, or remove the mark of "
-            "one, which then follows from the others"
-        )
-    return nearest
+    for hold, is_wished in _holds(wishes, asked):
+        kept = _unless_turned(closures, t, y, hold, closing)
+        if kept is None or (is_wished and opening(closures, t, kept, y) > NEARLY_CLOSED):
+            continue
+        if wishes.insisted and asked.is_marked and not is_wished:
+            names = ", ".join(f'"{asked.name(each)}"' for each in wishes.insisted)
+            raise ClosureError(
+                f"marked as given, but closures do not allow these values: {names}. Correct them, or remove the mark "
+                "of one, which then follows from the others"
+            )
+        return kept
+    return closing(closures, t, y, NO_HOLD)
 
 
-def _holds(
-    closures: Closures, t: float, y: Real, wish: tuple[Value, ...], asked: AskedFor, closing: Closing
-) -> Iterator[KeptValues]:
-    """The values to hold, in the order in which they are tried: modes are released only if hinges alone fail."""
-    yield asked.hold(wish, modes=True)
-    if asked.modes and not _closes(closing, closures, t, y, asked.hold((), modes=True)):
-        yield asked.hold(wish, modes=False)
+def _holds(wishes: Wishes, asked: AskedFor) -> Iterator[tuple[KeptValues, bool]]:
+    """What to hold, in the order in which it is tried, and whether values that the user gives are among it: modes are
+    released only if hinges alone fail."""
+    for modes in (True, False) if any(q for q, _ in asked.modes) else (False,):
+        for wish in dict.fromkeys((wishes.given, wishes.insisted, ())):
+            yield asked.hold(wish, modes=modes), bool(wish)
 
 
-def _closes(closing: Closing, closures: Closures, t: float, y: Real, hold: KeptValues) -> bool:
+def _unless_turned(closures: Closures, t: float, y: Real, hold: KeptValues, closing: Closing) -> Real | None:
+    """The result of `closing`, None where there is none or closed axes are opposite."""
     try:
-        closing(closures, t, y, hold)
+        found = closing(closures, t, y, hold)
     except ClosureError:
-        return False
-    return True
+        return None
+    return None if any(turned for _, turned in closures.half_turned()) else found
 
 
 def _closed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
-    start, y = y, y.copy()
-    errors, damping = _all_errors(closures, t, y), 1e-3
-    for _ in range(STEPS):
-        if _largest(errors) <= CLOSED or damping > STRONGEST:
-            break
+    """y with coordinates that close the closures, with the least strain energy of the change that this takes."""
+    start, y = y, _gap_closed(closures, t, y, hold)
+    energy = _strain(closures, y - start)
+    for _ in range(RELAXATIONS if energy > 0.0 else 0):
         found = decomposed(closures, t, y, hold)
+        further = _moved(closures, t, y, -found.relaxing(closures.errors(), y - start), hold)
+        try:
+            further = _gap_closed(closures, t, further, hold)
+        except (ClosureError, DynamicsError):
+            break
+        before, energy = energy, _strain(closures, further - start)
+        if not energy < before:
+            break
+        y = further
+        if energy >= (1.0 - RELAXED) * before:
+            break
+    closures.linearise(t, y)
+    return y
+
+
+def _gap_closed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
+    closures.linearise(t, y)  # raises where the tree itself has no dynamics
+    sizes, damping = closures.sizes, 1e-3
+    errors = closures.errors(sizes)  # not of the present sizes: they would seem to vanish as a hinge slides away
+    for _ in range(STEPS):
+        if _largest(closures.errors()) <= CLOSED or damping > STRONGEST:
+            break
+        found = decomposed(closures, t, y, hold, sizes)
         # The damping decreases with the errors, so that convergence is quadratic, also where rows become dependent.
         fading = damping * min(1.0, float(np.linalg.norm(errors)))
         floor = fading * found.largest**2 + np.finfo(float).tiny
-        trial = closures.moved(t, y, -found.damped(errors, floor))
-        trial[hold.coordinates] = start[hold.coordinates]
-        smaller = np.linalg.norm(closures.errors()) < np.linalg.norm(errors)
-        if smaller and closures.linearise_stiff(t, trial) == OK:
-            y, errors, damping = trial, closures.errors(), damping / 10.0
+        trial = _moved(closures, t, y, -found.damped(errors, floor), hold)
+        smaller = np.linalg.norm(closures.errors(sizes)) < np.linalg.norm(errors)
+        if smaller and _has_dynamics(closures, t, trial):
+            y, errors, damping = trial, closures.errors(sizes), damping / 10.0
         else:
             damping *= 10.0
-            closures.linearise_stiff(t, y)
-    if not _largest(errors) <= OPEN:
+            closures.linearise(t, y)
+    if not (_largest(closures.errors()) <= OPEN and np.all(closures.sizes <= FARTHEST * sizes)):
         where = closures.worst(errors)
         raise ClosureError(
             f"{where}: no coordinates close it; this gap remains in the nearest configuration found. Check lengths, "
@@ -120,10 +140,31 @@ def _closed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
     return y
 
 
+def _moved(closures: Closures, t: float, y: Real, x: Real, hold: KeptValues) -> Real:
+    """As `Closures.moved`, with the held coordinates as they were."""
+    trial = closures.moved(t, y, x)
+    trial[hold.coordinates] = y[hold.coordinates]
+    return trial
+
+
+def _has_dynamics(closures: Closures, t: float, y: Real) -> bool:
+    """Whether the tree has dynamics at y, which is then linearised there."""
+    try:
+        closures.linearise(t, y)
+    except DynamicsError:
+        return False
+    return True
+
+
+def _strain(closures: Closures, change: Real) -> float:
+    """Of a change of [q, u, work]: the strain energy, up to a factor."""
+    return float(sum(eta @ each.weight @ eta for each in closures.strains for eta in [change[each.coordinates]]))
+
+
 def _moving(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
     """y with speeds that the closures allow."""
     start = y
-    closures.linearise_stiff(t, y)
+    closures.linearise(t, y)
     rates, largest = closures.rates()
     taken = _largest(rates)
     for _ in range(3):
@@ -183,12 +224,15 @@ class Decomposed(NamedTuple):
         return x
 
 
-class Held(NamedTuple):
-    """The responses of all rows, projected on changes that leave the held values as they are: B'P = U s V'."""
+class Weighed(NamedTuple):
+    """The responses of all rows to changes Z z that leave the held values as they are, whose square z'z is the kinetic
+    energy plus the weighted strain energy: B'Z = U s V'. Z (nu,z); strain (z,nq+nu+1): derivative of the latter."""
 
     U: Real
     s: Real
     Vt: Real
+    Z: Real
+    strain: Real
 
     @property
     def largest(self) -> float:
@@ -197,22 +241,42 @@ class Held(NamedTuple):
 
     def damped(self, values: Real, floor: float) -> Real:
         """See `Decomposed.damped`."""
+        return self.Z @ self._damped(values, floor)
+
+    def relaxing(self, values: Real, change: Real) -> Real:
+        """x (nu,) that closes values (G,) and reduces most the weighted strain energy of a change of [q, u, work]."""
+        downhill = self.strain @ change
+        kept = self.s > DEPENDENT * self.largest
+        stopped = self.U[:, kept] @ (self.s[kept] * (self.Vt[kept] @ downhill))
+        return self.Z @ (downhill + self._damped(values - stopped, 0.0))
+
+    def _damped(self, values: Real, floor: float) -> Real:
         kept = self.s > (0.0 if floor > 0.0 else DEPENDENT * self.largest)
         s = self.s[kept]
         found: Real = self.Vt[kept].T @ (s / (s * s + floor) * (self.U[:, kept].T @ values))
         return found
 
 
-def decomposed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Decomposed | Held:
-    """The decomposition at the state y that was linearised last."""
-    speeds, responses = len(closures.constants[0].speed), closures.responses()
-    if not len(hold.fixed):
+def decomposed(
+    closures: Closures, t: float, y: Real, hold: KeptValues, largest: Real | float = np.inf
+) -> Decomposed | Weighed:
+    """The decomposition at the state y that was linearised last; `largest` as for `Closures.responses`."""
+    speeds, responses = len(closures.constants[0].speed), closures.responses(largest)
+    if not len(hold.fixed) and not closures.strains:
         return Decomposed(speeds, [[_decomposed(of) for of in groups] for groups in responses])
     half = np.zeros((sum(len(of.half) for groups in responses for of in groups), speeds))
     for of in (each for groups in responses for each in groups):
         half[of.rows, of.columns] = of.half
-    Q = np.linalg.qr(closures.moving(t, y)[hold.fixed].T)[0]
-    return Held(*np.linalg.svd(half - (half @ Q) @ Q.T, full_matrices=False))
+    moving = closures.moving(t, y)
+    Z = np.linalg.qr(moving[hold.fixed].T, mode="complete")[0][:, len(hold.fixed) :]
+    inertia, strain = np.eye(Z.shape[1]), np.zeros((Z.shape[1], len(y)))
+    for each in closures.strains:
+        modes = moving[each.speeds] @ Z
+        strain[:, each.coordinates] = modes.T @ each.weight
+        inertia += strain[:, each.coordinates] @ modes
+    root = np.linalg.cholesky(inertia)
+    Z, strain = np.linalg.solve(root, Z.T).T, np.linalg.solve(root, strain)
+    return Weighed(*np.linalg.svd(half @ Z, full_matrices=False), Z, strain)
 
 
 def _decomposed(of: GroupResponse) -> Group:
@@ -230,21 +294,16 @@ def _refuse_half_a_turn(closures: Closures) -> None:
             )
 
 
-def _all_errors(closures: Closures, t: float, y: Real) -> Real:
-    closures.linearise(t, y)  # raises where the tree itself has no dynamics
-    closures.linearise_stiff(t, y)
-    return closures.errors()
-
-
-def _errors(closures: Closures, t: float, y: Real, _: Real) -> float:
-    return _largest(_all_errors(closures, t, y))
+def _gaps(closures: Closures, t: float, y: Real, _: Real) -> float:
+    closures.linearise(t, y)
+    return _largest(closures.errors())
 
 
 def _rates(closures: Closures, t: float, y: Real, before: Real) -> float:
     """How fast closures open, relative to the present speeds or, at rest, to the speeds that were removed."""
-    closures.linearise_stiff(t, before)
+    closures.linearise(t, before)
     taken = _largest(closures.rates()[0])
-    closures.linearise_stiff(t, y)
+    closures.linearise(t, y)
     rates, largest = closures.rates()
     return min(largest, _largest(rates) / taken) if taken > 0.0 else largest
 

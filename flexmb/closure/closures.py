@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,10 +20,10 @@ from flexmb.levels.body import LEVELS
 from flexmb.scene.schema import Closure, Coupling
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.state import Layout
-from flexmb.tables.status import CLOSURE_SINGULAR, OUT_OF_RANGE
+from flexmb.tables.status import CLOSURE_SINGULAR
 from flexmb.typing import Flags, Index, Real
 
-STIFF = 100.0  # in assembly, modal masses are M + K (STIFF/omega)^2 with the lowest modal frequency omega
+STIFF = 100.0  # in assembly, modes weigh M + K (STIFF/omega)^2 with the lowest modal frequency omega
 BESIDE = 2.0**-11  # distance from a singular position, in sizes of the mechanism, at which loads are evaluated
 SAME = 1e-7  # relative difference below which loads count as equal
 
@@ -36,6 +35,14 @@ class ClosureError(ValueError):
 def called(item: Closure | Coupling) -> str:
     """What messages call a closure or coupling."""
     return f'{"coupling" if isinstance(item, Coupling) else "closure"} "{item.name}"'
+
+
+class Strain(NamedTuple):
+    """Modes of one body: their places in q and in u, and the weight (m,m) of a change of theirs."""
+
+    coordinates: slice
+    speeds: slice
+    weight: Real
 
 
 class Spread(NamedTuple):
@@ -228,27 +235,28 @@ class Closures:
         """Evaluate values and rates of the rows and their responses to unit loads at y."""
         self._check(dynamics.linearise(t, y, self._chain), self.fault)
 
-    def linearise_stiff(self, t: float, y: Real) -> int:
-        """As `linearise`, in the metric with increased modal masses; returns the status code.
-
-        If the increased masses fail the range check of an already deformed body, the true masses are used.
-        """
-        status = int(dynamics.linearise(t, y, replace(self._chain, c=self._stiff)))
-        if status == OUT_OF_RANGE:
-            status = int(dynamics.linearise(t, y, self._chain))
-        return status
-
     @kept
-    def _stiff(self) -> Constants:
-        """The tree with modal masses M + K (STIFF/omega)^2, where omega is the lowest modal frequency."""
-        c = self.constants[0]
-        heavier = c.mff + (STIFF / self._slowest) ** 2 * c.stiffness
-        return replace(c, mff=heavier)
+    def strains(self) -> tuple[Strain, ...]:
+        """The strain energy of every body with modes, as the inertia by which `flexmb.closure.assembly` keeps them."""
+        body, stiffness = self.constants[0].body, self.constants[0].stiffness
+        scale = (STIFF / self._slowest) ** 2
+        return tuple(
+            Strain(slice(q, q + m), slice(u, u + m), scale * stiffness[k, :m, :m])
+            for k, (q, u, m) in enumerate(body[["eta_index", "etad_index", "modes"]].tolist()) if m and scale > 0.0
+        )  # fmt: skip
 
-    def responses(self) -> list[list[GroupResponse]]:
-        """By cluster and group, B' of the rows relative to the size of their closures; zero for ineffective rows."""
+    @property
+    def sizes(self) -> Real:
+        """(C,) of the closures (m) at the state evaluated last."""
+        return self._own.closure["size"].copy()
+
+    def responses(self, largest: Real | float = np.inf) -> list[list[GroupResponse]]:
+        """By cluster and group, B' of the rows relative to the size of their closures; zero for ineffective rows.
+
+        `largest` (C,): sizes beyond these count as these.
+        """
         cc, own = self.constants[1], self._own
-        scale = self._scale("size")
+        scale = self._scale("size", largest)
         found = []
         for group in blocks(cc, own):
             left = np.linalg.norm(group.half[:, : group.own], axis=1)
@@ -256,18 +264,18 @@ class Closures:
             found.append(group._replace(half=(scale[group.rows] * felt)[:, None] * group.half))
         return [found[cluster["group_start"] : cluster["group_stop"]] for cluster in cc.cluster]
 
-    def errors(self) -> Real:
-        """Values of the rows (G,) relative to the size of their closures."""
-        return self._scale("size") * self._own.row["value"]
+    def errors(self, largest: Real | float = np.inf) -> Real:
+        """Values of the rows (G,) relative to the size of their closures; `largest` as for `responses`."""
+        return self._scale("size", largest) * self._own.row["value"]
 
     def rates(self) -> tuple[Real, float]:
         """Rates of the rows (G,), scaled as in `responses`, and the largest one relative to the speed of its ports."""
         fastest = np.abs(self._scale("speed") * self._own.row["rate"])
         return self._scale("size") * self._own.row["rate"], float(np.max(fastest, initial=0.0))
 
-    def _scale(self, key: str) -> Real:
+    def _scale(self, key: str, largest: Real | float = np.inf) -> Real:
         c = self.constants[1]
-        size = self._own.closure[key][c.row["closure"]]
+        size = np.minimum(self._own.closure[key], largest)[c.row["closure"]]
         return c.weight / np.where(size > 0.0, size, 1.0)
 
     def moved(self, t: float, y: Real, x: Real) -> Real:

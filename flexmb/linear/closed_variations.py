@@ -31,7 +31,7 @@ from flexmb.closure.constant_loads import Changes, ConstantLoads
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tangent import closure_tangent_workspace
 from flexmb.entry.variation import coordinate_motion
-from flexmb.linear.variations import Equations, Variations
+from flexmb.linear.variations import Equations, RestForces, Variations
 from flexmb.system.closed import ClosedSystem
 from flexmb.tables.arrays import Constants
 from flexmb.tables.state import DynamicsError, State, pack
@@ -109,6 +109,11 @@ class ClosedEquations(Equations):
     def loads(self, state: State, at: Variations) -> Real:
         left = self._freedom(state, self._slopes(state).of_row_rates.by_speed)
         return left.basis(at.chosen).T @ left.mass @ self.rates(state)
+
+    def forces(self, at: Variations) -> RestForces:
+        slopes, M, N = self._slopes(at.state), self.mass(at.state), at.basis
+        left = M @ slopes.of_rates.by_displacement + self._by_inertia(at.state, slopes.rates)
+        return RestForces(N.T @ M @ slopes.rates, -N.T @ left @ N)
 
     def variations(self, state: State) -> Variations:
         slopes = self._slopes(state)

@@ -2,33 +2,65 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from flexmb.linear.equations import entering
-from flexmb.linear.newton import balanced
+from flexmb.linear.newton import Stability, balanced, squares, verdict
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
 
 
-def equilibrium(system: System | Scene, guess: State | None = None) -> State:
+@dataclass(frozen=True, eq=False)
+class Equilibrium(State):
+    """A state of rest. stability: "stable", "neutral" or "unstable" by the tangent stiffness along what closures allow,
+    with loads, drives and functions of time held; None in a state that was made from this one with other values, and
+    where controllers act, of whose loop `linearize` tells."""
+
+    stability: Stability | None = field(default=None, init=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As for a state."""
+        return _known, (self.q, self.u, self.t, self.layout, self.stability)
+
+
+def _known(q: Any, u: Any, t: float, layout: Any, found: Stability | None) -> Equilibrium:
+    state = Equilibrium(q, u, t, layout)
+    object.__setattr__(state, "stability", found)
+    return state
+
+
+def as_equilibrium(state: State, found: Stability | None) -> Equilibrium:
+    """The state with a verdict."""
+    return _known(state.q, state.u, state.t, state.layout, found)
+
+
+def equilibrium(system: System | Scene, guess: State | None = None) -> Equilibrium:
     """The static equilibrium that Newton's method finds from a guess (default: the initial state).
 
     All speeds are zero; prescribed coordinates, motors and loads keep the values their functions have at the guess's
     time. Wheels without springs stay at their angles. Of a scene with continuous controllers it is where the closed
-    loop rests, the controllers' own states included. Whether the equilibrium is stable is for `linearize(...,
-    held=True)`. Raises EquilibriumError where none is found, NotImplementedError for closures on bodies of level
-    "ruthless" and sampled controllers, ValueError or TypeError for a guess that is not a state of this system or leaves
-    closures open.
+    loop rests, the controllers' own states included. From a guess where loads oppose every displacement it is the
+    equilibrium that follows as what is out of balance there fades away, if that is stable, else one that overdamped
+    motion leads to; near an unstable one that: `stability` of the result says. Loads that bend a structure far are
+    followed through by `equilibrium_path`.
+
+    Raises EquilibriumError where none is found, NotImplementedError for closures on bodies of level "ruthless" and
+    sampled controllers, ValueError or TypeError for a guess that is not a state of this system or leaves closures open.
     """
     if isinstance(system, Scene) and system.controllers:
         system = compile(system)
     if isinstance(system, System) and system.scene.controllers:
         from flexmb.linear.controlled_equilibrium import resting  # imported only for scenes with controllers
 
-        return resting(system, system.initial_state if guess is None else guess)
+        state = resting(system, system.initial_state if guess is None else guess)
+        return as_equilibrium(state, None)
     equations, guess = entering(system, guess)
-    return balanced(equations.held(guess.t), replace(guess, u=np.zeros_like(guess.u)))
+    held = equations.held(guess.t)
+    state = balanced(held, replace(guess, u=np.zeros_like(guess.u)))
+    at = held.variations(state)
+    return as_equilibrium(state, verdict(squares(at, held.forces(at))))

@@ -1,30 +1,41 @@
-"""States without acceleration: Newton's method with the exact derivative of the accelerations.
+"""States of rest: Newton's method on the generalised forces, with their exact tangent stiffness.
 
-Steps and errors are measured in the metric of kinetic energy, sqrt(xi' M xi) in m sqrt(kg), in which the method does
-not depend on units or scales of modes. Damping follows Deuflhard, Newton Methods for Nonlinear Problems (2004), sec.
-3.3: a step is accepted if the next, simplified correction is shorter. If this fails from the guess, pseudo-transient
+RestForces are those of inverse dynamics without accelerations. These, M udot, vanish where the accelerations do, but not
+their derivatives: where the inertia depends on the coordinates, those of accelerations would lead astray. Steps and
+errors are measured in the metric of kinetic energy, sqrt(xi' M xi) in m sqrt(kg), in which the method does not depend
+on units or scales of modes. Damping follows Deuflhard, Newton Methods for Nonlinear Problems (2004), sec. 3.3 and 3.1:
+steps stay so short that they follow the path along which all forces that the guess leaves fade in proportion, so that
+one does not jump to another branch. If this fails, or ends far away in an unstable equilibrium, pseudo-transient
 continuation (overdamped motion) provides a better guess.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from scipy.linalg import solve_triangular
+from typing import Literal, NamedTuple
 
+import numpy as np
+from scipy.linalg import eigvals, solve_triangular
+
+from flexmb.linear.linear_model import Complex
 from flexmb.linear.linearize import displacement_names
-from flexmb.linear.variations import Equations, Variations
+from flexmb.linear.variations import Equations, RestForces, Variations
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
 CONVERGED = 1e-12  # last correction, as part of a displacement of all free coordinates by 1 (rad, m, unit of a mode)
 RESIDUAL = 1e-9  # remaining acceleration, relative to that at the start
 ROUNDING = 2.0**-46  # the same, as part of the stiffness times a displacement of 1: 128 roundings
-STEPS = 100
+STEPS = 400
+ASTRAY = 0.5  # distance of a step's end from that path, parts of the step
 SMALLEST = 2.0**-12  # damping factor
 SHORTENINGS = 20  # by 4, of a step of overdamped motion
 RELAXATIONS = 200  # steps of overdamped motion
 FIRST, LONGEST = 0.1, 0.5  # lengths of steps, parts of a displacement of all free coordinates by 1
+DOUBLE = 2.0**-20  # imaginary part that rounding gives to double eigenvalues
 RANK = 1e-14  # stiffness relative to the largest; directions with less are free to move and are not corrected
+
+
+Stability = Literal["stable", "neutral", "unstable"]
 
 
 class EquilibriumError(ArithmeticError):
@@ -37,12 +48,17 @@ def balanced(equations: Equations, guess: State) -> State:
     if not equations.freedom:
         return start
     found = _newton(equations, start)
-    if found is not None:
-        return found
+    if found is not None and (found.settling or found.is_near):
+        return found.state
     try:
         return _relaxed(equations, start)
+    except EquilibriumError:
+        if found is None:
+            raise
     except (DynamicsError, np.linalg.LinAlgError) as error:
-        raise EquilibriumError(f'scene "{equations.system.scene.name}": no equilibrium found: {error}') from None
+        if found is None:
+            raise EquilibriumError(f'scene "{equations.system.scene.name}": no equilibrium found: {error}') from None
+    return found.state
 
 
 def _relaxed(equations: Equations, start: State) -> State:
@@ -55,8 +71,8 @@ def _relaxed(equations: Equations, start: State) -> State:
     here = _Loads(equations, equations.variations(start))
     tau = FIRST * here.scale / here.size
     for _ in range(RELAXATIONS):
-        if here.settling and (found := _newton(equations, here.at.state)) is not None:
-            return found
+        if here.settling and (found := _newton(equations, here.at.state)) is not None and found.settling:
+            return found.state
         further = _downhill(equations, here, tau)
         if further is None:
             break
@@ -64,7 +80,7 @@ def _relaxed(equations: Equations, start: State) -> State:
     found = _newton(equations, here.at.state)
     if found is None:
         raise EquilibriumError(_report(equations, here.at))
-    return found
+    return found.state
 
 
 class _Loads:
@@ -75,13 +91,12 @@ class _Loads:
     """
 
     def __init__(self, equations: Equations, at: Variations) -> None:
-        M, moving = at.mass, at.movable
+        M, moving, forces = at.mass, at.movable, equations.forces(at)
         self.at = at
-        self.loads, self.derivative = (M @ at.rates)[moving], (M @ at.by_displacement)[np.ix_(moving, moving)]
+        self.loads, self.derivative = forces.load[moving], -forces.stiffness[np.ix_(moving, moving)]
         self.inertia, self.size = M[np.ix_(moving, moving)], float(np.sqrt(at.rates @ M @ at.rates))
         self.scale = float(np.sqrt(np.trace(M)))
-        growth = np.linalg.eigvalsh(self.derivative + self.derivative.T)
-        self.settling = bool(np.max(growth, initial=0.0) <= -ROUNDING * np.min(growth, initial=0.0))
+        self.settling = _is_settling(-self.derivative)
 
 
 def _downhill(equations: Equations, here: _Loads, tau: float) -> tuple[Variations, float] | None:
@@ -106,21 +121,38 @@ def _downhill(equations: Equations, here: _Loads, tau: float) -> tuple[Variation
     return None
 
 
-def _newton(equations: Equations, state: State) -> State | None:
-    """The state where the accelerations vanish; None if Newton's method does not reach it."""
-    first = None
+def _is_settling(stiffness: Real) -> bool:
+    """Whether forces oppose every displacement, or none that leaves them as they are."""
+    values = np.linalg.eigvalsh(stiffness + stiffness.T)
+    return bool(np.min(values, initial=0.0) >= -ROUNDING * np.max(values, initial=0.0))
+
+
+class _Found(NamedTuple):
+    """An equilibrium; is_near: undamped steps led to it, from a guess with loads that some displacement follows."""
+
+    state: State
+    settling: bool
+    is_near: bool
+
+
+def _newton(equations: Equations, state: State) -> _Found | None:
+    """The state where the forces vanish; None if Newton's method does not reach it."""
+    first: _Linearised | None = None
+    undamped = True
     try:
-        at = equations.variations(state)
+        now = _Linearised(equations, equations.variations(state))
         for _ in range(STEPS):
-            now = _Linearised(at)
-            first = now.size if first is None else first
+            first = now if first is None else first
             if now.length <= CONVERGED * now.scale:
-                removed = now.left <= RESIDUAL * first + ROUNDING * now.stiffness * now.scale
-                return at.state if removed else None  # otherwise no displacement removes the rest
+                removed = now.left <= RESIDUAL * first.size + ROUNDING * now.stiffness * now.scale
+                if not removed:
+                    return None  # no displacement removes the rest
+                return _Found(now.at.state, now.settling, undamped and not first.settling)
             moved = _damped(equations, now)
             if moved is None:
                 return None
-            at = equations.variations(moved)
+            undamped = undamped and moved[1] == 1.0
+            now = _Linearised(equations, equations.variations(moved[0]))
     except (DynamicsError, np.linalg.LinAlgError):
         return None
     return None
@@ -130,51 +162,81 @@ class _Linearised:
     """Newton's correction at one state, lengths in the metric of kinetic energy, over the movable coordinates.
 
     step (n,) and its length; size: of the accelerations; left: size of the part that no step removes; stiffness: norm
-    of the derivative; scale: length of a displacement of all free coordinates by 1.
+    of the tangent; scale: length of a displacement of all free coordinates by 1; settling: see `_is_settling`.
     """
 
-    def __init__(self, at: Variations) -> None:
-        M, moving = at.mass, at.movable
+    def __init__(self, equations: Equations, at: Variations) -> None:
+        M, moving, forces = at.mass, at.movable, equations.forces(at)
         self.at, self._moving = at, moving
         self._root, self._own = np.linalg.cholesky(M), np.linalg.cholesky(M[np.ix_(moving, moving)])
-        K = self._root.T @ solve_triangular(self._own, at.by_displacement[:, moving].T, lower=True).T
-        U, values, Vt = np.linalg.svd(K, full_matrices=False)
+        half = solve_triangular(self._own, forces.stiffness[:, moving].T, lower=True).T
+        U, values, Vt = np.linalg.svd(solve_triangular(self._root, half, lower=True), full_matrices=False)
         self.stiffness = float(values[0]) if len(values) else 0.0
         kept = values > RANK * self.stiffness
         self._U, self._back = U[:, kept], Vt[kept].T / values[kept]
         self.scale = float(np.sqrt(np.trace(M)))
-        z = self._root.T @ at.rates
+        self.settling = _is_settling(solve_triangular(self._own, half[moving], lower=True))
+        z = solve_triangular(self._root, forces.load, lower=True)
         self.size, self.left = float(np.linalg.norm(z)), float(np.linalg.norm(z - self._U @ (self._U.T @ z)))
-        self.step, self.length = self.correction(at.rates)
+        self._along = self.correction(forces.load)
+        self.length = float(np.linalg.norm(self._along))
+        self.step = np.zeros(len(z))
+        self.step[moving] = solve_triangular(self._own.T, self._along, lower=False)
 
-    def correction(self, rates: Real) -> tuple[Real, float]:
-        """The step (n,) that removes accelerations (n,) as far as the derivative here says, and its length."""
-        y = -self._back @ (self._U.T @ (self._root.T @ rates))
-        step = np.zeros(len(rates))
-        step[self._moving] = solve_triangular(self._own.T, y, lower=False)
-        return step, float(np.linalg.norm(y))
+    def correction(self, load: Real) -> Real:
+        """The step that removes a load (n,) as far as the tangent here says, in orthonormal coordinates."""
+        z = solve_triangular(self._root, load, lower=True)
+        return np.asarray(self._back @ (self._U.T @ z))
+
+    def strays(self, factor: float, load: Real) -> float:
+        """How far the load (n,) after `factor` of the step is from what the tangent says, as part of that step."""
+        ahead = self.correction(load) - (1.0 - factor) * self._along
+        return float(np.linalg.norm(ahead)) / (factor * self.length)
 
 
-def _damped(equations: Equations, now: _Linearised) -> State | None:
-    """The result of the longest of the steps 1, 1/2, 1/4 ..., LONGEST at most, whose simplified correction is shorter.
-    """
+def _damped(equations: Equations, now: _Linearised) -> tuple[State, float] | None:
+    """The result of the longest of the steps 1, 1/2, 1/4 ..., LONGEST at most, that does not lead astray; and that."""
     factor = longest = min(1.0, LONGEST * now.scale / now.length)
     while factor >= SMALLEST * longest:
         try:
             moved = equations.moved(now.at, factor * now.step)
-            if now.correction(equations.rates(moved)[now.at.chosen])[1] <= (1.0 - 0.25 * factor) * now.length:
-                return moved
+            if now.strays(factor, equations.loads(moved, now.at)) <= ASTRAY:
+                return moved, factor
         except DynamicsError:
             pass  # cannot be evaluated there: take a shorter step
         factor *= 0.5
     return None
 
 
+def squares(at: Variations, forces: RestForces) -> Complex:
+    """The eigenvalues omega^2 (rad^2/s^2) of the tangent stiffness along what closures allow, against the inertia."""
+    square = np.ix_(at.movable, at.movable)
+    found: Complex = eigvals(forces.stiffness[square], at.mass[square]) if len(at.movable) else np.zeros(0, complex)
+    return found
+
+
+def verdict(squares: Complex) -> Stability:
+    """Of an equilibrium, by its `squares`.
+
+    "stable": all are positive; where forces have a potential the stiffness is definite then. "neutral": some vanish
+    within rounding. "unstable": some are negative, or complex as under forces that follow what they load.
+    """
+    rounding = ROUNDING * np.max(np.abs(squares), initial=0.0)
+    if np.any(squares.real < -rounding) or np.any(np.abs(squares.imag) > DOUBLE * np.abs(squares) + rounding):
+        return "unstable"
+    return "stable" if np.all(squares.real > rounding) else "neutral"
+
+
 def _report(equations: Equations, at: Variations) -> str:
     """The error message: which acceleration remains, where, and the remedy."""
-    left = at.mass @ at.rates
+    left, now = at.mass @ at.rates, _Linearised(equations, at)
     names, _ = displacement_names(equations)
     worst = int(np.argmax(np.abs(left)))
+    try:
+        ahead = LONGEST * now.scale / max(now.length, LONGEST * now.scale)
+        equations.loads(equations.moved(at, ahead * now.step), at)
+    except DynamicsError as error:
+        return f'scene "{equations.system.scene.name}": no equilibrium found as far as the search can go: {error}'
     return (
         f'scene "{equations.system.scene.name}": no equilibrium found; {left[worst]:.3g} N (N m) are left along '
         f"{names[at.chosen[worst]]}. Look for a coordinate without a spring that loads push away, or give a guess "

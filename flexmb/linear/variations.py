@@ -16,12 +16,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from flexmb.entry import articulated
-from flexmb.entry.derivatives import derivative_workspace, jacobian
+from flexmb.entry.derivatives import derivative_workspace, inverse_dynamics_derivatives, jacobian
 from flexmb.entry.tangent import tangent_workspace, time_derivative
 from flexmb.scene.functions import Constant, Function, Ramp
 from flexmb.system.tree_system import System
@@ -63,6 +63,15 @@ class Variations:
     def A(self) -> Real:
         """(2n,2n) matrix of d[xi; du]/dt."""
         return np.block([[self.transport, np.eye(len(self.rates))], [self.by_displacement, self.by_speed]])
+
+
+class RestForces(NamedTuple):
+    """At one state: generalised loads (f,), N (N m), on the independent coordinates, and the stiffness (f,f) by which
+    they fall with displacements while the loads of closures stay. They are inverse dynamics at rest with the opposite
+    sign: no derivative of the inertia enters, whatever the accelerations are."""
+
+    load: Real
+    stiffness: Real
 
 
 class Equations:
@@ -132,6 +141,23 @@ class Equations:
     def loads(self, state: State, at: Variations) -> Real:
         """Generalised loads, N (N m), on the coordinates (f,) that are independent at another state."""
         return self.mass(state) @ self.rates(state)
+
+    def forces(self, at: Variations) -> RestForces:
+        """Loads and tangent stiffness at a state: d(M udot) = M d(udot) + dM udot."""
+        left = at.mass @ at.by_displacement + self._by_inertia(at.state, at.rates)
+        return RestForces(at.mass @ at.rates, -left)
+
+    def _by_inertia(self, state: State, rates: Real) -> Real:
+        """Derivative (n,n) of M udot by displacements, at accelerations (n,) of the free speeds that do not change."""
+        nu, y, found = self.system.nu, pack(state), []
+        unused = np.empty((nu, nu)), np.empty((nu, nu))
+        for size in (1.0, 0.0):  # all terms but the inertia's are the same at zero accelerations
+            given, by_displacement = np.zeros(nu), np.empty((nu, nu))
+            given[self.free] = size * rates
+            tables = self.constants, self._derivatives
+            inverse_dynamics_derivatives(state.t, y, given, by_displacement, *unused, *tables)
+            found.append(by_displacement)
+        return np.asarray((found[0] - found[1])[np.ix_(self.free, self.free)])
 
     def movable(self, chosen: Index) -> Index:
         """Indices among these free speeds of those whose coordinate is not cyclic: all but wheels without springs."""

@@ -51,10 +51,11 @@ def asked(system: System, y: Real, named: NDArray[np.bool_] | None = None) -> As
 
 def everything(system: System) -> AskedFor:
     """All values, for a state that was given as a whole."""
+    names = tuple(name for names in system.state_names for name, _ in names)
     return AskedFor(
         Wishes(tuple(((i,), ()) for i in range(system.nq))),
         Wishes(tuple(((system.nq + j,), (j,)) for j in range(system.nu))),
-        system.nq, (), frozenset(), tuple(name for names in system.state_names for name, _ in names), is_marked=False,
+        system.nq, tuple(_modes(system)), frozenset(), names, is_marked=False,
     )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ FUNCTIONS = {
     "compile": ["scene"],
     "linearize": ["system", "state"],
     "equilibrium": ["system", "guess"],
+    "equilibrium_path": ["scene", "number", "values"],
     "steady_spin": ["system", "hinge", "rate"],
     "campbell": ["system", "hinge", "rates"],
     "advise": ["scene", "tolerance", "quantity", "t_end"],

@@ -1,0 +1,313 @@
+"""Paths of equilibria under a number of the scene, followed by arc length through limit points.
+
+The unknowns are displacements and the number p. From an equilibrium a step along the tangent of the path is corrected
+by Newton's method in the plane across that tangent (Riks 1979; Crisfield 1991, sec. 9.3):
+
+    K xi - dr/dp dp = r,    tangent . (xi, dp) = 0
+
+with the loads r and the tangent stiffness K of `flexmb.linear.newton`. dr/dp is a difference of two scenes: it aims
+steps, while what is found is exact. Lengths are measured in the metric of kinetic energy, and p by the range of the
+values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from flexmb.linear.equations import equations_of
+from flexmb.linear.equilibrium import Equilibrium, as_equilibrium, equilibrium
+from flexmb.linear.linear_model import Complex
+from flexmb.linear.newton import EquilibriumError, squares, verdict
+from flexmb.linear.variations import Equations, RestForces, Variations
+from flexmb.parameters.numbers import Number
+from flexmb.scene.open_loop import refuse_feedback
+from flexmb.scene.schema import Scene
+from flexmb.scene.values import with_values
+from flexmb.system.compile import compile
+from flexmb.tables import arguments
+from flexmb.tables.state import DynamicsError, State
+from flexmb.typing import Real
+
+FIRST, LONGEST, SHORTEST = 0.02, 0.2, 1e-7  # steps, parts of a displacement of all free coordinates by 1 and the range
+CORRECTIONS = 12  # Newton steps; after more the step is halved
+EASY = 4  # after fewer the next one is longer
+CONVERGED = 1e-11  # last correction, in the same measure
+STRAIGHT = 0.9  # least cosine between the tangents at both ends of a step
+MOST = 2000  # steps
+FARTHEST = 10.0  # ranges beyond the values, where the path is given up
+DIFFERENCE = 2.0**-18  # of p, parts of its range
+LOCATED = 1e-6  # where in a step something happens, part of the step
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalPoint:
+    """Where a path of equilibria turns or others cross it.
+
+    kind: "limit" where the number has a greatest or least value, "bifurcation" where the stiffness is singular while
+    the number passes on; value of the number; the state there.
+    """
+
+    kind: Literal["limit", "bifurcation"]
+    value: float
+    state: Equilibrium
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibriumPath:
+    """Equilibria along a path, in order: the values (n,) of the number, and the states, each with its stability."""
+
+    number: str
+    values: Real
+    states: tuple[Equilibrium, ...]
+    critical: tuple[CriticalPoint, ...]
+
+    def at(self, value: float) -> tuple[Equilibrium, ...]:
+        """All equilibria of the path at one of the values that were asked for, in order; ValueError for others."""
+        value = arguments.number("value", value)
+        found = tuple(state for each, state in zip(self.values, self.states, strict=True) if each == value)
+        if not found:
+            raise ValueError(f"{value:g} is not one of the values that the path was asked for, or it ends before")
+        return found
+
+
+def equilibrium_path(scene: Scene, number: str, values: Sequence[float] | Real) -> EquilibriumPath:
+    """The equilibria of a scene as one of its numbers, named as in `Scene.with_values`, goes from the first of `values`
+    to the last.
+
+    It begins at the equilibrium that `equilibrium` finds at the first value, and passes every other value, some more
+    than once where it turns back in between; it ends at the last. Limit and bifurcation points on the way are located.
+    At a bifurcation it goes straight on. EquilibriumError where there is no equilibrium at the first value or the path
+    does not reach the last; PathError for a number that the scene does not have; ValueError unless `values` are two or
+    more, all rising or all falling; NotImplementedError as for `equilibrium`, and for scenes with controllers.
+    """
+    if not isinstance(scene, Scene):
+        raise TypeError(f"a Scene is needed, not {type(scene).__name__}: the path changes a number of it")
+    refuse_feedback(scene, "a path of equilibria")
+    asked = arguments.finite("values", arguments.array("values", values))
+    steps = np.diff(asked) if asked.ndim == 1 else np.zeros(0)
+    if not len(steps) or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+        raise ValueError("values: give two or more numbers in a row that all rise or all fall")
+    family = _Family(scene, number, asked)
+    points = list(_followed(family, asked))
+    states = tuple(as_equilibrium(each.at.state, verdict(each.squares)) for _, each in points)
+    critical = [(kind, each, state) for (kind, each), state in zip(points, states, strict=True) if kind is not None]
+    found = tuple(CriticalPoint(kind, each.p, state) for kind, each, state in critical)
+    passed = np.array([each.p for _, each in points])
+    passed.flags.writeable = False
+    return EquilibriumPath(number, passed, states, found)
+
+
+class _Point(NamedTuple):
+    """An equilibrium at p: its derivatives, dr/dp (f,), the tangent (n+1,) of the path over all free speeds and p, of
+    length 1, and omega^2."""
+
+    p: float
+    at: Variations
+    by_number: Real
+    tangent: Real
+    squares: Complex
+
+    @property
+    def negative(self) -> int:
+        """Number of negative omega^2: those that are real, as complex ones pass zero by no load."""
+        return int(np.sum((self.squares.real < 0.0) & (self.squares.imag == 0.0)))
+
+    @property
+    def nearest(self) -> float:
+        """How far the nearest real omega^2 is from zero."""
+        return float(np.min(np.abs(self.squares[self.squares.imag == 0.0]), initial=np.inf))
+
+
+class _Family:
+    """The scenes with all values of one number; range of these."""
+
+    def __init__(self, scene: Scene, number: str, asked: Real) -> None:
+        Number(scene, number)  # PathError unless it is one real number
+        first: Scene = with_values(scene, {number: float(asked[0])})
+        self.number, self._system = Number(first, number), compile(first)
+        self.name, self.range = scene.name, float(np.ptp(asked))
+        self._made = dict[float, Equations]()
+
+    def start(self) -> tuple[Equations, Variations]:
+        """The equations at the first value, and its equilibrium."""
+        equations = self.equations(self.number.value)
+        return equations, equations.variations(equilibrium(self._system))
+
+    def equations(self, p: float) -> Equations:
+        """At rest, with functions of time at their values at t = 0."""
+        if p not in self._made:
+            system = self._system.with_numbers(self.number.scene_at(p))
+            self._made = dict([*self._made.items()][-1:])  # a point and one beside it
+            self._made[p] = equations_of(system).held(0.0)
+        return self._made[p]
+
+    def by_number(self, p: float, at: Variations) -> Real:
+        """dr/dp (f,) at a state."""
+        here, h = self.equations(p).loads(at.state, at), DIFFERENCE * self.range
+        return (self.equations(p + h).loads(at.state, at) - here) / h
+
+    def bordered(self, at: Variations, forces: RestForces, by_number: Real, row: Real) -> Callable[[Real, float], Real]:
+        """Solver of K xi - dr/dp dp = load, row . (xi, dp) = rest, for (xi, dp) over all free speeds (n+1,)."""
+        moving = at.movable
+        K = np.zeros((len(moving) + 1, len(moving) + 1))
+        K[:-1, :-1], K[:-1, -1] = forces.stiffness[np.ix_(moving, moving)], -by_number[moving]
+        across = self.weighed(at, row)
+        K[-1, :-1], K[-1, -1] = (across[:-1] @ at.basis)[moving], across[-1]
+
+        def solve(load: Real, rest: float) -> Real:
+            found, xi = np.linalg.solve(K, np.r_[load[moving], rest]), np.zeros(len(load))
+            xi[moving] = found[:-1]
+            return np.r_[at.basis @ xi, found[-1]]
+
+        return solve
+
+    def weighed(self, at: Variations, x: Real) -> Real:
+        """Of (xi, dp) (n+1,), the row by which lengths are measured: x . weighed(x) is the square of one."""
+        independent = x[:-1][at.chosen]
+        back = np.zeros(len(x) - 1)
+        back[at.chosen] = at.mass @ independent / np.trace(at.mass)
+        return np.r_[back, x[-1] / self.range / self.range]
+
+    def length(self, at: Variations, x: Real) -> float:
+        return float(np.sqrt(self.weighed(at, x) @ x))
+
+    def point(self, p: float, at: Variations, before: Real) -> _Point:
+        """An equilibrium with its tangent, which goes on as the one before it (n+1,)."""
+        forces = self.equations(p).forces(at)
+        by_number = self.by_number(p, at)
+        solve = self.bordered(at, forces, by_number, before)
+        tangent = solve(np.zeros(len(forces.load)), 1.0)
+        return _Point(p, at, by_number, tangent / self.length(at, tangent), squares(at, forces))
+
+    def corrected(self, p: float, state: State, by_number: Real, row: Real) -> tuple[float, Variations, int] | None:
+        """The equilibrium near a state at p, across `row` (n+1,), and the number of corrections; None if not found."""
+        for taken in range(CORRECTIONS):
+            equations = self.equations(p)
+            at = equations.variations(state)
+            forces = equations.forces(at)
+            step = self.bordered(at, forces, by_number, row)(forces.load, 0.0)
+            if not np.isfinite(step).all() or self.length(at, step) > 2.0 * LONGEST:
+                return None
+            p, state = p + float(step[-1]), equations.moved(at, step[:-1][at.chosen])
+            if self.length(at, step) <= CONVERGED:
+                equations = self.equations(p)
+                return p, equations.variations(equations.on_functions(state)), taken
+        return None
+
+    def stepped(self, point: _Point, h: float) -> tuple[_Point, int] | None:
+        """The point at a distance h, and the number of corrections; None if Newton's method does not find it."""
+        try:
+            equations, ahead = self.equations(point.p), h * point.tangent
+            state = equations.moved(point.at, ahead[:-1][point.at.chosen])
+            found = self.corrected(point.p + float(ahead[-1]), state, point.by_number, point.tangent)
+            if found is None:
+                return None
+            there = self.point(found[0], found[1], point.tangent)
+        except (DynamicsError, np.linalg.LinAlgError):
+            return None
+        turned = float(self.weighed(there.at, there.tangent) @ point.tangent)
+        return (there, found[2]) if turned >= STRAIGHT or h <= 16.0 * SHORTEST else None
+
+    def exactly(self, point: _Point, value: float) -> _Point | None:
+        """The equilibrium at a value near that of a point."""
+        try:
+            across = np.zeros(len(point.tangent))
+            across[-1] = self.range
+            found = self.corrected(value, point.at.state, point.by_number, across)
+            return None if found is None else self.point(value, found[1], point.tangent)
+        except (DynamicsError, np.linalg.LinAlgError):
+            return None
+
+
+Kind = Literal["limit", "bifurcation"]
+
+
+def _followed(family: _Family, asked: Real) -> Iterator[tuple[Kind | None, _Point]]:
+    """The points of the path, and what those are that are critical."""
+    onwards = float(np.sign(asked[1] - asked[0]))
+    _, at = family.start()
+    ahead = np.zeros(len(at.by_chosen) // 2 + 1)
+    ahead[-1] = onwards * family.range
+    try:
+        here, h = family.point(float(asked[0]), at, ahead), FIRST
+    except (DynamicsError, np.linalg.LinAlgError):
+        raise EquilibriumError(
+            f'scene "{family.name}": no path of equilibria leaves {asked[0]:g}, because something there may move '
+            "without resistance: give it a spring, prescribe it, or begin at another value"
+        ) from None
+    yield None, here
+    for _ in range(MOST):
+        there = family.stepped(here, h)
+        if there is None:
+            h *= 0.5
+            if h < SHORTEST:
+                raise EquilibriumError(_lost(family, here, "no equilibrium follows"))
+            continue
+        for kind, point in _between(family, here, there[0], h, asked):
+            yield kind, point
+            if kind is None and point.p == asked[-1]:
+                return
+        yield None, there[0]
+        here = there[0]
+        h = min(LONGEST, 1.5 * h) if there[1] <= EASY else h
+        if np.min(np.abs(here.p - asked)) > FARTHEST * family.range:
+            raise EquilibriumError(_lost(family, here, "the path turned away for good"))
+    raise EquilibriumError(_lost(family, here, f"{MOST} steps were too few"))
+
+
+def _between(family: _Family, here: _Point, there: _Point, h: float, asked: Real) -> list[tuple[Kind | None, _Point]]:
+    """What lies on a step of length h, in order: critical points, and values that were asked for."""
+    found: list[tuple[float, Kind | None, _Point]] = []
+    turns = here.tangent[-1] * there.tangent[-1] < 0.0
+    changes = abs(there.negative - here.negative)
+    tests: list[tuple[Kind, Callable[[_Point], float], bool]] = [
+        ("limit", lambda point: float(point.tangent[-1]), turns),
+        ("bifurcation", lambda point: point.nearest * (1 if point.negative == here.negative else -1), changes > turns),
+    ]
+    for kind, test, happens in tests:
+        place = _located(family, here, h, there, test) if happens else None
+        if place is not None:
+            found.append((place[0], kind, place[1]))
+    ends = sorted([(0.0, here), *((s, point) for s, _, point in found), (h, there)], key=lambda each: each[0])
+    for (s0, a), (s1, b) in zip(ends[:-1], ends[1:], strict=True):
+        for value in asked:
+            if (a.p < value <= b.p) or (b.p <= value < a.p):
+                s = s0 + (s1 - s0) * (float(value) - a.p) / (b.p - a.p)
+                near = family.stepped(here, s) if s > 0.0 else None
+                exact = family.exactly(b if near is None else near[0], float(value))
+                if exact is None:
+                    raise EquilibriumError(_lost(family, here, f"no equilibrium at {value:g} was found on it"))
+                found.append((s, None, exact))
+    return [(kind, point) for _, kind, point in sorted(found, key=lambda each: each[0])]
+
+
+def _located(
+    family: _Family, here: _Point, h: float, there: _Point, test: Callable[[_Point], float]
+) -> tuple[float, _Point] | None:
+    """Where on a step of length h a test changes sign, and the point there."""
+    known = {0.0: here, h: there}
+
+    def value(s: float) -> float:
+        if s not in known:
+            stepped = family.stepped(here, s)
+            if stepped is None:
+                raise EquilibriumError(_lost(family, here, "no equilibrium follows"))
+            known[s] = stepped[0]
+        return test(known[s])
+
+    if value(0.0) * value(h) >= 0.0:
+        return None
+    s = float(brentq(value, 0.0, h, xtol=LOCATED * h))
+    return s, known[s]
+
+
+def _lost(family: _Family, here: _Point, why: str) -> str:
+    return (
+        f'scene "{family.name}": the path of equilibria under {family.number.name} ends at {here.p:.6g}, '
+        f"{verdict(here.squares)}: {why}. Ask for values up to there, begin elsewhere, or free what is in the way"
+    )

@@ -1,0 +1,120 @@
+"""Equilibria far from the start: one branch whatever the polynomials are, limit and bifurcation points by hand."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import flexmb as fm
+from flexmb.scene import schema as s
+from tests.flexmb.linear.truss import HIGH, STIFF, guided, truss
+
+
+def strip(polynomials: int, **load: float) -> fm.Scene:
+    """A clamped beam of level exact, L = EI = 1, under a force or a torque at its tip, in a plane."""
+    section = s.BeamStation(
+        x_m=0.0, EA_N=1e6, EIy_Nm2=1.0, EIz_Nm2=1.0, GJ_Nm2=1.0, mass_per_length_kg_m=1.0, rotary_y_kg_m=1e-3,
+        rotary_z_kg_m=1e-3,
+    )  # fmt: skip
+    made = fm.SceneBuilder("strip")
+    modes = s.Modes(count=polynomials, families=("bending_y",))
+    made.beam("rod", length=1.0, elements=4, section=section, modes=modes, level="exact")
+    made.weld("clamp", "ground", "rod").marker("tip", "rod", node="tip")
+    for kind, value in load.items():
+        add, direction = {"force": (made.force, (0, 1, 0)), "torque": (made.torque, (0, 0, 1))}[kind]
+        add("load", "rod", node="tip", direction=direction, function=fm.Constant(value=value))
+    return made.scene()
+
+
+def tip(system: fm.System, state: fm.State) -> np.ndarray:
+    return system.evaluate(state.t, state.q, state.u).markers["tip"].position
+
+
+@pytest.mark.parametrize("turns", [1.0, 2.5, 4.0])
+def test_a_torque_winds_a_strip_into_a_circle(turns):
+    """A linear problem, although the inertia changes: curvature T / EI everywhere."""
+    one, found = (fm.equilibrium(strip(6, torque=2.0 * np.pi * each)) for each in (1.0, turns))
+    assert found.stability == "stable"
+    assert found.q == pytest.approx(turns * one.q, rel=1e-9)
+    curvature = 2.0 * np.pi * turns
+    circle = np.array([np.sin(curvature), 1.0 - np.cos(curvature), 0.0]) / curvature
+    system = fm.compile(strip(20, torque=curvature))
+    assert tip(system, fm.equilibrium(system)) == pytest.approx(circle, abs=1e-9)
+
+
+def test_elastica_by_any_polynomials_and_by_path():
+    """P L^2 / EI = 300 from straight: the branch that a slowly growing load leads to."""
+    far = [fm.equilibrium(fm.compile(strip(p, force=300.0))) for p in (6, 12, 20)]
+    places = [tip(fm.compile(strip(p, force=300.0)), each) for p, each in zip((6, 12, 20), far, strict=True)]
+    assert {each.stability for each in far} == {"stable"}
+    assert np.max(np.abs(np.array(places) - [np.sqrt(2.0 / 300.0), 0.96618, 0.0])) < 2e-3  # x: EI theta'^2 / 2 = P
+    path = fm.equilibrium_path(strip(12, force=0.0), "loads.load.function.value", [0.0, 10.0, 300.0])
+    assert not path.critical and {each.stability for each in path.states} == {"stable"}
+    system = fm.compile(strip(12, force=300.0))
+    assert tip(system, path.at(10.0)[0]) == pytest.approx([1.0 - 0.5549956, 0.81060902, 0.0], abs=1e-6)
+    assert tip(system, path.at(300.0)[0]) == pytest.approx(places[1], abs=1e-9)
+
+
+def load(z: float) -> float:
+    """That holds the truss of von Mises at a height."""
+    length = np.hypot(1.0, z)
+    return 2.0 * STIFF * z * (np.hypot(1.0, HIGH) - length) / length
+
+
+LIMIT = float(np.sqrt(np.hypot(1.0, HIGH) ** (2.0 / 3.0) - 1.0))  # dP/dz = 0: length^3 = free length
+SIDEWAYS = float(brentq(lambda z: np.hypot(1.0, z) - (np.hypot(1.0, HIGH) - np.hypot(1.0, z)) * z * z, 2.0, HIGH))
+
+
+def test_a_truss_snaps_through():
+    scene = guided()
+    top = load(LIMIT)
+    path = fm.equilibrium_path(scene, "loads.push.function.value", [0.0, 0.5 * top, 1.2 * top])
+    assert [each.kind for each in path.critical] == ["limit", "limit"]
+    assert [each.value for each in path.critical] == pytest.approx([top, -top], rel=1e-8)
+    assert [each.state.q[0] for each in path.critical] == pytest.approx([LIMIT, -LIMIT], rel=1e-5)
+    heights = np.array([each.q[0] for each in path.states])
+    assert path.values == pytest.approx(np.vectorize(load)(heights), abs=1e-8 * top)
+    between = np.abs(heights) < LIMIT * (1.0 - 1e-4)
+    stable = np.array([each.stability == "stable" for each in path.states])
+    assert np.array_equal(stable, ~between | (np.abs(np.abs(heights) - LIMIT) < 1e-4) & stable)
+    assert [each.stability for each in path.at(0.5 * top)] == ["stable", "unstable", "stable"]
+    assert path.values[-1] == 1.2 * top and heights[-1] < -HIGH
+
+
+def test_a_truss_gives_way_sideways_before():
+    made = truss().rigid_body("slide", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    made.prismatic("across", "ground", "slide", axis=(1, 0, 0))
+    scene = made.prismatic("up", "slide", "mass", axis=(0, 0, 1), position=HIGH).scene()
+    path = fm.equilibrium_path(scene, "loads.push.function.value", [0.0, 0.9 * load(LIMIT)])
+    assert [each.kind for each in path.critical] == ["bifurcation"]
+    assert path.critical[0].value == pytest.approx(load(SIDEWAYS), rel=1e-5)
+    assert [path.states[0].stability, path.states[-1].stability] == ["stable", "unstable"]
+
+
+def test_what_is_found_says_whether_it_is_stable_and_only_that():
+    scene = guided(0.01)
+    system = fm.compile(scene)
+    found = fm.equilibrium(system)
+    assert found.stability == "unstable" and found.q[0] == pytest.approx(0.0, abs=1e-12)  # the guess was beside it
+    assert copy.copy(found).stability == pickle.loads(pickle.dumps(found)).stability == "unstable"
+    assert replace(found, q=[HIGH]).stability is None
+    assert fm.equilibrium(system, system.state([0.5], [0.0])).stability == "stable"
+
+
+def test_what_cannot_be_followed_is_refused():
+    scene = guided()
+    number = "loads.push.function.value"
+    for values in ([0.0], [0.0, 1.0, 0.5], [[0.0, 1.0]]):
+        with pytest.raises(ValueError, match="rise or all fall"):
+            fm.equilibrium_path(scene, number, values)
+    with pytest.raises(ValueError, match="nowhere"):
+        fm.equilibrium_path(scene, "nowhere.mass_kg", [0.0, 1.0])
+    with pytest.raises(TypeError, match="Scene"):
+        fm.equilibrium_path(fm.compile(scene), number, [0.0, 1.0])
+    with pytest.raises(ValueError, match="not one of the values"):
+        fm.equilibrium_path(scene, number, [0.0, 1.0]).at(0.5)
