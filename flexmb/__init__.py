@@ -35,7 +35,6 @@ _HOME = {
     "flexmb.run.stages": "RunStage simulate_stages",
     "flexmb.run.trajectory": "Trajectory",
     "flexmb.scene.build": "SceneBuilder",
-    "flexmb.scene.check": "check_scene",
     "flexmb.scene.files": "load_scene save_scene",
     "flexmb.scene.open_loop": "open_loop",
     "flexmb.scene.problems": "SceneError SceneWarning",
@@ -51,6 +50,7 @@ _HOME = {
     "flexmb.system.derivative_records": "AccelerationDerivatives EvaluationDerivatives InverseDynamicsDerivatives",
     "flexmb.system.kinks": "NotDifferentiableError",
     "flexmb.system.observables": "Evaluation",
+    "flexmb.system.starting": "check_scene",
     "flexmb.system.tree_system": "System",
     "flexmb.tables.state": "DynamicsError PrecisionWarning State",
     "flexmb.tables.status": "Status",
@@ -90,7 +90,6 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.run.trajectory import Trajectory as Trajectory
     from flexmb.scene import schema as schema
     from flexmb.scene.build import SceneBuilder as SceneBuilder
-    from flexmb.scene.check import check_scene as check_scene
     from flexmb.scene.connectors import *  # noqa: F403  (the schema's names, those of connectors and hinges among them)
     from flexmb.scene.files import load_scene as load_scene
     from flexmb.scene.files import save_scene as save_scene
@@ -121,6 +120,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.system.derivative_records import InverseDynamicsDerivatives as InverseDynamicsDerivatives
     from flexmb.system.kinks import NotDifferentiableError as NotDifferentiableError
     from flexmb.system.observables import Evaluation as Evaluation
+    from flexmb.system.starting import check_scene as check_scene
     from flexmb.system.tree_system import System as System
     from flexmb.tables.state import DynamicsError as DynamicsError
     from flexmb.tables.state import PrecisionWarning as PrecisionWarning

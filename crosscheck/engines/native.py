@@ -16,6 +16,7 @@ from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
+from msgspec import structs
 
 from crosscheck.engines.answers import LOAD_PARTS
 from crosscheck.engines.contract import (
@@ -117,7 +118,7 @@ class NativeEngine:
         return before[1] if before is not None and before[0] is scene else self._made(scene)
 
     def _made(self, scene: Scene) -> NativeModel:
-        system = compile(scene)
+        system = compile(structs.replace(scene, allow=(*scene.allow, "level_range")))  # levels are what cases compare
         system.route(self._algorithm)
         if INTEGRATORS[self._method].linearises:
             refuse_without_jacobian(system, self._algorithm, self._method)

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import assert_never
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from flexmb.closure.closures import ClosureError
@@ -73,7 +74,8 @@ def _open(scene: Scene) -> set[str]:
 def _open_in_run(scene: Scene, t_end: float) -> set[str]:
     """At some times of flexmb's run, and after each of its events."""
     try:
-        run = simulate(scene, t_end, samples=PLACES, rtol=1e-8, atol=1e-10, max_steps=STEPS)
+        allowed = structs.replace(scene, allow=(*scene.allow, "level_range"))
+        run = simulate(allowed, t_end, samples=PLACES, rtol=1e-8, atol=1e-10, max_steps=STEPS)
     except (ClosureError, NotImplementedError):
         return set()
     dense, found = DenseSystem(scene), set[str]()

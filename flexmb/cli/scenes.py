@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Annotated
 
 import typer
@@ -17,6 +18,8 @@ def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_c
     """
     Check a scene without running it: every defect with its place and its remedy.
 
+    What is sound compiles, closes its loops and has accelerations at its start.
+
         flexmb check boom.toml --t-end 60
         flexmb check boom.toml --strict
 
@@ -26,11 +29,14 @@ def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_c
     **Exit code**: 0 sound, 2 wrong, or with `--strict` doubtful.
     """
     with no_traceback(strict):
-        from flexmb.scene.check import check_and_warn
         from flexmb.scene.files import load_scene
+        from flexmb.scene.loaded import called
+        from flexmb.scene.problems import SceneWarning, in_short
+        from flexmb.system.starting import check_scene
 
         loaded = load_scene(scene)
-        check_and_warn(loaded, t_end)
+        if doubts := check_scene(loaded, t_end):
+            warnings.warn(in_short(called(loaded), doubts), SceneWarning, stacklevel=2)
     counts = ", ".join(
         f"{len(getattr(loaded, key))} {key.replace('_', ' ')}" for key in ("bodies", "hinges", "markers")
     )

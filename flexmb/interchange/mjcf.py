@@ -19,6 +19,7 @@ from flexmb.interchange.mjcf_text import refuse_bad_text
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant
 from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
 
@@ -173,8 +174,8 @@ class _Model:
                 self._fail(what, "set it to zero: in scenes, only coordinates of hinges with axes have armatures")
             if m.jnt_type[j] == FREE and (m.jnt_stiffness[j] or np.any(m.dof_damping[first : first + 6])):
                 self._fail(f'free joint "{self._joint_name(j)}" has a spring or damper', "remove it")
-            turned = not np.array_equal(m.qpos_spring[place : place + 4], m.qpos0[place : place + 4])
-            if m.jnt_type[j] == BALL and m.jnt_stiffness[j] and turned:
+            turn = m.qpos_spring[place : place + 4] - m.qpos0[place : place + 4]
+            if m.jnt_type[j] == BALL and m.jnt_stiffness[j] and np.max(np.abs(turn)) > ROUNDING:
                 self._fail(f'the spring of ball joint "{self._joint_name(j)}" is at rest elsewhere', "turn its body")
 
     def _refuse_actuators(self) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant
+from flexmb.scene.rounding import ROUNDING
 
 JOINT, TENDON = 2, 3  # mjtEq
 OF_JOINT = 1  # mjtWrap
@@ -56,14 +57,15 @@ class MjcfCouplings:
             return
         powers = m.eq_data[i]
         one, other = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])
-        if other >= 0 and np.any(powers[HIGHER]):
+        if other >= 0 and np.max(np.abs(powers[HIGHER])) > ROUNDING * np.max(np.abs(powers)):
             remedy = "make it linear, or prescribe both coordinates"
             self._fail(f'equality constraint "{name}" is a polynomial of higher degree than one', remedy)
         factors = self._factors(name, int(m.eq_type[i]), one)
         if other >= 0:
             for j, factor in self._factors(name, int(m.eq_type[i]), other).items():
                 factors[j] = factors.get(j, 0.0) - float(powers[1]) * factor
-        factors = {j: factor for j, factor in factors.items() if factor != 0.0}
+        largest = max(map(abs, factors.values()), default=0.0)
+        factors = {j: factor for j, factor in factors.items() if abs(factor) > ROUNDING * largest}
         offset = float(powers[0])
         if not factors:
             self._fail(f'equality constraint "{name}" relates no coordinates', "remove it")

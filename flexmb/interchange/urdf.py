@@ -20,9 +20,11 @@ from numpy.typing import ArrayLike
 from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming, usable
 from flexmb.interchange.urdf_mimic import Mimics
 from flexmb.scene.build import SceneBuilder
+from flexmb.scene.check.inertia import PRINTED
 from flexmb.scene.options import Placement
 from flexmb.scene.quaternions import about, quaternion_of
 from flexmb.scene.reading import Unreadable, read_text
+from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
 
@@ -59,7 +61,7 @@ def _parsed(path: Path) -> ElementTree.Element:
         text = read_text(path)
         if "<!ENTITY" in text:
             raise ModelError(f"{path}: it declares entities, which no URDF needs: remove them")
-        root = _elements(text)
+        root = _elements(text.lstrip())  # other readers take blank lines before the declaration too
     except Unreadable as error:
         raise ModelError(f"{path}: {error}") from None
     except expat.ExpatError as error:
@@ -164,8 +166,8 @@ class _Robot:
             self._number(place, inertial, "inertia", f"i{k}") for k in ("xx", "yy", "zz", "xy", "xz", "yz")
         )
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if self.repair and not np.array_equal(possible := _possible(mass, tensor), tensor):
-            self.repaired.append(name)
+        if self.repair and (changed := _largest((possible := _possible(mass, tensor, com)) - tensor)):
+            self.repaired.append(f"{name} (by {changed:.3g} of {_largest(tensor):.3g} kg m²)")
             tensor = possible
         turned = R @ tensor @ R.T
         builder.rigid_body(self._body_of(name), mass=mass, com=com, inertia=0.5 * (turned + turned.T))
@@ -246,15 +248,19 @@ class _Robot:
         raise ModelError(f"{self.file}: {place}: {what}: {remedy}")
 
 
-def _possible(mass: float, tensor: Real) -> Real:
+def _possible(mass: float, tensor: Real, com: Real) -> Real:
     """The tensor itself if it is possible; else the one in which negative second moments sum m x x' are zero."""
     if mass == 0.0:
         return np.zeros((3, 3))
     second, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
-    if second[0] >= 0.0:
+    if second[0] >= -PRINTED * _largest(tensor) - ROUNDING * mass * (com @ com):  # the checks of scenes accept it
         return tensor
     second = np.maximum(second, 0.0)
     return np.sum(second) * np.eye(3) - (axes * second) @ axes.T
+
+
+def _largest(a: Real) -> float:
+    return float(np.max(np.abs(a)))
 
 
 def _upright(axis: Real) -> Real:

@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
 from flexmb.linear.linear_model import Complex, LinearModel, Stability, modal_assurance
+from flexmb.linear.linearize import linear_model, warn_beyond_level
 from flexmb.linear.spin import steady_spin
+from flexmb.linear.variations import Equations
 from flexmb.output.whole import whole_file
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
@@ -85,7 +87,9 @@ class Campbell:
 def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
     """Eigenvalues against the spin rate (rad/s) of a revolute hinge or wheel, in the order of `rates`.
 
-    The initial guess of every steady state is that of the previous rate. Raises what `steady_spin` raises.
+    The initial guess of every steady state is that of the previous rate. Warns (`SceneWarning`) where a body turns
+    faster than its level describes: unstable there may be the level, and not the machine. Raises what
+    `steady_spin` raises.
     """
     if isinstance(system, Scene):
         system = compile(system)
@@ -93,6 +97,7 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
     if rates.ndim != 1 or not len(rates):
         raise ValueError(f"rates: give at least one, in a row, not an array of shape {rates.shape}")
     guess: State | None = None
+    turning: list[tuple[Equations, State]] = []
     values: list[Complex] = []
     macs: list[Real] = []
     verdicts: list[Stability] = []
@@ -100,7 +105,8 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
     before: tuple[LinearModel, Complex] | None = None
     for rate in rates:
         spin = steady_spin(system, hinge, float(rate), guess)
-        model, guess = spin.linearize(), spin.state
+        model, guess = linear_model(spin.equations, spin.state), spin.state
+        turning.append((spin.equations, spin.equations.on_functions(spin.state)))
         found, current = _spectrum(model)
         if before is None:
             names = tuple(_dominant(model, shape) for shape in current.T)
@@ -114,6 +120,7 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
         values.append(found)
         before = model, current
         verdicts.append(model.stability)
+    warn_beyond_level(turning)
     return Campbell(
         system.scene.name, hinge, rates, np.array(values), np.array(macs), names, tuple(verdicts)
     )  # fmt: skip

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
+
 import numpy as np
 
 from flexmb.linear.equations import entering
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, Variations
+from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
@@ -26,10 +30,10 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     chain the states are the independent coordinates; the dependent ones are among the outputs. For a scene with
     controllers it is the model of the closed loop about the controllers' initial states, which come last in x. Sensor
     signals are among the outputs: "gyro[0]", or "angle" for a single number; loads and accelerations have direct
-    feedthrough, D. Raises DynamicsError where the accelerations do not exist, `NotDifferentiableError` (one of them)
-    where a controller is exactly at a limit, NotImplementedError for sampled
-    controllers and closures on bodies of level "ruthless", ValueError or TypeError for a state that does not belong to
-    this system or leaves closures open.
+    feedthrough, D. Warns (`SceneWarning`) of bodies that turn faster than their level describes. Raises DynamicsError
+    where the accelerations do not exist, `NotDifferentiableError` (one of them) where a controller is exactly at a
+    limit, NotImplementedError for sampled controllers and closures on bodies of level "ruthless", ValueError or
+    TypeError for a state that does not belong to this system or leaves closures open.
     """
     if isinstance(system, Scene) and system.controllers:
         system = compile(system)
@@ -40,7 +44,19 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
         system.layout.entering(state)
         return closed_loop(system, state, held_model if held else linear_model)
     equations, state = entering(system, state)
-    return held_model(equations, state) if held else linear_model(equations, state)
+    equations = equations.held(state.t) if held else equations
+    warn_beyond_level([(equations, equations.on_functions(state))])
+    return linear_model(equations, state)
+
+
+def warn_beyond_level(states: Sequence[tuple[Equations, State]]) -> None:
+    """A SceneWarning for bodies that turn faster than their level describes, for the caller of the calling function."""
+    from flexmb.system.level_range import too_fast  # imported here because many scenes have no flexible bodies
+
+    system = states[0][0].system
+    t, u = (np.array([getattr(state, key) for _, state in states]) for key in ("t", "u"))
+    for each in too_fast(system, t, u, lambda n: states[n][0].turns(states[n][1])):
+        warnings.warn(f'scene "{system.scene.name}": {each}', SceneWarning, stacklevel=3)
 
 
 def held_model(equations: Equations, state: State) -> LinearModel:

@@ -8,7 +8,7 @@ import numpy as np
 
 from flexmb.linear.equations import entering
 from flexmb.linear.linear_model import LinearModel
-from flexmb.linear.linearize import linear_model
+from flexmb.linear.linearize import linear_model, warn_beyond_level
 from flexmb.linear.newton import balanced
 from flexmb.linear.variations import Equations
 from flexmb.scene.open_loop import refuse_feedback
@@ -37,6 +37,7 @@ class SteadySpin:
         if not isinstance(self.equations, Equations):
             raise TypeError(f"equations is a {type(self.equations).__name__}: give those of steady_spin")
         self.equations.system.layout.entering(self.state)
+        warn_beyond_level([(self.equations, self.equations.on_functions(self.state))])
         return linear_model(self.equations, self.state)
 
 

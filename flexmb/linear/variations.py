@@ -134,6 +134,11 @@ class Equations:
         self.system.check_status(status, int(self._real_w.fault[0]))
         return self._real_w.speed["acceleration"][self.free]
 
+    def turns(self, state: State) -> Real:
+        """Angular velocities (N,3) rad/s of the bodies' frames, in their own axes."""
+        self.rates(state)
+        return np.array(self._real_w.body["velocity"][:, :3])
+
     def mass(self, state: State) -> Real:
         """Mass matrix (n,n) of the free speeds, without closures."""
         return self.system.mass_matrix(state)[np.ix_(self.free, self.free)]

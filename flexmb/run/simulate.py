@@ -84,7 +84,8 @@ def simulate(
     all its coordinates, followed by ".speeds" for all its speeds; closed chains take the nearest state that closes
     their closures. Or state is a `Restart`, from which a run of the same scene and method is resumed bit-identically.
 
-    Warns (`SceneWarning`) of doubtful input, and of beams of level exact that bent more than their points can follow.
+    Warns (`SceneWarning`) of doubtful input, of beams of level exact that bent more than their points can follow, and
+    of bodies that turned faster than their level describes (`allow = ["level_range"]` waives it).
     Raises SceneError for an invalid scene or one whose profiles end before t_end, NotImplementedError for one that is
     not supported yet, ValueError or TypeError for invalid settings, and ClosureError if no initial state closes the
     closures, if they leave no motion, or if the given state is far from closing them. A run that fails raises nothing:
@@ -191,8 +192,9 @@ def _run(
 def _looked_at(
     system: System, trajectory: Trajectory, warned: list[Warning], was_interrupted: bool
 ) -> tuple[Trajectory, list[Warning], bool]:
-    """The same, with what there is to say of beams of level exact that bent too far for their points."""
-    for doubt in _beyond_points(system, trajectory):
+    """The same, with what there is to say of beams that bent too far for their points, and of bodies that turned too
+    fast for their level."""
+    for doubt in (*_beyond_points(system, trajectory), *_beyond_level(system, trajectory)):
         warned = [*warned, SceneWarning(f'scene "{system.scene.name}": {doubt}')]
         trajectory = replace(trajectory, message=f"{trajectory.message}; {doubt}")
     return trajectory, warned, was_interrupted
@@ -205,6 +207,16 @@ def _beyond_points(system: System, trajectory: Trajectory) -> list[str]:
     from flexmb.system.enough_points import unfollowed  # imported here because few scenes have such beams
 
     return [str(each) for each in unfollowed(system, trajectory.t, trajectory.q)]
+
+
+def _beyond_level(system: System, trajectory: Trajectory) -> list[str]:
+    """What there is to say of bodies that turned faster than their level of fidelity describes, in a failed run too."""
+    if all(link.is_rigid for link in system.links):
+        return []
+    from flexmb.system.level_range import too_fast  # imported here because many scenes have no flexible bodies
+
+    t, q, u = trajectory.t, trajectory.q, trajectory.u
+    return [str(each) for each in too_fast(system, t, u, lambda n: system.turns(float(t[n]), q[n], u[n]))]
 
 
 def _again(stage: RunPart, state: Given, algorithm: Algorithm, stabilise: float, settings: Settings) -> Trajectory:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, TypeVar
 
 import msgspec
+from msgspec import structs
+
+from flexmb.scene.rounding import ROUNDING
 
 Vector = tuple[float, float, float]
 Matrix3 = tuple[Vector, Vector, Vector]
@@ -163,6 +166,28 @@ class BeamBody(SceneStruct, frozen=True, kw_only=True, tag="beam", tag_field="ki
     points: Literal["line", "rotary", "section"] = "section"
     tip_masses: tuple[TipMass, ...] = ()
     nodes: tuple[BeamNode, ...] = ()
+
+    def __post_init__(self) -> None:
+        """A place that rounding has put beside an end of the beam is that end."""
+        try:
+            near = {
+                key: tuple(_at_end(each, self.length_m) for each in getattr(self, key))
+                for key in ("stations", "tip_masses", "nodes")
+            }
+        except (AttributeError, TypeError):  # values of other types, which checks name with their places
+            return
+        for key, items in near.items():
+            if items != getattr(self, key):
+                structs.force_setattr(self, key, items)
+
+
+AtPlace = TypeVar("AtPlace", BeamStation, TipMass, BeamNode)
+
+
+def _at_end(item: AtPlace, length: float) -> AtPlace:
+    """The item itself, or at the end of the beam from which only rounding separates it."""
+    ends = [end for end in (0.0, length) if item.x_m != end and abs(item.x_m - end) <= ROUNDING * length]
+    return structs.replace(item, x_m=ends[0]) if ends else item
 
 
 class InertiaPoint(SceneStruct, frozen=True, kw_only=True):

@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.scene.bodies import BeamBody
+from flexmb.scene.bodies import BeamBody, BeamStation
 from flexmb.scene.collocation import partial_integrals
 from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.rounding import ROUNDING
 from flexmb.typing import Real
 
 _Station = tuple[float, tuple[float, float, float]]  # x in m, curvature in 1/m
@@ -41,7 +42,12 @@ class _Span(NamedTuple):
 
 def is_curved(body: BeamBody) -> bool:
     """Whether the unloaded axis of a beam is curved or twisted."""
-    return any(any(station.curvature_1_m) for station in body.stations)
+    return any(is_bent(station, body.length_m) for station in body.stations)
+
+
+def is_bent(station: BeamStation, length: float) -> bool:
+    """Whether a beam of this length (m) would turn by more than rounding with the curvature of a station."""
+    return max(map(abs, station.curvature_1_m)) * length > ROUNDING
 
 
 def turn_at_rest(body: BeamBody) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from flexmb.scene.bodies import BeamBody, BeamStation, Matrix6
+from flexmb.scene.rounding import ROUNDING
 from flexmb.typing import Real
 
 EXTENSION, TWIST, ABOUT_Y, ABOUT_Z = 0, 3, 4, 5
@@ -26,7 +27,6 @@ WITHOUT_SHEAR = [EXTENSION, TWIST, ABOUT_Y, ABOUT_Z]
 STRAINS = ("extension", "shear along y", "shear along z", "twist", "curvature about y", "curvature about z")
 STIFFNESS_KEYS = ("EA_N", "EIy_Nm2", "EIz_Nm2", "GJ_Nm2")
 SHEAR_KEYS = ("GAy_N", "GAz_N")
-ROUNDING = 64 * np.finfo(float).eps  # of sums of at most nine products of three factors, there and back
 INERTIA_KEYS = ("mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
 
 
@@ -151,7 +151,8 @@ def _about_axis(station: BeamStation, body: BeamBody) -> float:
     M = inertia_on_axis(station)
     if body.points != "line":
         return float(M[TWIST, TWIST])
-    return float(M[0, 4] ** 2 + M[0, 5] ** 2)  # of the mass at its centre, times the mass
+    first = float(np.hypot(M[0, 4], M[0, 5]))  # of the mass at its centre
+    return first**2 if first > ROUNDING * float(M[0, 0]) * body.length_m else 0.0
 
 
 def _on_axis(stated: Real, point: tuple[float, float]) -> Real:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, get_args
 from flexmb.jain.elimination import Elimination
 from flexmb.scene.bodies import SidBody
 from flexmb.scene.check import check_and_warn, check_scene
+from flexmb.scene.check.starting import built
 from flexmb.scene.garbage import collector_paused
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
@@ -49,12 +50,11 @@ def assembled(scene: Scene, elimination: Elimination = "fastest") -> System:
     """The system of a scene that has been checked."""
     arguments.one_of("elimination", elimination, get_args(Elimination))
     scene = _read(scene)
-    if scene.constraints:
-        from flexmb.system.closed import ClosedSystem  # imported here, because trees do not need it
+    with collector_paused(), built(scene):
+        if scene.constraints:
+            from flexmb.system.closed import ClosedSystem  # imported here, because trees do not need it
 
-        with collector_paused():
             return ClosedSystem(scene)
-    with collector_paused():
         return System(scene, elimination)
 
 

@@ -233,6 +233,12 @@ class Mechanics(SceneArrays):
         out.rates[:], out.drives[:], out.loads[:] = rates, drives, loads
         self._observe_motion(arguments.number("t", t), self._fitting(y))
 
+    def turns(self, t: float, q: Real, u: Real) -> Real:
+        """Angular velocities (N,3) rad/s of the bodies' frames, in their own axes."""
+        self.observation.out.rates[:] = 0.0
+        self._observe_motion(t, np.concatenate([q, u, [0.0]]))
+        return np.array(self.own_workspace.body["velocity"][:, :3])
+
     def _fitting(self, y: Real) -> Real:
         """y = [q, u, work] of a length that kernels can read; its numbers are not checked."""
         return arguments.vector("y", y, self.nq + self.nu + 1)

@@ -9,6 +9,7 @@ Geometric stiffness, which is in the slopes of Ct, Cr and Oe of a SID file, is p
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -24,6 +25,7 @@ from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.problems import SceneError
 from flexmb.scene.quaternions import quaternion_of
+from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -60,14 +62,15 @@ def _imported(sid: Sid, name: str, level: Level | None) -> ImportedSid:
     notes: list[str] = []
     sums = _Sums(sid, notes)
     points = _points(sid, sums)
-    nodes = [node for node in sid.nodes if not _is_body_frame(node)]
+    scale = _Scale.of(sid)
+    nodes = [node for node in sid.nodes if not _is_body_frame(node, scale)]
     geometric = {} if sums.at_rest_only else _geometric_stiffness(sid, sums)
     body = {
         "name": name,
         "points": inertia_points(*points),
         "stiffness": sid.Ke.zero + (0.0 if sid.ksigma.slope is None else sid.ksigma.slope[:, :, 0]),
         "damping": sid.De.zero if np.any(sid.De.zero) else (),
-        "boundary": "clamped-free" if any(_held(node) for node in sid.nodes) else "free-free",
+        "boundary": "clamped-free" if any(_held(node, scale) for node in sid.nodes) else "free-free",
         "level": level or ("ruthless" if sums.at_rest_only else "full"),
         "nodes": [_node(node, bool(geometric)) for node in nodes],
         **geometric,
@@ -101,14 +104,16 @@ class _Sums:
         self.m = len(sid.modes)
         Gr0 = _matrices(sid.Gr.zero)
         self.P = -0.5 * Gr0 + 0.25 * _trace(Gr0)[..., None, None] * np.eye(3)
-        size = float(np.max(np.abs(Gr0), initial=0.0))
-        _agree("Gr", "Cr", -2.0 * _axial(self.P), -2.0 * sid.Cr.zero, size)
+        size, scale = _largest(Gr0), _Scale.of(sid)
+        turning, moving = (ROUNDING * sid.mass * scale.shape * each for each in (scale.reach, 1.0))
+        _agree("Gr", "Cr", -2.0 * _axial(self.P), -2.0 * sid.Cr.zero, PRINTED * size + turning)
         if sid.mdCM.first is not None:
-            _agree("mdCM", "Ct", sid.mdCM.first[:, :, 0].T, sid.Ct.zero)
+            slack = PRINTED * _largest(sid.Ct.zero) + moving
+            _agree("mdCM", "Ct", sid.mdCM.first[:, :, 0].T, sid.Ct.zero, slack)
         spin = self.P - _trace(self.P)[..., None, None] * np.eye(3)
-        self.order = _order_of_products(sid.Oe.zero, spin)
+        self.order = _order_of_products(sid.Oe.zero, spin, turning)
         if sid.J.first is not None:
-            _agree("J", "Gr", np.moveaxis(sid.J.first, 1, 0), -2.0 * symmetric(spin), size)
+            _agree("J", "Gr", np.moveaxis(sid.J.first, 1, 0), -2.0 * symmetric(spin), PRINTED * size + turning)
         spin_slope = None if sid.Oe.first is None else _of_six(sid.Oe.first, self.order)
         second = None if spin_slope is None else spin_slope - 0.5 * _trace(spin_slope)[..., None, None] * np.eye(3)
         self.change = np.zeros((self.m, self.m, 3, 3))
@@ -116,14 +121,14 @@ class _Sums:
         if sid.Gr.first is not None:
             Gr1 = np.stack([_matrices(sid.Gr.first[:, k]) for k in range(self.m)], axis=1)
             self.Q = -0.5 * Gr1 + 0.25 * _trace(Gr1)[..., None, None] * np.eye(3)
-            _agree("Gr", "Me", _trace(self.Q), sid.Me.zero)
+            _agree("Gr", "Me", _trace(self.Q), sid.Me.zero, PRINTED * _largest(sid.Me.zero))
             if second is not None:
                 self.change = second - symmetric(self.Q)
         elif second is not None:
             self._separate(sid, second, notes)
         else:
             self.Q = self._at_rest(sid)
-        if sid.Me.slope is not None and np.max(np.abs(sid.Me.slope)) > PRINTED * np.max(np.abs(sid.Me.zero)):
+        if sid.Me.slope is not None and _largest(sid.Me.slope) > PRINTED * _largest(sid.Me.zero):
             notes.append(
                 "Me has a slope, from inertia that turns with its points: of that only geometric stiffness is carried"
             )
@@ -135,7 +140,7 @@ class _Sums:
         axis of the body.
         """
         extra = _trace(second) - sid.Me.zero
-        if np.max(np.abs(extra), initial=0.0) > PRINTED * np.max(np.abs(sid.Me.zero), initial=0.0):
+        if _largest(extra) > PRINTED * _largest(sid.Me.zero):
             axis = np.linalg.eigh(_second_moment(sid.J.zero))[1][:, -1]
             self.change = extra[..., None, None] * np.outer(axis, axis)
             notes.append("Gr has no M1: the geometric stiffness in Oe is taken to act along the body's longest axis")
@@ -178,8 +183,7 @@ def _geometric_stiffness(sid: Sid, sums: _Sums) -> dict[str, Real]:
     Cr1 = np.zeros((sums.m, sums.m, 3)) if sid.Cr.first is None else sid.Cr.first
     along, turning = (0.5 * (each + np.swapaxes(each, 0, 1)) for each in (Ct1, Cr1))
     moment = sums.change + 0.5 * cross_matrix(turning)
-    largest = max(1.0, float(np.max(np.abs(sums.Q), initial=0.0)))
-    if max(np.max(np.abs(each), initial=0.0) for each in (along, moment)) <= PRINTED * largest:
+    if max(_largest(along) * _Scale.of(sid).reach, _largest(moment)) <= PRINTED * _largest(sums.Q):
         return {}
     return {
         "gravity_stiffness": -np.moveaxis(along, -1, 0),
@@ -205,43 +209,59 @@ def _field(shape: Taylor) -> Real:
     return np.zeros((m, m, 3)) if shape.first is None else shape.first.transpose(1, 2, 0)
 
 
-def _held(node: SidNode) -> bool:
+class _Scale(NamedTuple):
+    """Length (m) of a body and displacement of its points by unit modal coordinates, as its masses have them.
+
+    What rounding leaves of a zero is measured by these.
+    """
+
+    reach: float
+    shape: float
+
+    @classmethod
+    def of(cls, sid: Sid) -> _Scale:
+        """The roots of mean squares."""
+        squares = max(float(np.trace(sid.J.zero)), 0.0), float(np.max(np.diag(sid.Me.zero), initial=0.0))
+        return cls(*np.sqrt(np.array(squares) / sid.mass).tolist())
+
+
+def _held(node: SidNode, scale: _Scale) -> bool:
     """Whether the node is at the origin and no mode moves it."""
-    return not any(np.any(each.zero) for each in (node.origin, node.phi, node.psi))
+    moved = max(_largest(node.phi.zero), scale.reach * _largest(node.psi.zero))
+    return _largest(node.origin.zero) <= ROUNDING * scale.reach and moved <= ROUNDING * scale.shape
 
 
-def _is_body_frame(node: SidNode) -> bool:
-    return node.name == "origin" and _held(node) and np.array_equal(node.AP.zero, np.eye(3))
+def _is_body_frame(node: SidNode, scale: _Scale) -> bool:
+    return node.name == "origin" and _held(node, scale) and _largest(node.AP.zero - np.eye(3)) <= ROUNDING
 
 
 def _refuse(sid: Sid) -> None:
     """SidError for data that scenes do not support."""
-    if np.any(sid.ksigma.zero):
+    if _largest(sid.ksigma.zero) > ROUNDING * _largest(sid.Ke.zero):
         raise SidError("ksigma has an M0: flexmb has no bodies that are stressed at rest; measure modes from rest")
     for name in ("Ke", "De"):
-        if getattr(sid, name).slope is not None:
+        block = getattr(sid, name)
+        if block.slope is not None and _largest(block.slope) > ROUNDING * _largest(block.zero):
             raise SidError(f"{name} has an M1: flexmb has no stiffness or damping that changes with the modes")
     for node in sid.nodes:
         if np.max(np.abs(node.AP.zero @ node.AP.zero.T - np.eye(3))) > PRINTED or np.linalg.det(node.AP.zero) < 0.0:
             raise SidError(f"AP of node {node.name} is not a rotation: correct its M0")
 
 
-def _agree(one: str, other: str, a: Real, b: Real, size: float | None = None) -> None:
-    size = float(np.max(np.abs(b), initial=0.0)) if size is None else size
-    if np.max(np.abs(a - b), initial=0.0) > PRINTED * size:
+def _agree(one: str, other: str, a: Real, b: Real, slack: float) -> None:
+    if _largest(a - b) > slack:
         raise SidError(f"{one} and {other} contradict each other: they are redundant, so correct one of them")
 
 
-def _order_of_products(Oe: Real, spin: Real) -> tuple[int, ...]:
+def _order_of_products(Oe: Real, spin: Real, dust: float) -> tuple[int, ...]:
     """The order of the products of angular velocities in the last three columns of Oe.
 
     The standard has xy, yz, zx; some programs write xy, xz, yz. Gr, which is redundant, decides. SidError if neither
-    order agrees with it.
+    order agrees with it, but for `dust`.
     """
     wanted = symmetric(spin)
-    size = float(np.max(np.abs(wanted), initial=0.0))
     for order in ((0, 1, 2, 3, 4, 5), (0, 1, 2, 3, 5, 4)):
-        if np.max(np.abs(_of_six(Oe, order) - wanted), initial=0.0) <= PRINTED * size:
+        if _largest(_of_six(Oe, order) - wanted) <= PRINTED * _largest(wanted) + dust:
             return order
     raise SidError("Oe and Gr contradict each other: they are redundant, so correct one of them")
 
@@ -268,6 +288,10 @@ def _second_moment(J: Real) -> Real:
 def _axial(P: Real) -> Real:
     """sum m r x phi from P = sum m phi r' (...,3,3)."""
     return np.stack([P[..., 2, 1] - P[..., 1, 2], P[..., 0, 2] - P[..., 2, 0], P[..., 1, 0] - P[..., 0, 1]], axis=-1)
+
+
+def _largest(a: Real) -> float:
+    return float(np.max(np.abs(a), initial=0.0))
 
 
 def _trace(A: Real) -> Real:

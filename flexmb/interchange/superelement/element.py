@@ -13,6 +13,8 @@ from flexmb.typing import Real
 
 RIGID = 1e-6
 """Largest force of a rigid-body motion, relative to the sum of the magnitudes of its terms, that counts as rounding."""
+DUST = 1e-12
+"""Forces and masses below this share of the structure's largest are rounding: what programs write in place of zeros."""
 ALIKE = 1e-6  # relative difference allowed between the masses in x, y and z, and the halves of a symmetric matrix
 LARGEST = 1e60  # as in scenes: beyond all mechanical quantities, with finite sums and products
 MOTIONS = ("translation x", "translation y", "translation z", "rotation x", "rotation y", "rotation z")
@@ -43,6 +45,17 @@ class SuperElement:
             some = ", ".join(map(str, self.ids[:8])) + (", ..." if len(self.ids) > 8 else "")
             raise SuperElementError(f"there is no node {number}: the nodes are {some}")
         return int(found[0])
+
+    def lever(self) -> Real:
+        """By row (N,), the length (m) that makes a displacement of it: 1 for translations, the reach for rotations.
+
+        K and M, divided by the levers of rows and columns, have one unit.
+        """
+        arms = self.position - self.position.mean(axis=0)
+        long = float(np.max(np.linalg.norm(arms, axis=1), initial=0.0)) or 1.0
+        found = np.ones(len(self.K))
+        found[self.place[:, 3:][self.place[:, 3:] >= 0]] = long
+        return found
 
     def rigid(self, about: Real) -> Real:
         """The six rigid-body motions (N,6) about a point (3,) m: translations, then small rotations."""
@@ -116,9 +129,11 @@ def _places(ids: NDArray[np.int64], dofs: list[str]) -> NDArray[np.int64]:
 
 
 def _check_stiffness(element: SuperElement) -> None:
-    R = element.rigid(element.position.mean(axis=0))
-    parts = np.abs(element.K) @ np.abs(R)
-    share = np.max(np.abs(element.K @ R) / np.where(parts > 0.0, parts, 1.0), axis=0)
+    R, lever = element.rigid(element.position.mean(axis=0)), element.lever()
+    units = np.outer(lever, np.repeat((1.0, np.max(lever)), 3))
+    force, parts = np.abs(element.K @ R) / units, np.abs(element.K) @ np.abs(R) / units
+    dust = DUST * np.max(parts, initial=0.0)
+    share = np.max(np.where(force > dust, force, 0.0) / np.where(parts > 0.0, parts, 1.0), axis=0)
     worst = int(np.argmax(share))
     if not share[worst] <= RIGID:
         raise SuperElementError(

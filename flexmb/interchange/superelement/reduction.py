@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.interchange.gram import NoMasses
-from flexmb.interchange.superelement.element import ALIKE, MOTIONS, SuperElement, SuperElementError
+from flexmb.interchange.superelement.element import ALIKE, DUST, MOTIONS, SuperElement, SuperElementError
 from flexmb.interchange.superelement.inertia import carried_sums
 from flexmb.interchange.superelement.points import RigidBlock, points_with
 from flexmb.scene.bodies import Level, ModalBody
@@ -66,6 +66,7 @@ def reduced(
         raise SuperElementError(f"the damping ratio is {damping_ratio:g}: give a number from 0 to 1, such as 0.005")
     nodes = [element.node(number) for number in dict.fromkeys(interface)]
     held = _interface_rows(element, nodes)
+    _refuse_loose(element, held)
     if len(held) + modes <= 6:
         raise SuperElementError("one interface node without modes is a rigid body: give modes, or more nodes")
     T = _shapes(element.K, element.M, held, modes)
@@ -134,6 +135,19 @@ def _interface_rows(element: SuperElement, nodes: list[int]) -> NDArray[np.int64
                 "surface to a node that has them, by rigid or distributing elements"
             )
     return element.place[nodes].ravel()
+
+
+def _refuse_loose(element: SuperElement, held: NDArray[np.int64]) -> None:
+    """SuperElementError for a displacement inside whose stiffness is zero, or what programs write in place of it."""
+    lever = element.lever()
+    own = np.diag(element.K) / lever**2
+    own[held] = np.inf
+    if np.min(own) <= DUST * np.max(np.abs(element.K) / np.outer(lever, lever)):
+        node, motion = np.argwhere(element.place == np.argmin(own))[0]
+        raise SuperElementError(
+            f"K lets a part move without force while the interface is held: node {element.ids[node]} has no stiffness "
+            f"in {MOTIONS[motion]}; join the part, or remove displacements without stiffness from K and M"
+        )
 
 
 def _shapes(K: Real, M: Real, held: NDArray[np.int64], modes: int) -> Real:

@@ -35,14 +35,9 @@ PHYSICS = (
 
 
 def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) -> tuple[Doubt, ...]:
-    """Raise SceneError with all defects of a scene, under the name of its file if it has one; return its doubts.
+    """Raise SceneError with all defects of a scene that its numbers show; return its doubts.
 
-    Tables of prescribed motions must cover t_start (s), and with `t_end` (s) the run from t_start to t_end.
-
-    A doubtful scene can be run; doubts that its `allow` lists are not returned. `compile`, `simulate` and the command
-    lines show the same doubts as a `SceneWarning`, which `pytest -W error::flexmb.SceneWarning` and the option
-    `--strict` turn into an error. SID bodies and every fidelity level are accepted: `compile` decides whether they can
-    be run. Raises TypeError for anything but a Scene.
+    What `flexmb.check_scene` does before it compiles the scene. SID bodies and every fidelity level are accepted.
     """
     if not isinstance(scene, Scene):
         raise TypeError(f"a Scene is needed, not {type(scene).__name__}: load_scene reads one, SceneBuilder makes one")

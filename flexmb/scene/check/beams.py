@@ -10,6 +10,7 @@ from flexmb.scene.check.exact_beams import damping, exact_beam, without_strains
 from flexmb.scene.check.sections import stations
 from flexmb.scene.check.walk import sound
 from flexmb.scene.problems import Defect, Doubt, Place
+from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 from flexmb.scene.sections import twists_with_inertia
 from flexmb.scene.sizes import MOST_BYTES, PER_MODE, PLENTY, beam_estimate
@@ -78,7 +79,8 @@ def _along(place: Place, body: BeamBody) -> Iterator[Defect]:
                 yield Defect(str(place.key(key, i, "x_m")), what, f"choose 0 <= x_m <= {body.length_m:g}")
     for i, lump in enumerate(body.tip_masses):
         yield from inertia.mass(place.key("tip_masses", i, "mass_kg"), lump.mass_kg, zero=False)
-        yield from inertia.tensor(place.key("tip_masses", i, "inertia_kg_m2"), lump.inertia_kg_m2)
+        dust = ROUNDING * lump.mass_kg * body.length_m**2
+        yield from inertia.tensor(place.key("tip_masses", i, "inertia_kg_m2"), lump.inertia_kg_m2, dust)
 
 
 def _modes(place: Place, body: BeamBody) -> Iterator[Defect]:

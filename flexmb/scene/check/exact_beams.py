@@ -9,7 +9,7 @@ from flexmb.scene.bodies import BeamBody, Modes
 from flexmb.scene.convert import ROOT
 from flexmb.scene.pieces import across, piece_count
 from flexmb.scene.problems import Defect, Doubt, Place, closest
-from flexmb.scene.rest_curve import MOST_TURN, turn_at_rest
+from flexmb.scene.rest_curve import MOST_TURN, is_bent, turn_at_rest
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import MOST_MODES
 from flexmb.scene.strains import FEWEST_POINTS, MORE_POINTS, STRAINS, points_of_piece, polynomials
@@ -102,7 +102,7 @@ def without_strains(place: Place, body: BeamBody) -> Iterator[Defect]:
             what = f'{key} is for strains, which level "{body.level}" does not have'
             yield Defect(str(place.key("modes", key)), what, 'leave it out, or make the level "exact"')
     for i, station in enumerate(body.stations):
-        if any(station.curvature_1_m):
+        if is_bent(station, body.length_m):
             what = f'level "{body.level}" has straight beams only'
             spot = place.key("stations", i, "curvature_1_m")
             yield Defect(str(spot), what, 'make the level "exact", or join straight beams by welds')

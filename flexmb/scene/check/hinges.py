@@ -49,7 +49,11 @@ def _to_examine(scene: Scene) -> set[int]:
 
 def closures(scene: Scene) -> Iterator[Defect]:
     """A closure of a kind without an axis must not be given one."""
-    given = [i for i, each in enumerate(scene.closures) if each.axis != Z_AXIS and each.type not in WITH_AXIS]
+    given = [
+        i
+        for i, each in enumerate(scene.closures)
+        if each.type not in WITH_AXIS and max(abs(a - b) for a, b in zip(each.axis, Z_AXIS, strict=True)) > UNIT_LENGTH
+    ]
     for place, closure in sound(scene, "closures", given):
         what = f"a {closure.type} closure has no axis of its own"
         yield Defect(str(place.key("axis")), what, "leave the axis out, or turn quaternion_a and quaternion_b")

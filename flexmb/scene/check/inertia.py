@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flexmb.scene.bodies import RigidBody
+from flexmb.scene.check.reach import reach
 from flexmb.scene.check.walk import LARGEST, sound
 from flexmb.scene.columns import column
 from flexmb.scene.problems import Defect, Place
+from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 
 # Tensors printed to ten digits fulfil symmetry and the triangle inequality (an equality for a flat body) this well.
@@ -21,10 +23,13 @@ def rigid_bodies(scene: Scene) -> Iterator[Defect]:
     """Every rigid body has a nonnegative mass, and an inertia tensor that a distribution of this mass can have."""
     rigid = {i: body for i, body in enumerate(scene.bodies) if isinstance(body, RigidBody)}
     doubtful = _doubtful(list(rigid.values()))
+    size = reach(scene) if any(doubtful) else 0.0
+    whole = sum(body.mass_kg for body in rigid.values() if body.mass_kg > 0.0)
     for place, body in sound(scene, "bodies", [i for i, doubt in zip(rigid, doubtful, strict=True) if doubt]):
         yield from mass(place.key("mass_kg"), body.mass_kg)
-        yield from tensor(place.key("inertia_kg_m2"), body.inertia_kg_m2)
-        if body.mass_kg == 0.0 and np.any(body.inertia_kg_m2):
+        dust = ROUNDING * size**2 * (body.mass_kg if body.mass_kg > 0.0 else whole)
+        yield from tensor(place.key("inertia_kg_m2"), body.inertia_kg_m2, dust)
+        if body.mass_kg == 0.0 and np.max(np.abs(body.inertia_kg_m2)) > dust:
             what = "a body without mass cannot have inertia"
             yield Defect(str(place.key("mass_kg")), what, "give its mass, or set its inertia to zero too")
 
@@ -49,10 +54,13 @@ def mass(place: Place, value: float, *, zero: bool = True) -> Iterator[Defect]:
         yield Defect(str(place), "the mass is zero", "give a positive mass, or leave the item out")
 
 
-def tensor(place: Place, value: ArrayLike) -> Iterator[Defect]:
-    """An inertia tensor is symmetric, positive semidefinite, and its moments fulfil J1 + J2 >= J3."""
+def tensor(place: Place, value: ArrayLike, dust: float) -> Iterator[Defect]:
+    """An inertia tensor is symmetric, positive semidefinite, and its moments fulfil J1 + J2 >= J3.
+
+    `dust` (kg m²): what rounding leaves of terms m r² that cancel, where r is a length of the problem.
+    """
     inertia = np.asarray(value, dtype=np.float64)
-    slack = PRINTED * float(np.max(np.abs(inertia), initial=0.0))
+    slack = PRINTED * float(np.max(np.abs(inertia), initial=0.0)) + dust
     gap = np.abs(inertia - inertia.T)
     if np.any(gap > slack):
         i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)

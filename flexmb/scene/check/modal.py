@@ -15,6 +15,7 @@ from flexmb.scene.check.second_order import second_order
 from flexmb.scene.check.walk import LARGEST, entries, sound
 from flexmb.scene.modal_data import ModalArrays, modal_arrays
 from flexmb.scene.problems import Defect, Doubt, Place
+from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import MOST_BYTES, modes_memory
 from flexmb.typing import Real
@@ -99,11 +100,12 @@ def _read(place: Place, body: ModalBody) -> Generator[Defect, None, ModalArrays 
 
 def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defect]:
     spot = place.key("file" if body.file is not None else "points")
+    size = float(np.max(np.linalg.norm(arrays.position, axis=1)))
     for j, (mass, tensor) in enumerate(zip(arrays.mass, arrays.inertia, strict=True)):
         point = spot.key(j) if body.file is None else spot.named(f"point {j}")
         yield from inertia.mass(point, mass)
         if np.any(tensor):
-            yield from inertia.tensor(point, tensor)
+            yield from inertia.tensor(point, tensor, ROUNDING * abs(mass) * size**2)
     if not np.any(arrays.mass > 0.0):
         yield Defect(str(spot), "the body has no mass", "give its points mass")
 
@@ -148,8 +150,8 @@ def _shapes(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defe
     M, coupling, rigid = _mass_blocks(arrays)
     d = np.diag(M)
     # Gram matrices of n points and m modes are known to m n round-offs once scaled to unit diagonal.
-    slack = m * len(arrays.mass) * np.finfo(float).eps
-    if np.any(d <= 0.0):
+    slack = max(m * len(arrays.mass) * np.finfo(float).eps, ROUNDING)
+    if np.any(d <= ROUNDING**2 * np.max(d)):
         n = int(np.argmin(d))
         yield Defect(str(place), f"mode {n} moves no mass", "leave the mode out, or give the points it moves mass")
         return
@@ -157,7 +159,7 @@ def _shapes(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defe
     if np.linalg.eigvalsh(M * scale)[0] < slack:
         yield Defect(str(place), "the modes are not independent: their mass matrix is singular", "drop one of them")
         return
-    floating = M - coupling.T @ np.linalg.pinv(rigid) @ coupling
+    floating = M - coupling.T @ np.linalg.pinv(rigid, rcond=ROUNDING, hermitian=True) @ coupling
     if body.boundary == "free-free" and np.linalg.eigvalsh(floating * scale)[0] < slack:
         remedy = "the body frame carries the rigid-body motion: remove it from the modes"
         yield Defect(str(place), "a combination of the free-free modes is a rigid-body motion", remedy)

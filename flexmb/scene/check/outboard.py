@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody, Vector
 from flexmb.scene.check.profiles import start_of
+from flexmb.scene.check.reach import reach
 from flexmb.scene.check.walk import entries
 from flexmb.scene.columns import column
 from flexmb.scene.freedoms import Ball, Coordinate, Floating, Freedom, ScalarFreedom
@@ -22,6 +23,7 @@ from flexmb.scene.hinges import Hinge
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Defect
 from flexmb.scene.quaternions import rotation_by, rotation_matrix
+from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import PointMass, Scene, Wheel
 from flexmb.scene.sections import inertia_on_axis, mass_centres
 from flexmb.scene.tree import GROUND, NodeFrame, ordered, rest_frames
@@ -29,6 +31,11 @@ from flexmb.typing import Real
 
 # With a moment of inertia below this fraction of the largest, no digits of the acceleration are left.
 NEGLIGIBLE = 1e-12
+ABOUT, ALONG = "inertia about", "mass along"
+LOCKED = (
+    "the hinge starts where its axes align (gimbal lock): one of its freedoms is lost",
+    "start elsewhere, choose another sequence, or use a spherical hinge",
+)
 GAUSS = np.polynomial.legendre.leggauss(2)  # exact for a linear section times x^2
 
 
@@ -38,7 +45,7 @@ def moved_inertia(scene: Scene) -> Iterator[Defect]:
     all_freedoms = [hinge.freedoms for hinge in scene.hinges]
     free, armatures = _free_directions(all_freedoms), [_armatures(own) for own in all_freedoms]
     ends = _motions(*nodes.frames(scene.hinges, "child"))
-    known, beyond, inertia = _clusters(scene, nodes, ends)
+    known, beyond, inertia, dust = _clusters(scene, nodes, ends)
     of_child = [nodes.number[hinge.child] for hinge in scene.hinges]
     faults: dict[int, tuple[str, str]] = {}
     for freedoms in set(map(len, free)) - {0}:
@@ -46,18 +53,21 @@ def moved_inertia(scene: Scene) -> Iterator[Defect]:
         H = np.swapaxes(np.array([free[i] for i in hinges]), 1, 2)
         armature = np.array([armatures[i] for i in hinges])
         resisted = np.concatenate([H, np.eye(freedoms) * (armature > 0.0)[:, None]], axis=1)
-        locked = np.linalg.svd(resisted, compute_uv=False)[:, -1] <= NEGLIGIBLE
-        for i in hinges[locked]:
-            what = "the hinge starts where its axes align (gimbal lock): one of its freedoms is lost"
-            faults[int(i)] = what, "start elsewhere, choose another sequence, or use a spherical hinge"
+        locked = np.linalg.svd(resisted, compute_uv=False)[:, -1] <= np.sqrt(NEGLIGIBLE)  # it enters squared
+        faults |= {int(i): LOCKED for i in hinges[locked]}
         tested = [
             n
             for n, (i, lock) in enumerate(zip(hinges, locked, strict=True))
             if not lock and known[of_child[i]] and not beyond[of_child[i]]
         ]
         bodies = [of_child[i] for i in hinges[tested]]
-        for n, noun in _unmoved(H[tested], ends[hinges[tested]], inertia[bodies], armature[tested]):
+        seen = H[tested], ends[hinges[tested]], inertia[bodies], armature[tested]
+        for n, noun in _unmoved(*seen, dust):
             i = int(hinges[tested[n]])
+            along = np.linalg.svd(seen[0][n], full_matrices=False)[0]
+            if noun == ABOUT and not any(_unmoved(along[None], *(each[[n]] for each in seen[1:]), dust)):
+                faults[i] = LOCKED  # what the hinge carries has inertia about all axes, and its own axes nearly align
+                continue
             child = scene.hinges[i].child
             what = f'body "{child}" and what is welded to it have no {noun} a free direction of this hinge'
             remedy = f"give them {noun.split()[0]}, weld the hinge, or prescribe the coordinate or give it an armature"
@@ -66,24 +76,26 @@ def moved_inertia(scene: Scene) -> Iterator[Defect]:
         yield Defect(str(place), *faults[i])
 
 
-def _unmoved(H: Real, end: Real, cluster: Real, armature: Real) -> Iterator[tuple[int, str]]:
+def _unmoved(H: Real, end: Real, cluster: Real, armature: Real, dust: Real) -> Iterator[tuple[int, str]]:
     """Numbers of the hinges among n with a free direction in H (n,6,f) that moves no inertia, and what is missing.
 
     `end` (n,6,6): motion of the body's frame to that of the hinge's; `cluster` (n,6,6): inertia in the body's frame;
-    `armature` (n,f): inertia of the coordinates alone.
+    `armature` (n,f): inertia of the coordinates alone. `dust` (6,): what rounding leaves of moments and masses.
     """
     X = np.linalg.inv(end)
     inertia = np.swapaxes(X, 1, 2) @ cluster @ X
-    D = np.swapaxes(H, 1, 2) @ inertia @ H + armature[:, None] * np.eye(H.shape[2])
+    D = np.swapaxes(H, 1, 2) @ inertia @ H
+    rounded = (np.diagonal(D, axis1=1, axis2=2) <= np.max(dust[:, None] * (H != 0.0), axis=1)) & (armature == 0.0)
+    D = D + armature[:, None] * np.eye(H.shape[2])
     diagonal = np.diagonal(D, axis1=1, axis2=2)
     mass, moment = inertia[:, 5, 5], np.trace(inertia[:, :3, :3], axis1=1, axis2=2)
     angular = np.any(H[:, :3] != 0.0, axis=1)
-    still = diagonal <= NEGLIGIBLE * np.where(angular, moment[:, None], mass[:, None])
+    still = rounded | (diagonal <= NEGLIGIBLE * np.where(angular, moment[:, None], mass[:, None]))
     size = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     coupled = np.linalg.eigvalsh(D / (size[:, :, None] * size[:, None, :]))[:, 0] <= NEGLIGIBLE
     for n in np.flatnonzero(np.any(still, axis=1) | coupled):
         along = bool(np.any(still[n])) and not np.any(angular[n, still[n]])
-        yield int(n), "mass along" if along else "inertia about"
+        yield int(n), ALONG if along else ABOUT
 
 
 class _Nodes:
@@ -121,12 +133,14 @@ def _beside(node: NodeFrame, R: Real, p: Real) -> tuple[Real, Real]:
     return turn @ R, node.position + turn @ p
 
 
-def _clusters(scene: Scene, nodes: _Nodes, ends: Real) -> tuple[list[bool], list[bool], Real]:
+def _clusters(scene: Scene, nodes: _Nodes, ends: Real) -> tuple[list[bool], list[bool], Real, Real]:
     """For every body with all bodies welded to it: whether its inertia is known, whether further massive bodies are
-    connected by moving hinges, and the inertia (N,6,6) in the body's frame."""
+    connected by moving hinges, and the inertia (N,6,6) in the body's frame; and what rounding leaves (6,) of it."""
     known, total = _spatial_inertias(scene, nodes)
     beyond = [False] * len(known)
-    massive = np.any(total != 0.0, axis=(1, 2)).tolist()
+    lightest = np.min(total[:, 5, 5], where=total[:, 5, 5] > 0.0, initial=np.inf)
+    dust = ROUNDING * (lightest if np.isfinite(lightest) else 0.0) * np.array([reach(scene) ** 2] * 3 + [1.0] * 3)
+    massive = np.any(np.diagonal(total, axis1=1, axis2=2) > dust, axis=1).tolist()
     number = {hinge.name: i for i, hinge in enumerate(scene.hinges)}
     for body, hinge in reversed(ordered(scene)):
         if hinge.parent == GROUND:
@@ -142,7 +156,7 @@ def _clusters(scene: Scene, nodes: _Nodes, ends: Real) -> tuple[list[bool], list
             massive[parent] = massive[parent] or massive[k]
         else:
             known[parent] = False
-    return known, beyond, total
+    return known, beyond, total, dust
 
 
 def _spatial_inertias(scene: Scene, nodes: _Nodes) -> tuple[list[bool], Real]:

@@ -11,6 +11,7 @@ from flexmb.scene.check.walk import holding, non_finite, suspicious, values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.problems import Defect, Place
+from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 
 SAMPLES = 6  # a quintic spline needs degree + 1
@@ -72,7 +73,8 @@ def initial_motion(place: Place, item: SceneStruct, keys: tuple[str, str], funct
         return
     for key, profile in zip(keys, start, strict=True):
         given = getattr(item, key)
-        if given != 0.0 and abs(given - profile) > PRINTED * max(1.0, abs(profile)):
+        size = max(1.0, abs(profile))
+        if abs(given) > ROUNDING * size and abs(given - profile) > PRINTED * size:  # what is zero is not given
             what = f"starts at {given:g}, but its prescribed motion at {profile:g}"
             yield Defect(str(place.key(key)), what, f"leave {key} out: the profile says where the motion starts")
 
@@ -105,7 +107,8 @@ def _covers(place: Place, table: Table, t_end: float | None, t_start: float) -> 
         return
     first, last = table.times_s[0], table.times_s[-1]
     needed = t_start if t_end is None else t_end
-    if first > t_start or last < needed:
+    slack = ROUNDING * max(abs(first), abs(last), abs(t_start), abs(needed))
+    if first > t_start + slack or last < needed - slack:
         what = f"the profile covers {first:g} s to {last:g} s, but the run {t_start:g} s to {needed:g} s"
         yield Defect(str(place.key("times_s")), what, "extend the table, or shorten the run")
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flexmb.scene.bodies import ModalBody
 from flexmb.scene.modal_data import ModalArrays, node_arrays
 from flexmb.scene.problems import Defect, Place
+from flexmb.scene.rounding import ROUNDING
 
 FULL = 'or use level "full", which no load stiffens'
 
@@ -22,7 +24,7 @@ def second_order(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator
         except ValueError as error:
             yield Defect(str(spot), str(error), "give three m x m matrices, or m x m vectors")
             continue
-        moves = np.any(node.translation_modes) or np.any(node.rotation_modes)
+        moves = _largest(node.translation_modes, node.rotation_modes) > ROUNDING * _largest(arrays.translation_modes)
         if "force_stiffness" in given and len(given) > 1:
             what = "second-order field and force_stiffness are given"
             yield Defect(str(spot), what, "give one of them: each follows from the other")
@@ -48,3 +50,7 @@ def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defe
         what = 'level "stiffened" needs a second-order field, and the body has none'
         remedy = "give second_translation of its points, or gravity_stiffness and gradient_stiffness"
         yield Defect(str(place.key("level")), what, f"{remedy}, {FULL}")
+
+
+def _largest(*shapes: ArrayLike) -> float:
+    return max(float(np.max(np.abs(each), initial=0.0)) for each in shapes)

@@ -51,7 +51,7 @@ def stations(place: Place, body: BeamBody) -> Iterator[Defect]:
         if not found:
             yield from _plausible(spot, station, body.length_m)
             sound += 1
-            if body.level != "exact" and not is_plain(station):
+            if body.level != "exact" and body.length_m > 0.0 and not is_plain(station):
                 yield from _shown(place, spot, station, body)
     if body.level == "exact" and sound == len(body.stations):
         yield from _strained(place, body)

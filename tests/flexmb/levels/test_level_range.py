@@ -1,0 +1,90 @@
+"""Whatever turns a flexible body faster than its level describes says so, with the level to take."""
+
+import warnings
+from typing import get_args
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+from typer.testing import CliRunner
+
+import flexmb as fm
+from flexmb.cli import app
+from flexmb.scene.bodies import Level, Modes
+from flexmb.scene.files import save_scene
+from flexmb.scene.shapes import beam_section
+from flexmb.system.level_range import ALLOWED, UNPULLED
+
+RULER = beam_section(E=70e9, G=27e9, A=2e-5, Iy=1.7e-12, Iz=6.7e-10, rho=2700.0)
+FIRST = 3.5160 * np.sqrt(70e9 * 1.7e-12 / (2700.0 * 2e-5))  # rad/s, of a cantilever of 1 m
+
+
+def arm(rate: float, level: Level = "full", axis=(0, 0, 1), **motion: object) -> fm.Scene:
+    """A ruler of 1 m that turns about its root."""
+    modes = Modes(count=4 if level != "exact" else 2)
+    builder = fm.SceneBuilder("arm").beam("ruler", length=1.0, elements=8, section=RULER, modes=modes, level=level)
+    return builder.revolute("hub", "ground", "ruler", axis=axis, rate=rate, **motion).scene()
+
+
+def said(scene: fm.Scene, t_end: float = 0.02) -> list[str]:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run = fm.simulate(scene, t_end, samples=3)
+    words = [str(each.message) for each in caught]
+    assert all(issubclass(each.category, fm.SceneWarning) for each in caught)
+    assert all(word.split(": ", 1)[1] in run.message for word in words)
+    return words
+
+
+@pytest.mark.parametrize("level", [level for level in get_args(Level) if level != "rigid"])
+def test_a_run_beyond_the_range_of_its_level_names_the_level_to_take(level):
+    words = said(arm(0.6 * FIRST, level))
+    assert len(words) == (1 if level in UNPULLED else 0)
+    for word in words:
+        assert f'level "{level}"' in word and '"stiffened" or "exact"' in word and "= 0.36" in word
+        assert "unstable" not in word
+
+
+def test_what_turns_slowly_or_about_its_own_axis_is_silent():
+    assert said(arm(0.9 * np.sqrt(ALLOWED) * FIRST)) == []
+    assert said(arm(3.0 * FIRST, axis=(1, 0, 0))) == []
+    (word,) = said(arm(1.5 * FIRST))
+    assert "unstable" in word
+    assert said(replace(arm(1.5 * FIRST), allow=("level_range",))) == []
+
+
+def test_linear_models_and_campbell_diagrams_warn_once():
+    """About the rates of the diagram, also where the scene drives the hub otherwise."""
+    for motion in ({}, {"prescribed": fm.Constant(value=0.0)}):
+        system = fm.compile(arm(0.0, **motion))
+        fm.campbell(system, "hub", [0.0, 0.3 * FIRST])
+        with pytest.warns(fm.SceneWarning, match="= 1.4; level .* unstable") as caught:
+            fm.campbell(system, "hub", [0.0, 0.3 * FIRST, 0.6 * FIRST, 1.2 * FIRST])
+        assert len(caught) == 1
+    with pytest.warns(fm.SceneWarning, match="first frequency"):
+        fm.steady_spin(system, "hub", 0.6 * FIRST).linearize()
+    with pytest.warns(fm.SceneWarning, match="first frequency"):
+        fm.linearize(arm(0.6 * FIRST))
+    fm.linearize(arm(0.6 * FIRST, "stiffened"))
+
+
+def test_the_check_knows_rates_at_the_start_and_prescribed_ones(tmp_path):
+    spun = arm(0.0, prescribed=fm.SpinUp(rate=0.6 * FIRST, duration_s=5.0))
+    assert fm.check_scene(spun) == () == fm.check_scene(arm(0.6 * FIRST, "stiffened"))
+    for scene, t_end in ((arm(0.6 * FIRST), None), (spun, 10.0)):
+        (doubt,) = fm.check_scene(scene, t_end)
+        assert doubt.waiver == "level_range" and 'body "ruler"' in doubt.where and "stiffened" in doubt.remedy
+        assert fm.check_scene(replace(scene, allow=("level_range",)), t_end) == ()
+    save_scene(arm(0.6 * FIRST), tmp_path / "arm.toml")
+    assert "level_range" in CliRunner().invoke(app, ["check", str(tmp_path / "arm.toml")]).stderr
+    assert CliRunner().invoke(app, ["check", "--strict", str(tmp_path / "arm.toml")]).exit_code == 2
+
+
+def test_what_is_allowed_changes_the_first_frequency_by_a_tenth():
+    """Level full against level exact, in a steady spin with the flapping in its plane of rotation left out."""
+    rate = np.sqrt(ALLOWED) * FIRST * 0.999
+    frequency = {
+        level: min(mode.frequency_hz for mode in fm.steady_spin(arm(0.0, level), "hub", rate).linearize().modes)
+        for level in ("full", "exact")
+    }
+    assert 0.05 < frequency["exact"] / frequency["full"] - 1.0 < 0.15
