@@ -27,6 +27,7 @@ _HOME = {
     "flexmb.linear.newton": "EquilibriumError",
     "flexmb.linear.spin": "steady_spin SteadySpin",
     "flexmb.run.batch_trajectory": "BatchTrajectory",
+    "flexmb.run.envelope": "Envelope Extremes",
     "flexmb.run.event_record": "EventRecord",
     "flexmb.run.interruption": "Interrupted",
     "flexmb.run.restart": "Restart",
@@ -80,6 +81,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.linear.spin import SteadySpin as SteadySpin
     from flexmb.linear.spin import steady_spin as steady_spin
     from flexmb.run.batch_trajectory import BatchTrajectory as BatchTrajectory
+    from flexmb.run.envelope import Envelope as Envelope
+    from flexmb.run.envelope import Extremes as Extremes
     from flexmb.run.event_record import EventRecord as EventRecord
     from flexmb.run.interruption import Interrupted as Interrupted
     from flexmb.run.restart import Restart as Restart

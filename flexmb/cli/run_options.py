@@ -43,6 +43,13 @@ Also = Annotated[
     list[str] | None,
     Option(help="In addition to the CSV: `npz`, `parquet`, or `rrd` for the viewer rerun; may be repeated."),
 ]
+Envelope = Annotated[
+    bool,
+    Option(
+        "--envelope",
+        help="Follow the run again over all of its steps; print the peaks of loads, write envelope.csv.",
+    ),
+]
 Plots = Annotated[bool, Option("--plots/--no-plots", help="Write charts beside the CSV.")]
 Sections = Annotated[
     list[str] | None,

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 FORMATS = {"npz": "to_npz", "parquet": "to_parquet", "rrd": "to_rerun"}
 """Endings, and the methods of a trajectory that write them."""
 
+ENVELOPE = "envelope.csv"
 SECTIONS = 21  # equally spaced, where no positions are given
 
 
@@ -40,6 +41,7 @@ def simulate(
     restart: o.RestartFile = None,
     samples: o.Samples = 201,
     algorithm: o.AlgorithmName = "articulated",
+    envelope: o.Envelope = False,
     also: o.Also = None,
     plots: o.Plots = True,
     sections: o.Sections = None,
@@ -57,13 +59,15 @@ def simulate(
         flexmb simulate boom.toml --t-end 60 --method rk4 --step 1e-3 --no-plots
         flexmb simulate boom.toml --t-end 60 --method exponential --rtol 1e-6 --atol 1e-8
         flexmb simulate boom.toml --t-end 60 --algorithm frisch
+        flexmb simulate boom.toml --t-end 60 --envelope
         flexmb simulate boom.toml --t-end 60 --also parquet --also rrd
         flexmb simulate boom.toml --t-end 60 --set tip.mass_kg=0.2 --set hub_hinge.rotation.angle_rad=0.1
         flexmb simulate boom.toml --t-end 120 --restart out/restart.npz --out later
         flexmb simulate boom.toml --t-end 60 --sections strip --sections mast:0,0.5,1 --error-estimate
 
     **Columns** of the CSV are named `channel [unit]`: coordinates, speeds, markers, hinge loads, drives, energy,
-    momentum. Markers and loads are in World axes; loads act on the outboard body about the outboard hinge point.
+    momentum. Markers and loads are in World axes; loads act on the outboard body about the outboard hinge point. They
+    are values at the output times: peaks between these are found by `--envelope`, one row per channel.
 
     **Exit code**: 0 finished, 1 stopped before the end (what was reached is written), 2 the scene or an option is
     wrong, or the scene is doubtful with `--strict`, 130 interrupted by Ctrl-C (what was reached is written).
@@ -79,6 +83,8 @@ def simulate(
         with console.status(Text(f"simulating {scene} (the first run after an update compiles)")):
             trajectory, interrupted = _run(scene, t_end, values or (), restart, settings)
         _report(trajectory, out, also or (), plots, wanted)
+        if envelope and not interrupted:
+            _find_envelope(trajectory, out / ENVELOPE)
         if error and not interrupted:
             _estimate_error(trajectory)
     if interrupted:
@@ -127,6 +133,17 @@ def _report(
         console.print("wrote", str(path), soft_wrap=True)
 
 
+def _find_envelope(trajectory: Trajectory, path: Path) -> None:
+    from flexmb.run.summary import peaks_table
+
+    with console.status(Text("following the run over all of its steps")):
+        found = trajectory.envelope
+    console.print(peaks_table(trajectory, found))
+    with whole_file(path) as beside:
+        found.to_csv(beside)
+    console.print("wrote", str(path), soft_wrap=True)
+
+
 def _estimate_error(trajectory: Trajectory) -> None:
     from flexmb.run.summary import errors_table
 
@@ -146,8 +163,8 @@ def _written(trajectory: Trajectory, out: Path, also: Sequence[str], plots: bool
     with ExitStack() as together:
         for path, write in writers.items():
             write(together.enter_context(whole_file(path)))
-    if trajectory.restart is None:
-        restart.unlink(missing_ok=True)  # of an earlier run
+    for other in {restart, out / ENVELOPE} - set(writers):
+        other.unlink(missing_ok=True)  # of an earlier run
     return [*writers, *(trajectory.plot(out) if plots else ())]
 
 

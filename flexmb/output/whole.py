@@ -57,12 +57,12 @@ def write_whole(path: Path, content: str | bytes) -> None:
         beside.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
 
 
-def write_csv(path: Path, header: Sequence[str], rows: Iterable[Iterable[float]]) -> None:
-    """Write a table of numbers as CSV, with 17 digits, which are read back exactly."""
+def write_csv(path: Path, header: Sequence[str], rows: Iterable[Iterable[float | str]]) -> None:
+    """Write a table of numbers, or names, as CSV; numbers with 17 digits, which are read back exactly."""
     with whole_file(path) as beside, beside.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(header)
-        writer.writerows([f"{value:.17g}" for value in row] for row in rows)
+        writer.writerows([value if isinstance(value, str) else f"{value:.17g}" for value in row] for row in rows)
 
 
 def save_figure(figure: Figure, path: Path, **settings: Any) -> Path:

@@ -85,7 +85,7 @@ def _runs(method: Method) -> Iterator[tuple[str, Use]]:
 
 def _run(scene: Scene, method: Method, algorithm: Algorithm = "articulated") -> None:
     step = STEP if INTEGRATORS[method].fixed else None
-    simulate(scene, T_END, method, samples=3, step=step, algorithm=algorithm)
+    _ = simulate(scene, T_END, method, samples=3, step=step, algorithm=algorithm).envelope
 
 
 def _eventful(builder: Callable[[], SceneBuilder], method: Method) -> None:

@@ -44,6 +44,9 @@ def joined(first: Run, later: Run) -> Run:
         **{key: each(key) for key in ("loads", "wheel_loads", "energy", "connectors", "hinge_forces")},
         **{key: _of_some(first, later, kept, key) for key in SOME},
         work=both(first.work, later.work + counted),
+        ways=(*(way._replace(until=min(way.until, float(later.t[0]))) for way in first.ways), *later.ways)
+        if first.ways and later.ways
+        else (),
     )
     return _ended(whole, later)
 

@@ -15,6 +15,7 @@ from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import Memory, memory
 from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, problem, stiff_problem
+from flexmb.integrate.recorded import RecordedSteps, recorded
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import CROSSED, Watch
 from flexmb.jit.direct import undispatched
@@ -143,6 +144,10 @@ class Integration:
         known = self.feedback.remember()
         self.feedback.replay()
         return known
+
+    def recorded(self, room: int) -> tuple[Any, RecordedSteps]:
+        """The problem that `begin` has posed, with a record of so many steps."""
+        return recorded(self._problem, room)
 
     def _batch_outputs(self, n: int) -> None:
         assert self.feedback is not None

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, NamedTuple, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,18 @@ class Statistics:
     output_s: float
 
 
+class Way(NamedTuple):
+    """How a run, or a part of a joined one, is followed again for its envelope.
+
+    parts: gives its extremes up to a time (s); start, until: of the run (s); names: its `q_names` and `u_names`.
+    """
+
+    parts: Callable[[float], Iterable[Any]]
+    start: float
+    until: float
+    names: tuple[Any, Any]
+
+
 @dataclass(frozen=True)
 class RunArrays:
     """The results of one run at the output times that were reached; `flexmb.Trajectory` describes the fields."""
@@ -93,6 +105,8 @@ class RunArrays:
     signals: dict[str, Real] = field(default_factory=dict)
     power: dict[str, Real] = field(default_factory=dict)
     events: tuple[EventRecord, ...] = ()
+    ways: tuple[Way, ...] = field(default=(), repr=False, compare=False)
+    """How the run is followed again, for its envelope; empty for a trajectory that `simulate` has not made."""
 
     def __post_init__(self) -> None:
         """TypeError or ValueError for inconsistent arrays. Methods that use them check again, as arrays may change."""
@@ -141,34 +155,75 @@ class RunArrays:
         """(name, unit, values (T,)) of every scalar channel, time first."""
         refuse_torn(self)
         yield "t", "s", self.t
-        for i, (name, unit) in enumerate(self.q_names):
-            yield name, unit, self.q[:, i]
-        for i, (name, unit) in enumerate(self.u_names):
-            yield name, unit, self.u[:, i]
-        for name, path in self.markers.items():
-            yield from _vector(f"{name}.position", "m", path.position)
-            for i, axis in enumerate("wxyz"):
-                yield f"{name}.quaternion.{axis}", "1", path.quaternion[:, i]
-            yield from _spatial(name, ("angular_velocity", "velocity"), ("rad/s", "m/s"), path.velocity)
-            yield from _spatial(name, ("angular_acceleration", "acceleration"), ("rad/s^2", "m/s^2"), path.acceleration)
-        for name, load in (self.loads | self.wheel_loads | self.connectors).items():
-            yield from _spatial(name, ("torque", "force"), ("N m", "N"), load)
-        for name, drive in self.drives.items():
-            for i in range(drive.shape[1]):
-                yield f"{name}.drive[{i}]", "N or N m", drive[:, i]
-        for name, force in self.hinge_forces.items():
-            yield f"{name}.hinge_force", "N or N m", force[:, 0]
-        for kind, energy in self.energy.items():
-            yield f"energy.{kind}", "J", energy
-        yield "energy.total", "J", self.total_energy
-        yield "work", "J", self.work
-        yield from _spatial("momentum", ("angular", "linear"), ("N m s", "N s"), self.momentum)
-        for name, signals in self.signals.items():
-            for i in range(signals.shape[1]):
-                yield f"signal.{name}[{i}]", "", signals[:, i]
-        for name, power in self.power.items():
-            for i in range(power.shape[1]):
-                yield f"power.{name}[{i}]", "W", power[:, i]
+        for kind, part, values in arrays_of(self):
+            for i, (name, unit) in enumerate(labels(self, kind, part, values.shape[1])):
+                yield name, unit, values[:, i]
+
+
+Kind = Literal[
+    "q", "u", "position", "quaternion", "velocity", "acceleration", "loads", "wheel_loads", "connectors", "drives",
+    "hinge_forces", "energy", "work", "momentum", "signals", "power",
+]  # fmt: skip
+"""Kinds of results: fields of a run, or of the paths of its markers."""
+_BY_NAME: tuple[Kind, ...] = "loads", "wheel_loads", "connectors", "drives", "hinge_forces"
+_OF_CONTROLLERS: tuple[Kind, ...] = "signals", "power"
+
+
+def arrays_of(run: RunArrays) -> Iterator[tuple[Kind, str, Real]]:
+    """(kind, name, values (T,k)) of every array but the time, in the order of `RunArrays.columns`."""
+    refuse_torn(run)
+    yield "q", "", run.q
+    yield "u", "", run.u
+    for name, path in run.markers.items():
+        yield "position", name, path.position
+        yield "quaternion", name, path.quaternion
+        yield "velocity", name, path.velocity
+        yield "acceleration", name, path.acceleration
+    for kind in _BY_NAME:
+        for name, values in getattr(run, kind).items():
+            yield kind, name, values
+    for name, values in (run.energy | {"total": run.total_energy}).items():
+        yield "energy", name, values[:, None]
+    yield "work", "", run.work[:, None]
+    yield "momentum", "", run.momentum
+    for kind in _OF_CONTROLLERS:
+        for name, values in getattr(run, kind).items():
+            yield kind, name, values
+
+
+def labels(run: RunArrays, kind: Kind, name: str, width: int) -> list[tuple[str, str]]:
+    """(name, unit) of each of the columns of one of the `arrays_of`, which has so many."""
+    match kind:
+        case "q":
+            return list(run.q_names)
+        case "u":
+            return list(run.u_names)
+        case "position":
+            return _vector(f"{name}.position", "m")
+        case "quaternion":
+            return [(f"{name}.quaternion.{axis}", "1") for axis in "wxyz"]
+        case "velocity":
+            return _spatial(name, ("angular_velocity", "velocity"), ("rad/s", "m/s"))
+        case "acceleration":
+            return _spatial(name, ("angular_acceleration", "acceleration"), ("rad/s^2", "m/s^2"))
+        case "loads" | "wheel_loads" | "connectors":
+            return _spatial(name, ("torque", "force"), ("N m", "N"))
+        case "drives":
+            return [(f"{name}.drive[{i}]", "N or N m") for i in range(width)]
+        case "hinge_forces":
+            return [(f"{name}.hinge_force", "N or N m")]
+        case "energy":
+            return [(f"energy.{name}", "J")]
+        case "work":
+            return [("work", "J")]
+        case "momentum":
+            return _spatial("momentum", ("angular", "linear"), ("N m s", "N s"))
+        case "signals":
+            return [(f"signal.{name}[{i}]", "") for i in range(width)]
+        case "power":
+            return [(f"power.{name}[{i}]", "W") for i in range(width)]
+        case _:
+            assert_never(kind)
 
 
 def refuse_torn(run: RunArrays) -> None:
@@ -210,13 +265,9 @@ def _named(run: RunArrays, name: str) -> dict[str, Any]:
     return found
 
 
-def _vector(name: str, unit: str, values: Real) -> Iterator[tuple[str, str, Real]]:
-    for i, axis in enumerate("xyz"):
-        yield f"{name}.{axis}", unit, values[:, i]
+def _vector(name: str, unit: str) -> list[tuple[str, str]]:
+    return [(f"{name}.{axis}", unit) for axis in "xyz"]
 
 
-def _spatial(
-    name: str, parts: tuple[str, str], units: tuple[str, str], values: Real
-) -> Iterator[tuple[str, str, Real]]:
-    yield from _vector(f"{name}.{parts[0]}", units[0], values[:, :3])
-    yield from _vector(f"{name}.{parts[1]}", units[1], values[:, 3:])
+def _spatial(name: str, parts: tuple[str, str], units: tuple[str, str]) -> list[tuple[str, str]]:
+    return [*_vector(f"{name}.{parts[0]}", units[0]), *_vector(f"{name}.{parts[1]}", units[1])]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, TypedDict, Unpack
@@ -14,12 +14,15 @@ from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.driver import Driver, Leg
+from flexmb.run.envelope import PartialEnvelope
+from flexmb.run.followed import FollowedRun, Stretch
 from flexmb.run.interruption import Interrupted
 from flexmb.run.making import Making
 from flexmb.run.origin import Given, Values, origin, start_time
 from flexmb.run.outputs import observed
 from flexmb.run.propagate import integration, unmoved
 from flexmb.run.restart import Restart
+from flexmb.run.run_arrays import Way
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_times
 from flexmb.run.trajectory import Trajectory
@@ -182,11 +185,33 @@ def _run(
     driver = Driver(system, times, settings, algorithm, stabilise, begin.events, made_by)
     driver.course = course
     trajectory = driver(begin)
+    given, stopped = dict(state) if isinstance(state, Mapping) else state, trajectory.stopped_at
+    steps = trajectory.statistics.accepted_steps
+    parts = partial(_followed, stage, given, settings, algorithm, stabilise, stopped, steps)
+    trajectory = replace(trajectory, ways=(Way(parts, t, stopped, (trajectory.q_names, trajectory.u_names)),))
     warned: list[Warning] = [SceneWarning(doubt) for doubt in driver.doubts]
     if start is not None and start.is_low:
         warned.append(PrecisionWarning(start.warning))
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
     return trajectory, warned, driver.was_interrupted
+
+
+def _followed(
+    stage: RunPart, state: Given, settings: Settings, algorithm: Algorithm, stabilise: float, stopped: float,
+    steps: int, until: float,
+) -> Iterator[PartialEnvelope]:  # fmt: skip
+    """Extremes of a run of `steps` steps that stopped at a time (s), up to another one: see `flexmb.run.followed`."""
+    system, times = stage
+    times = np.array([*times[times < stopped], stopped])
+    follow = FollowedRun(times, settings, algorithm, stabilise, steps)
+    if not system.scene.events:
+        return follow([Stretch(system, origin(system, float(times[0]), state, settings.method), stopped)], until)
+    course: list[Leg] = []
+    ends = times if settings.integrator.fixed else times[[0, -1]]
+    _, _, was_interrupted = _run(RunPart(system, ends), state, settings, algorithm, stabilise, course)
+    if was_interrupted:
+        raise KeyboardInterrupt
+    return follow([Stretch(leg.system, leg.begin, leg.raw.t) for leg in course], until)
 
 
 def _looked_at(

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from rich.text import Text
 
 from flexmb.output.listing import Listing, figures, names, prose
-from flexmb.run.channels import channels_of, signal_range, unit
+from flexmb.run.channels import channels_of, norms, signal_range, unit
+from flexmb.run.envelope import Envelope
 from flexmb.run.trajectory import Trajectory
 from flexmb.typing import Real
 
 MOST_EVENTS = 8  # number of events that are listed
+_LOADS = "load", "wheel_load", "connector"
 
 
 def summary(trajectory: Trajectory) -> Listing:
-    """Status, drift of energy and momentum, steps, and where the time went."""
+    """Status, largest loads at the output times, drift of energy and momentum, steps, and where the time went."""
     table = Listing(*names(""), *prose(""))
     for name, value in _rows(trajectory):
         table.add(Text(name, style="dim"), value)
@@ -39,6 +42,65 @@ def errors_table(trajectory: Trajectory, errors: Mapping[str, Real]) -> Listing:
     return table
 
 
+def peaks_table(trajectory: Trajectory, envelope: Envelope) -> Listing:
+    """The largest load, drive and hinge force of each hinge, over all steps and at the output times."""
+    table = Listing(
+        *names("channel"), *figures("largest", "at", "output times"), title="\nPeaks over all steps",
+        caption="Output times: the largest value at these alone, which the files hold.",
+    )  # fmt: skip
+    for name, found in _peaks(trajectory, envelope).items():
+        table.add(name, f"{found.size:.6g} {unit(name)}", f"{found.t:.6g} s", f"{found.sampled:.6g}")
+    return table
+
+
+class Peak(NamedTuple):
+    """The largest absolute value or magnitude of a channel, when (s), and the largest one at the output times."""
+
+    size: float
+    t: float
+    sampled: float
+
+
+def _peaks(trajectory: Trajectory, envelope: Envelope) -> dict[str, Peak]:
+    """By channel, of what loads a structure."""
+    found = {}
+    for name, values in channels_of(trajectory).items():
+        kind, _, of = name.partition(":")
+        if name in envelope.magnitudes and kind in _LOADS:
+            each = envelope.magnitudes[name]
+            found[name] = Peak(float(each.greatest[0]), float(each.t_greatest[0]), _largest(values))
+        elif kind in ("drive", "hinge_force"):
+            each = (envelope.drives if kind == "drive" else envelope.hinge_forces)[of]
+            for i, size in enumerate(each.largest):
+                t = each.t_greatest[i] if each.greatest[i] == size else each.t_least[i]
+                label = name if len(each.largest) == 1 else f"{name}[{i}]"
+                found[label] = Peak(float(size), float(t), _largest(values[:, i : i + 1]))
+    return found
+
+
+def _largest(values: Real) -> float:
+    """The largest norm of rows, NaN if none is known."""
+    found = norms(values)
+    return float(np.nanmax(found)) if np.isfinite(found).any() else float("nan")
+
+
+def _loads(trajectory: Trajectory) -> list[tuple[str, str]]:
+    """The largest torque and force of all, which are values at output times and no peaks."""
+    told = []
+    for part in ("torque", "force"):
+        sizes = {
+            name: _largest(values)
+            for name, values in channels_of(trajectory).items()
+            if name.partition(":")[0] in _LOADS and name.endswith(f".{part}")
+        }
+        known = {name: size for name, size in sizes.items() if size > 0.0}  # not NaN either
+        if known:
+            name = max(known, key=known.__getitem__)
+            told.append(f"{known[name]:.6g} {unit(name)} ({name})")
+    at = f"at the {len(trajectory.t)} output times; --envelope (Trajectory.envelope) finds the peaks over all steps"
+    return [("largest loads", f"{', '.join(told)} {at}")] if told else []
+
+
 def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
     cost = trajectory.statistics
     steps = f"{cost.accepted_steps} accepted, {cost.rejected_steps} rejected, {cost.evaluations} evaluations"
@@ -53,6 +115,7 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
     if trajectory.events:
         rows.append(("events", _events(trajectory)))
     if len(trajectory.t):
+        rows += _loads(trajectory)
         rows += [("energy drift", _energy(trajectory)), *_momentum(trajectory)]
     by = "" if trajectory.made_by is None else f", by {trajectory.made_by.system.kernels} kernels"
     return [

@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from flexmb.kept import kept
 from flexmb.output.whole import write_csv
 from flexmb.run import exports
+from flexmb.run.envelope import Envelope, envelope
 from flexmb.run.joining import joined
 from flexmb.run.making import Making, error_estimate
-from flexmb.run.run_arrays import MarkerPath, RunArrays, refuse_torn
+from flexmb.run.peaks import part_of
+from flexmb.run.run_arrays import MarkerPath, RunArrays, Way, refuse_torn
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes
@@ -62,6 +65,32 @@ class Trajectory(RunArrays):
         for a resumed run.
         """
         return error_estimate(self, self._making("its error"))
+
+    @kept
+    def envelope(self) -> Envelope:
+        """The least and greatest values of loads, drives, markers, signals and all other results over every step of the
+        run, between these, and on both sides of every event, with their times.
+
+            run.envelope.loads["hinge"].greatest        (6,) [torque; force], N m and N
+            run.envelope.magnitudes["load:hinge.torque"].largest
+
+        Found at the first access by following the run again, which takes about three times as long as the run itself;
+        it holds for any number of output times. ValueError for a trajectory that `simulate` has not made,
+        DynamicsError where the motion cannot be followed.
+        """
+        refuse_torn(self)
+        if not self._is_followed:
+            raise ValueError("the envelope needs a trajectory as simulate made it: use the trajectory of each run")
+        found = [part for way in self.ways for part in way.parts(way.until)]
+        return envelope(self, [part_of(self, np.zeros((0, 2), np.int64)), *found])
+
+    @property
+    def _is_followed(self) -> bool:
+        """Whether the ways are those of this run."""
+        names, ways = (self.q_names, self.u_names), self.ways
+        if not (isinstance(ways, tuple) and ways and len(self.t) and all(isinstance(way, Way) for way in ways)):
+            return False
+        return ways[0].start == self.t[0] and ways[-1].until >= self.t[-1] and all(way.names == names for way in ways)
 
     def loads_in(self, axes: Axes = "world", about: tuple[str, str] | None = None) -> dict[str, Real]:
         """`loads` (T,6) in the axes of each hinge's own frame "inboard" or "outboard", and about a node (body, node).

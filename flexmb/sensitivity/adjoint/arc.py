@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from flexmb.integrate import recorded
 from flexmb.integrate.control import COUNTS, EVALUATIONS, STOP
 from flexmb.integrate.dop853_tableau import STAGES, A, C
 from flexmb.integrate.problem import Clock, problem
@@ -15,7 +16,7 @@ from flexmb.jit.direct import addresses, undispatched
 from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID
 from flexmb.run.interruption import interruptible
 from flexmb.run.outputs import ending
-from flexmb.sensitivity.adjoint import recorded, stages
+from flexmb.sensitivity.adjoint import stages
 from flexmb.sensitivity.adjoint.transposes import Transposes
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError

@@ -19,10 +19,10 @@ from math import inf
 
 import numpy as np
 
+from flexmb.integrate.recorded import CONSTANTS, PROJECT, RHS, WORKSPACE
 from flexmb.jit.bundle import bundle
 from flexmb.jit.direct import nothing_at, status_at
 from flexmb.jit.kernel import helper, kernel
-from flexmb.sensitivity.adjoint.recorded import CONSTANTS, PROJECT, RHS, WORKSPACE
 from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 

@@ -32,6 +32,24 @@ def test_simulate_writes_a_csv_and_charts_and_tells_what_happened(scene_file, tm
         assert word in result.output
 
 
+def test_loads_are_said_to_be_those_of_output_times_and_peaks_are_found_where_asked_for(scene_file, tmp_path):
+    words = ("simulate", scene_file, "--t-end", 3, "--samples", 3, "--out", tmp_path, "--no-plots")
+    result = invoke(*words)
+    said = " ".join(result.output.split())
+    assert "largest loads" in said and "at the 3 output times; --envelope (Trajectory.envelope) finds the peaks" in said
+    assert not (tmp_path / "envelope.csv").exists()
+    result = invoke(*words, "--envelope")
+    assert result.exit_code == 0, result.output
+    run = fm.simulate(pendulum(), 3.0, samples=3)
+    peak = run.envelope.magnitudes["load:pivot.force"].greatest[0]
+    assert peak > 1.002 * np.linalg.norm(run.loads["pivot"][:, 3:], axis=1).max()
+    assert "Peaks over all steps" in result.output and f"{peak:.6g} N" in result.output
+    rows = dict(line.split(",", 1) for line in (tmp_path / "envelope.csv").read_text().splitlines())
+    assert float(rows["load:pivot.force"].split(",")[3]) == peak
+    invoke(*words)  # an earlier run's does not stay beside another trajectory
+    assert not (tmp_path / "envelope.csv").exists()
+
+
 def test_a_run_that_stops_early_writes_what_it_reached_and_exits_1(tmp_path):
     bead = (
         fm.SceneBuilder("centrifuge")

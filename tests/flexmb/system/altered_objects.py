@@ -185,6 +185,7 @@ def trajectory_kind(thorough: bool) -> Kind:
     if thorough:
         uses |= {
             "error_estimate": lambda each: each.error_estimate(), "plot": lambda each: _written(each.plot, "charts"),
+            "envelope": lambda each: each.envelope.u.greatest,
             "to_pandas": lambda each: each.to_pandas().values, "to_xarray": lambda each: each.to_xarray().sizes["t"],
         }  # fmt: skip
     changes = of_arrays("t", "q", "u", "momentum", "work")

@@ -166,6 +166,9 @@ def _of_runs(w: World) -> Calls:
     found.add("Trajectory, attributes", lambda: attributes(run))
     found.ask(run, "columns", "error_estimate", "loads_in")
     found["Trajectory.columns"].look = list
+    found.add("Trajectory.envelope", lambda: run.envelope, {},
+              lambda it: [each.greatest for name, _, each in it.channels if not name.endswith("]")])  # fmt: skip
+    found.add("Envelope.to_csv", lambda: written(run.envelope.to_csv, "envelope.csv"))
     found.add("Trajectory.loads_in, outboard", lambda: run.loads_in("outboard"))
     found.add("Trajectory.section_loads", lambda: run.section_loads("arm", [0.0, 0.25]))
     found.add("Trajectory.state_at", lambda: run.state_at(1))

@@ -43,7 +43,7 @@ EXEMPT = {
     "EventSensitivity", "Fit", "Gradient", "Sensitivities", "Uncertainties",  # results
     "FinalValue", "Misfit", "TimeIntegral",  # data, checked by the call of `gradient` and in tests of it
     "Advice", "Campbell", "Evaluation", "LinearModel", "SteadySpin", "System", "Trajectory", "Status",  # results
-    "BatchTrajectory", "CriticalPoint", "Equilibrium", "EquilibriumPath",  # results
+    "BatchTrajectory", "CriticalPoint", "Envelope", "Equilibrium", "EquilibriumPath", "Extremes",  # results
     "ClosureError", "DynamicsError", "EquilibriumError", "EventError", "Interrupted",
     "NotDifferentiableError", "PrecisionWarning", "SceneError", "SceneWarning",
 }  # fmt: skip

@@ -1,0 +1,114 @@
+"""The accepted steps of a run: their times, and every so many of their states, as an integrator finds them.
+
+An integrator projects the state at the end of every step that it accepts. The problem that it is given here passes all
+that it is asked on to another one, and keeps what was projected. Times of samples within steps are kept, too.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexmb.integrate.problem import Problem, StiffProblem
+from flexmb.jit.bundle import AnyBundle, bundle
+from flexmb.jit.direct import nothing_at, real_at, status_at
+from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID, pointer
+from flexmb.typing import Index, Real
+
+# Indices in `RecordedSteps.address` and, the first four, in that of `flexmb.sensitivity.adjoint.stages.Stages`.
+RHS, PROJECT, CONSTANTS, WORKSPACE, BACK, LEAP, MOVE = range(7)
+ADDRESSES = 4
+"""How many of them a problem without leaps, and without Jacobian, has."""
+
+
+@bundle
+class RecordedSteps:
+    """The steps of one part of a run; `count` goes on where `time` is full.
+
+    A leap over a singular position enters its end twice.
+    """
+
+    address: Index  # of the kernels and tables of the motion
+    every: Index  # (1,) how many steps lie between two states that are kept
+    count: Index  # (1,) of times; the first is that of the start
+    time: Real  # (room,) s
+    state: Real  # (rooms,n) at every `every`-th time
+
+
+@helper
+def _enter(t, s):
+    """Keep a time; returns its place, or a number beyond the room.
+
+    A step whose end could not be evaluated is repeated with a smaller size: later times are then no ends of steps.
+    """
+    room, n = s.time.shape[0], s.count[0]
+    while 0 < n <= room and t <= s.time[n - 1]:
+        n -= 1
+    if n < room:
+        s.time[n] = t
+    s.count[0] = n + 1
+    return n
+
+
+@kernel
+def rhs(t, y, dy, s, same):
+    """dy/dt of the motion; returns a status code. The record is passed for both arguments."""
+    return status_at(s.address[RHS], (t, y, dy, s.address[CONSTANTS], s.address[WORKSPACE]))
+
+
+@kernel
+def project(t, y, s):
+    """Project y, and keep it as the end of a step."""
+    nothing_at(s.address[PROJECT], (t, y, s.address[CONSTANTS]))
+    n = _enter(t, s)
+    if n < s.time.shape[0] and n % s.every[0] == 0:
+        for i in range(s.state.shape[1]):
+            s.state[n // s.every[0], i] = y[i]
+
+
+@kernel
+def back(y, s):
+    """See `Problem`."""
+    return real_at(s.address[BACK], (y, s.address[CONSTANTS]))
+
+
+@kernel
+def leap(end, y, dy, y_new, dy_new, s):
+    """See `Problem`; the end of a leap is entered twice."""
+    t = real_at(s.address[BACK], (y_new, s.address[CONSTANTS]))
+    h = real_at(s.address[LEAP], (end, y, dy, y_new, dy_new, s.address[CONSTANTS]))
+    if h > 0.0:
+        _enter(t, s)
+        n = _enter(t + h, s)
+        if n + 1 < s.time.shape[0]:
+            s.time[n + 1] = t + h
+        s.count[0] += 1
+    return h
+
+
+@kernel
+def move(y, increment, result, s):
+    """See `StiffProblem`."""
+    nothing_at(s.address[MOVE], (y, increment, result, s.address[CONSTANTS]))
+
+
+def recorded(posed: Problem | StiffProblem, room: int) -> tuple[Any, RecordedSteps]:
+    """The same problem with a record of its steps, which has room for so many times and no states but the first."""
+    kernels = [each.__wrapper_address__() for each in (posed.rhs, posed.project, posed.back, posed.leap)]
+    tables = posed.constants.kernel_address, posed.workspace.kernel_address
+    moving = posed.move.__wrapper_address__() if isinstance(posed, StiffProblem) else 0
+    record = RecordedSteps(
+        address=np.array([*kernels[:2], *tables, *kernels[2:], moving]), every=np.array([room + 1]),
+        count=np.zeros(1, np.int64), time=np.zeros(room), state=np.zeros((1, 0)),
+    )  # fmt: skip
+    own = posed._replace(
+        rhs=pointer(rhs, STATUS, REAL, VECTOR, VECTOR, record, record),
+        project=pointer(project, VOID, REAL, VECTOR, record),
+        constants=AnyBundle(record), workspace=AnyBundle(record), back=pointer(back, REAL, VECTOR, record),
+        leap=pointer(leap, REAL, REAL, VECTOR, VECTOR, VECTOR, VECTOR, record),
+    )  # fmt: skip
+    if isinstance(own, StiffProblem):
+        own = own._replace(move=pointer(move, VOID, VECTOR, VECTOR, VECTOR, record))
+    return own, record
