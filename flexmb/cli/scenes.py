@@ -26,8 +26,10 @@ def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_c
     **Exit code**: 0 sound, 2 wrong, or with `--strict` doubtful.
     """
     with no_traceback(strict):
+        from flexmb.scene.bodies import BeamBody
         from flexmb.scene.check import check_and_warn
         from flexmb.scene.files import load_scene
+        from flexmb.scene.strains import in_words
 
         loaded = load_scene(scene)
         check_and_warn(loaded, t_end)
@@ -35,6 +37,9 @@ def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_c
         f"{len(getattr(loaded, key))} {key.replace('_', ' ')}" for key in ("bodies", "hinges", "markers")
     )
     console.print(Text.assemble(("sound", "green"), printable(f": {loaded.name} ({counts})")))
+    for body in loaded.bodies:
+        if isinstance(body, BeamBody) and body.level != "rigid":
+            console.print(printable(f'  beam "{body.name}", {body.level}: {in_words(body)}'), soft_wrap=True)
 
 
 def schema() -> None:
