@@ -23,6 +23,7 @@ from flexmb.advisor.models import (
     flexible_bodies,
     levels,
 )
+from flexmb.advisor.modes import all_families, all_strains
 from flexmb.jain.cost import articulated
 from flexmb.levels.body import BY_NAME
 from flexmb.modal import flexible_model
@@ -31,7 +32,7 @@ from flexmb.scene.bodies import BeamBody, Body, ModalBody
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import Scene
 from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, mass_per_length, stiffness_on_axis
-from flexmb.scene.strains import polynomials
+from flexmb.scene.strains import CURVATURES, polynomials
 
 EXACT_REFERENCES = ((1, 4), (1, 6), (1, 8), (2, 6), (4, 6), (8, 6))
 """Pieces, and polynomials of each curvature along one, of references for beams that bend far."""
@@ -84,8 +85,8 @@ def rungs(
         by_modes = (BodyModel("modes", n, level) for level in levels(body) for n in counts)
         return (BodyModel("rigid"), BodyModel("sprung"), *by_modes)
     sets: list[tuple[str, ...]] = [()]
-    some = tuple(family for family in body.modes.families if family in moving)
-    if some and set(some) != set(body.modes.families):
+    some = tuple(family for family in all_families(body) if family in moving)
+    if some and some != all_families(body):
         sets.append(some)
     carries = body.modes.static or any(hinge.parent == body.name for hinge in scene.hinges)
     sets_of_strains = (False, True) if _stretches(body) else (False,)
@@ -104,7 +105,7 @@ def rungs(
 
 def _stretches(body: BeamBody) -> bool:
     """Whether the beam has stretch or shear."""
-    return "axial" in body.modes.families or body.theory == "timoshenko"
+    return not set(all_strains(body)) <= set(CURVATURES)
 
 
 def _strains(polynomials: int, pieces: int, stretching: bool, families: tuple[str, ...] = ()) -> BodyModel:

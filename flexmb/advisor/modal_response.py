@@ -41,7 +41,7 @@ from flexmb.system.tree_system import System
 from flexmb.typing import Real
 
 MODES = 12
-FAMILIES = ("axial", "bending_y", "bending_z")
+FAMILIES = ("axial", "bending_y", "bending_z", "torsion")
 _RTOL = 1e-8
 
 
@@ -164,7 +164,9 @@ def momenta(model: FlexibleModel) -> tuple[Real, Real]:
 
 
 def _families(model: FlexibleModel) -> NDArray[np.intp]:
-    """The body axis along which each mode moves most mass."""
+    """What each mode does most to the tip of a beam; of a raw body the axis along which it moves most mass."""
+    if (tip := model.nodes.get("tip")) is not None and tip.position[0] > 0.0:
+        return np.argmax(np.abs([*tip.translation, tip.position[0] * tip.rotation_modes[0]]), axis=0)
     moved = np.einsum("p,pim->im", model.mass, mass_shapes(model) ** 2)
     return np.argmax(moved, axis=0)
 

@@ -18,12 +18,12 @@ from flexmb.advisor.modal_response import mass_shapes
 from flexmb.modal import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
-from flexmb.scene.bodies import BeamBody, Level, ModalBody, ModalNode, Modes, StrainPolynomials
+from flexmb.scene.bodies import FAMILIES, BeamBody, Family, Level, ModalBody, ModalNode, Modes, StrainPolynomials
 from flexmb.scene.modal_data import inertia_points, modal_arrays, node_arrays
 from flexmb.scene.pieces import AT_END, across
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import ModalState, Scene
-from flexmb.scene.strains import points_of_piece, twists
+from flexmb.scene.strains import CURVATURES, SHEARED, Strain, points_of_piece, polynomials_of, strains
 from flexmb.surrogate import cut_where_loaded, substructured
 from flexmb.surrogate.lumping import vector
 from flexmb.typing import Real
@@ -56,20 +56,19 @@ def with_strains(
     cut too.
 
     They have `polynomials` of each curvature of `families` (of the beam's own if empty); if `stretching` two fewer, but
-    one at least, of the stretch if "axial" is among its families, and of the shears in bending if its theory is
-    "timoshenko". An initial modal state is projected as by `with_modes`. Raises ValueError for a beam that has no such
-    strain or no stretch, and for several pieces of one that starts bent.
+    one at least, of the stretch and the shears that it has. An initial modal state is projected as by `with_modes`.
+    Raises ValueError for a beam that has no such strain or no stretch, and for several pieces of one that starts bent.
     """
     body = next(each for each in scene.bodies if each.name == name)
     if not isinstance(body, BeamBody):
         raise ValueError(f'body "{name}" is no beam, and has no strains')
-    strains = _strains(body, polynomials, stretching, families or body.modes.families)
+    chosen = _strains(body, polynomials, stretching, families)
     bent = any(state.body == name for state in scene.modal_states)
     ends = _between(scene, body, pieces)
     if pieces > 1 or (ends != 1 and not bent):
-        return substructured(scene, name, ends, level="exact", polynomials=strains)
+        return substructured(scene, name, ends, level="exact", polynomials=chosen)
     modes = replace(
-        body.modes, count=0, polynomials=strains, static=False, boundary="clamped-free", pieces=1, points=None
+        body.modes, count=0, polynomials=chosen, static=False, boundary="clamped-free", pieces=1, points=None
     )
     new = _cut(scene, replace(body, level="exact", mass="consistent", modes=modes))
     new = _damped(new, new.modes)
@@ -97,19 +96,27 @@ def _between(scene: Scene, beam: BeamBody, pieces: int) -> int | list[float]:
     return ends[:-1]
 
 
+def all_strains(beam: BeamBody) -> tuple[Strain, ...]:
+    """The strains that a beam can have: those of its polynomials or families, else all of its theory, also the stretch
+    that level exact leaves out by default."""
+    return strains(beam if beam.modes.polynomials is not None else replace(beam, level="full"))
+
+
+def all_families(beam: BeamBody) -> tuple[Family, ...]:
+    """The families of `all_strains`."""
+    return tuple(family for family in FAMILIES if family in all_strains(beam))
+
+
 def _strains(beam: BeamBody, count: int, stretching: bool, families: tuple[str, ...]) -> StrainPolynomials:
-    curved = {name: count for name in families if name != "axial" and (name != "torsion" or twists(beam))}
+    own = all_strains(beam)
+    if families:
+        own = tuple(each for each in own if each in families or dict(SHEARED).get(each) in families)
+    curved = tuple(each for each in own if each in CURVATURES)
     if not curved:
-        raise ValueError(f'beam "{beam.name}" has no curvature among {", ".join(families)}')
-    if not stretching:
-        return StrainPolynomials(**curved)
-    fewer = max(1, count - 2)
-    stretched = {"axial": fewer} if "axial" in families else {}
-    if beam.theory == "timoshenko":
-        stretched |= {name.replace("bending", "shear"): fewer for name in curved if name.startswith("bending")}
-    if not stretched:
+        raise ValueError(f'beam "{beam.name}" has no curvature among {", ".join(own)}')
+    if stretching and own == curved:
         raise ValueError(f'beam "{beam.name}" has no stretch or shear: its families and its theory exclude them')
-    return StrainPolynomials(**curved, **stretched)
+    return polynomials_of(own if stretching else curved, count)
 
 
 def mode_count(body: BeamBody | ModalBody) -> int:
@@ -120,8 +127,9 @@ def mode_count(body: BeamBody | ModalBody) -> int:
 def _beam(beam: BeamBody, count: int, level: Level, static: bool, families: tuple[str, ...]) -> BeamBody:
     if level == "exact" or is_curved(beam):
         raise ValueError(f'beam "{beam.name}": level "exact" has strains, and other levels have straight beams only')
+    own = beam.modes.families if beam.modes.polynomials is None else all_families(beam)
     modes = replace(
-        beam.modes, count=count, static=static, families=families or beam.modes.families,
+        beam.modes, count=count, static=static, families=families or own,
         polynomials=None, pieces=1, cuts=(), points=None,
     )  # fmt: skip
     return _damped(replace(beam, level=level), modes)

@@ -29,9 +29,11 @@ def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_c
     **Exit code**: 0 sound, 2 wrong, or with `--strict` doubtful.
     """
     with no_traceback(strict):
+        from flexmb.scene.bodies import BeamBody
         from flexmb.scene.files import load_scene
         from flexmb.scene.loaded import called
         from flexmb.scene.problems import SceneWarning, in_short
+        from flexmb.scene.strains import in_words
         from flexmb.system.starting import check_scene
 
         loaded = load_scene(scene)
@@ -41,6 +43,9 @@ def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_c
         f"{len(getattr(loaded, key))} {key.replace('_', ' ')}" for key in ("bodies", "hinges", "markers")
     )
     console.print(Text.assemble(("sound", "green"), printable(f": {loaded.name} ({counts})")))
+    for body in loaded.bodies:
+        if isinstance(body, BeamBody) and body.level != "rigid":
+            console.print(printable(f'  beam "{body.name}", {body.level}: {in_words(body)}'), soft_wrap=True)
 
 
 def schema() -> None:

@@ -95,7 +95,7 @@ def _finer(body: BeamBody) -> BeamBody:
     count = MORE * max(body.modes.count, 1)
     attached = mode_count(body) - body.modes.count
     finer = msgspec.structs.replace(body, elements=max(MORE * body.elements, count + attached))
-    count = min(count, available_modes(finer) - attached)  # a shaft of two lumps has two modes of torsion
+    count = min(count, available_modes(finer) - attached)
     ratio = body.modes.damping_ratio
     if isinstance(ratio, tuple):
         ratio = (*ratio, *[ratio[-1]] * (count - body.modes.count))

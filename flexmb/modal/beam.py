@@ -16,14 +16,14 @@ from flexmb.modal.cross import cross_matrix
 from flexmb.modal.interpolation import BendingField, ElementMesh, LineField
 from flexmb.modal.section import SectionTable, section_table
 from flexmb.modal.stations import Lump, Stations, quadrature
-from flexmb.scene.bodies import BeamBody
+from flexmb.scene.bodies import FAMILIES, BeamBody
+from flexmb.scene.strains import families
 from flexmb.typing import Real
 
 # Rows of [ux, uy, uz, rx, ry, rz] that a family moves: translation row, rotation row, sign of the rotation.
 _BENDING_ROWS = {"bending_y": (1, 5, 1.0), "bending_z": (2, 4, -1.0)}
 _LINE_ROWS = {"axial": 0, "torsion": 3}
 _TURNS_ABOUT = {"torsion": 0, "bending_y": 2, "bending_z": 1}
-FAMILIES = ("axial", "torsion", "bending_y", "bending_z")
 
 
 @dataclass(frozen=True)
@@ -122,6 +122,7 @@ class BeamElements:
             M = _congruent(self.motion(stations.x, np.eye(self.size)), stations.matrices())
         else:
             turning = {name: stations.about(axis) for name, axis in _TURNS_ABOUT.items()}
+            turning["torsion"] = turning["torsion"] + stations.twist
             for name, field in self.fields.items():
                 own = self.coordinates(name)
                 if isinstance(field, LineField):
@@ -136,15 +137,15 @@ class BeamElements:
 
 
 def beam_elements(body: BeamBody) -> BeamElements:
-    """Mesh and fields of `body` for the families in `modes.families`. Raises ValueError for bad mesh data."""
+    """Mesh and fields of `body` for its families. Raises ValueError for bad mesh data."""
     if body.elements < 1 or body.length_m <= 0.0:
         raise ValueError(f"beam '{body.name}': needs elements >= 1 and length_m > 0")
-    if not body.modes.families:
+    if not families(body):
         raise ValueError(f"beam '{body.name}': modes.families is empty; name at least one of {', '.join(FAMILIES)}")
     table = section_table(body)
     mesh = ElementMesh(np.linspace(0.0, body.length_m, body.elements + 1))
     bending = BendingField(mesh, shear=body.theory == "timoshenko")
-    chosen = [name for name in FAMILIES if name in body.modes.families]
+    chosen = [name for name in FAMILIES if name in families(body)]
     return BeamElements(mesh, table, {name: LineField(mesh) if name in _LINE_ROWS else bending for name in chosen})
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -70,6 +70,20 @@ def _arms(stations: Stations) -> tuple[Real, Real]:
     size[size == 0.0] = 1.0  # a section without inertia, beside others
     a[:, 1], a[:, 2], b[:, 1], b[:, 2] = ((yy + root) / size, yz / size, yz / size, (zz + root) / size)
     return a, b
+
+
+def twisting(points: Points, twist: Real) -> Points:
+    """Each of the points (n,) as two halves that move apart along the axis as it turns about it, so that the twist has
+    the inertia `twist` (n,) kg m^2 of its own.
+
+    No rigid motion feels it, nor do bending and stretch; the kinetic energy stays a sum of squares, and a polynomial.
+    """
+    if not (np.any(twist) and np.any(points.rotation[:, 0])):
+        return points
+    along = np.zeros_like(points.translation)
+    along[:, 0] = np.sqrt(twist / points.mass)[:, None] * points.rotation[:, 0]
+    half = replace(points, mass=points.mass / 2.0, inertia=points.inertia / 2.0)
+    return join([replace(half, translation=points.translation + sign * along) for sign in (1.0, -1.0)])
 
 
 def turning_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:

@@ -25,11 +25,15 @@ from flexmb.scene.pieces import edges as piece_edges
 from flexmb.scene.pieces import piece_count
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.rest_curve import rest_sections
-from flexmb.scene.strains import points_of_piece, polynomials
+from flexmb.scene.strains import Strain, points_of_piece, polynomials
 from flexmb.typing import Index, Real
 
-# Relative to the largest: below it an eigenvalue of the modal masses is zero but for rounding.
+# Of modal masses that are scaled to a unit diagonal: below it an eigenvalue is zero but for rounding.
 _MASSLESS = 1e-13
+# Compliances below this share of the largest have lost digits to it, and are found by themselves.
+_GRADE = 1e-8
+# Of scalar products of modes of unit mass: below it they are good whatever they were before.
+_GOOD = 1e-12
 # Elements of stiffness and masses that are scaled to a unit diagonal: below it they are rounding errors of their sums.
 _UNCOUPLED = 1e-12
 
@@ -117,7 +121,10 @@ def _polynomial_beam(body: BeamBody, others: Real, like: Hung | None = None) -> 
     field = strain_field(body, places, None if like is None else hung(body, places).following(like))
     x, weight = gauss_weights(body)
     table = section_table(body)
-    own = section_masses(x, weight[:, None, None] * table.at(table.inertia, x), body, table.plain)
+    twist = weight * table.at(table.twist, x)
+    own = section_masses(x, weight[:, None, None] * table.at(table.inertia, x), twist, body, table.plain)
+    inertia = own.inertia.copy()
+    inertia[:, 0, 0] += own.twist  # here the sections themselves have it, and turn with it
     _, rotation = rest_sections(body, x)
     at_lumps = len(field.x) - len(places) + np.arange(len(rigid_lumps))
     _, turned = rest_sections(body, _lumps_at(rigid_lumps))
@@ -131,7 +138,7 @@ def _polynomial_beam(body: BeamBody, others: Real, like: Hung | None = None) -> 
         ),
         np.concatenate(
             [
-                rotation @ own.inertia @ np.swapaxes(rotation, 1, 2),
+                rotation @ inertia @ np.swapaxes(rotation, 1, 2),
                 *((R @ lump.inertia @ R.T)[None] for R, lump in zip(turned, rigid_lumps, strict=True)),
             ]
         ),
@@ -169,21 +176,52 @@ def _modes(body: BeamBody, field: StrainField, K: Real, M: Real) -> BeamModes:
     columns, compliance = np.zeros_like(K), np.zeros(len(K))
     sets = [np.ix_(own, own) for own in _uncoupled(strain, K, M)]
     for own in sets:
-        compliance[own[1][0]], columns[own] = eigenpairs(M[own], K[own])
-    if not compliance.min() > _MASSLESS * compliance.max():
-        raise ValueError(
-            "some of its strains move no inertia while the beam is straight: use fewer polynomials, or give the "
-            'sections their rotary inertia and points = "section"'
-        )
+        _refuse_massless(M[own], strain[own[1][0]], list(polynomials(body)))
+        compliance[own[1][0]], columns[own] = _graded(M[own], K[own])
     columns /= np.sqrt(compliance)
     squares = np.zeros(len(K))
     for own in sets:
-        squares[own[1][0]], columns[own] = refined(K[own], M[own], columns[own])
+        squares[own[1][0]], columns[own] = _polished(K[own], M[own], columns[own])
     # Frequencies that agree to nine digits count as equal, so that the order of the strains decides.
     order = np.lexsort((strain, [float(f"{each:.8e}") for each in squares]))
     columns, frequencies = columns[:, order], np.sqrt(squares[order])
     turn, shift = (shape @ columns for shape in (each[field.gauss[-1]] for each in field.shapes()))
     return BeamModes(columns * tip_signs(shift, body.length_m * turn), frequencies)
+
+
+def _refuse_massless(M: Real, strain: Index, names: list[Strain]) -> None:
+    """ValueError for modal masses M (m,m) of coupled polynomials, each of one `strain` (m,), that are singular.
+
+    The masses are scaled first, so that soft strains and stiff ones, short and long ones, count alike.
+    """
+    size = np.sqrt(np.diag(M))
+    lowest, still = np.linalg.eigh(M / np.where(size > 0.0, size, 1.0) / np.where(size > 0.0, size, 1.0)[:, None])
+    if not lowest[0] > _MASSLESS * lowest[-1]:
+        found = " and ".join(names[i] for i in np.unique(strain[np.abs(still[:, 0]) > 0.1]))
+        raise ValueError(
+            f"its {found} can be combined so that no inertia moves: use fewer polynomials of one of them, or give the "
+            'sections their rotary inertia and points = "section"'
+        )
+
+
+def _graded(M: Real, K: Real) -> tuple[Real, Real]:
+    """Values (m,) and columns (m,m) of M x = value K x, X'K X = 1, each with digits of its own: a slender beam is
+    softer in bending than in shear by the fourth power of its slenderness."""
+    values, columns = eigenpairs(M, K)
+    lost = values < _GRADE * values.max()
+    if not np.any(lost):
+        return values, columns
+    rest = columns[:, lost]
+    own, turn = _graded(rest.T @ M @ rest, rest.T @ K @ rest)
+    return np.concatenate([own, values[~lost]]), np.hstack([rest @ turn, columns[:, ~lost]])
+
+
+def _polished(K: Real, M: Real, X: Real) -> tuple[Real, Real]:
+    """`refined` eigenpairs, unless the columns are further from X'M X = 1 then: where masses are all but singular,
+    rounding errors of modes of nearly one frequency would turn them into each other."""
+    values, better = refined(K, M, X)
+    lack, then = (float(np.max(np.abs(np.eye(len(M)) - each.T @ M @ each))) for each in (X, better))
+    return (values, better) if then <= max(lack, _GOOD) else (np.diag(X.T @ K @ X) / np.diag(X.T @ M @ X), X)
 
 
 def _uncoupled(strain: Index, K: Real, M: Real) -> list[Index]:

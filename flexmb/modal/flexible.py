@@ -10,7 +10,16 @@ import numpy as np
 from msgspec.structs import replace
 
 from flexmb.modal.beam import BeamElements, beam_elements
-from flexmb.modal.element_points import Points, axis_points, join, massy_lump, on_axis, section_points, turning_lump
+from flexmb.modal.element_points import (
+    Points,
+    axis_points,
+    join,
+    massy_lump,
+    on_axis,
+    section_points,
+    turning_lump,
+    twisting,
+)
 from flexmb.modal.equivalent import with_equivalent_masses
 from flexmb.modal.exact import exact_model
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, SecondOrder, undeforming_node
@@ -110,7 +119,8 @@ def points_of(
     """Stations and lumps in the form of `body.points`."""
     along = axis_points if body.points == "rotary" else section_points  # sections without inertia are masses alone
     at_lump = massy_lump if body.points == "section" else turning_lump
-    return join([along(elements, columns, stations), *(at_lump(elements, columns, lump) for lump in rigid_lumps)])
+    own = twisting(along(elements, columns, stations), stations.twist)
+    return join([own, *(at_lump(elements, columns, lump) for lump in rigid_lumps)])
 
 
 def second_order_of(body: BeamBody, elements: BeamElements, columns: Real, x: Real, offset: Real) -> SecondOrder | None:

@@ -65,7 +65,7 @@ def beam_modes(elements: BeamElements, K: Real, M: Real, modes: Modes) -> BeamMo
 
     Uncoupled families are solved separately, so that degenerate bending modes each lie in one plane; their modes are
     merged by frequency, then in the order axial, torsion, bending_y, bending_z. Families that a section or a lump
-    couples are solved together; families that are not chosen are held fixed. Families without inertia have no modes.
+    couples are solved together; families that are not chosen are held fixed.
     Free-free modes are orthogonal to the rigid motions of the chosen families, which makes the body frame a mean-axis
     (Buckens) frame. Raises ValueError if the finite-element model has fewer modes than requested.
     """
@@ -76,7 +76,7 @@ def beam_modes(elements: BeamElements, K: Real, M: Real, modes: Modes) -> BeamMo
     found.sort(key=_order)
     if len(found) < modes.count:
         raise ValueError(
-            f"{modes.count} modes wanted, but the finite-element model has only {len(found)} with inertia; use more "
+            f"{modes.count} modes wanted, but the finite-element model has only {len(found)}; use more "
             "elements, more families, or fewer modes"
         )
     chosen = found[: modes.count]
@@ -110,7 +110,7 @@ def _order(mode: tuple[float, int, Real]) -> tuple[float, int]:
 
 
 def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Coupled]:
-    """Sets of families that M or K couples, in order, without those that have no inertia."""
+    """Sets of families that M or K couples, in order."""
     names = list(elements.fields)
     blocks = [elements.coordinates(name) for name in names]
     coupled = np.array(
@@ -127,8 +127,6 @@ def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Cou
             member[block] = its == group
         index = np.flatnonzero(member & free)
         k, m = K[np.ix_(index, index)], M[np.ix_(index, index)]
-        if not np.any(m):
-            continue
         rigid = np.zeros((len(index), 0)) if clamped else elements.rigid()[index]
         parts.append(_part(index, k, m, rigid[:, np.any(rigid, axis=0)]))
     return parts

@@ -16,6 +16,7 @@ from flexmb.scene.sections import (
     stiffness_on_axis,
     without_shear,
 )
+from flexmb.scene.strains import twist_inertia
 from flexmb.typing import Real
 
 
@@ -27,13 +28,14 @@ class SectionTable:
     in N, N m, N m². Without shear (Euler-Bernoulli) its shear rows and columns are zero but for infinity on the
     diagonal. inertia (n,6,6): of the velocities and angular velocities of the section, kg/m, kg, kg m. Both are about
     the axis of the beam, whatever point the scene states them at. `plain`: nothing couples the strains, nor the
-    velocities. Two stations at the same x are a jump.
+    velocities. twist (n,): kg m, see `flexmb.scene.strains.twist_inertia`. Two stations at the same x are a jump.
     """
 
     x: Real
     stiffness: Real
     inertia: Real
     plain: bool
+    twist: Real
 
     @property
     def sheared(self) -> bool:
@@ -112,12 +114,13 @@ def section_table(body: BeamBody) -> SectionTable:
     try:
         stiffness = np.array([stiffness_on_axis(station) for station in stations])
         inertia = np.array([inertia_on_axis(station) for station in stations])
+        twist = twist_inertia(body, stations)
     except ValueError as error:
         raise ValueError(f"beam '{body.name}': {error}") from None
     if not sheared and body.level != "exact":  # whose strains may include shear in any theory
         stiffness = np.array([_rigid_in_shear(each) for each in stiffness])
     plain = has_plain_sections(body)
-    return SectionTable(np.array([station.x_m for station in stations], dtype=float), stiffness, inertia, plain)
+    return SectionTable(np.array([station.x_m for station in stations], dtype=float), stiffness, inertia, plain, twist)
 
 
 def _rigid_in_shear(K: Real) -> Real:

@@ -27,7 +27,8 @@ class Stations:
     """Inertia of sections: positions x (n,) m of their axis points and mass (n,) kg; mass centre (n,3) m from the axis
     point and inertia (n,3,3) kg m^2 about the mass centre.
 
-    `plain`: all mass centres are on the axis, and the inertias are diagonal.
+    `plain`: all mass centres are on the axis, and the inertias are diagonal. twist (n,) kg m^2: inertia of the twist of
+    sections that have none about the axis.
     """
 
     x: Real
@@ -35,6 +36,7 @@ class Stations:
     com: Real
     inertia: Real
     plain: bool
+    twist: Real
 
     def about(self, axis: int) -> Real:
         """Moments of inertia (n,) kg m^2 about an axis through the mass centre: 0, 1, 2 for x, y, z."""
@@ -42,7 +44,9 @@ class Stations:
 
     def matrices(self) -> Real:
         """Mass matrices (n,6,6) for [displacement; rotation] of the axis points."""
-        return inertia_matrices(self.mass, self.com, self.inertia)
+        found: Real = inertia_matrices(self.mass, self.com, self.inertia)
+        found[:, 3, 3] += self.twist
+        return found
 
 
 @dataclass(frozen=True)
@@ -75,19 +79,26 @@ def inertia_stations(
     about its mass centre. Stations without mass are left out. The intervals of the Gauss points end at the `cuts` (m).
     """
     x, weight = quadrature(mesh, table, cuts)
-    inertia = weight[:, None, None] * table.at(table.inertia, x)
+    inertia, twist = weight[:, None, None] * table.at(table.inertia, x), weight * table.at(table.twist, x)
     if body.mass == "lumped":
-        element, xi, _ = mesh.locate(x)
-        x, (near, far) = mesh.nodes, np.zeros((2, len(mesh.nodes), 6, 6))
-        np.add.at(near, element, inertia * (1.0 - xi)[:, None, None])
-        np.add.at(far, element + 1, inertia * xi[:, None, None])
-        inertia = near + far
+        inertia, twist = _lumped(mesh, x, inertia), _lumped(mesh, x, twist)
+        x = mesh.nodes
     kept = inertia[:, 0, 0] > 0.0  # a point without mass would divide by zero in `section_points`
-    return section_masses(x[kept], inertia[kept], body, table.plain)
+    return section_masses(x[kept], inertia[kept], twist[kept], body, table.plain)
 
 
-def section_masses(x: Real, inertia: Real, body: BeamBody, plain: bool) -> Stations:
-    """Mass centres and inertias about them from mass matrices (n,6,6) about the axis."""
+def _lumped(mesh: ElementMesh, x: Real, values: Real) -> Real:
+    """Values (n,...) at x (n,) shared between the nodes before and beyond: (nodes,...)."""
+    element, xi, _ = mesh.locate(x)
+    share = xi.reshape(-1, *[1] * (values.ndim - 1))
+    near, far = np.zeros((2, len(mesh.nodes), *values.shape[1:]))
+    np.add.at(near, element, values * (1.0 - share))
+    np.add.at(far, element + 1, values * share)
+    return near + far
+
+
+def section_masses(x: Real, inertia: Real, twist: Real, body: BeamBody, plain: bool) -> Stations:
+    """Mass centres and inertias about them from mass matrices (n,6,6) about the axis; twist (n,) as in `Stations`."""
     if plain:
         mass, com, about_com = inertia[:, 0, 0], np.zeros((len(x), 3)), inertia[:, 3:, 3:]
     else:
@@ -103,7 +114,7 @@ def section_masses(x: Real, inertia: Real, body: BeamBody, plain: bool) -> Stati
             assert_never(body.points)
     if plain or body.points == "section":
         about_com[:, 0, 0] = about_com[:, 1, 1] + about_com[:, 2, 2]
-    return Stations(x, mass, com, about_com, plain)
+    return Stations(x, mass, com, about_com, plain, twist)
 
 
 def lumps(body: BeamBody) -> tuple[Lump, ...]:

@@ -17,9 +17,11 @@ Quaternion = tuple[float, float, float, float]
 Level = Literal["rigid", "ruthless", "linear", "full", "stiffened", "exact"]
 Square = tuple[tuple[float, ...], ...]
 VectorSquare = tuple[tuple[Vector, ...], ...]
+Family = Literal["axial", "torsion", "bending_y", "bending_z"]
 
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ZERO: Vector = (0.0, 0.0, 0.0)
+FAMILIES: tuple[Family, ...] = ("axial", "torsion", "bending_y", "bending_z")
 
 
 class SceneStruct(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -54,7 +56,9 @@ class BeamStation(SceneStruct, frozen=True, kw_only=True):
 
     x is the beam axis. A station has its stiffness either by numbers or as a matrix, and so its inertia. By numbers y
     and z are the principal section axes: `EIz` resists bending in the x-y plane. Shear stiffnesses are used by
-    Timoshenko beams only; rotary inertias per length are rho*Iy, rho*Iz, and the torsional one is their sum.
+    Timoshenko beams only; rotary inertias per length are rho*Iy, rho*Iz, and the torsional one is their sum. Where the
+    sections of a beam have no inertia about its axis, it twists all the same: the twist has the inertia that they state
+    and `points = "line"` leaves out, else that of a homogeneous section, mass per length times (EIy + EIz) / EA.
 
     `stiffness` (6x6, symmetric, positive definite) maps the strains [extension, shear along y, shear along z, twist,
     curvature about y, curvature about z] to [N, Qy, Qz, Mx, My, Mz]: N where both are forces and strains, N m where one
@@ -118,16 +122,18 @@ class StrainPolynomials(SceneStruct, frozen=True, kw_only=True):
 class Modes(SceneStruct, frozen=True, kw_only=True):
     """The modes of a beam: the `count` lowest of the chosen families, clamped at the root or free-free.
 
+    `families` are all of them if not given, at level "exact" all but stretch, which makes slender beams stiff.
+
     `static` adds attachment modes (unit tip force and moment in the chosen families) to the eigenmodes; with `count` 0
     they are the only modes.
 
     At level "exact" the strains are polynomials along each of `pieces` equal parts of the beam, or, if `cuts` names
     nodes, of its parts between these; strains may jump from one part to the next, as they do at a node with a load, a
     hinge or a lump, and where the section does (`flexmb.surrogate.cut_where_loaded`). There are `count` of them for
-    each curvature of the chosen families and for torsion, and in theory "timoshenko" two fewer, but one at least, for
-    the shear of each; or as many as `polynomials` says, which alone allows stretch. Attachment modes are contained in
-    them. `points`: Gauss points of a piece, three more than the largest number of its polynomials if not given, and six
-    at least.
+    each curvature of the chosen families and for torsion, and two fewer, but one at least, for stretch beside bending
+    and, in theory "timoshenko", for the shear of each plane; or as many as `polynomials` says. Attachment modes are
+    contained in them. `points`: Gauss points of a piece, three more than the largest number of its polynomials if not
+    given, and six at least.
 
     Damping is that of `damping_ratio` and, if `viscosity_s` is not zero, of a material (Kelvin and Voigt) whose stress
     is that of the strain plus `viscosity_s` times the strain rate.
@@ -135,9 +141,7 @@ class Modes(SceneStruct, frozen=True, kw_only=True):
 
     count: int
     boundary: Literal["clamped-free", "free-free"] = "clamped-free"
-    families: tuple[Literal["axial", "torsion", "bending_y", "bending_z"], ...] = (
-        "axial", "torsion", "bending_y", "bending_z",
-    )  # fmt: skip
+    families: tuple[Family, ...] | None = None
     static: bool = False
     polynomials: StrainPolynomials | None = None
     pieces: int = 1
@@ -151,7 +155,7 @@ class BeamBody(SceneStruct, frozen=True, kw_only=True, tag="beam", tag_field="ki
     """A beam along +x of the body frame, root at the origin; straight but for the curvature of its stations.
 
     `bending_y` is deflection along y (resisted by EIz), `bending_z` along z. `points` is the model of the section's
-    inertia: "line" omits the rotary inertia of bending and of torsion, "rotary" gives each inertia point a tensor that
+    inertia: "line" omits it, "rotary" gives each inertia point a tensor that
     turns with it, "section" has four point masses on each section (the kinetic energy is then a polynomial).
     """
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from flexmb.scene.bodies import BeamBody, Level
 from flexmb.scene.sections import has_plain_sections
+from flexmb.scene.strains import families
 
 MOST_BYTES = 2**32
 """Limit of the memory that the model of one body may need while it is made, the same as for the outputs of a run and
@@ -47,13 +48,13 @@ def beam_estimate(body: BeamBody, modes: int) -> Estimate:
     points = elements * _POINTS[body.points]
     if not has_plain_sections(body):  # one eigenproblem of all families
         bending = 9 if body.theory == "timoshenko" else 4
-        coupled = elements * sum(bending if name.startswith("bending") else 4 for name in body.modes.families)
+        coupled = elements * sum(bending if name.startswith("bending") else 4 for name in families(body))
         memory = _PER_COUPLED * coupled**2 + modes_memory(body.level, points, modes)
         return Estimate(memory, 1e-3 * coupled**3 / _SPEED_COUPLED)
     size = elements * sum(
         count * (shear if name.startswith("bending") else 1)
         for name, count in _COORDINATES.items()
-        if name in body.modes.families
+        if name in families(body)
     )
     memory = _PER_COORDINATE * size**2 + modes_memory(body.level, points, modes)
     return Estimate(memory, 1e-3 * size**3 / _SPEED)

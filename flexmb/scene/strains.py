@@ -1,36 +1,94 @@
-"""The strains of a beam of level "exact": how many polynomials each has, and at how many Gauss points they are seen."""
+"""The strains of a beam of any level: the one place that says what it can do, how finely, and with what inertia.
+
+Stiffness never depends on inertia. A beam that is to twist twists, whether or not its sections have inertia about its
+axis: where they have none, the twist gets that of a homogeneous section (`twist_inertia`), so that its frequencies are
+those of a bar rather than infinite.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Literal
 
-from flexmb.scene.bodies import BeamBody
+import numpy as np
+
+from flexmb.scene.bodies import FAMILIES, BeamBody, BeamStation, Family, StrainPolynomials
 from flexmb.scene.pieces import piece_count
-from flexmb.scene.sections import twists_with_inertia
+from flexmb.scene.sections import (
+    ABOUT_Y,
+    ABOUT_Z,
+    EXTENSION,
+    TWIST,
+    inertia_on_axis,
+    stiffness_on_axis,
+    twists_with_inertia,
+)
+from flexmb.typing import Real
 
 Strain = Literal["axial", "shear_y", "shear_z", "torsion", "bending_z", "bending_y"]
 STRAINS: tuple[Strain, ...] = ("axial", "shear_y", "shear_z", "torsion", "bending_z", "bending_y")
 """In the order of the rows [stretch, shears; twist, curvatures about y and z]."""
 CURVATURES: tuple[Strain, ...] = ("torsion", "bending_z", "bending_y")
+SHEARED: tuple[tuple[Strain, Strain], ...] = (("shear_y", "bending_y"), ("shear_z", "bending_z"))
+"""The shear of each bending plane, of theory "timoshenko"."""
 
 # Gauss points of a piece beyond its polynomials, and at least (docs/notation.md, section 5)
 MORE_POINTS, FEWEST_POINTS = 3, 6
 
 
+def families(body: BeamBody) -> tuple[Family, ...]:
+    """The families of a beam: those that it lists, or for which it has polynomials; else all, at level exact all but
+    stretch."""
+    exact, modes = body.level == "exact", body.modes
+    if exact and modes.polynomials is not None:
+        return tuple(family for family in FAMILIES if getattr(modes.polynomials, family) > 0)
+    if modes.families is not None:
+        return modes.families
+    return tuple(family for family in FAMILIES if not exact or family != "axial")
+
+
+def strains(body: BeamBody) -> tuple[Strain, ...]:
+    """The strains that a beam has, in the order of STRAINS; none at level rigid."""
+    match body.level:
+        case "rigid":
+            return ()
+        case "exact":
+            return tuple(polynomials(body))
+        case _:
+            return _of_families(body, families(body))
+
+
 def polynomials(body: BeamBody) -> dict[Strain, int]:
-    """Number of polynomials of each strain that the beam has, along each of its pieces, in the order of STRAINS."""
-    given, count = body.modes.polynomials, body.modes.count
-    if given is not None:
-        wanted = {strain: int(getattr(given, strain)) for strain in STRAINS}
-    else:
-        wanted = {strain: count if strain in body.modes.families else 0 for strain in CURVATURES}
-        if not twists(body):
-            wanted["torsion"] = 0
-        if body.theory == "timoshenko":
-            pairs: tuple[tuple[Strain, Strain], ...] = (("shear_y", "bending_y"), ("shear_z", "bending_z"))
-            for shear, bending in pairs:
-                wanted[shear] = max(1, wanted[bending] - 2) if wanted[bending] else 0
-    return {strain: wanted[strain] for strain in STRAINS if wanted.get(strain, 0) > 0}
+    """Number of polynomials of each strain that a beam of level exact has, along each of its pieces, in the order of
+    STRAINS."""
+    given = body.modes.polynomials
+    if given is None:
+        return _counts(_of_families(body, families(body)), body.modes.count)
+    return {strain: count for strain in STRAINS if (count := getattr(given, strain)) > 0}
+
+
+def as_fine(body: BeamBody, count: int) -> StrainPolynomials:
+    """`count` polynomials of each curvature that the beam has, and of its other strains as many as belong to these."""
+    return polynomials_of(strains(body), count)
+
+
+def polynomials_of(own: Iterable[Strain], count: int) -> StrainPolynomials:
+    """`count` polynomials of each curvature of these strains, and of the others as many as belong to these."""
+    return StrainPolynomials(**_counts(tuple(own), count))
+
+
+def _of_families(body: BeamBody, chosen: tuple[Family, ...]) -> tuple[Strain, ...]:
+    """The strains of a beam with these families."""
+    sheared = {shear for shear, bending in SHEARED if bending in chosen} if body.theory == "timoshenko" else set()
+    return tuple(strain for strain in STRAINS if strain in chosen or strain in sheared)
+
+
+def _counts(own: tuple[Strain, ...], count: int) -> dict[Strain, int]:
+    """`count` polynomials of each curvature, and of stretch and shear beside bending two fewer, but one at least."""
+    bends = any(strain.startswith("bending") for strain in own)
+    fewer = min(count, max(1, count - 2)) if bends else count
+    wanted = {strain: count if strain in CURVATURES else fewer for strain in own}
+    return {strain: number for strain, number in wanted.items() if number > 0}
 
 
 def strain_count(body: BeamBody) -> int:
@@ -45,7 +103,37 @@ def points_of_piece(body: BeamBody) -> int:
     return max(FEWEST_POINTS, MORE_POINTS + max(polynomials(body).values(), default=0))
 
 
-def twists(body: BeamBody) -> bool:
-    """Whether something of the beam has an inertia about its axis, without which a straight beam has no torsion."""
-    lumps = any(lump.inertia_kg_m2[0][0] > 0.0 or any(lump.com_m[1:]) for lump in body.tip_masses)
-    return lumps or twists_with_inertia(body)
+def borrows_inertia(body: BeamBody) -> bool:
+    """Whether a beam twists although its sections have no inertia about its axis, as `points` has it."""
+    return "torsion" in strains(body) and not twists_with_inertia(body)
+
+
+def twist_inertia(body: BeamBody, stations: list[BeamStation]) -> Real:
+    """Inertia per length (n,) kg m of the twist at stations of a beam that `borrows_inertia`; zero for others.
+
+    That which the section states and `points = "line"` leaves out, else m (EIy + EIz) / EA of a homogeneous section.
+    ValueError for a station without mass or stiffness.
+    """
+    if not borrows_inertia(body):
+        return np.zeros(len(stations))
+    return np.array([_polar(station) for station in stations])
+
+
+def in_words(body: BeamBody) -> str:
+    """What a flexible beam does, what is held, and whose inertia its twist has."""
+    own = polynomials(body) if body.level == "exact" else dict.fromkeys(strains(body), 0)
+    found = ", ".join(f"{count} {strain}" if count else strain for strain, count in own.items())
+    possible = _of_families(body, FAMILIES)
+    if held := ", ".join(strain for strain in possible if strain not in own):
+        found += f"; held: {held}"
+    if borrows_inertia(body):
+        values = twist_inertia(body, list(body.stations))
+        size = " to ".join(dict.fromkeys(f"{value:.3g}" for value in (values.min(), values.max())))
+        found += f"; its sections have no inertia about the axis, and the twist has {size} kg m"
+    return found
+
+
+def _polar(station: BeamStation) -> float:
+    M, K = inertia_on_axis(station), stiffness_on_axis(station)
+    homogeneous = M[0, 0] * (K[ABOUT_Y, ABOUT_Y] + K[ABOUT_Z, ABOUT_Z]) / K[EXTENSION, EXTENSION]
+    return float(M[TWIST, TWIST] or homogeneous)

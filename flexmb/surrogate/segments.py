@@ -11,7 +11,7 @@ import numpy as np
 from flexmb.scene import schema as s
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.sections import has_plain_sections
-from flexmb.scene.strains import polynomials
+from flexmb.scene.strains import strains, twist_inertia
 from flexmb.scene.tree import rest_frames
 from flexmb.surrogate.chain import (
     NodePlace,
@@ -63,7 +63,7 @@ def finite_segments(scene: s.Scene, body: str | None, n: int) -> s.Scene:
 def _segmented(scene: s.Scene, beam: s.BeamBody, n: int) -> s.Scene:
     if is_curved(beam):
         raise ValueError(f'beam "{beam.name}" is curved: finite segments are for straight ones; join several by welds')
-    if beam.theory == "timoshenko" or not _families(beam) <= {*_TURNS, "axial"}:
+    if beam.theory == "timoshenko" or not set(strains(beam)) <= {*_TURNS, "axial"}:
         raise ValueError(f'beam "{beam.name}": finite segments have no shear; use theory "euler-bernoulli"')
     if not has_plain_sections(beam):
         raise ValueError(
@@ -92,19 +92,14 @@ def _cuts(beam: s.BeamBody, n: int) -> list[_Cut]:
         raise ValueError(f'beam "{beam.name}": finite segments need at least 2 elements, got {n}')
     length = beam.length_m / n
     cuts = []
-    if any(family in _TURNS for family in _families(beam)):
+    if any(strain in _TURNS for strain in strains(beam)):
         cuts += [_Cut((i + 0.5) * length, i * length, (i + 1) * length, "turn") for i in range(n)]
-    if "axial" in _families(beam):
+    if "axial" in strains(beam):
         for i in range(1, n):
             start = 0.0 if i == 1 else (i - 0.5) * length
             end = beam.length_m if i == n - 1 else (i + 0.5) * length
             cuts.append(_Cut(i * length, start, end, "axial"))
     return sorted(cuts, key=lambda cut: cut.x)
-
-
-def _families(beam: s.BeamBody) -> set[str]:
-    """What the beam does: its families of modes, or the strains that have polynomials."""
-    return set(polynomials(beam)) if beam.level == "exact" else set(beam.modes.families)
 
 
 def _segments(beam: s.BeamBody, ends: list[float], places: dict[str, NodePlace]) -> list[s.RigidBody]:
@@ -149,14 +144,22 @@ def _turn(beam: s.BeamBody, cut: _Cut, lag: float, placement: dict) -> s.Hinge:
     """A hinge with one rotation for each family that turns sections: revolute for one, else a gimbal."""
     letters, axes, turns = "", [], []
     for family, (letter, axis, key) in _TURNS.items():
-        if family in _families(beam):
+        if family in strains(beam):
             k = _spring(beam, key, cut)
             letters += letter
             axes.append(axis)
-            turns.append(s.AngularCoordinate(stiffness_Nm_rad=k, damping_Nms_rad=lag * k))
+            own = _twist_inertia(beam, cut) if family == "torsion" else 0.0
+            turns.append(s.AngularCoordinate(stiffness_Nm_rad=k, damping_Nms_rad=lag * k, armature_kg_m2=own))
     if len(turns) == 1:
         return s.Revolute(**placement, axis=axes[0], rotation=turns[0])
     return s.Gimbal(**placement, sequence=letters, rotations=tuple(turns))
+
+
+def _twist_inertia(beam: s.BeamBody, cut: _Cut) -> float:
+    """The inertia (kg m^2) that the twist of the piece has where its sections have none about the axis."""
+    stations = sorted(beam.stations, key=lambda station: station.x_m)
+    x, weight = quadrature(beam, (cut.start, cut.end))
+    return float(weight @ np.interp(x, [station.x_m for station in stations], twist_inertia(beam, stations)))
 
 
 def _spring(beam: s.BeamBody, key: str, cut: _Cut) -> float:

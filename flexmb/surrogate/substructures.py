@@ -18,7 +18,6 @@ import numpy as np
 from msgspec.structs import replace
 
 from flexmb.modal import flexible_model
-from flexmb.scene.check.beams import twisting_points
 from flexmb.scene.problems import closest
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import BeamBody, BeamStation, Hinge, Level, Modes, Scene, StrainPolynomials, Weld
@@ -31,6 +30,7 @@ from flexmb.scene.sections import (
     matrix,
     stiffness_on_axis,
 )
+from flexmb.scene.strains import as_fine, families
 from flexmb.scene.tree import nodes_along
 from flexmb.surrogate.chain import (
     NodePlace,
@@ -66,19 +66,18 @@ def substructured(
     exact beam with the square of the length of a piece at level "full", and with its third power at "stiffened"; where
     the twist varies along the beam, the third power requires an eigenmode of torsion in each piece.
 
-    A piece of level "exact" has `polynomials` of each curvature of the beam's families, or of each strain, instead of
-    modes; by default those that one piece of the beam has if it is of level "exact" itself, otherwise `CURVATURES`.
-    With p of them the chain converges with the power 2 p of the length of a piece. A beam of that level whose axis is
-    curved has pieces of that level only.
+    A piece of level "exact" has `polynomials` of each curvature of the beam instead of modes, and of its stretch and
+    shears as many as belong to these; or those of each strain. By default it has those that one piece of the beam has
+    if it is of level "exact" itself, otherwise `CURVATURES`. With p of them the chain converges with the power 2 p of
+    the length of a piece. A beam of that level whose axis is curved has pieces of that level only.
 
     Sections, theory, tip masses and the choice of inertia points are those of the beam; modal damping becomes
     proportional to stiffness, exact for the beam's first mode.
 
     Pieces are named `<beam>.p00` ... and welds `<beam>.w01` ... from the root; a node or a tip mass at a cut belongs to
-    the outer piece. Raises ValueError for a body that is not a beam or is rigid, for fewer than one piece, for a
-    place that is not inside the beam, for an
-    initial modal state, for torsion of pieces without rotary inertia, and for `eigenmodes` or `polynomials` that
-    pieces of the level do not have.
+    the outer piece. Raises ValueError for a body that is not a beam or is rigid, for fewer than one piece, for a place
+    that is not inside the beam, for an initial modal state, and for `eigenmodes` or `polynomials` that pieces of the
+    level do not have.
     """
     if isinstance(pieces, int) and pieces < 1:
         raise ValueError(f"a beam is divided into at least one piece, got {pieces}")
@@ -105,7 +104,7 @@ def _refuse(beam: BeamBody, level: Level, eigenmodes: int, polynomials: int | St
 
 
 def _eigenmodes(beam: BeamBody, count: int) -> Modes:
-    return Modes(count=count, families=beam.modes.families, static=True)
+    return Modes(count=count, families=families(beam), static=True)
 
 
 def _strains(beam: BeamBody, polynomials: int | StrainPolynomials | None) -> Modes:
@@ -113,9 +112,9 @@ def _strains(beam: BeamBody, polynomials: int | StrainPolynomials | None) -> Mod
     own = beam.modes
     if polynomials is None and beam.level == "exact":
         return Modes(count=own.count, families=own.families, polynomials=own.polynomials, points=own.points)
-    if isinstance(polynomials, StrainPolynomials):
-        return Modes(count=0, families=own.families, polynomials=polynomials)
-    return Modes(count=CURVATURES if polynomials is None else polynomials, families=own.families)
+    if not isinstance(polynomials, StrainPolynomials):
+        polynomials = as_fine(replace(beam, level="exact"), CURVATURES if polynomials is None else polynomials)
+    return Modes(count=0, families=own.families, polynomials=polynomials)
 
 
 def _ends(beam: BeamBody, pieces: int | Sequence[str | float]) -> list[float]:
@@ -170,11 +169,6 @@ def _piece(
             replace(node, x_m=node.x_m - start) for node in beam.nodes if places[node.name].piece == number
         ),
     )
-    if "torsion" in modes.families and twisting_points(beam) and not twisting_points(piece):
-        raise ValueError(
-            f'beam "{beam.name}": its pieces cannot be twisted, because they have no inertia about the axis; give '
-            'sections rotary inertia and choose points "section" or "rotary", or leave "torsion" out of the families'
-        )
     if lag == 0.0 or level == "exact":
         return piece
     frequencies = np.sqrt(np.diag(flexible_model(piece).stiffness))

@@ -30,11 +30,13 @@ from flexmb.advisor.confirm import Confirmation
 from flexmb.advisor.ladder import STAGES, Step, highest_frequency
 from flexmb.advisor.methods import FINEST, RunMethod, ladders, operations, simulated, simulated_within
 from flexmb.advisor.models import EXACT, LEVELS, BodyModel, Model, built, flexible_bodies, levels
+from flexmb.advisor.modes import all_strains
 from flexmb.advisor.quantity import error, measured, scales
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
+from flexmb.scene.strains import CURVATURES
 from flexmb.system.compile import compile
 
 TOLERANCES = (1e-2, 1e-3)
@@ -137,7 +139,7 @@ def finer(scene: Scene, advice: Advice) -> Model:
     for body in bodies:
         level = LEVELS[-1] if isinstance(body, BeamBody) else levels(body)[-1]
         if isinstance(body, BeamBody) and body.name not in bent and exact:
-            stretching = "axial" in body.modes.families or body.theory == "timoshenko"
+            stretching = not set(all_strains(body)) <= set(CURVATURES)
             rung = BodyModel("strains", level=EXACT, pieces=of_exact, polynomials=7, stretching=stretching)
             found.append((body.name, rung))
         elif isinstance(body, BeamBody) and body.name not in bent:

@@ -12,6 +12,7 @@ import flexmb as fm
 from flexmb.scene import schema as s
 from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Ramp
+from flexmb.scene.strains import strains
 from tests.repo.project import ROOT
 
 LARGE = ROOT / "cases" / "large_deflection"
@@ -140,7 +141,7 @@ def free_beam(count: int) -> fm.Scene:
 def bent(system: fm.System, turn: float) -> fm.State:
     """A state of the free beam, in flight, with its two lowest modes such that they turn the tip by `turn` (rad)."""
     state = system.initial_state
-    rest = len(state.q) - len(system.scene.bodies[0].modes.families) * system.scene.bodies[0].modes.count
+    rest = len(state.q) - len(strains(system.scene.bodies[0])) * system.scene.bodies[0].modes.count
     shape = np.zeros(len(state.q) - rest)
     shape[:2] = 1.0, 0.7
 

@@ -25,7 +25,7 @@ from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Plan
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import BeamBody, Marker, Scene
 from flexmb.scene.sections import has_plain_sections
-from flexmb.scene.strains import polynomials
+from flexmb.scene.strains import families, polynomials
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
@@ -128,7 +128,7 @@ def _mode_refusals(beam: BeamBody) -> Iterator[str]:
             yield f"it is planar, and the beam has polynomials of {', '.join(sorted(beyond))}"
         if is_curved(beam):
             yield f'its elements are straight, and beam "{beam.name}" is curved where it is not loaded'
-    elif set(beam.modes.families) - {"bending_y", "axial"}:
+    elif set(families(beam)) - {"bending_y", "axial"}:
         yield 'it is planar: the beam may want the families "bending_y" and "axial" only'
     if np.any(beam.modes.damping_ratio) or beam.modes.viscosity_s:
         yield "it has no modal damping, and none by the rate of strain"

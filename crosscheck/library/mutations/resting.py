@@ -12,6 +12,7 @@ from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.scene.hinges import Free, Hinge, Weld
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene
+from flexmb.scene.strains import families
 from flexmb.scene.tree import GROUND, node_frame
 
 EPS = 1e-12
@@ -32,7 +33,7 @@ def rests(scene: Scene, name: str) -> str:
 
 def twists_only(body: Body) -> bool:
     """Whether a beam's only modes are those of torsion, so that its axis stays straight."""
-    return isinstance(body, BeamBody) and set(body.modes.families) == {"torsion"}
+    return isinstance(body, BeamBody) and set(families(body)) == {"torsion"}
 
 
 def is_clamped_along_world(scene: Scene, name: str) -> bool:

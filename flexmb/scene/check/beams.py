@@ -14,7 +14,7 @@ from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 from flexmb.scene.sections import twists_with_inertia
 from flexmb.scene.sizes import MOST_BYTES, PER_MODE, PLENTY, beam_estimate
-from flexmb.scene.strains import strain_count
+from flexmb.scene.strains import families, strain_count
 
 
 def beams(scene: Scene) -> Iterator[Defect]:
@@ -33,8 +33,7 @@ def beams(scene: Scene) -> Iterator[Defect]:
 
 
 def mode_count(body: BeamBody) -> int:
-    """Modal coordinates of a beam: eigenmodes, and the attachment modes of the families that have inertia; at level
-    exact the polynomials of all strains."""
+    """Modal coordinates of a beam: eigenmodes and attachment modes; at level exact the polynomials of all strains."""
     if body.level == "exact":
         return strain_count(body)
     return body.modes.count + (_attachments(body) if body.modes.static else 0)
@@ -85,8 +84,8 @@ def _along(place: Place, body: BeamBody) -> Iterator[Defect]:
 
 def _modes(place: Place, body: BeamBody) -> Iterator[Defect]:
     modes = body.modes
-    if not modes.families or len(set(modes.families)) < len(modes.families):
-        yield Defect(str(place.key("families")), f"the families are {modes.families}", "list each wanted family once")
+    if not (own := families(body)) or len(set(own)) < len(own):
+        yield Defect(str(place.key("families")), f"the families are {own}", "list each wanted family once")
     if modes.count < 0 or mode_count(body) < 1:
         remedy = 'give one at least, or "static" ones, or make the level "rigid"'
         yield Defect(str(place.key("count")), f"{modes.count} modes", remedy)
@@ -98,26 +97,18 @@ def _modes(place: Place, body: BeamBody) -> Iterator[Defect]:
 
 def _attachments(body: BeamBody) -> int:
     """Unit tip loads: one for axial and torsion, force and moment for each bending plane."""
-    counts = {"axial": 1, "torsion": 1 if twisting_points(body) else 0, "bending_y": 2, "bending_z": 2}
-    return sum(counts[family] for family in body.modes.families)
+    counts = {"axial": 1, "torsion": 1, "bending_y": 2, "bending_z": 2}
+    return sum(counts[family] for family in families(body))
 
 
 def available_modes(body: BeamBody) -> int:
-    """Coordinates with inertia of the wanted families.
+    """Coordinates of the wanted families.
 
     A free-free beam has the root's coordinates in addition, but just as many rigid motions, which are not modes.
     """
     bending = body.elements if body.mass == "lumped" and not _has_rotary(body) else 2 * body.elements
-    counts = {"axial": body.elements, "torsion": twisting_points(body), "bending_y": bending, "bending_z": bending}
-    return sum(counts[family] for family in body.modes.families)
-
-
-def twisting_points(body: BeamBody) -> int:
-    """Coordinates of torsion with inertia: every element's, or without rotary inertia those of lumps off the axis."""
-    if twists_with_inertia(body):
-        return body.elements
-    lumps = [lump for lump in body.tip_masses if lump.inertia_kg_m2[0][0] > 0.0 or any(lump.com_m[1:])]
-    return min(len(lumps), body.elements)
+    counts = {"axial": body.elements, "torsion": body.elements, "bending_y": bending, "bending_z": bending}
+    return sum(counts[family] for family in families(body))
 
 
 def _has_rotary(body: BeamBody) -> bool:

@@ -9,10 +9,19 @@ from flexmb.scene.bodies import BeamBody, Modes
 from flexmb.scene.convert import ROOT
 from flexmb.scene.pieces import across, piece_count
 from flexmb.scene.problems import Defect, Doubt, Place, closest
-from flexmb.scene.rest_curve import MOST_TURN, is_bent, turn_at_rest
+from flexmb.scene.rest_curve import MOST_TURN, is_bent, is_curved, turn_at_rest
 from flexmb.scene.schema import Scene
+from flexmb.scene.sections import has_plain_sections
 from flexmb.scene.sizes import MOST_MODES
-from flexmb.scene.strains import FEWEST_POINTS, MORE_POINTS, STRAINS, points_of_piece, polynomials
+from flexmb.scene.strains import (
+    FEWEST_POINTS,
+    MORE_POINTS,
+    SHEARED,
+    STRAINS,
+    Strain,
+    points_of_piece,
+    polynomials,
+)
 
 MOST_PIECES, MOST_POLYNOMIALS, MOST_POINTS = 1000, 40, 200
 """Beyond these a number is taken for a slip. The fastest frequency grows with the fourth power of the polynomials: with
@@ -33,10 +42,7 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
         yield Defect(str(modes.key("boundary")), "strains have no boundary conditions to choose", remedy)
     if body.mass != "consistent":
         yield Defect(str(place.key("mass")), f'mass is "{body.mass}"', 'use "consistent": inertia is at Gauss points')
-    try:
-        found = polynomials(body)
-    except ValueError:  # a station without mass, which the checks of stations name
-        return
+    found = polynomials(body)
     if not found:
         remedy = 'give polynomials of a curvature, or make the level "rigid"'
         yield Defect(str(modes.key("count")), "the beam has no strain", remedy)
@@ -51,11 +57,24 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
         if shear in found and any(each.stiffness is None and getattr(each, key) is None for each in body.stations):
             spot = str(place.key("stations"))
             yield Defect(spot, f"{shear} has polynomials, and a station no {key}", f"give {key} at every station")
+    yield from _still(modes, body, found)
     if (count := sum(found.values()) * max(piece_count(body), 1)) > MOST_MODES:
         what = f"{count} polynomials in all its pieces: one body with so many takes minutes and gigabytes to make"
         remedy = f"give {MOST_MODES} at most; several bodies that are welded together cost O(N)"
         yield Defect(str(modes.key("pieces")), what, remedy)
     yield from damping(modes, body.modes, count)
+
+
+def _still(place: Place, body: BeamBody, found: dict[Strain, int]) -> Iterator[Defect]:
+    """Shear undoes a slope from its second polynomial on; without rotary inertia nothing moves then."""
+    if body.tip_masses or is_curved(body) or not has_plain_sections(body):
+        return  # `compile` sees what moves
+    for (shear, bending), key in zip(SHEARED, ("rotary_z_kg_m", "rotary_y_kg_m"), strict=True):
+        turns = body.points != "line" and any(getattr(station, key) for station in body.stations)
+        if not turns and min(found.get(shear, 0) - 1, found.get(bending, 0)) > 0:
+            what = f"{shear} and {bending} can be combined so that no inertia moves"
+            remedy = f'give the sections {key} and points = "section", or {shear} one polynomial in modes.polynomials'
+            yield Defect(str(place.key("polynomials")), what, remedy)
 
 
 def _numbers(place: Place, body: BeamBody) -> Iterator[Defect]:

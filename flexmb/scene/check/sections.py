@@ -15,7 +15,6 @@ from flexmb.scene.sections import (
     SHEAR_KEYS,
     STIFFNESS_KEYS,
     STRAINS,
-    TWIST,
     WITHOUT_SHEAR,
     free_shear,
     is_plain,
@@ -23,11 +22,10 @@ from flexmb.scene.sections import (
     mass_per_length,
     stiffness_on_axis,
     symmetric,
-    twists_with_inertia,
     without_shear,
 )
 from flexmb.scene.strains import STRAINS as POLYNOMIALS
-from flexmb.scene.strains import polynomials
+from flexmb.scene.strains import families, polynomials
 from flexmb.typing import Real
 
 # Axial wave speed sqrt(EA / mass per length): soft rubber has some 50 m/s, diamond 18 km/s. The limits are wider than
@@ -224,7 +222,7 @@ def _shown(place: Place, spot: Place, station: BeamStation, body: BeamBody) -> I
     shear centre is off the axis, contradicts that: its twist under a force would be lost.
     """
     K, strains = stiffness_on_axis(station), list(range(6))
-    chosen = np.array([family in body.modes.families for family in FAMILY_OF_STRAIN])
+    chosen = np.array([family in families(body) for family in FAMILY_OF_STRAIN])
     if body.theory == "euler-bernoulli":
         own = chosen[WITHOUT_SHEAR]
         shear = np.abs(free_shear(K)[:, own]) / np.array([1.0, *[body.length_m] * 3])[own]
@@ -242,10 +240,3 @@ def _shown(place: Place, spot: Place, station: BeamStation, body: BeamBody) -> I
         what = f'the section couples {STRAINS[a]} with {STRAINS[b]}, and the modes leave out "{FAMILY_OF_STRAIN[b]}"'
         remedy = f'add "{FAMILY_OF_STRAIN[b]}" to the families, or leave out "{FAMILY_OF_STRAIN[a]}" too'
         yield Defect(str(place.key("modes", "families")), what, remedy)
-    twist = np.abs(K[strains.index(TWIST)] / np.sqrt(K[strains.index(TWIST), strains.index(TWIST)]) / size)
-    twist[strains.index(TWIST)] = 0.0
-    lumped = any(lump.inertia_kg_m2[0][0] > 0.0 or any(lump.com_m[1:]) for lump in body.tip_masses)
-    if "torsion" in body.modes.families and np.max(twist) > PRINTED and not lumped and not twists_with_inertia(body):
-        what = "the section couples twist with other strains, and nothing has inertia about the axis"
-        remedy = 'give the sections rotary inertia, and points = "section" or "rotary"'
-        yield Defect(str(place.key("points")), what, remedy)

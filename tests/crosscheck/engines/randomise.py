@@ -22,6 +22,7 @@ from flexmb.scene.schema import (
     Vector,
     Wheel,
 )
+from flexmb.scene.strains import families
 from flexmb.scene.tree import Coordinate, coordinates, with_coordinates
 
 _ANGLE = 0.8  # rad: away from the singularity of three-axis gimbals at pi/2
@@ -101,11 +102,10 @@ def _beam_modes(body: BeamBody) -> tuple[int, float]:
     }
     scale = _DEFLECTION * body.length_m * np.sqrt(mean["mass_per_length_kg_m"]) / 2.0
     polar = mean["rotary_y_kg_m"] + mean["rotary_z_kg_m"]
-    turns = "torsion" in body.modes.families and polar > 0.0 and body.points != "line"
-    if turns:
+    if "torsion" in families(body) and polar > 0.0:
         scale = min(scale, 0.2 * np.sqrt(polar))
-    attachments = {"axial": 1, "torsion": 1 if turns else 0, "bending_y": 2, "bending_z": 2}
-    extra = sum(attachments[family] for family in body.modes.families) if body.modes.static else 0
+    attachments = {"axial": 1, "torsion": 1, "bending_y": 2, "bending_z": 2}
+    extra = sum(attachments[family] for family in families(body)) if body.modes.static else 0
     return body.modes.count + extra, float(scale)
 
 

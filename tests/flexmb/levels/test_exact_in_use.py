@@ -87,12 +87,14 @@ def _without_shear(station: s.BeamStation) -> s.BeamStation:
     return msgspec.structs.replace(station, GAy_N=None, GAz_N=None)
 
 
-def test_torsion_without_inertia_is_refused():
-    """A line that twists has no inertia while it is straight: its modes would be infinitely fast."""
-    modes = s.Modes(count=2, polynomials=s.StrainPolynomials(torsion=1, bending_y=2))
-    scene = beam(modes, points="line").weld("clamp", "ground", "rod").scene()
-    with pytest.raises(ValueError, match="move no inertia"):
-        flexmb.compile(scene)
+def test_shear_that_undoes_bending_without_inertia_is_refused_by_name():
+    """By the check, and by the model for a scene that was never checked."""
+    modes = s.Modes(count=2, polynomials=s.StrainPolynomials(shear_y=3, bending_y=2))
+    with pytest.raises(SceneError, match=r"shear_y and bending_y can be combined[\s\S]*rotary_z_kg_m"):
+        beam(modes, points="line").weld("clamp", "ground", "rod").scene()
+    few = msgspec.structs.replace(modes, polynomials=s.StrainPolynomials(shear_y=1, bending_y=2))
+    with pytest.raises(ValueError, match="'rod': its shear_y and bending_y can be combined"):
+        exact_model(msgspec.structs.replace(body_of(beam(few, points="line")), modes=modes))
 
 
 def test_frisch_and_regressor_refuse_it():

@@ -111,7 +111,7 @@ def test_with_the_modes_for_its_load_nothing_is_open() -> None:
 @pytest.mark.parametrize("families", [("axial",), ("torsion",), ("bending_y", "axial", "torsion")])
 @pytest.mark.parametrize("static", [False, True])
 def test_a_finer_beam_has_the_modes_that_it_is_asked_for(families: tuple, static: bool) -> None:
-    """Of one element, and of a shaft without rotary inertia, whose lumps alone turn."""
+    """Of one element, and of a shaft with a lump, whose sections have no rotary inertia."""
     lump = fm.TipMass(x_m=2.0, mass_kg=1.0, inertia_kg_m2=((0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1)))
     wanted = fm.Modes(count=1, families=families, static=static)
     if families == ("torsion",) and static:

@@ -105,15 +105,7 @@ def test_static_modes_of_a_free_beam_make_its_tip_flexibility_exact():
 def test_static_modes_keep_the_eigenmodes():
     plain, extended = (frequencies(beam(8, 6, modes={"static": static})) for static in (False, True))
     assert extended[:6] == pytest.approx(plain, rel=1e-14)
-    assert len(extended) == 6 + 5  # axial force, two forces and two moments of bending; torsion has no inertia here
-
-
-def test_family_without_inertia_has_no_modes():
-    body = beam(8, 40, modes={"families": ("torsion", "bending_y")})
-    twist = flexible_model(beam(8, 30, modes={"families": ("torsion", "bending_y")})).nodes["tip"].rotation_modes[0]
-    assert not np.any(twist)
-    with pytest.raises(ValueError, match="40 modes wanted"):
-        flexible_model(body)
+    assert len(extended) == 6 + 6  # axial force, torque, two forces and two moments of bending
 
 
 def test_modal_damping():

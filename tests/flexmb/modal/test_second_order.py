@@ -35,7 +35,7 @@ def tapered(boundary: str = "clamped-free", theory: str = "euler-bernoulli", fam
         )
         for x, a in ((0.0, 1.0), (1.3, 0.6))
     )  # fmt: skip
-    modes = s.Modes(count=count, boundary=boundary, families=families or s.Modes(count=1).families)
+    modes = s.Modes(count=count, boundary=boundary, families=families)
     lump = s.TipMass(x_m=0.8, mass_kg=0.2, com_m=(0.0, 0.05, 0.02))
     return s.BeamBody(
         name="beam", length_m=1.3, elements=3, stations=stations, modes=modes, theory=theory, level="stiffened",

@@ -226,9 +226,6 @@ BAD = {
     "no modes": (both(put(*MODES, "count", 0), STATELESS), ["$.bodies[1].modes.count"], ["0 modes"], ["rigid"]),
     "more modes than coordinates": (both(put(*MODES, "count", 25), STATELESS), ["modes.count"], ["25", "24"],
                                     ["more elements"]),
-    "no torsional inertia for torsion modes": (
-        both(put("bodies", 1, "points", "line"), put(*MODES, "families", ["torsion"])),
-        ["modes.count"], ["3 modes", "give 0"], ["families"]),
     "repeated family": (put(*MODES, "families", ["axial", "bending_y", "axial"]), ["modes.families"], [], ["once"]),
     "damping ratios do not match": (put(*MODES, "damping_ratio", [0.01, 0.02]), ["modes.damping_ratio"],
                                     ["2 damping ratios for 3"], ["one for each"]),

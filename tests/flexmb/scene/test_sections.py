@@ -72,8 +72,6 @@ CASES: dict[str, tuple[s.BeamStation, dict[str, Any], str, str]] = {
     "an axis off the shear centres": (
         replace(NUMBERS, reference_point_m=(0.0, 0.02)), {"theory": "euler-bernoulli"}, "stations[0]",
         "shears with twist"),
-    "twist without inertia": (
-        station(0.0, ALONE, section_mass(c=(0.0, 0.0, 0.0))), {"points": "line"}, "points", "about the axis"),
     "an error of units": (station(0.0, 1e3 * K, 1e-3 * M), {}, "stiffness[0][0]", "waves would run"),
 }  # fmt: skip
 

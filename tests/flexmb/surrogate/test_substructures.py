@@ -13,7 +13,8 @@ from flexmb.modal import flexible_model
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.check import check_scene
 from flexmb.scene.functions import Constant
-from flexmb.scene.schema import BeamBody, BeamNode, Modes, TipMass, Weld
+from flexmb.scene.schema import BeamBody, BeamNode, Modes, StrainPolynomials, TipMass, Weld
+from flexmb.scene.strains import polynomials
 from flexmb.scene.tree import ordered
 from flexmb.surrogate import modal_points, substructured
 from flexmb.surrogate.lumping import beam_piece, combine
@@ -218,11 +219,17 @@ def test_refusals():
     bent = cantilever(("bending_y",), "line").modal_state("b", coordinates=[0.1]).scene()
     with pytest.raises(ValueError, match="undeformed"):
         substructured(bent, "b", 2)
-    twisted = TipMass(x_m=LENGTH, mass_kg=0.3, com_m=(0.0, 0.1, 0.0))
-    with pytest.raises(ValueError, match="cannot be twisted.*rotary inertia"):
-        substructured(beam_scene(ALL, points="line", tip_masses=[twisted]), "boom", 2)
-    untwisted = substructured(beam_scene(ALL, points="line"), "boom", 2)  # as the beam itself
-    assert flexible_model(untwisted.bodies[0]).mode_count == 5
+    twisted = substructured(beam_scene(ALL, points="line"), "boom", 2)  # as the beam itself
+    assert flexible_model(twisted.bodies[0]).mode_count == 6
+
+
+def test_polynomials_of_pieces_are_of_the_strains_that_the_beam_has():
+    own = StrainPolynomials(axial=3, bending_y=4)
+    modes = Modes(count=0, polynomials=own)
+    scene = SceneBuilder("strains").beam("b", length=LENGTH, elements=8, section=SECTION, level="exact", modes=modes)
+    scene = scene.weld("w", "ground", "b").scene()
+    pieces = substructured(scene, "b", 2, polynomials=4).bodies
+    assert [polynomials(body) for body in pieces] == [{"axial": 2, "bending_y": 4}] * 2
 
 
 def test_a_modal_body_cannot_be_split():
