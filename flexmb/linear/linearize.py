@@ -27,7 +27,7 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     controllers it is the model of the closed loop about the controllers' initial states, which come last in x. Sensor
     signals are among the outputs: "gyro[0]", or "angle" for a single number; loads and accelerations have direct
     feedthrough, D. Raises DynamicsError where the accelerations do not exist, `NotDifferentiableError` (one of them)
-    where a controller is exactly at a limit, NotImplementedError for sampled
+    where a controller is exactly at a limit, or a connector just at a stop or slack, NotImplementedError for sampled
     controllers and closures on bodies of level "ruthless", ValueError or TypeError for a state that does not belong to
     this system or leaves closures open.
     """
@@ -52,6 +52,7 @@ def linear_model(equations: Equations, state: State) -> LinearModel:
     """The model of equations whose functions of time are already held or replaced as wanted."""
     system, free = equations.system, equations.free
     state = equations.on_functions(state)
+    system.refuse_corners(*system.layout.entering(state))
     at, n = equations.variations(state), equations.freedom
     names, units = displacement_names(equations)
     speeds = [system.state_names[1][j] for j in free]
