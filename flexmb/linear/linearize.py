@@ -32,8 +32,8 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     signals are among the outputs: "gyro[0]", or "angle" for a single number; loads and accelerations have direct
     feedthrough, D. Warns (`SceneWarning`) of bodies that turn faster than their level describes. Raises DynamicsError
     where the accelerations do not exist, `NotDifferentiableError` (one of them) where a controller is exactly at a
-    limit, NotImplementedError for sampled controllers and closures on bodies of level "ruthless", ValueError or
-    TypeError for a state that does not belong to this system or leaves closures open.
+    limit, or a connector just at a stop or slack, NotImplementedError for sampled controllers and closures on bodies of
+    level "ruthless", ValueError or TypeError for a state that does not belong to this system or leaves closures open.
     """
     if isinstance(system, Scene) and system.controllers:
         system = compile(system)
@@ -68,6 +68,7 @@ def linear_model(equations: Equations, state: State) -> LinearModel:
     """The model of equations whose functions of time are already held or replaced as wanted."""
     system, free = equations.system, equations.free
     state = equations.on_functions(state)
+    system.refuse_corners(*system.layout.entering(state))
     at, n = equations.variations(state), equations.freedom
     names, units = displacement_names(equations)
     speeds = [system.state_names[1][j] for j in free]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from flexmb.scene.schema import Scene
 from flexmb.scene.values import PathError, changed_at, with_values
+
+NEARBY = 2.0**-6
+"""Change of a number, relative to its scale, by which one sees what depends on it."""
 
 
 class Number:
@@ -33,8 +36,27 @@ class Number:
 
     def scene_at(self, value: float) -> Scene:
         """The scene with another value."""
-        changed: Scene = with_values(self._scene, {self.name: value})
+        return self.scene_with({self.name: value})
+
+    def scene_with(self, values: Mapping[str, float]) -> Scene:
+        """The scene with other values of several of its numbers, by name."""
+        changed: Scene = with_values(self._scene, values)
         return changed
+
+    @property
+    def own_scene(self) -> Scene:
+        """The scene to which it belongs."""
+        return self._scene
+
+    @property
+    def nearby_value(self) -> float:
+        """A value that is a little larger."""
+        return self.value + NEARBY * self.scale
+
+    @property
+    def nearby(self) -> Scene:
+        """The scene with this value: what differs in it depends on the number."""
+        return self.scene_at(self.nearby_value)
 
     @property
     def scale(self) -> float:

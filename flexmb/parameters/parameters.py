@@ -29,7 +29,6 @@ from flexmb.parameters.tables import ParameterBlock, Tables, blocks, diagonal, n
 from flexmb.parameters.together import derivatives_together
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
-from flexmb.scene.values import with_values
 from flexmb.tables import arguments
 from flexmb.tables.per_thread import Own, per_thread
 from flexmb.tables.state import State, finite_result
@@ -47,14 +46,19 @@ class ParameterError(ValueError):
 class Parameters:
     """Numbers of a scene, and derivatives by them; made by `System.parameters`. Threads may share it.
 
-    names (P,); values (P,); errors (P,): estimates of the relative errors of the derivatives of the tables; blocks: the
-    tables in dual numbers, LANES parameters each; initial_state (nq+nu+1,P): d[q, u, work]/dp of the scene's state at
-    t = 0, for closed chains of the nearest one that closes all closures.
+    names (P,); values (P,); reached (P,): whether the tables depend on a number at all; errors (P,): estimates of the
+    relative errors of the derivatives of the tables; blocks: the tables in dual numbers, LANES parameters each;
+    initial_state (nq+nu+1,P): d[q, u, work]/dp of the scene's state at t = 0, for closed chains of the nearest one that
+    closes all closures.
+
+    All methods raise `NotDifferentiableError` (a DynamicsError) at states at which a law has a corner.
     """
 
-    def __init__(self, plant: Plant, names: Sequence[str]) -> None:
-        """PathError where the scene has no such number, ParameterError where there is no derivative by it."""
-        chosen = numbers(plant.scene, names)
+    def __init__(self, plant: Plant, chosen: Sequence[Number], *, starts: bool = True) -> None:
+        """starts: whether the initial state of the scene is that of the motion, and is differentiated.
+
+        ParameterError where there is no derivative by a number.
+        """
         if plant.closures is not None and plant.closures.at_rest:
             raise NotImplementedError(
                 f'scene "{plant.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
@@ -64,13 +68,15 @@ class Parameters:
         self.values.flags.writeable = False
         self.plant = plant.with_numbers(plant.scene)
         """The same system, with equal functions of time kept apart: numbers of one may change without the other's."""
-        found = _Differentiation(self.plant)
+        found = _Differentiation(self.plant, starts)
         rates = found.by_all(chosen)
         self.errors = np.array([each.error for each in rates])
-        of_tables = np.column_stack([each.values for each in rates])
+        self.reached = np.array([each.name in found.reached or bool(np.any(rate.values))
+                                 for each, rate in zip(chosen, rates, strict=True)])  # fmt: skip
+        of_tables = np.stack([each.values for each in rates], axis=1) if chosen else np.zeros((found.size, 0))
         self.blocks: tuple[ParameterBlock, ...] = blocks(found.tables, found.diagonal, self.names, of_tables)
         self.initial_state: Real = of_tables[-len(found.tables.start) :].copy()
-        for each in (self.errors, self.initial_state):
+        for each in (self.errors, self.initial_state, self.reached):
             each.flags.writeable = False
         self.own = Own()
 
@@ -96,6 +102,7 @@ class Parameters:
 
     def _slopes(self, t: float, y: Real, dy: Real) -> Real:
         """The same of arrays that fit."""
+        self.plant.refuse_corners(t, y)
         found = np.empty(dy.shape)
         for start, bound in self._bound:
             place = slice(start, start + bound.count)
@@ -111,6 +118,7 @@ class Parameters:
         NaN where redundant closures leave loads undetermined.
         """
         t, y = self.plant.layout.entering(state)
+        self.plant.refuse_corners(t, y)
         found = dict[str, Any]()
         for start, bound in self._bound:
             bound.check(bound.observe(t, y))
@@ -128,6 +136,7 @@ class Parameters:
         """d tau/dp (nu,P) of tau = M udot + c of the tree for given accelerations (nu,)."""
         t, y = self.plant.layout.entering(state)
         rates = self.plant.layout.rates("accelerations", accelerations)
+        self.plant.refuse_corners(t, y)
         found = np.empty((self.plant.nu, len(self.names)))
         for start, bound in self._bound:
             bound.invert(t, y, rates)
@@ -206,6 +215,20 @@ class _Bound:
         return direct(kernels.inverse, VOID, REAL, VECTOR, VECTOR, *tables)
 
 
+def parameters(plant: Plant, names: Sequence[str]) -> Parameters:
+    """The parameters of these names; PathError where the scene has no such number, ParameterError where there is no
+    derivative by it, or nothing in the motion depends on it."""
+    found = Parameters(plant, numbers(plant.scene, names))
+    for name, is_reached in zip(found.names, found.reached.tolist(), strict=True):
+        if not is_reached:
+            raise ParameterError(
+                f'parameter "{name}": accelerations, loads and the initial state at given outputs of controllers do '
+                "not depend on it: leave it out; by numbers of controllers, sensors and events, derivatives are those "
+                "of runs: see `sensitivities`"
+            )
+    return found
+
+
 _OF_TABLES = {
     "tree.body.planar": (
         'it bends a beam of level "exact", whose strains are in one plane, out of that plane; give the beam torsion '
@@ -222,18 +245,25 @@ _OF_TABLES = {
 class _Differentiation:
     """The tables of a scene as functions of each of its numbers."""
 
-    def __init__(self, plant: Plant) -> None:
-        self._plant = plant
-        self.tables = _tables(plant)
+    def __init__(self, plant: Plant, starts: bool) -> None:
+        self._plant, self._starts = plant, starts
+        self.reached: set[str] = set()
+        """Names of the numbers with which tables were seen to differ."""
+        self.tables = _tables(plant, starts)
         self.diagonal = diagonal(self.tables)
         self._structure, self._parts = structure(self.tables), parts(self.tables, plant.nq)
         self._middle = numbers_of(self.tables)
+
+    @property
+    def size(self) -> int:
+        """The count of all floats of the tables."""
+        return len(self._middle)
 
     def by(self, number: Number) -> Any:
         """Derivatives of `numbers_of` the tables by a number; ParameterError where there are none."""
 
         def at(value: float) -> Real:
-            return self._middle if value == number.value else self._at(number.scene_at(value))
+            return self._middle if value == number.value else self._with(number, {number.name: value})
 
         try:
             return derivative(at, number.value, number.scale, self._parts)
@@ -249,12 +279,19 @@ class _Differentiation:
             return [self.by(each) for each in chosen]
 
         def tables(values: Mapping[str, float]) -> Real:
-            return self._at(with_values(self._plant.scene, values)) if values else self._middle
+            return self._with(chosen[0], values) if values else self._middle
 
         return derivatives_together(tables, chosen, self._parts, self.by)
 
+    def _with(self, number: Number, values: Mapping[str, float]) -> Real:
+        """The tables with other values of a number and of others that belong to the same scene."""
+        found = self._at(number.scene_with(values))
+        if len(values) == 1 and not self.reached.issuperset(values) and not np.array_equal(found, self._middle):
+            self.reached.update(values)
+        return found
+
     def _at(self, scene: Scene) -> Real:
-        tables = _tables(self._plant.with_numbers(scene))
+        tables = _tables(self._plant.with_numbers(scene), self._starts)
         changed = [name for name, each in structure(tables).items() if each != self._structure.get(name)]
         if changed:
             what = _OF_TABLES.get(changed[0], f"what the tables contain depends on it: {changed[0]}")
@@ -263,9 +300,11 @@ class _Differentiation:
         return numbers_of(tables)
 
 
-def _tables(plant: Plant) -> Tables:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SceneWarning)  # of values that closures change, which compiling has said
-        start = plant.initial_state.y.copy()
+def _tables(plant: Plant, starts: bool) -> Tables:
+    start = np.zeros(plant.nq + plant.nu + 1)
+    if starts:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SceneWarning)  # of values that closures change, which compiling has said
+            start = plant.initial_state.y.copy()
     closures = plant.closures
     return Tables(plant.constants, None if closures is None else closures.constants[1], start)

@@ -44,5 +44,7 @@ class Plant(Protocol):
 
     def check_status(self, status: int, fault: int | None = None) -> None: ...
 
+    def refuse_corners(self, t: float, y: Real) -> None: ...
+
     def with_numbers(self, scene: Scene) -> Plant:
         """The system of the same scene with slightly other numbers, whose tables are smooth functions of these."""

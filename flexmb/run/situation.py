@@ -51,7 +51,7 @@ class Situation:
     ) -> None:
         """stabilise (1/s): see `flexmb.simulate`. given: for a resumed run, the scene altered by changes of values
         alone; see `EventMemory`."""
-        self.system = system = _with_stops(system)
+        self.system = system = with_stops(system)
         self.settings, self._algorithm, self._stabilise = settings, algorithm, stabilise
         self.given = given or system.scene
         self._built = [system]
@@ -260,7 +260,7 @@ def _found(scene: Scene, path: str) -> Coordinate | Wheel:
     return found[0]
 
 
-def _with_stops(system: System) -> System:
+def with_stops(system: System) -> System:
     """The system with sensors for the loads of all stops on which a coordinate may come to rest."""
     known = {sensor.name for sensor in system.scene.sensors}  # the scene of a resumed run has these sensors already
     sensors = [stop_sensor(event, action) for event, action in resting(system.scene)]

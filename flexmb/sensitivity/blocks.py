@@ -73,13 +73,13 @@ class Blocks:
 
     def _chains(self, system: System) -> list[Any]:
         assert system.closures is not None
-        self._chain = system.closures.chain("articulated")
+        self.chain = system.closures.chain("articulated")
         found = []
         for each, w in zip(self.duals, self.workspaces, strict=True):
             assert each.closures is not None
             found.append(
                 chain.ChainBlock(
-                    chain=self._chain,
+                    chain=self.chain,
                     c=each.constants,
                     cc=each.closures,
                     y=np.zeros(len(self.state[0])),
@@ -105,8 +105,8 @@ class Blocks:
     @property
     def fault(self) -> int:
         """Index of the item at which the last evaluation failed."""
-        if self.system.closures is not None and self._chain.fault[0]:
-            return int(self._chain.fault[0])
+        if self.system.closures is not None and self.chain.fault[0]:
+            return int(self.chain.fault[0])
         return max(int(w.fault[0]) for w in self.workspaces)
 
     def check(self, status: int) -> None:

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexmb.integrate.settings import Settings
-from flexmb.parameters.numbers import Number
 from flexmb.run.driver import Leg
 from flexmb.run.propagate import Integration, integration
 from flexmb.run.trajectory import Trajectory
-from flexmb.scene.schema import Scene
 from flexmb.sensitivity.channels import Chosen, Seen, channels
+from flexmb.sensitivity.gate import Admitted
 from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
-from flexmb.sensitivity.passage import Passage, is_mechanical
+from flexmb.sensitivity.passage import Passage
 from flexmb.typing import Real
 
 # Derivatives are integrated as changes by this part of each number. The error of a step is held below rtol times them
@@ -28,15 +27,12 @@ EventTimes = list[tuple[str, float, Real]]
 class Following:
     """One run, followed with scaled derivatives: each is per SHARE of the `scale` of its number."""
 
-    def __init__(
-        self, scene: Scene, found: Sequence[Number], settings: Settings, trajectory: Trajectory, outputs: Chosen
-    ) -> None:
-        self._order = np.argsort([not is_mechanical(scene, each) for each in found], kind="stable")
-        numbers = [found[k] for k in self._order]
-        self._scales = np.array([SHARE * each.scale for each in numbers])
+    def __init__(self, admitted: Admitted, settings: Settings, trajectory: Trajectory, outputs: Chosen) -> None:
+        self._scales = np.array([SHARE * each.scale for each in admitted.numbers])
         self._settings, self._trajectory, self._outputs = settings, trajectory, outputs
-        self._passage = Passage(scene, numbers, self._scales, settings, float(trajectory.t[-1] - trajectory.t[0]))
-        self._derivatives = np.full((len(trajectory.t), len(outputs.names), len(found)), np.nan)
+        length = float(trajectory.t[-1] - trajectory.t[0])
+        self._passage = Passage(admitted, admitted.numbers, self._scales, settings, length)
+        self._derivatives = np.full((*outputs.values.shape, len(self._scales)), np.nan)
         self._events: EventTimes = []
 
     def __call__(self, course: Sequence[Leg]) -> tuple[Real, EventTimes]:
@@ -60,9 +56,8 @@ class Following:
                 self._see(variation, solve, clock.times, states, times, is_last)
                 found = self._passage.ended(variation, before)
                 self._events += [(each.event.name, stop, each.dt) for each in found.crossings]
-        order = np.argsort(self._order)
-        scaled = self._derivatives / self._scales
-        return scaled[..., order], [(name, t, (dt / self._scales)[order]) for name, t, dt in self._events]
+        self._derivatives[np.isnan(self._outputs.values)] = np.nan  # of loads that closures leave undetermined
+        return self._derivatives / self._scales, [(name, t, dt / self._scales) for name, t, dt in self._events]
 
     def _times(self, leg: Leg, is_last: bool) -> slice:
         """The numbers of the output times of a part of the run."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
-from flexmb.parameters.numbers import numbers
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
@@ -18,10 +17,10 @@ from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 from flexmb.sensitivity.adjoint.whole import Adjoint
 from flexmb.sensitivity.channels import refuse_unknown_outputs
-from flexmb.sensitivity.refusals import refuse_beyond_adjoint, refuse_measured_loads, refuse_moving_instants
+from flexmb.sensitivity.gate import admitted
+from flexmb.sensitivity.refusals import refuse_beyond_adjoint
 from flexmb.sensitivity.scalars import ScalarTerm, terms_of
 from flexmb.sensitivity.sensitivities import METHODS
-from flexmb.system.compile import assembled
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
@@ -80,20 +79,16 @@ def gradient(
     t_end, terms = arguments.number("t_end", t_end), terms_of(of)
     check_and_warn(scene, t_end, 0.0)
     refuse_beyond_adjoint(scene)
-    refuse_measured_loads(scene)
-    found = numbers(scene, by)
-    refuse_moving_instants(scene, found)
-    given = Settings(method, **settings).checked(abs(t_end))
-    system = assembled(scene)
-    refuse_unknown_outputs(system, [name for term in terms for name in term.channels])
+    given, gated = Settings(method, **settings).checked(abs(t_end)), admitted(scene, by)
+    refuse_unknown_outputs(gated.system, [name for term in terms for name in term.channels])
     for term in terms:
         list(term.probes(t_end, []))  # refuses what does not fit the run
-    trajectory, course = run_with_course(system, np.array([0.0, t_end]), given)
+    trajectory, course = run_with_course(gated.system, np.array([0.0, t_end]), given)
     if not trajectory.finished or trajectory.t[-1] < t_end:
         raise DynamicsError(
             f"there is no gradient of a run that does not reach t = {t_end:g} s: {trajectory.message}"
         )
-    adjoint = Adjoint(scene, found, terms, given)
+    adjoint, found = Adjoint(gated, terms, given), gated.numbers
     derivatives = adjoint(course)
     return Gradient(
         adjoint.value, tuple(each.name for each in found), np.array([each.value for each in found]), derivatives,

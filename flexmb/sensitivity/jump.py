@@ -22,6 +22,7 @@ from flexmb.scene.schema import SceneEvent
 from flexmb.sensitivity.impulses import Striking
 from flexmb.sensitivity.law_rates import EventRates
 from flexmb.sensitivity.leg import Course, Variation
+from flexmb.sensitivity.part_scene import ChangeOfValue
 from flexmb.sensitivity.watched import Watched
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
@@ -45,7 +46,7 @@ class Jumped(NamedTuple):
     dt: Real
     D: Real
     held: dict[str, Real]
-    changes: list[tuple[str, object]]
+    changes: list[ChangeOfValue]
 
 
 class EventError(DynamicsError):
@@ -75,19 +76,20 @@ def jumped(
                 "the run has no derivative beyond; move one of them"
             )
     D = end.Y if before is None else end.Y + np.outer(before.y, dt)
-    held, changes = dict(held), list[tuple[str, object]]()
+    held, changes = dict(held), list[ChangeOfValue]()
     striking = Striking(variation, end.y, held)
     for event in leg.events:
         for i, action in enumerate(event.actions):
             own = rates[event.name].restitution.get(i) if event.name in rates else None
-            D = _acted(striking, action, D, own, held, changes)
+            D = _acted(striking, action, D, own, held)
+            if isinstance(action, Change):
+                changes.append(ChangeOfValue(event.name, i))
     return Jumped(crossings, dt, D, held, changes)
 
 
 def _acted(
-    striking: Striking, action: Action, D: Real, restitution: Real | None, held: dict[str, Real],
-    changes: list[tuple[str, object]],
-) -> Real:  # fmt: skip
+    striking: Striking, action: Action, D: Real, restitution: Real | None, held: dict[str, Real]
+) -> Real:
     """The change of the state after an action along D (n,P)."""
     match action:
         case Latch(coordinate=name):
@@ -101,10 +103,7 @@ def _acted(
             held.pop(name, None)
             striking.free(name)
             return D
-        case Change(path=path, value=value):
-            changes.append((path, value))
-            return D
-        case EndRun():
+        case Change() | EndRun():
             return D
         case _:
             assert_never(action)

@@ -11,7 +11,10 @@ import numpy as np
 from flexmb.control.wiring import law_numbers, profile_tables, wired
 from flexmb.parameters.numbers import Number
 from flexmb.parameters.spectral import derivative
+from flexmb.scene.check.walk import values
+from flexmb.scene.convert import ROOT
 from flexmb.scene.events import Impact
+from flexmb.scene.functions import ControlSignal
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
 from flexmb.typing import Real
@@ -38,22 +41,32 @@ class EventRates(NamedTuple):
 def law_rates(system: System, numbers: Sequence[Number | None], scales: Real) -> LawRates:
     """Of a system's controllers by these numbers; None for one on which nothing depends."""
     wiring = wired(system)
-    inputs = wiring.controller["inputs"].tolist()
-
-    def of_laws(scene: Scene, is_gain: bool) -> Real:
-        course, piece = profile_tables(scene)
-        laws = law_numbers(scene.controllers, inputs)
-        gains = _gains(system.with_numbers(scene) if is_gain else system)
-        return np.concatenate([*laws, gains, course["data"].ravel(), piece.ravel()])
-
-    found = np.zeros((len(of_laws(system.scene, is_gain=False)), len(numbers)))
-    for is_gain in (False, True):
-        chosen = [each if _concerns_laws(each, system.scene, is_gain) else None for each in numbers]
-        found += _by_numbers(partial(of_laws, is_gain=is_gain), system.scene, chosen, scales)
+    found = np.zeros((len(_of_laws(system, system.scene, are_driven=False)), len(numbers)))
+    for are_driven in (False, True):
+        chosen = [each if _concerns_laws(each, system.scene, are_driven) else None for each in numbers]
+        found += _by_numbers(partial(_of_laws, system, are_driven=are_driven), system.scene, chosen, scales)
     shapes = wiring.number.shape, wiring.initial.shape, wiring.drive.shape, (len(wiring.course), 4), wiring.piece.shape
     stops = np.cumsum([np.prod(shape, dtype=int) for shape in shapes])
     parts = np.split(found, stops[:-1])
     return LawRates(*(part.reshape(*shape, len(numbers)) for part, shape in zip(parts, shapes, strict=True)))
+
+
+def reaches_laws(system: System, number: Number) -> bool:
+    """Whether the numbers of controllers, or of what they drive, differ with a number of the system's scene."""
+    return any(
+        _concerns_laws(number, system.scene, are_driven)
+        and not np.array_equal(*(_of_laws(system, each, are_driven) for each in (system.scene, number.nearby)))
+        for are_driven in (False, True)
+    )
+
+
+def _of_laws(system: System, scene: Scene, are_driven: bool) -> Real:
+    """All numbers of controllers, of gains if they `are_driven` by the number that differs, and of profiles."""
+    course, piece = profile_tables(scene)
+    laws = law_numbers(scene.controllers, wired(system).controller["inputs"].tolist())
+    signals = system.with_numbers(scene).signals if are_driven else system.signals
+    gains = np.array([signal.gain for signal in signals.values()])
+    return np.concatenate([*laws, gains, course["data"].ravel(), piece.ravel()])
 
 
 def event_rates(scene: Scene, numbers: Sequence[Number | None], scales: Real) -> dict[str, EventRates]:
@@ -67,6 +80,12 @@ def event_rates(scene: Scene, numbers: Sequence[Number | None], scales: Real) ->
     return found
 
 
+def reaches_event(scene: Scene, number: Number) -> bool:
+    """Whether the level of an event or a restitution differs with a number."""
+    other = number.nearby
+    return any(not np.array_equal(*(_of_event(of, each.name) for of in (scene, other))) for each in scene.events)
+
+
 def _of_event(scene: Scene, name: str) -> Real:
     [event] = [each for each in scene.events if each.name == name]
     return np.array([event.level, *(each.restitution for each in event.actions if isinstance(each, Impact))])
@@ -74,19 +93,18 @@ def _of_event(scene: Scene, name: str) -> Real:
 
 def _changes(number: Number | None, scene: Scene, part: Callable[[Scene], Any]) -> bool:
     """Whether a part of a scene depends on a number."""
-    return number is not None and part(number.scene_at(number.value + 2.0**-6 * number.scale)) != part(scene)
+    return number is not None and part(number.nearby) != part(scene)
 
 
-def _concerns_laws(number: Number | None, scene: Scene, is_gain: bool) -> bool:
-    """Whether the tables of controllers depend on a number that is the gain of what a signal drives, or none."""
-    if number is None or number.name.endswith(".gain") != is_gain:
-        return False
-    return is_gain or _changes(number, scene, lambda of: (of.controllers, of.sensors))
+def _concerns_laws(number: Number | None, scene: Scene, are_driven: bool) -> bool:
+    """Whether the gains of what signals drive, or else the tables of controllers, depend on a number."""
+    if _changes(number, scene, _driven_gains):
+        return are_driven
+    return not are_driven and _changes(number, scene, lambda of: (of.controllers, of.sensors))
 
 
-def _gains(system: System) -> Real:
-    """Gains of what signals drive."""
-    return np.array([signal.gain for signal in system.signals.values()])
+def _driven_gains(scene: Scene) -> list[float]:
+    return [each.gain for _, _, each in values(ROOT, scene) if isinstance(each, ControlSignal)]
 
 
 def _by_numbers(

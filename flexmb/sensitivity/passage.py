@@ -14,12 +14,13 @@ from flexmb.integrate.settings import Settings
 from flexmb.parameters.numbers import Number
 from flexmb.run.driver import Leg
 from flexmb.run.propagate import Integration
-from flexmb.scene.schema import Scene
 from flexmb.sensitivity.blocks import Blocks
+from flexmb.sensitivity.gate import Admitted
 from flexmb.sensitivity.jump import EventError, Jumped, jumped
 from flexmb.sensitivity.law_rates import LawRates, event_rates, law_rates
 from flexmb.sensitivity.leg import Course, Variation
 from flexmb.sensitivity.loops import Loops
+from flexmb.sensitivity.part_scene import ChangeOfValue, PartNumber, PartScene
 from flexmb.sensitivity.systems import Systems
 from flexmb.typing import Real
 
@@ -31,16 +32,15 @@ class Passage:
     """
 
     def __init__(
-        self, scene: Scene, numbers: Sequence[Number | None], scales: Real, settings: Settings, length: float
+        self, admitted: Admitted, numbers: Sequence[Number | None], scales: Real, settings: Settings, length: float
     ) -> None:
-        """numbers (P,): those that the tables of the mechanics may depend on come first; length (s) of the run."""
-        self._scene, self._numbers, self._scales, self._settings = scene, numbers, scales, settings
-        self._length = length
-        mechanical = sum(each is not None and is_mechanical(scene, each) for each in numbers)
-        self._systems = Systems(numbers, scales, mechanical)
-        self._levels = event_rates(scene, numbers, scales)
-        self._changes: list[tuple[str, Any]] = []
-        self._alive = [True] * len(numbers)
+        """numbers (P,): those that are admitted, in any order, and None for other directions; length (s) of the run."""
+        self._admitted, self._numbers, self._scales, self._settings = admitted, numbers, scales, settings
+        self._scene, self._length = admitted.system.scene, length
+        self._systems = Systems(scales)
+        self._levels = event_rates(self._scene, numbers, scales)
+        self._changes: list[ChangeOfValue] = []
+        self._of_part: list[PartNumber | None] = []
         self._laws: LawRates | None = None
         self._energy = np.zeros(len(numbers))
         self._system: Any = None
@@ -50,15 +50,21 @@ class Passage:
 
     def blocks(self, leg: Leg) -> Blocks:
         """The tables of a part of the run in dual numbers."""
-        if self._system is None:
-            self._blocks, self._start = self._systems.first(leg.system)
-        elif leg.system is not self._system:
-            assert self.after is not None
-            self._blocks = self._systems.then(leg.system, leg.begin.state, self._alive, self.after.held)
-            if self.after.changes:  # latches and releases leave controllers as they are
-                self._laws = None
+        if leg.system is self._system and not (self.after is not None and self.after.changes):
+            assert self._blocks is not None
+            return self._blocks
+        part = PartScene(self._scene, self._changes, leg.system.scene)
+        self._of_part = [None if each is None else PartNumber(each, part) for each in self._numbers]
+        self._laws = None
+        if self.after is None:
+            names = [None if each is None else each.name for each in self._numbers]
+            chosen = [names.index(name) for name in self._admitted.tables.names]
+            self._blocks, self._start = self._systems.first(self._admitted.tables, chosen)
+        else:
+            acting = [each if each is not None and part.is_mechanical(each) else None for each in self._of_part]
+            anew = bool(self.after.changes)
+            self._blocks = self._systems.then(leg.system, leg.begin.state, acting, self.after.held, anew)
         self._system = leg.system
-        assert self._blocks is not None
         return self._blocks
 
     def loops(self, solve: Integration, before: Loops | None, ends: bool) -> Loops | None:
@@ -66,8 +72,7 @@ class Passage:
         if solve.feedback is None:
             return None
         if self._laws is None:
-            alive = [each if self._alive[k] else None for k, each in enumerate(self._numbers)]
-            self._laws = law_rates(solve.system, alive, self._scales)
+            self._laws = law_rates(solve.system, self._of_part, self._scales)
         assert self._blocks is not None
         return Loops(solve.feedback, self._blocks, self._laws, before, ends)
 
@@ -102,27 +107,6 @@ class Passage:
         found = jumped(variation, end, self._levels, {} if self.after is None else self.after.held, tolerance)
         if found.changes:
             self._changes += found.changes
-            self._alive = [self._matters(each) for each in self._numbers]
             self._energy = variation.energy_rates(leg.raw.t, Course(end.y, found.D))
         self.after = found
         return found
-
-    def _matters(self, number: Number | None) -> bool:
-        """Whether the scene after the changes so far depends on a number; True for a direction without one."""
-        if number is None:
-            return True
-        other = number.scene_at(number.value + 2.0**-6 * number.scale)
-        return bool(_changed(other, self._changes) != _changed(self._scene, self._changes))
-
-
-def _changed(scene: Scene, changes: Sequence[tuple[str, Any]]) -> Scene:
-    for path, value in changes:
-        scene = scene.with_values({path: value})
-    return scene
-
-
-def is_mechanical(scene: Scene, number: Number) -> bool:
-    """Whether the tables of the mechanics may depend on a number."""
-    other = number.scene_at(number.value + 2.0**-6 * number.scale)
-    steady = {"controllers", "events", "sensors"}
-    return any(getattr(other, key) != getattr(scene, key) for key in scene.__struct_fields__ if key not in steady)

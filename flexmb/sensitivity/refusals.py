@@ -11,21 +11,22 @@ from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse
 from flexmb.scene.schema import DriveSensor, LoadSensor, Scene
 from flexmb.scene.tree import watches_signals
+from flexmb.sensitivity.part_scene import all_changes, changed
 
 _SCHEDULE = "period_s", "offset_s", "delay_s"
-_ENDS = "start_s", "duration_s"
 
 
 def refuse_moving_instants(scene: Scene, numbers: Sequence[Number]) -> None:
     """ParameterError for numbers that move the instants of sampled controllers or the ends of pulses."""
+    changes = [(), *((each,) for each in all_changes(scene))]
     for number in numbers:
-        other = number.scene_at(number.value + 2.0**-6 * number.scale)
-        if _schedule(other) != _schedule(scene):
+        pairs = [(changed(scene, each), changed(number.nearby, each)) for each in changes]
+        if any(_schedule(other) != _schedule(now) for now, other in pairs):
             raise ParameterError(
                 f'parameter "{number.name}" moves the instants at which a sampled controller acts: derivatives by it '
                 "are not available; compare runs with other values"
             )
-        if number.name.rpartition(".")[2] in _ENDS and _pulses(other) != _pulses(scene):
+        if any(_pulses(other) != _pulses(now) for now, other in pairs):
             raise ParameterError(
                 f'parameter "{number.name}" moves the start or the end of a pulse, at which a load jumps: derivatives '
                 'by it are not available; use a function of kind "smooth_step", or events on time with their levels as '

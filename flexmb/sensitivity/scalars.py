@@ -58,8 +58,8 @@ class FinalValue:
         """The channels that it reads."""
         return (self.channel,)
 
-    def probes(self, t_end: float, parts: Sequence[float]) -> Iterator[Probe]:
-        """Its instants; parts: the ends of the parts of the run between events, s."""
+    def probes(self, t_end: float, cuts: Sequence[float]) -> Iterator[Probe]:
+        """Its instants; cuts: where the run may jump, s."""
         yield Probe(t_end, self.channel, self.weight, 0.0, squared=False)
 
 
@@ -85,7 +85,7 @@ class Misfit:
         """The channels that it reads."""
         return self.measured.channels
 
-    def probes(self, t_end: float, parts: Sequence[float]) -> Iterator[Probe]:
+    def probes(self, t_end: float, cuts: Sequence[float]) -> Iterator[Probe]:
         """Its instants; ValueError where the run ends before the last of them."""
         t, names, values = self.measured
         if t[-1] > t_end:
@@ -113,7 +113,8 @@ class Misfit:
 class TimeIntegral:
     """`weight` times the integral over the run of a channel c, or of (c - level)^2 if `squared`.
 
-    It is found by Gauss's rule of NODES points in each of `panels` equal intervals, which events divide further.
+    It is found by Gauss's rule of NODES points in each of `panels` equal intervals, which are divided further wherever
+    something jumps: at events, at the instants of sampled controllers, at the ends of pulses.
     """
 
     channel: str
@@ -138,9 +139,9 @@ class TimeIntegral:
         """The channels that it reads."""
         return (self.channel,)
 
-    def probes(self, t_end: float, parts: Sequence[float]) -> Iterator[Probe]:
-        """Its instants, none of which is the end of a part."""
-        ends = np.unique([*np.linspace(0.0, t_end, self.panels + 1), *parts])
+    def probes(self, t_end: float, cuts: Sequence[float]) -> Iterator[Probe]:
+        """Its instants, none of which is a cut."""
+        ends = np.unique([*np.linspace(0.0, t_end, self.panels + 1), *cuts])
         x, w = np.polynomial.legendre.leggauss(NODES)
         for start, stop in zip(ends[:-1], ends[1:], strict=True):
             half = 0.5 * (stop - start)

@@ -10,7 +10,6 @@ import numpy as np
 
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
-from flexmb.parameters.numbers import numbers
 from flexmb.run.samples import sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
 from flexmb.run.trajectory import Trajectory
@@ -19,8 +18,7 @@ from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 from flexmb.sensitivity.channels import chosen, refuse_unknown_outputs
 from flexmb.sensitivity.following import Following
-from flexmb.sensitivity.refusals import refuse_measured_loads, refuse_moving_instants
-from flexmb.system.compile import assembled
+from flexmb.sensitivity.gate import admitted
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
@@ -42,7 +40,8 @@ class Sensitivities:
     """Derivatives of a run, by `sensitivities`.
 
     t (T,) s; outputs (K,) and units (K,) with their values (T,K); parameters (P,) with theirs, parameter_values (P,);
-    derivatives (T,K,P) at fixed times, each in the unit of the output over that of the parameter; events with the
+    derivatives (T,K,P) at fixed times, each in the unit of the output over that of the parameter, NaN for loads that
+    redundant closures leave undetermined, whose values are NaN; events with the
     derivatives of their times; the trajectory of the run itself.
     """
 
@@ -87,7 +86,8 @@ def sensitivities(
 
     The variational equations are integrated beside the motion, exact to the tolerance, through latches, impacts,
     releases and changes of values, closures, and sampled and continuous controllers. Raises what `simulate` raises;
-    PathError or ParameterError (ValueErrors) for a number that is none or by which there is no derivative;
+    PathError or ParameterError (ValueErrors) for a number that is none, by which there is no derivative, or on which
+    nothing in the run depends;
     DynamicsError for a run that fails, or that has no derivative beyond an event, with the time and the event;
     NotImplementedError for what derivatives do not pass yet.
     """
@@ -97,20 +97,16 @@ def sensitivities(
         raise ValueError(f'method "{method}" does not integrate derivatives: use {names}')
     t_end = arguments.number("t_end", t_end)
     check_and_warn(scene, t_end, 0.0)
-    refuse_measured_loads(scene)
-    found = numbers(scene, by)
-    refuse_moving_instants(scene, found)
-    given = Settings(method, **settings).checked(abs(t_end))
-    system, times = assembled(scene), sample_times(samples, t_end, 0.0)
-    refuse_unknown_outputs(system, of)
-    trajectory, course = run_with_course(system, times, given)
+    given, times = Settings(method, **settings).checked(abs(t_end)), sample_times(samples, t_end, 0.0)
+    gated = admitted(scene, by)
+    refuse_unknown_outputs(gated.system, of)
+    trajectory, course = run_with_course(gated.system, times, given)
     if not trajectory.finished:
         raise DynamicsError(f"there are no derivatives of a run that does not finish: {trajectory.message}")
     outputs = chosen(trajectory, of)
-    following = Following(scene, found, given, trajectory, outputs)
-    derivatives, events = following(course)
+    derivatives, events = Following(gated, given, trajectory, outputs)(course)
     return Sensitivities(
-        trajectory.t, outputs.names, outputs.units, outputs.values, tuple(each.name for each in found),
-        np.array([each.value for each in found]), derivatives,
+        trajectory.t, outputs.names, outputs.units, outputs.values, tuple(each.name for each in gated.numbers),
+        np.array([each.value for each in gated.numbers]), derivatives,
         tuple(EventSensitivity(*each) for each in events), trajectory,
     )  # fmt: skip

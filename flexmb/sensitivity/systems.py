@@ -1,7 +1,8 @@
 """The systems of the parts of a run in dual numbers: what events change and what they hold keeps its derivatives.
 
 The tables of the scene are differentiated once (`System.parameters`). After a latch or a release nothing but functions
-of time and integers differ, so that the derivatives are taken over; after other changes they are found anew.
+of time and integers differ, so that the derivatives are taken over; after other changes they are found anew, by the
+numbers of that part of the run (`flexmb.sensitivity.part_scene`).
 """
 
 from __future__ import annotations
@@ -16,10 +17,9 @@ from flexmb.jit.bundle import broaden
 from flexmb.jit.lanes import LANES
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.parameters.numbers import Number
+from flexmb.parameters.parameters import Parameters
 from flexmb.parameters.tables import DualClosureConstants, DualConstants
-from flexmb.scene.schema import Scene
 from flexmb.scene.tree import rate_name, scalar_paths
-from flexmb.scene.values import PathError
 from flexmb.sensitivity.blocks import Blocks, DualTables, set_lanes
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State, pack
@@ -40,68 +40,53 @@ class KnownTables(NamedTuple):
 
 
 class Systems:
-    """Makes the blocks of one part of a run after the other.
+    """Makes the blocks of one part of a run after the other; scales (P,)."""
 
-    numbers: those that the directions belong to, None for a direction that belongs to none; those that no table depends
-    on come last. scales (P,).
-    """
-
-    def __init__(self, numbers: Sequence[Number | None], scales: Real, mechanical: int) -> None:
-        """mechanical: how many of the first numbers the tables of the mechanics may depend on."""
-        self._numbers, self._scales, self._mechanical = numbers, scales, mechanical
+    def __init__(self, scales: Real) -> None:
+        self._scales = scales
         self._known: KnownTables | None = None
+        self._chosen: list[int] = []
 
-    def first(self, system: System) -> tuple[Blocks, Real]:
-        """The blocks of a run's own scene, and the scaled derivatives (nq+nu+1,P) of its initial state."""
-        start = np.zeros((system.nq + system.nu + 1, len(self._numbers)))
-        self._known = self._differentiated(system, list(range(self._mechanical)), start)
+    def first(self, known: Parameters, chosen: Sequence[int]) -> tuple[Blocks, Real]:
+        """The blocks of a run's own scene, from the parameters that are `chosen` among the directions, and the scaled
+        derivatives (nq+nu+1,P) of its initial state."""
+        start = np.zeros((known.plant.nq + known.plant.nu + 1, len(self._scales)))
+        start[:, list(chosen)] = known.initial_state * self._scales[list(chosen)]
+        self._known, self._chosen = self._arranged(known, chosen), list(chosen)
         return self._blocks(self._known, {}), start
 
-    def then(self, system: System, state: State, alive: Sequence[bool], held: Mapping[str, Real]) -> Blocks:
-        """The blocks after events, from a state on. alive (P,): which numbers the scene still depends on; held: the
-        scaled derivatives (P,) of the values at which coordinates are held, by name."""
+    def then(
+        self, system: System, state: State, numbers: Sequence[Number | None], held: Mapping[str, Real], anew: bool
+    ) -> Blocks:
+        """The blocks after events, from a state on. numbers (P,): of this part, None for a direction on which no table
+        depends. held: the scaled derivatives (P,) of the values at which coordinates are held, by name. anew: whether
+        values have changed that depend on the numbers."""
         assert self._known is not None  # a run begins with `first`
         plant = system.with_numbers(system.scene)
-        taken = [_taken_over(self._known.system, plant, each) if all(alive) else None for each in self._known.duals]
+        chosen = [k for k, each in enumerate(numbers) if each is not None]
+        same = not anew and chosen == self._chosen
+        taken = [_taken_over(self._known.system, plant, each) if same else None for each in self._known.duals]
         if all(each is not None for each in taken):
             found = KnownTables(plant, [each for each in taken if each is not None])
             _alike(found.duals)
         else:
-            start = np.zeros((system.nq + system.nu + 1, len(self._numbers)))
-            names = [k for k in range(self._mechanical) if alive[k] and _exists(system.scene, self._name(k))]
-            found = self._differentiated(system, names, start)
-        self._known = found
+            parameters = Parameters(system, [each for each in numbers if each is not None], starts=False)
+            found = self._arranged(parameters, chosen)
+        self._known, self._chosen = found, chosen
         if found.system.closures is not None:  # the rows that are independent here
             found.system.closures.begin_at(state.t, pack(state))
         return self._blocks(found, held)
 
-    def _name(self, k: int) -> str:
-        number = self._numbers[k]
-        assert number is not None  # one of the first ones
-        return number.name
-
-    def _differentiated(self, system: System, chosen: Sequence[int], start: Real) -> KnownTables:
-        """The tables of a system by those of the numbers that are chosen; the part of its initial state to `start`."""
-        P = len(self._numbers)
-        if not chosen:
-            plant = system.with_numbers(system.scene)
-            plant.initial_state  # noqa: B018  (counts the rows of closures)
-            sources = list[tuple[Any, Any]]()
-        else:
-            parameters = system.parameters([self._name(k) for k in chosen])
-            sources = [(each.constants, each.closures) for each in parameters.blocks]
-            assert isinstance(parameters.plant, System)  # it is the same one with its functions of time kept apart
-            plant = parameters.plant
-            start[:, list(chosen)] = parameters.initial_state * self._scales[list(chosen)]
-        tree = [
-            _arranged(plant.constants, [each[0] for each in sources], chosen, self._scales, b) for b in range(_count(P))
-        ]
-        closed: list[DualClosureConstants | None] = [None] * _count(P)
+    def _arranged(self, parameters: Parameters, chosen: Sequence[int]) -> KnownTables:
+        """The tables of a system by those of the directions that are chosen."""
+        plant, count = parameters.plant, range(-(-len(self._scales) // LANES))
+        assert isinstance(plant, System)  # it is the same one with its functions of time kept apart
+        sources = [(each.constants, each.closures) for each in parameters.blocks]
+        tree = [_arranged(plant.constants, [each[0] for each in sources], chosen, self._scales, b) for b in count]
+        closed: list[DualClosureConstants | None] = [None for _ in count]
         if plant.closures is not None:
             own = plant.closures.constants[1]
-            of_closures = [
-                _arranged(own, [each[1] for each in sources], chosen, self._scales, b) for b in range(_count(P))
-            ]
+            of_closures = [_arranged(own, [each[1] for each in sources], chosen, self._scales, b) for b in count]
             closed = [DualClosureConstants(**each) for each in of_closures]
         found = [DualTables(DualConstants(**each), other) for each, other in zip(tree, closed, strict=True)]
         _alike(found)
@@ -116,7 +101,7 @@ class Systems:
                 set_lanes(functions["data"][_function_of(known.system, name), :1], rates[None], b)
             found.append(each._replace(constants=replace(each.constants, function=functions)))
         _alike(found)
-        return Blocks(known.system, found, len(self._numbers))
+        return Blocks(known.system, found, len(self._scales))
 
 
 def _alike(duals: Sequence[DualTables]) -> None:
@@ -125,10 +110,6 @@ def _alike(duals: Sequence[DualTables]) -> None:
     closures = [each.closures for each in duals if each.closures is not None]
     if closures:
         broaden(closures)
-
-
-def _count(directions: int) -> int:
-    return -(-directions // LANES)
 
 
 def _arranged(table: Any, sources: Sequence[Any], chosen: Sequence[int], scales: Real, b: int) -> dict[str, Any]:
@@ -193,15 +174,6 @@ def _with_derivatives(before: Any, now: Any, duals: Any) -> dict[str, Any] | Non
                 wide[name] = known[name]
         found[each.name] = wide
     return found
-
-
-def _exists(scene: Scene, name: str) -> bool:
-    """Whether a scene has a number of this name."""
-    try:
-        Number(scene, name)
-    except PathError:
-        return False
-    return True
 
 
 def _function_of(system: System, coordinate: str) -> int:

@@ -65,16 +65,11 @@ class ClosedSystem(ChainDerivatives, System):
         tree = scene.constraints, self.constants, own, self.layout, self.workspace, slowest
         self._closures = self.own.closures = Closures(*tree, self.check_status)  # for this thread
         self._start: State | None = None
-        self._correction: Real | float = 0.0
-        """Of the scene's initial values before the closures are closed: see `with_numbers`."""
 
     def with_numbers(self, scene: s.Scene) -> ClosedSystem:
-        """As for a tree. Its initial state is that of this system, with what the scene changes of its initial values,
-        closed once more: it is a smooth function of the numbers also where the scene's own values are rough."""
+        """As for a tree. Its closures close the initial values of that scene, as those of a run of it do."""
         with asking(self.kernels):
-            found = ClosedSystem(scene, like=self.scene)
-        found._correction = pack(self.initial_state) - self._at_start
-        return found
+            return ClosedSystem(scene, like=self.scene)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As for a tree."""
@@ -91,7 +86,7 @@ class ClosedSystem(ChainDerivatives, System):
         """
         if self._start is None:
             y = pack(super().initial_state)
-            y = self._as_asked(0.0, y + self._correction, asked(self, y))
+            y = self._as_asked(0.0, y, asked(self, y))
             self._start = State(y[: self.nq], y[self.nq : -1], 0.0, self.layout)
         return State(self._start.q, self._start.u, 0.0, self.layout)
 

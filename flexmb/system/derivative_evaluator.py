@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from flexmb.entry.derivative_call import derivative_call, differentiate
 from flexmb.system.evaluator import Evaluator
 from flexmb.system.mechanics import Mechanics
 from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.system.derivatives import DifferentiableMotion
 
 
 class DerivativeEvaluator(Evaluator):
@@ -15,9 +18,9 @@ class DerivativeEvaluator(Evaluator):
 
     `System.derivative_evaluator` makes one. `by_displacement`, `by_speed` and `by_force`, as of
     `AccelerationDerivatives`, are read-only views of the arrays of the thread that asks for them: get them once, before
-    the loop. What may be given, what is raised, and how threads share it, is as of an `Evaluator`. Where a law has a
-    corner, derivatives are those on one side. States of closed chains must fulfil the closures; where these are
-    singular, calls raise a DynamicsError.
+    the loop. What may be given, what is raised, and how threads share it, is as of an `Evaluator`; in addition
+    `NotDifferentiableError` where a law has a corner, for which scenes with such laws are looked at in Python before
+    each call. States of closed chains must fulfil the closures; where these are singular, calls raise a DynamicsError.
     """
 
     @property
@@ -44,10 +47,13 @@ def _another(system: Any) -> Any:
     return system.derivative_evaluator()
 
 
-def fresh_derivative_evaluator(system: Mechanics, route: DerivativeRoute | None = None) -> DerivativeEvaluator:
+def fresh_derivative_evaluator(
+    system: DifferentiableMotion, route: DerivativeRoute | None = None
+) -> DerivativeEvaluator:
     """An evaluator with tables of its own, by default of a tree."""
     chosen = route or OF_TREES
-    return DerivativeEvaluator(system, chosen, chosen.fresh(system))
+    refuse = system.refuse_corners if system.has_corners else None
+    return DerivativeEvaluator(system, chosen, chosen.fresh(system), refuse)
 
 
 class DerivativeRoute(NamedTuple):

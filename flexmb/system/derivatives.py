@@ -209,10 +209,6 @@ class DifferentiableMotion(FreeMotion):
         """Which section loads (X,6) it does not determine."""
         return np.zeros((len(balance.x), 6), bool)
 
-    @kept
-    def _has_corners(self) -> bool:
-        return has_corners(self.constants)
-
     # Tables and kernels of derivatives
 
     @per_thread
@@ -257,10 +253,19 @@ class DifferentiableMotion(FreeMotion):
     def _without_kinks(self, state: State, what: str) -> tuple[float, Real]:
         """The same for what is driven by given values."""
         t, y = self.layout.entering(state)
-        if self._has_corners:
+        self.refuse_corners(t, y)
+        return t, y
+
+    @kept
+    def has_corners(self) -> bool:
+        """Whether a law of the scene has corners, at which no derivatives exist."""
+        return has_corners(self.constants)
+
+    def refuse_corners(self, t: float, y: Real) -> None:
+        """NotDifferentiableError where a law has a corner at y = [q, u, work]: the one check of all derivatives."""
+        if self.has_corners:
             self._inverse(t, y, np.zeros(self.nu))  # evaluates the connectors
             refuse_kinks(self, self.own_workspace)
-        return t, y
 
     def _coordinate_motion(self, t: float, y: Real) -> Real:
         """N (nq,nu): derivatives of dq/dt by the speeds, constant where there are no quaternions."""

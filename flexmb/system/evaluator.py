@@ -20,6 +20,9 @@ from flexmb.tables.state import finite_result
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 
+Refusal = Callable[[float, Real], None]
+"""Raises where there is nothing to evaluate at t (s) and y = [q, u, work]."""
+
 
 class Evaluated(Protocol):
     """What an evaluator evaluates: an algorithm, or derivatives."""
@@ -43,11 +46,13 @@ class Evaluator(partial):  # a partial, so that calls enter the compiled gate wi
 
     _careful: _Careful
 
-    def __new__(cls, system: Mechanics, algorithm: Evaluated, tables: tuple[Any, ...]) -> Evaluator:
-        """tables: what the algorithm's kernel takes after t and y, the workspace second."""
-        careful, w = _Careful(system, algorithm, tables), tables[1]
+    def __new__(
+        cls, system: Mechanics, algorithm: Evaluated, tables: tuple[Any, ...], refuse: Refusal | None = None
+    ) -> Evaluator:
+        """tables: what the algorithm's kernel takes after t and y, the workspace second; refuse: is called before."""
+        careful, w = _Careful(system, algorithm, tables, refuse), tables[1]
         call: Any = careful
-        if may_read_objects():
+        if may_read_objects() and refuse is None:
             behind = addresses(algorithm.kernel(), STATUS, REAL, VECTOR, *tables)
             call = gate(
                 system.layout.quaternions, careful.rates, system.nq, w.speed, w.doubt, behind, careful.notes, careful
@@ -84,8 +89,11 @@ class _Careful:
     and thereby the evaluator; no two living threads have the same number.
     """
 
-    def __init__(self, system: Mechanics, algorithm: Evaluated, tables: tuple[Any, ...]) -> None:
+    def __init__(
+        self, system: Mechanics, algorithm: Evaluated, tables: tuple[Any, ...], refuse: Refusal | None
+    ) -> None:
         self.system, self.algorithm, self._tables, self._w = system, algorithm, tables, tables[1]
+        self._refuse = refuse
         numbers = np.zeros(system.nu)
         self.rates = numbers[:]
         numbers.flags.writeable = False  # views that are made from now on are read-only too
@@ -98,6 +106,8 @@ class _Careful:
         if not self._is_owner():
             return self._of_this_thread(t, q, u)
         t, y = self.system.layout.packed(t, q, u)
+        if self._refuse is not None:
+            self._refuse(t, y)
         status = self._evaluate(t, y)
         if status != OK:
             self.system.check_status(status, int(self._w.fault[0]))
@@ -143,7 +153,7 @@ class _Careful:
     @per_thread
     def _of_this_thread(self) -> Evaluator:
         """The evaluator of a thread that is not the owner."""
-        return Evaluator(self.system, self.algorithm, self.algorithm.fresh(self.system))
+        return Evaluator(self.system, self.algorithm, self.algorithm.fresh(self.system), self._refuse)
 
     @per_thread
     def _evaluate(self) -> Direct:

@@ -80,11 +80,11 @@ class System(DifferentiableMotion):
             p.accelerations(state)      (nu,2)
 
         PathError (a ValueError) where the scene has no such number, or where it is whole, a name or a switch;
-        ParameterError (a ValueError) where motions have no derivative by it.
+        ParameterError (a ValueError) where motions have no derivative by it, or do not depend on it.
         """
-        from flexmb.parameters.parameters import Parameters  # imported here, because few programs differentiate
+        from flexmb.parameters.parameters import parameters  # imported here, because few programs differentiate
 
-        return Parameters(self, names)
+        return parameters(self, names)
 
     def inertia_regressor(self, bodies: Sequence[str] | None = None) -> InertiaRegressor:
         """Y in tau = M udot + c = Y(q, u, udot) pi + rest of the tree, for the inertia parameters pi of its bodies.

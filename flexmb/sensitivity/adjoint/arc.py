@@ -26,6 +26,8 @@ from flexmb.typing import Index, Real
 MEMORY = 2**27  # bytes of stages that are kept at once; and of states
 AT_END = 3  # steps that are expected for each time at which one must end, beside ROOM
 ROOM = 1000
+ROWS_HOLD = 8
+"""Steps for which the transposes keep the independent rows of closures; the run itself chooses them at each step."""
 
 
 class Scheme(NamedTuple):
@@ -213,7 +215,8 @@ class Arc:
             s.y[:] = self._record.state[first // every]
             self._check(stages.forwards(first, stop, s), float(self.t[first]))
             upper = stop
-            for i in [*(i for i in range(stop - 1, first, -1) if i in places), first]:
+            for i in [*(i for i in range(stop - 1, first, -1) if i in places or i % ROWS_HOLD == 0), first]:
+                transposes.choose(float(self.t[upper]), s.stage[upper - 1 - first, S])
                 self._check(stages.backwards(first, i, upper, s), float(self.t[i]))
                 upper = i
                 if i in places and i > 0:

@@ -18,8 +18,8 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class StateDirections:
-    """Where the directions are: parameters, first those on which the tables of the mechanics may depend; values at
-    which coordinates are held, by `slots`; entries of y; signals, then states, of controllers."""
+    """Where the directions are: parameters; values at which coordinates are held, by `slots`; entries of y; signals,
+    then states, of controllers."""
 
     parameters: int
     slots: tuple[str, ...]

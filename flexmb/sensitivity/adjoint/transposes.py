@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from flexmb.closure.dynamics import project
 from flexmb.entry.pulled import pull_workspace
 from flexmb.jain.derivatives.pull_tables import ARMATURE, DAMPING, REST, STIFFNESS
 from flexmb.jain.derivatives.tables import ports_in_use
@@ -39,6 +40,7 @@ class Transposes:
         depends on the work done."""
         self._blocks, self._count, plant = blocks, count, blocks.system
         c, by_recursion = plant.constants, not of_power and plant.closures is None
+        self._chains: list[Any] = []
         self._x = pull_workspace(c, plant.nq, plant.nu) if by_recursion else None
         acts = [_acting(each, c, by_recursion, functions) for each in blocks.duals[: -(-count // LANES)]]
         self._chosen = np.flatnonzero(np.concatenate(acts)[:count])
@@ -58,6 +60,8 @@ class Transposes:
         self._linear = route.linear(*route.tables())
         exact, n = self._linear.exact, plant.nq + plant.nu + 1
         where = addresses(self._linear.jacobian, STATUS, REAL, VECTOR, MATRIX, exact, self._linear.tangent)
+        if plant.closures is not None:
+            self._chains = [exact, *([] if self._lanes is None else [self._lanes.chain])]
         self.transpose = transposed.transpose
         self.tables = transposed.ByJacobian(np.array(where), np.zeros((n, n)), c, table)
         self.held = DrivenFunctions(np.array(functions, np.int64), [exact, *of_lanes])
@@ -70,6 +74,12 @@ class Transposes:
             np.array([self._lanes.motion, self._lanes.manifold]), np.array(self._lanes.where, np.int64),
             self._lanes.state, self._lanes.slope, np.zeros(LANES * len(self._lanes)),
         )  # fmt: skip
+
+    def choose(self, t: float, y: Real) -> None:
+        """Choose the independent rows of closures for times up to t (s), near the state y there."""
+        for chain in self._chains:
+            chain.cw.time[0] = -np.inf  # nothing went before
+            project(t, y.copy(), chain)
 
     def by_driven(self) -> Real:
         """(F,) by what controllers drive, since the last call."""

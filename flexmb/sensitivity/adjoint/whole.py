@@ -20,17 +20,16 @@ from flexmb.integrate.problem import Clock
 from flexmb.integrate.settings import Settings
 from flexmb.jit.direct import addresses
 from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID
-from flexmb.parameters.numbers import Number
 from flexmb.run.driver import Leg
 from flexmb.run.propagate import Integration, integration
 from flexmb.scene.events import Latch
-from flexmb.scene.schema import Scene
 from flexmb.sensitivity.adjoint.arc import Arc, IntegratedMotion, Plain, StepCost
 from flexmb.sensitivity.adjoint.part import PassedPart, StateDirections
 from flexmb.sensitivity.adjoint.sampling import SampledLoop
 from flexmb.sensitivity.adjoint.seeing import Seeing
+from flexmb.sensitivity.gate import Admitted
 from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
-from flexmb.sensitivity.passage import Passage, is_mechanical
+from flexmb.sensitivity.passage import Passage
 from flexmb.sensitivity.scalars import Probe, ScalarTerm, TimeIntegral
 from flexmb.typing import Index, Real
 
@@ -48,16 +47,16 @@ class Adjoint:
     value: of the scalar; cost: of the steps; both are known after the call.
     """
 
-    def __init__(self, scene: Scene, found: Sequence[Number], terms: Sequence[ScalarTerm], settings: Settings) -> None:
-        self._order = np.argsort([not is_mechanical(scene, each) for each in found], kind="stable")
-        self._numbers, self._terms = [found[k] for k in self._order], terms
-        self._scene, self._settings = scene, settings
+    def __init__(self, admitted: Admitted, terms: Sequence[ScalarTerm], settings: Settings) -> None:
+        self._admitted, self._terms, self._settings = admitted, terms, settings
+        self._numbers = admitted.numbers
         self.value = 0.0
         self.cost = StepCost(0, 0, 0, 0)
 
     def __call__(self, course: Sequence[Leg]) -> Real:
         """The gradient (P,)."""
-        latches = [action for event in self._scene.events for action in event.actions if isinstance(action, Latch)]
+        events = self._admitted.system.scene.events
+        latches = [action for event in events for action in event.actions if isinstance(action, Latch)]
         with integration(course[0].system, "articulated", 0.0, self._settings.integrator) as solve:
             y, _ = self._begun(solve, course[0])
             made = None if solve.feedback is None else solve.feedback.running
@@ -70,15 +69,15 @@ class Adjoint:
             gradient = part.passed(gradient, rows)
             if part.arc is not None:
                 self.cost = self.cost.plus(part.arc.cost)
-        return gradient[: len(self._numbers)][np.argsort(self._order)]
+        return gradient[: len(self._numbers)]
 
     def _forwards(self, course: Sequence[Leg]) -> list[PassedPart]:
         """Record all parts, with what the scalar adds in them, and what events and controllers do."""
         places, t_end = self._places, course[-1].raw.t
         numbers = [*self._numbers, *[None] * (places.size - len(self._numbers))]
         length = t_end - course[0].begin.state.t
-        passage = Passage(self._scene, numbers, np.ones(places.size), self._settings, length)
-        probes = self._probes(course, t_end)
+        passage = Passage(self._admitted, numbers, np.ones(places.size), self._settings, length)
+        probes = self._probes(t_end, self._cuts(course))
         found, left, loops = list[PassedPart](), None, None
         for i, leg in enumerate(course):
             held = {} if passage.after is None else passage.after.held
@@ -146,11 +145,20 @@ class Adjoint:
     def _names(self) -> list[str]:
         return [name for term in self._terms for name in term.channels]
 
-    def _probes(self, course: Sequence[Leg], t_end: float) -> dict[float, list[Probe]]:
+    def _cuts(self, course: Sequence[Leg]) -> list[float]:
+        """Where something may jump (s): the ends of the parts, the instants of controllers, switches of functions."""
+        cuts = [leg.raw.t for leg in course]
+        for leg in course:
+            with integration(leg.system, "articulated", 0.0, self._settings.integrator) as solve:
+                ends = self._begun(solve, leg)[1].segment_ends.tolist()
+            cuts += [t for t in ends if leg.begin.state.t < t < leg.raw.t]
+        return sorted(set(cuts))
+
+    def _probes(self, t_end: float, cuts: Sequence[float]) -> dict[float, list[Probe]]:
         """The instants of all terms, by time."""
-        ends, found = [leg.raw.t for leg in course], dict[float, list[Probe]]()
+        found = dict[float, list[Probe]]()
         for term in self._terms:
-            for probe in term.probes(t_end, ends):
+            for probe in term.probes(t_end, cuts):
                 found.setdefault(probe.t, []).append(probe)
         return found
 

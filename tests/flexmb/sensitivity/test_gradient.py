@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import msgspec
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from flexmb.parameters.numbers import Number
 from flexmb.ready import scenes
 from flexmb.sensitivity.adjoint import arc, part
 from flexmb.sensitivity.adjoint.sampling import SampledLoop
+from tests.flexmb.sensitivity.differences import TIGHT
 from tests.flexmb.sensitivity.test_sensitivities import EVENTS, NUMBERS, arm
 from tests.repo.project import ROOT
 
@@ -294,3 +297,36 @@ def test_an_optimiser_takes_it():
 
     found = minimize(cost, [1.0, 0.1], jac=True, method="BFGS", options={"gtol": 1e-10})
     assert np.max(np.abs(found.x - true)) < 1e-5
+
+
+def test_an_integral_is_cut_where_sampled_controllers_act():
+    """Few panels find what many do, though 13 instants lie within them; the signal is constant between them."""
+    scene = scenes.with_feedback(scenes.pendulum(), period=0.037).with_values({"servo.kd": 0.1})
+    few, many = (
+        fm.gradient(scene, 0.5, ["servo.kd"], fm.TimeIntegral("signal.servo[0]", squared=True, panels=panels), **TIGHT)
+        for panels in (2, 200)
+    )
+    starts = np.arange(14) * 0.037
+    run = fm.simulate(scene, 0.5, samples=[0.0, *(starts + 1e-3), 0.5], **TIGHT)
+    held = {name: values for name, _, values in run.columns()}["signal.servo[0]"][1:-1]
+    assert few.value == pytest.approx(np.sum(held**2 * np.diff([*starts, 0.5])), rel=1e-9)
+    assert few.value == pytest.approx(many.value, rel=1e-12)
+    np.testing.assert_allclose(few.derivatives, many.derivatives, rtol=1e-10)
+
+
+@pytest.mark.parametrize("kind", ["spherical", "revolute", "cylindrical"])
+def test_planar_loops_with_closures_of_every_kind(kind):
+    """Rows that a plane mechanism cannot move count for nothing, whichever of a closure's rows these are."""
+    scene = fm.SceneBuilder("four-bar", gravity=(0.0, -9.81, 0.0))
+    for name, length in (("crank", 0.4), ("coupler", 1.0), ("rocker", 0.7)):
+        scene.rigid_body(name, mass=1.0, com=(0.5 * length, 0.0, 0.0), inertia=(0.03, 0.03, 0.05),
+                         nodes={"end": (length, 0.0, 0.0)})
+    scene.revolute("A", "ground", "crank", axis=(0, 0, 1), angle=1.0, rate=2.0)
+    scene.revolute("B", "crank", "coupler", axis=(0, 0, 1), angle=-0.63, parent_node="end")
+    scene.revolute("C", "ground", "rocker", axis=(0, 0, 1), angle=1.5, parent_position=(1.1, 0.0, 0.0))
+    scene.closure("D", kind, "coupler", "rocker", node_a="end", node_b="end")
+    made = scene.scene()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fm.SceneWarning)  # the start is rough
+        found = disagreement(made, 0.3, ["coupler.mass_kg", "crank.nodes.end.position_m.0"], ["B.rotation"])
+    assert found < OTHER_STEPS

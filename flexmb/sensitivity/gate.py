@@ -1,0 +1,72 @@
+"""The one gate of the numbers by which runs are differentiated: each reaches what is differentiated, or is refused.
+
+A number acts through tables of the mechanics or the initial state, through laws of controllers, through levels and
+restitutions of events, or through the values to which events change the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from flexmb.parameters.numbers import Number, numbers
+from flexmb.parameters.parameters import ParameterError, Parameters
+from flexmb.run.situation import with_stops
+from flexmb.scene.schema import Scene
+from flexmb.sensitivity.law_rates import reaches_event, reaches_laws
+from flexmb.sensitivity.part_scene import PartNumber, PartScene, all_changes, changed, differ_in_mechanics
+from flexmb.sensitivity.refusals import refuse_measured_loads, refuse_moving_instants
+from flexmb.system.compile import assembled
+from flexmb.system.tree_system import System
+
+
+class Admitted(NamedTuple):
+    """A system whose run may be differentiated by all of these numbers, of which the tables of its own scene depend on
+    those of `tables`."""
+
+    system: System
+    numbers: tuple[Number, ...]
+    tables: Parameters
+
+
+def admitted(scene: Scene, names: Sequence[str]) -> Admitted:
+    """The system of a checked scene, with numbers by which it may be differentiated.
+
+    PathError or ParameterError (ValueErrors) for a number that is none, or by which there is no derivative, or on which
+    nothing depends; NotImplementedError for scenes whose runs have none.
+    """
+    refuse_measured_loads(scene)
+    found = numbers(scene, names)
+    refuse_moving_instants(scene, found)
+    system = with_stops(assembled(scene))
+    acting = [each for each in found if differ_in_mechanics(scene, each.nearby)]
+    tables = Parameters(system, acting)
+    reached = {each.name for each, is_reached in zip(acting, tables.reached.tolist(), strict=True) if is_reached}
+    for each in found:
+        if not (
+            each.name in reached
+            or reaches_event(scene, each)
+            or reaches_laws(system, each)
+            or _reaches_change(scene, each)
+        ):
+            raise ParameterError(
+                f'parameter "{each.name}" = {each.value:g}: nothing in the run depends on it, neither the equations of '
+                "motion or the initial state nor a controller or an event (initial values of prescribed coordinates, "
+                "for example, come from their functions): leave it out"
+            )
+    return Admitted(system, found, tables)
+
+
+def _reaches_change(scene: Scene, number: Number) -> bool:
+    """Whether a scene depends on a number after a change of a value, by what it is changed to."""
+    for change in all_changes(scene):
+        now = changed(scene, [change])
+        if now == changed(number.nearby, [change]):
+            continue
+        own = PartNumber(number, PartScene(scene, [change], now))
+        system = assembled(now)
+        if differ_in_mechanics(now, own.nearby) and Parameters(system, [own], starts=False).reached[0]:
+            return True
+        if reaches_laws(system, own):
+            return True
+    return False
