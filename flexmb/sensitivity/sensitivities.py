@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Unpack
+from typing import NamedTuple, Unpack
 
 import numpy as np
 
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
-from flexmb.parameters.numbers import numbers
+from flexmb.parameters.numbers import Number, numbers
+from flexmb.run.driver import Leg
 from flexmb.run.samples import sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
 from flexmb.run.trajectory import Trajectory
@@ -92,25 +93,51 @@ def sensitivities(
     NotImplementedError for what derivatives do not pass yet.
     """
     refuse_unknown("sensitivities", settings)
+    run = run_to_follow(scene, t_end, numbers(scene, by), method, samples, settings, of)
+    if not run.trajectory.finished:
+        raise DynamicsError(f"there are no derivatives of a run that does not finish: {run.trajectory.message}")
+    return run.derivatives(of)
+
+
+class RunToFollow(NamedTuple):
+    """A run that may be followed with derivatives by numbers of its scene; course: its parts between events."""
+
+    scene: Scene
+    numbers: tuple[Number, ...]
+    settings: Settings
+    trajectory: Trajectory
+    course: list[Leg]
+
+    def derivatives(self, of: Sequence[str]) -> Sensitivities:
+        """Derivatives of these outputs of the run, which has finished, by the numbers."""
+        outputs = chosen(self.trajectory, of)
+        following = Following(self.scene, self.numbers, self.settings, self.trajectory, outputs)
+        derivatives, events = following(self.course)
+        return Sensitivities(
+            self.trajectory.t, outputs.names, outputs.units, outputs.values, tuple(each.name for each in self.numbers),
+            np.array([each.value for each in self.numbers]), derivatives,
+            tuple(EventSensitivity(*each) for each in events), self.trajectory,
+        )  # fmt: skip
+
+
+def run_to_follow(
+    scene: Scene, t_end: float, found: tuple[Number, ...], method: Method, samples: int | Sequence[float] | Real,
+    settings: RunSettings, of: Sequence[str] | None = None,
+) -> RunToFollow:  # fmt: skip
+    """The run of `sensitivities`, whether it finishes or not, after everything that these refuse before a run.
+
+    of: the outputs, None where the caller looks for them in the run.
+    """
     if method not in METHODS:
         names = " or ".join(f'"{name}"' for name in METHODS)
         raise ValueError(f'method "{method}" does not integrate derivatives: use {names}')
     t_end = arguments.number("t_end", t_end)
     check_and_warn(scene, t_end, 0.0)
     refuse_measured_loads(scene)
-    found = numbers(scene, by)
     refuse_moving_instants(scene, found)
     given = Settings(method, **settings).checked(abs(t_end))
     system, times = assembled(scene), sample_times(samples, t_end, 0.0)
-    refuse_unknown_outputs(system, of)
+    if of is not None:
+        refuse_unknown_outputs(system, of)
     trajectory, course = run_with_course(system, times, given)
-    if not trajectory.finished:
-        raise DynamicsError(f"there are no derivatives of a run that does not finish: {trajectory.message}")
-    outputs = chosen(trajectory, of)
-    following = Following(scene, found, given, trajectory, outputs)
-    derivatives, events = following(course)
-    return Sensitivities(
-        trajectory.t, outputs.names, outputs.units, outputs.values, tuple(each.name for each in found),
-        np.array([each.value for each in found]), derivatives,
-        tuple(EventSensitivity(*each) for each in events), trajectory,
-    )  # fmt: skip
+    return RunToFollow(scene, found, given, trajectory, course)
