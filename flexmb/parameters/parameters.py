@@ -35,7 +35,7 @@ from flexmb.tables.state import State, finite_result
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 
-MANY = 16
+MANY = 3
 """Numbers whose derivatives are found together, where they concern different entries of the tables."""
 
 

@@ -26,6 +26,7 @@ LARGEST = 1e-9  # relative error that is accepted
 # Shares of values over scale, and of values over width, that count as rounding. That of an eigenproblem is some hundred
 # eps, and is magnified by the inverse of the width.
 ROUNDING, MAGNIFIED = 1e-11, 2e-14
+NOUGHT = 3.0  # times this rounding: a part whose derivatives are no larger has none, and what is there is noise
 
 
 class NotSmooth(ValueError):
@@ -51,12 +52,12 @@ def derivative(
     best, trouble = Derivative(np.zeros_like(middle), np.inf), ""
     for is_hasty, width in product((True, False), WIDTHS):
         try:
-            found = _on_interval(function, x, width * scale, middle, scale, parts, is_hasty)
+            found, settled = _on_interval(function, x, width * scale, middle, scale, parts, is_hasty)
         except ValueError as error:  # that the value is outside of its range: a smaller interval may not be
             trouble = str(error)
             continue
         best = min(best, found, key=lambda each: each.error)
-        if best.error <= ENOUGH:
+        if best.error <= ENOUGH or found.error <= LARGEST and settled:
             break
     if not best.error <= LARGEST:
         raise NotSmooth(
@@ -70,15 +71,17 @@ def derivative(
 def _on_interval(
     function: Callable[[float], Real], x: float, width: float, middle: Real, scale: float,
     parts: Sequence[slice | Index], is_hasty: bool,
-) -> Derivative:  # fmt: skip
+) -> tuple[Derivative, bool]:  # fmt: skip
     """By interpolation on [x - width, x + width]: points are added until the derivative does not change.
 
+    Also whether what it still changes by is rounding, which a smaller interval would magnify: twice as many points
+    square an error that is of the interpolation, so that the one before tells what is left of it.
     If `is_hasty`, no points are added where the errors, if they fall as a power of the number of points, would not come
     down to ENOUGH: a smaller interval needs fewer.
     """
     odd, even = dict[float, Real](), dict[float, Real]()  # f(x + d) -+ f(x - d) by d / width
     size = np.abs(middle)
-    before, error = None, np.inf
+    before, error, earlier = None, np.inf, np.inf
     for intervals in INTERVALS:
         places, weights = _rule(intervals)
         for place in places:
@@ -91,12 +94,18 @@ def _on_interval(
             # The middle is none of the points: it must lie on the interpolant of the others.
             jump = sum(weight * even[place] for place, weight in zip(places, _rest(intervals), strict=True)) / width
             rounding = size * (ROUNDING / scale + MAGNIFIED / width)
+            earlier = error
             error = max(_relative(each, now, rounding, parts) for each in (now - before, jump))
             is_slow = is_hasty and error ** (INTERVALS[-1] / intervals) > ENOUGH
             if error <= ENOUGH or is_slow or intervals == INTERVALS[-2] and error > HOPELESS:
                 break
         before = now
-    return Derivative(now, error)
+    return Derivative(now, error), earlier**2 <= ENOUGH
+
+
+def nought(values: Real) -> float:
+    """The largest derivative, for a change of a number by its scale, that is rounding in a part with these values."""
+    return float(NOUGHT * ROUNDING * np.max(np.abs(values), initial=0.0))
 
 
 def _relative(change: Real, derivative: Real, rounding: Real, parts: Sequence[slice | Index]) -> float:
@@ -107,7 +116,8 @@ def _relative(change: Real, derivative: Real, rounding: Real, parts: Sequence[sl
         largest = np.max(np.abs(derivative[part]), initial=0.0)
         if not np.isfinite(off):
             return np.inf
-        if off > np.max(rounding[part], initial=0.0):
+        noise = np.max(rounding[part], initial=0.0)
+        if off > noise and not max(off, largest) <= NOUGHT * noise:
             worst = max(worst, off / largest if largest > 0.0 else np.inf)
     return worst
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from flexmb.parameters.numbers import Number
-from flexmb.parameters.spectral import WIDTHS, Derivative, NotSmooth, derivative
+from flexmb.parameters.spectral import WIDTHS, Derivative, NotSmooth, derivative, nought
 from flexmb.typing import Flags, Real
 
 Tables = Callable[[Mapping[str, float]], Real]
@@ -68,6 +68,7 @@ def _of_group(
     Errors are those of each number alone: relative to the largest derivative by it in each part of the tables.
     """
     own = {k: mask for k, mask in enumerate(concerned) if k in group and mask is not None}
+    middle = tables({})
     places = [np.flatnonzero(_within(mask, part)) for mask in own.values() for part in parts]
 
     def at(share: float) -> Real:
@@ -77,7 +78,8 @@ def _of_group(
         rates = derivative(at, 0.0, 1.0, [each for each in places if len(each)])
     except (NotSmooth, ValueError):
         return {}
-    if np.any(rates.values[~np.any(list(own.values()), axis=0)]):
+    strays = np.where(np.any(list(own.values()), axis=0), 0.0, np.abs(rates.values))
+    if any(np.max(strays[part], initial=0.0) > nought(middle[part]) for part in parts):
         return {}
     return {k: Derivative(np.where(mask, rates.values / chosen[k].scale, 0.0), rates.error) for k, mask in own.items()}
 

@@ -18,14 +18,20 @@ from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
+from flexmb.integrate.settings import Settings
 from flexmb.parameters.numbers import numbers
-from flexmb.run.simulate import RunSettings, simulate
+from flexmb.run.driver import Leg
+from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
 from flexmb.run.trajectory import Trajectory
+from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import SceneError, SceneWarning, closest
 from flexmb.scene.schema import Scene
+from flexmb.sensitivity.channels import refuse_unknown_outputs
+from flexmb.sensitivity.gate import admitted_to, prepared
 from flexmb.sensitivity.measurements import Measurements, measurements
 from flexmb.sensitivity.rows import aligned
-from flexmb.sensitivity.sensitivities import sensitivities
+from flexmb.sensitivity.sensitivities import of_run
+from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
@@ -100,33 +106,54 @@ class Fit:
         return f"{self.parameters[j]} ({self.correlation[k, j]:+.2f})"
 
 
-class _Problem(NamedTuple):
-    """scene, names (P,) and their scales; what was measured; whether a value was (T,K); settings of the runs."""
+class _Run(NamedTuple):
+    """A run of the system of a scene, and its parts between events."""
 
     scene: Scene
-    names: tuple[str, ...]
-    scales: Real
-    data: Measurements
-    known: Any
-    settings: RunSettings
+    system: System
+    trajectory: Trajectory
+    course: list[Leg]
 
-    @property
-    def times(self) -> Real:
+
+class _Problem:
+    """scene, names (P,) and their scales; what was measured; whether a value was (T,K); settings of the runs.
+
+    The search asks for the derivatives where it has just asked for the residuals, so that the last run is kept.
+    """
+
+    def __init__(
+        self, scene: Scene, names: tuple[str, ...], scales: Real, data: Measurements, settings: RunSettings
+    ) -> None:
+        self.scene, self.names, self.scales, self.data = scene, names, scales, data
+        self.known: Any = np.isfinite(data.values)
+        self.times = data.t if data.t[0] == 0.0 else np.r_[0.0, data.t]
         """Output times of a run, which starts at 0."""
-        return self.data.t if self.data.t[0] == 0.0 else np.r_[0.0, self.data.t]
+        self.settings = Settings("dop853", **settings).checked(float(self.times[-1]))
+        self.runs = 0
+        self._last: tuple[bytes, _Run] | None = None
 
-    def scene_at(self, x: Real) -> Scene:
-        found: Scene = self.scene.with_values(dict(zip(self.names, (x * self.scales).tolist(), strict=True)))
-        return found
-
-    def model(self, x: Real) -> Trajectory:
+    def run(self, x: Real) -> _Run:
         """The run with these scaled parameters; what is doubtful in trial values is not said."""
+        key = x.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = None  # so that two runs are never held at once
+            self.runs += 1
+            scene = self.scene.with_values(dict(zip(self.names, (x * self.scales).tolist(), strict=True)))
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SceneWarning)
+                check_and_warn(scene, float(self.times[-1]))
+                system = prepared(scene)
+                self._last = key, _Run(scene, system, *run_with_course(system, self.times, self.settings))
+        return self._last[1]
+
+    def derivatives(self, x: Real) -> Real:
+        """(T,K,P) of the channels, at the times of the measurements, by the scaled parameters."""
+        run = self.run(x)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)
-            return self._run(x)
-
-    def _run(self, x: Real) -> Trajectory:
-        return simulate(self.scene_at(x), float(self.times[-1]), samples=self.times, **self.settings)
+            gated = admitted_to(run.system, self.names)
+            found = of_run(gated, self.settings, run.trajectory, run.course, self.data.channels)
+        return found.derivatives[-len(self.data.t) :] * self.scales
 
     def seen(self, trajectory: Trajectory) -> Real:
         """The channels (T,K) of a run at the times of the measurements."""
@@ -158,18 +185,18 @@ def fit(
     max_runs = arguments.count("max_runs", max_runs)
     found, given = numbers(scene, parameters), measurements(data)
     names = tuple(each.name for each in found)
-    problem = _Problem(
-        scene, names, np.array([each.scale for each in found]), given, np.isfinite(given.values), settings
-    )
+    refuse_unknown("fit", settings)
+    problem = _Problem(scene, names, np.array([each.scale for each in found]), given, settings)
     start = np.array([each.value for each in found]) / problem.scales
     limits = _limits(bounds or {}, names, start, problem.scales)
     if int(np.sum(problem.known)) < len(names):
         raise ValueError(
             f"there are {int(np.sum(problem.known))} measured values for {len(names)} parameters: give more"
         )
-    first = problem.model(start)
-    _refuse_unknown_channels(first, given.channels)
-    _refuse_unfinished(first)
+    first = problem.run(start)
+    _refuse_unknown_channels(first.trajectory, given.channels)
+    _refuse_unfinished(first.trajectory)
+    refuse_unknown_outputs(first.system, given.channels)
     noise = _given_noise(sigma, given.channels)
     return _searched(problem, start, limits, noise, max_runs)
 
@@ -178,15 +205,13 @@ def _searched(problem: _Problem, start: Real, limits: tuple[Real, Real], noise: 
     """The fit, with these sigmas (K,), or with estimated ones."""
     from scipy.optimize import least_squares  # imported here because it is slow to import
 
-    data, known, runs = problem.data, problem.known, 0
+    data, known = problem.data, problem.known
     weights = np.std(np.where(known, data.values, np.nan), axis=0, where=known) if noise is None else noise
     weights = np.where(weights > 0.0, weights, 1.0)
 
     def residuals(x: Real) -> Real:
-        nonlocal runs
-        runs += 1
         try:
-            run = problem.model(x)
+            run = problem.run(x).trajectory
         except (SceneError, DynamicsError):
             run = None
         if run is None or not run.finished or len(run.t) < len(problem.times):
@@ -195,11 +220,7 @@ def _searched(problem: _Problem, start: Real, limits: tuple[Real, Real], noise: 
         return found
 
     def jacobian(x: Real) -> Real:
-        found = sensitivities(
-            problem.scene_at(x), float(problem.times[-1]), problem.names, data.channels, samples=problem.times,
-            **problem.settings,
-        )  # fmt: skip
-        scaled = found.derivatives[-len(data.t) :] * problem.scales / weights[:, None]
+        scaled = problem.derivatives(x) / weights[:, None]
         J: Real = scaled[known]
         return J
 
@@ -227,12 +248,12 @@ def _searched(problem: _Problem, start: Real, limits: tuple[Real, Real], noise: 
         if len(weights) == 1 or np.all(np.abs(weights - before) <= AGREE * weights):
             break
     J = solution.jac * (before / weights)[np.nonzero(problem.known)[1], None]  # the weights may have changed since
-    return _found(problem, x, solution, J, weights, noise is None, runs)
+    return _found(problem, x, solution, J, weights, noise is None)
 
 
-def _found(problem: _Problem, x: Real, solution: Any, J: Real, weights: Real, estimated: bool, runs: int) -> Fit:
-    run = problem.model(x)
-    off = np.where(problem.known, problem.seen(run) - problem.data.values, np.nan)
+def _found(problem: _Problem, x: Real, solution: Any, J: Real, weights: Real, estimated: bool) -> Fit:
+    made = problem.run(x)
+    off = np.where(problem.known, problem.seen(made.trajectory) - problem.data.values, np.nan)
     covariance, unseen = _covariance(J, x)
     sigma = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore"):
@@ -242,7 +263,8 @@ def _found(problem: _Problem, x: Real, solution: Any, J: Real, weights: Real, es
         problem.names, x * problem.scales, sigma * problem.scales,
         covariance * np.outer(problem.scales, problem.scales), correlation, hidden, problem.data.t,
         problem.data.channels, off, weights, estimated,
-        float(np.nansum((off / weights) ** 2)), int(np.sum(problem.known)) - len(x), problem.scene_at(x), run, runs,
+        float(np.nansum((off / weights) ** 2)), int(np.sum(problem.known)) - len(x), made.scene,
+        made.trajectory, problem.runs,
         str(solution.message),
     )  # fmt: skip
 

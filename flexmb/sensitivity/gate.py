@@ -35,10 +35,20 @@ def admitted(scene: Scene, names: Sequence[str]) -> Admitted:
     PathError or ParameterError (ValueErrors) for a number that is none, or by which there is no derivative, or on which
     nothing depends; NotImplementedError for scenes whose runs have none.
     """
+    return admitted_to(prepared(scene), names)
+
+
+def prepared(scene: Scene) -> System:
+    """The system whose runs are differentiated; NotImplementedError for scenes whose runs have no derivatives."""
     refuse_measured_loads(scene)
+    return with_stops(assembled(scene))
+
+
+def admitted_to(system: System, names: Sequence[str]) -> Admitted:
+    """The same of a prepared system."""
+    scene = system.scene
     found = numbers(scene, names)
     refuse_moving_instants(scene, found)
-    system = with_stops(assembled(scene))
     acting = [each for each in found if differ_in_mechanics(scene, each.nearby)]
     tables = Parameters(system, acting)
     reached = {each.name for each, is_reached in zip(acting, tables.reached.tolist(), strict=True) if is_reached}

@@ -10,6 +10,7 @@ import numpy as np
 
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
+from flexmb.run.driver import Leg
 from flexmb.run.samples import sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
 from flexmb.run.trajectory import Trajectory
@@ -18,7 +19,7 @@ from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 from flexmb.sensitivity.channels import chosen, refuse_unknown_outputs
 from flexmb.sensitivity.following import Following
-from flexmb.sensitivity.gate import admitted
+from flexmb.sensitivity.gate import Admitted, admitted
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
@@ -103,8 +104,15 @@ def sensitivities(
     trajectory, course = run_with_course(gated.system, times, given)
     if not trajectory.finished:
         raise DynamicsError(f"there are no derivatives of a run that does not finish: {trajectory.message}")
+    return of_run(gated, given, trajectory, course, of)
+
+
+def of_run(
+    gated: Admitted, settings: Settings, trajectory: Trajectory, course: Sequence[Leg], of: Sequence[str]
+) -> Sensitivities:
+    """The derivatives of a run that has finished; course: its parts between events."""
     outputs = chosen(trajectory, of)
-    derivatives, events = Following(gated, given, trajectory, outputs)(course)
+    derivatives, events = Following(gated, settings, trajectory, outputs)(course)
     return Sensitivities(
         trajectory.t, outputs.names, outputs.units, outputs.values, tuple(each.name for each in gated.numbers),
         np.array([each.value for each in gated.numbers]), derivatives,
