@@ -229,12 +229,13 @@ def test_a_case_in_which_nothing_is_compared_is_named(runner: CliRunner, tmp_pat
 
 @pytest.mark.parametrize("asked", [["second"], ["fine", "sloppy"]])
 def test_an_engine_without_a_part_is_no_request(runner: CliRunner, tmp_path: Path, asked: list[str]) -> None:
-    """It takes part neither by name nor, as a foreign one, where all engines are compared; nothing would tell of it."""
+    """It takes part neither by name nor, as a foreign one, where engines of a variant are compared; none would tell."""
     folder = copy_case(tmp_path)
     file = folder / "run.toml"
     text = file.read_text(encoding="utf-8")
     assert text.count('variant = "rigid"\ngoals') == 1
-    named = text.replace('variant = "rigid"\ngoals', 'variant = "rigid"\nengines = ["fine", "stepper"]\ngoals')
+    pair = 'a = { variant = "rigid", engine = "fine" }\nb = { variant = "rigid", engine = "stepper" }'
+    named = text.replace('variant = "rigid"\ngoals', f"{pair}\ngoals")
     file.write_text(named, encoding="utf-8")
     engines = [word for name in asked for word in ("-e", name)]
     result = runner.invoke(cli.app, ["run", str(folder), *engines, "--out", str(tmp_path / "out")], env=WIDE)
