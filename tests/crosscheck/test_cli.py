@@ -227,17 +227,20 @@ def test_a_case_in_which_nothing_is_compared_is_named(runner: CliRunner, tmp_pat
     assert runner.invoke(cli.app, ["run", str(other), *words], env=WIDE).exit_code == 1
 
 
-def test_an_engine_without_a_part_is_no_request(runner: CliRunner, tmp_path: Path) -> None:
-    """Of a case that compares nothing; nothing would tell of it."""
+@pytest.mark.parametrize("asked", [["second"], ["fine", "sloppy"]])
+def test_an_engine_without_a_part_is_no_request(runner: CliRunner, tmp_path: Path, asked: list[str]) -> None:
+    """It takes part neither by name nor, as a foreign one, where engines of a variant are compared; none would tell."""
     folder = copy_case(tmp_path)
     file = folder / "run.toml"
-    alone = file.read_text(encoding="utf-8").split("[[variant]]")[0] + '[[variant]]\nname = "a"\nengines = ["fine"]\n'
-    file.write_text(alone, encoding="utf-8")
-    for asked in (["second"], ["fine", "sloppy"]):
-        engines = [word for name in asked for word in ("-e", name)]
-        result = runner.invoke(cli.app, ["run", str(folder), *engines, "--out", str(tmp_path / "out")], env=WIDE)
-        assert (result.exit_code, f"a part for engine {asked[-1]}" in result.output) == (2, True), result.output
-        assert not (tmp_path / "out").exists()
+    text = file.read_text(encoding="utf-8")
+    assert text.count('variant = "rigid"\ngoals') == 1
+    pair = 'a = { variant = "rigid", engine = "fine" }\nb = { variant = "rigid", engine = "stepper" }'
+    named = text.replace('variant = "rigid"\ngoals', f"{pair}\ngoals")
+    file.write_text(named, encoding="utf-8")
+    engines = [word for name in asked for word in ("-e", name)]
+    result = runner.invoke(cli.app, ["run", str(folder), *engines, "--out", str(tmp_path / "out")], env=WIDE)
+    assert (result.exit_code, f"a part for engine {asked[-1]}" in result.output) == (2, True), result.output
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("asked", ["second", "sloppy"])
