@@ -14,6 +14,7 @@ import numpy as np
 
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.connectors import BetweenNodes
+from flexmb.scene.hinges import Closure
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -61,14 +62,14 @@ def _ports(scene: Scene, body: BeamBody) -> Iterator[tuple[float, str]]:
     for hinge in scene.hinges:
         yield from place(hinge, "parent", "parent_node", "hinge")
         yield from place(hinge, "child", "child_node", "hinge")
-    for what, items in (("closure", scene.closures), ("connector", scene.connectors)):
-        for item in items:
-            if what == "closure" or isinstance(item, BetweenNodes):
-                yield from place(item, "body_a", "node_a", what)
-                yield from place(item, "body_b", "node_b", what)
-    for what, items in (("load", scene.loads), ("wheel", scene.wheels), ("point mass", scene.point_masses)):
-        for item in items:
-            yield from place(item, "body", "node", what)
+    between = [*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))]
+    for item in between:
+        what = "closure" if isinstance(item, Closure) else "connector"
+        yield from place(item, "body_a", "node_a", what)
+        yield from place(item, "body_b", "node_b", what)
+    for what, on_body in (("load", scene.loads), ("wheel", scene.wheels), ("point mass", scene.point_masses)):
+        for each in on_body:
+            yield from place(each, "body", "node", what)
 
 
 def _lumps_and_steps(body: BeamBody) -> Iterator[tuple[float, str]]:

@@ -55,10 +55,11 @@ def points_with(S: Real, sums: Real, omega: Real) -> NearPoints:
     spread = start.position - start.position.mean(axis=0)
     position = rigid.centre + _nearest(spread, second / each, np.ones((count, 1)), 1)
     R = np.concatenate([np.broadcast_to(np.eye(3), (count, 3, 3)), -cross_matrix(position)], axis=2).reshape(-1, 6)
-    follow = _inverse(S[:6, :6]) @ S[:6, 6:]
+    inverse = _inverse(each * R.T @ R)  # of the points: M may have rounding errors that no rigid body has
+    follow = inverse @ S[:6, 6:]
     elastic = S[6:, 6:] - S[6:, :6] @ follow
     phi = start.translation_modes.reshape(-1, m)
-    phi = phi - R @ (_inverse(each * R.T @ R) @ (each * R.T @ phi))
+    phi = phi - R @ (inverse @ (each * R.T @ phi))
     moved = R @ follow + _nearest(phi, elastic / each, R, 4)
     points = EquivalentMasses(np.full(count, each), position, moved.reshape(count, 3, m))
     return NearPoints(points, _distance(elastic, each * phi.T @ phi, omega))
@@ -96,6 +97,6 @@ def _nearest(fields: Real, products: Real, others: Real, number: int) -> Real:
     free = Q[:, np.count_nonzero(np.abs(np.diag(R)) > MASSLESS) :]
     left, _, right = np.linalg.svd(free.T @ fields @ root, full_matrices=False)
     found = np.asarray(free @ (left @ right) @ root)
-    if not np.max(np.abs(found.T @ found - products)) <= ROUNDING * np.abs(values).max():  # fewer points than fields
+    if not np.max(np.abs(found.T @ found - root @ root)) <= ROUNDING * np.abs(values).max():  # too few points
         raise NoMasses(number)
     return found
