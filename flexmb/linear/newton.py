@@ -1,6 +1,6 @@
 """States of rest: Newton's method on the generalised forces, with their exact tangent stiffness.
 
-RestForces are those of inverse dynamics without accelerations. These, M udot, vanish where the accelerations do, but not
+Forces are those of inverse dynamics without accelerations. These, M udot, vanish where the accelerations do, but not
 their derivatives: where the inertia depends on the coordinates, those of accelerations would lead astray. Steps and
 errors are measured in the metric of kinetic energy, sqrt(xi' M xi) in m sqrt(kg), in which the method does not depend
 on units or scales of modes. Damping follows Deuflhard, Newton Methods for Nonlinear Problems (2004), sec. 3.3 and 3.1:
