@@ -97,6 +97,7 @@ def _closed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
     energy = _strain(closures, y - start)
     for _ in range(RELAXATIONS if energy > 0.0 else 0):
         found = decomposed(closures, t, y, hold)
+        assert isinstance(found, Weighed)  # there are strains
         further = _moved(closures, t, y, -found.relaxing(closures.errors(), y - start), hold)
         try:
             further = _gap_closed(closures, t, further, hold)
@@ -241,14 +242,14 @@ class Weighed(NamedTuple):
 
     def damped(self, values: Real, floor: float) -> Real:
         """See `Decomposed.damped`."""
-        return self.Z @ self._damped(values, floor)
+        return np.asarray(self.Z @ self._damped(values, floor))
 
     def relaxing(self, values: Real, change: Real) -> Real:
         """x (nu,) that closes values (G,) and reduces most the weighted strain energy of a change of [q, u, work]."""
         downhill = self.strain @ change
         kept = self.s > DEPENDENT * self.largest
         stopped = self.U[:, kept] @ (self.s[kept] * (self.Vt[kept] @ downhill))
-        return self.Z @ (downhill + self._damped(values - stopped, 0.0))
+        return np.asarray(self.Z @ (downhill + self._damped(values - stopped, 0.0)))
 
     def _damped(self, values: Real, floor: float) -> Real:
         kept = self.s > (0.0 if floor > 0.0 else DEPENDENT * self.largest)
