@@ -16,9 +16,9 @@ modes = fm.Modes(count=8, families=("bending_y",))
 
 
 def beam(level):
-    """The beam, spun up smoothly about z."""
+    """The beam, spun up smoothly about z; runs at level `full` warn that this is beyond its range, unless allowed."""
     return (
-        fm.SceneBuilder(level)
+        fm.SceneBuilder(level, allow=("level_range",))
         .beam("beam", length=1.0, elements=24, section=section, modes=modes, level=level, points="line")
         .revolute("hub", "ground", "beam", prescribed=fm.SpinUp(rate=6.0, duration_s=15.0))
         .marker("tip", "beam", node="tip")

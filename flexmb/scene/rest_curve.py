@@ -47,7 +47,7 @@ def is_curved(body: BeamBody) -> bool:
 
 def is_bent(station: BeamStation, length: float) -> bool:
     """Whether a beam of this length (m) would turn by more than rounding with the curvature of a station."""
-    return max(map(abs, station.curvature_1_m)) * length > ROUNDING
+    return any(not abs(each) * length <= ROUNDING for each in station.curvature_1_m)  # so is what is no number
 
 
 def turn_at_rest(body: BeamBody) -> float:

@@ -64,8 +64,8 @@ def moved_inertia(scene: Scene) -> Iterator[Defect]:
         seen = H[tested], ends[hinges[tested]], inertia[bodies], armature[tested]
         for n, noun in _unmoved(*seen, dust):
             i = int(hinges[tested[n]])
-            along = np.linalg.svd(seen[0][n], full_matrices=False)[0]
-            if noun == ABOUT and not any(_unmoved(along[None], *(each[[n]] for each in seen[1:]), dust)):
+            along, own = np.linalg.svd(seen[0][n], full_matrices=False)[0], (seen[1][[n]], seen[2][[n]], seen[3][[n]])
+            if noun == ABOUT and not any(_unmoved(along[None], *own, dust)):
                 faults[i] = LOCKED  # what the hinge carries has inertia about all axes, and its own axes nearly align
                 continue
             child = scene.hinges[i].child

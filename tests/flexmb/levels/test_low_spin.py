@@ -21,7 +21,7 @@ ROW = re.compile(r"> \| (?:s|flapping frequency[^|]*) \|([\d. |]+)\|")
 def flapping(level: fm.Level, spins: Real) -> Real:
     """Lowest frequency (rad/s) across the plane of rotation at these rates (rad/s) of a hub of no radius."""
     scene = (
-        fm.SceneBuilder("rotor")
+        fm.SceneBuilder("rotor", allow=("level_range",))
         .beam("blade", length=1.0, elements=16, section=SECTION, level=level, points="line",
               modes=fm.Modes(count=6, families=("bending_z",)))
         .revolute("hub", "ground", "blade", axis=(0, 0, 1))

@@ -19,7 +19,7 @@ def blade(level: str) -> fm.Scene:
     """Bends across the spin axis z with EI, along it with 2 EI."""
     section = beam_section(E=7e10, G=2.7e10, A=1e-3, Iy=2e-7, Iz=1e-7, rho=2700.0)
     return (
-        fm.SceneBuilder("blade")
+        fm.SceneBuilder("blade", allow=("level_range",))
         .rigid_body("hub", mass=1.0, inertia=(1.0, 1.0, 1.0))
         .revolute("shaft", "ground", "hub", prescribed=fm.SpinUp(rate=2.0, duration_s=5.0))
         .beam("beam", length=LENGTH, elements=24, section=section, modes=8, level=level, points="line")
@@ -103,6 +103,7 @@ def test_a_drive_of_the_scene_is_replaced_in_tables_of_its_own_size():
     driven = blade("full")
     free = fm.Scene(
         name=driven.name,
+        allow=driven.allow,
         bodies=driven.bodies,
         hinges=tuple(
             fm.Revolute(name="shaft", parent="ground", child="hub") if hinge.name == "shaft" else hinge
