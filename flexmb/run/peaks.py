@@ -20,7 +20,7 @@ _FINE = np.linspace(-1.0, 1.0, 33)
 ROUNDING = 2.0**-50  # of polynomials, relative
 REFINED = 2
 """How often the place of a peak is looked for between points that lie 16 times closer."""
-_NUMBERS = 2**21  # numbers that are held at once
+_NUMBERS = 2**22  # numbers that are held at once
 
 
 def part_of(run: RunArrays, panels: Index, steps: int = 0, left_out: int = 0) -> PartialEnvelope:

@@ -21,6 +21,8 @@ METHODS = [
     ("dop853", {}), ("radau5", {"rtol": 1e-7, "atol": 1e-9}), ("exponential", {}), ("rk4", {"step": 1e-2}),
     ("generalised_alpha", {"step": 5e-3}),
 ]  # fmt: skip
+SCENES = sorted((Path(__file__).parents[3] / "cases").glob("*/*/scene.toml"))
+QUICK = "sliders/rotating_tube", "closed_chains/slider_crank", "deploying_boom/latching", "connectors/one_at_a_time"
 SPEED, STIFF, MASS = 0.5, 4e4, 2.0
 
 
@@ -204,3 +206,26 @@ def test_polynomials_between_points() -> None:
     assert np.min(np.abs(np.sin(found.t_greatest[0] + 0.3) - 1.0)) < 1e-8
     assert abs(found.greatest[1] - 1.0) < 1e-14 and found.t_greatest[1] == 0.0
     assert np.isnan(found.greatest[2]) and np.isnan(at_points(t.ravel(), values.reshape(-1, 3)).least[2])
+
+
+def _case(path: Path) -> str:
+    return "/".join(path.parts[-3:-1])
+
+
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(each, id=_case(each), marks=() if _case(each) in QUICK else pytest.mark.slow) for each in SCENES],
+)
+@pytest.mark.filterwarnings("ignore::flexmb.SceneWarning", "ignore::flexmb.PrecisionWarning")
+def test_it_contains_what_finer_output_times_show(path: Path) -> None:
+    """Of the scenes of all cases, from a run with three output times, up to the error that it states."""
+    scene = fm.load_scene(path)
+    coarse = fm.simulate(scene, 0.2, samples=3, max_steps=1500)
+    fine = fm.simulate(scene, coarse.stopped_at, samples=101, max_steps=1500)
+    found, columns = coarse.envelope, {name: values for name, _, values in fine.columns()}
+    assert found.steps == coarse.statistics.accepted_steps and found.left_out == 0
+    for name, _, extremes in found.channels:
+        values = columns.get(name)
+        if values is not None and np.isfinite(values).all():
+            over = max(values.max() - extremes.greatest[0], extremes.least[0] - values.min())
+            assert over <= extremes.error[0] + 1e-6 * extremes.largest[0] + 1e-9, name
