@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexmb.linear.equations import entering
+from flexmb.linear.equations import built, entering
 from flexmb.linear.newton import balanced
 from flexmb.scene.schema import Scene
-from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
 
@@ -25,7 +24,7 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> State:
     closures open.
     """
     if isinstance(system, Scene) and system.controllers:
-        system = compile(system)
+        system = built(system)
     if isinstance(system, System) and system.scene.controllers:
         from flexmb.linear.controlled_equilibrium import resting  # imported only for scenes with controllers
 

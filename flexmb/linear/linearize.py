@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.linear.equations import entering
+from flexmb.linear.equations import built, entering
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, Variations
 from flexmb.scene.schema import Scene
-from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
@@ -32,7 +31,7 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     this system or leaves closures open.
     """
     if isinstance(system, Scene) and system.controllers:
-        system = compile(system)
+        system = built(system)
     if isinstance(system, System) and system.scene.controllers:
         from flexmb.linear.closed_loop import closed_loop  # imported only for scenes with controllers
 

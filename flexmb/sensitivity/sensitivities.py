@@ -11,12 +11,13 @@ import numpy as np
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.parameters.numbers import numbers
-from flexmb.run.samples import sample_times
+from flexmb.run.samples import refuse_large_run, sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
+from flexmb.scene.sizes import refuse_bytes
 from flexmb.sensitivity.channels import chosen, refuse_unknown_outputs
 from flexmb.sensitivity.following import Following
 from flexmb.sensitivity.refusals import refuse_measured_loads, refuse_moving_instants
@@ -101,7 +102,11 @@ def sensitivities(
     found = numbers(scene, by)
     refuse_moving_instants(scene, found)
     given = Settings(method, **settings).checked(abs(t_end))
-    system, times = assembled(scene), sample_times(samples, t_end, 0.0)
+    times = sample_times(samples, t_end, 0.0)
+    size = 8.0 * len(times) * len(of) * len(found)
+    refuse_bytes(size, f"{len(of)} outputs by {len(found)} numbers at {len(times)} times take", "ask for fewer")
+    refuse_large_run(scene, len(times), given, "articulated")
+    system = assembled(scene)
     refuse_unknown_outputs(system, of)
     trajectory, course = run_with_course(system, times, given)
     if not trajectory.finished:
