@@ -26,7 +26,7 @@ def bench(
     cases: common.CaseWords,
     engine: common.EngineNames = None,
     variant: Variants = None,
-    rounds: Annotated[int, typer.Option("--rounds", min=1, help="How often each engine is timed.")] = 10,
+    rounds: common.Rounds = 10,
     accuracy: Annotated[
         float, typer.Option("--accuracy", help="How near to the reference, of the signals' sizes, an equal must be.")
     ] = 1e-4,

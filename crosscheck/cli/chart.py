@@ -18,7 +18,7 @@ def chart(
     cases: common.CaseWords,
     engine: common.EngineNames = None,
     variant: Variants = None,
-    rounds: Annotated[int, typer.Option("--rounds", min=1, help="How often each effort is timed.")] = 5,
+    rounds: common.Rounds = 5,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for pictures, data and pages.")] = Path("charts"),
     time_limit: common.TimeLimit = None,
     quiet: common.Quiet = False,

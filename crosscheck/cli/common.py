@@ -6,7 +6,7 @@ import json
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from math import inf, isfinite
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -149,7 +149,13 @@ TimeLimit = Annotated[
         "--time-limit", metavar="SECONDS", help=f"Stop what takes longer; default the case's limit or {TIME_LIMIT_S:g}."
     ),
 ]
-Jobs = Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="Jobs at a time; by default one per core.")]
+MOST_ROUNDS, MOST_JOBS, LONGEST_S = 1000, 4096, 1e7
+Rounds = Annotated[
+    int, typer.Option("--rounds", min=1, max=MOST_ROUNDS, help="How often each engine, or each effort, is timed.")
+]
+Jobs = Annotated[
+    int | None, typer.Option("--jobs", "-j", min=1, max=MOST_JOBS, help="Jobs at a time; by default one per core.")
+]
 SchedulerAddress = Annotated[
     str,
     typer.Option(
@@ -245,8 +251,8 @@ def sole_writer(out: Path, strict: bool = False) -> Iterator[None]:
 
 
 def check_limit(seconds: float | None) -> None:
-    if seconds is not None and not 0.0 < seconds < inf:
-        refuse(f"--time-limit {seconds:g}: give a positive number of seconds")
+    if seconds is not None and not 0.0 < seconds <= LONGEST_S:
+        refuse(f"--time-limit {seconds:g}: give a positive number of seconds, {LONGEST_S:g} at most")
 
 
 @contextmanager

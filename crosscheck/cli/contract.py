@@ -22,7 +22,7 @@ def contract(
     time_limit: Annotated[
         float, typer.Option("--time-limit", metavar="SECONDS", min=0.1, help="Of each clause, compiling included.")
     ] = CLAUSE_LIMIT_S,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Clauses at a time.")] = 1,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, max=common.MOST_JOBS, help="Clauses at a time.")] = 1,
     clause: Annotated[
         list[str] | None, typer.Option("--clause", metavar="PATTERN", help="Only clauses of such names (repeat it).")
     ] = None,

@@ -27,6 +27,7 @@ from crosscheck.library.case_error import CaseError
 from crosscheck.library.find import Case, shipped_folder
 from crosscheck.library.reference import VALUES, StoredReference, current_reference, values_text
 from crosscheck.running.plan import variant_scene
+from flexmb.output.csv_cells import as_text
 from flexmb.output.whole import write_whole
 from flexmb.output.writing import check_folder, folder
 from flexmb.run.channels import unit
@@ -96,7 +97,7 @@ def uncertainty_text(reference: StoredReference) -> str:
     rows.writerow(["channel", "unit", "uncertainty", "range", "how"])
     for channel, known in reference.knowledge.channels.items():
         symbol = "rad" if channel.endswith(".orientation") else unit(channel)
-        rows.writerow([channel, symbol, repr(known.uncertainty), repr(known.scale), known.how])
+        rows.writerow([channel, symbol, repr(known.uncertainty), repr(known.scale), as_text(known.how)])
     return text.getvalue()
 
 

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated, Literal
 
 import msgspec
 
+from flexmb.scene.reading import read_bytes
+
 FILE = "mutation.json"
+_Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 
 
 class ScoredMutation(msgspec.Struct, frozen=True, kw_only=True):
@@ -48,7 +52,7 @@ class _Shown(msgspec.Struct):
 class _Mutant(msgspec.Struct):
     mutation: str
     target: str
-    outcome: str
+    outcome: Literal["noticed", "missed", "no mutant", "not judged"]
     reason: str
     channels: dict[str, _Shown]
 
@@ -63,10 +67,10 @@ class _Case(msgspec.Struct):
     """A case in the file; `docs/mutations.md` explains every key."""
 
     case: str
-    score: float | None
+    score: _Share | None
     mutants: tuple[_Mutant, ...]
     passed_over: tuple[_PassedOver, ...]
-    score_by_reference: float | None = None
+    score_by_reference: _Share | None = None
 
 
 class _File(msgspec.Struct):
@@ -79,10 +83,13 @@ def read_scores(out: Path) -> Scores:
     if not file.is_file():
         return Scores()
     try:
-        found = msgspec.json.decode(file.read_bytes(), type=_File)
-    except (ValueError, OSError) as error:
+        found = msgspec.json.decode(read_bytes(file), type=_File)
+    except (ValueError, OSError, RecursionError) as error:
         return Scores(error=f"{FILE} cannot be read: {error}")
-    return Scores(cases={each.case: _score(each) for each in found.cases})
+    cases = {each.case: _score(each) for each in found.cases}
+    if len(cases) < len(found.cases):
+        return Scores(error=f"{FILE} cannot be read: it names a case twice")
+    return Scores(cases=cases)
 
 
 def _score(case: _Case) -> CaseScore:

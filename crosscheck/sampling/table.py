@@ -10,6 +10,7 @@ from typing import Self, TextIO
 
 from crosscheck.sampling.file import SweepFile
 from crosscheck.sampling.sample import SampleRecord
+from flexmb.output.csv_cells import as_text
 from flexmb.output.whole import whole_file
 from flexmb.output.writing import writing
 
@@ -63,6 +64,8 @@ class SamplesTable:
 
     @staticmethod
     def _write(stream: TextIO, line: Sequence[object]) -> None:
-        """One line: texts are quoted, numbers have all their digits."""
-        csv.writer(stream, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n").writerow(line)
+        """One line: texts are quoted and no formulas, numbers have all their digits."""
+        csv.writer(stream, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n").writerow(
+            [as_text(cell) if isinstance(cell, str) else cell for cell in line]
+        )
         stream.flush()

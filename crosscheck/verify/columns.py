@@ -16,6 +16,7 @@ from crosscheck.judging.against_reference import CLOCK, shared_times
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import KINDS, LINEAR_KINDS, kind_named, part_of
 from crosscheck.library.reference import channels_by_column
+from flexmb.output.csv_cells import NUMBER, from_text
 from flexmb.scene.reading import MIB, Unreadable, read_text
 from flexmb.typing import Real
 
@@ -28,7 +29,6 @@ STORED = ("marker:", "load:", "wheel_load:", "drive:")  # prefixes of items' cha
 DRIVE = "drive"
 LIMIT = 128 * MIB
 FEWEST = 8  # fewest samples at times of its own: fewer say too little about a motion
-NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
 
@@ -100,7 +100,7 @@ def _rows(text: str) -> tuple[list[str], list[int], Real]:
         header = next((row for row in reader if any(row)), None)
         if header is None:
             raise VerifyError("it is empty: begin with a line of column names")
-        names = [name.strip() for name in header]
+        names = [from_text(name.strip()) for name in header]
         if len(names) == 1:
             for separator, word in SEPARATORS.items():
                 if separator in names[0]:

@@ -11,6 +11,7 @@ from crosscheck.library.reference import current_reference
 from crosscheck.running.plan import sample_times, variant_scene
 from crosscheck.verify.columns import short_names
 from crosscheck.verify.target import chosen_variant, goal_of, has_stored
+from flexmb.output.csv_cells import as_text
 from flexmb.scene.schema import Scene
 
 
@@ -31,7 +32,7 @@ def sample_times_csv(case: Case, variant: str | None) -> str:
     names = dict.fromkeys(column for channel, width in shapes.items() for column in short_names(channel, width))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["t", *names])
+    writer.writerow(["t", *map(as_text, names)])
     writer.writerows([[repr(float(t)), *([""] * len(names))] for t in times])
     return text.getvalue()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
@@ -48,6 +49,8 @@ def equivalence(
     **Exit code**: 0 compared, 2 the scene, the body or an option is wrong.
     """
     with no_traceback():
+        if not isfinite(angle):
+            raise ValueError(f"--angle is {angle}: give a finite number")
         from flexmb.frisch.equivalence.appendage import appendage_of
         from flexmb.frisch.equivalence.comparison import equivalence as compare
         from flexmb.frisch.equivalence.equivalence_picture import write_equivalence_plot

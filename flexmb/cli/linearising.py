@@ -74,13 +74,13 @@ def _linearised(
     scene: Path, at: str, spin: str | None, rate: float, cut: bool
 ) -> tuple[LinearModel, Real | None, str]:
     """The linear model, the truncation of its eigenvalues if asked for and known, and why it is not known."""
+    from flexmb.linear.equations import built
     from flexmb.linear.equilibrium import equilibrium
     from flexmb.linear.linearize import linearize as linearized
     from flexmb.linear.spin import steady_spin
     from flexmb.linear.truncation import truncation
     from flexmb.scene.bodies import BeamBody
     from flexmb.scene.files import load_scene
-    from flexmb.system.compile import compile
 
     def linear(system: System) -> LinearModel:
         if spin is not None:
@@ -89,8 +89,10 @@ def _linearised(
             return linearized(system, equilibrium(system), held=True)
         return linearized(system)
 
+    if spin is None and rate != 0.0:
+        raise ValueError(f"--rate {rate:g} is the rate of a spin: name its hinge or wheel by --spin")
     loaded = load_scene(scene)
-    model = linear(compile(loaded))
+    model = linear(built(loaded))
     if not cut or not any(isinstance(body, BeamBody) and body.level != "rigid" for body in loaded.bodies):
         return model, None, ""
     try:
@@ -104,7 +106,8 @@ def campbell(
     hinge: Annotated[str, typer.Argument(help="Revolute hinge or wheel that spins.", metavar="HINGE")],
     rates: Annotated[str, typer.Option(help="Rates in rad/s: `from:to:count`.", show_default=False)],
     modes: Annotated[
-        int | None, typer.Option(help="Number of modes to draw, lowest first; by default all.", show_default=False)
+        int | None,
+        typer.Option(help="Number of modes to draw, lowest first; by default all.", min=1, show_default=False),
     ] = None,
     picture: Annotated[Path, typer.Option("--picture", "-o", help="Picture file.")] = Path("out/campbell.png"),
     csv: Annotated[Path | None, typer.Option(help="File for the numbers.", show_default=False)] = None,

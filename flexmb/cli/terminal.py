@@ -61,9 +61,9 @@ def range_of(option: str, text: str) -> list[float]:
         first, last, count = text.split(":")
         start, stop, steps = float(first), float(last), int(count)
     except ValueError:
-        raise ValueError(f"--{option} is from:to:count, such as 0:40:41; got {text!r}") from None
+        raise ValueError(f"--{option} is from:to:count, such as 0:40:41; got {text!r:.60}") from None
     if not 2 <= steps <= MOST_STEPS or not isfinite(stop - start):
-        raise ValueError(f"--{option}: give 2 to {MOST_STEPS} values between finite ends, not {text}")
+        raise ValueError(f"--{option}: give 2 to {MOST_STEPS} values between finite ends, not {text:.60}")
     return [start + (stop - start) * i / (steps - 1) for i in range(steps)]
 
 

@@ -259,6 +259,7 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
 
 
 INTEGRATOR = Integrator(
-    "exponential", exponential, order=5, linearises=True, algebra=(40.0, 10.0),  # an exponential of a matrix
+    "exponential", exponential, order=5, linearises=True, matrices=48,
+    algebra=(40.0, 10.0),  # an exponential of a matrix
     summary="stiff scenes at higher accuracy, and ringing that must not be damped; order 6 where nothing is stiff",
 )  # fmt: skip

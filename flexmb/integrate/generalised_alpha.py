@@ -348,6 +348,6 @@ def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
 
 INTEGRATOR = Integrator(
     "generalised_alpha", generalised_alpha, order=2, fixed=True, linearises=True, keeps_jacobian=True,
-    damps=True, algebra=(2.0 / 24.0, 1.0),  # a real matrix of the speeds
+    damps=True, matrices=2, algebra=(2.0 / 24.0, 1.0),  # a real matrix of the speeds
     summary="rough answers at large steps, with damping that is chosen",
 )  # fmt: skip

@@ -41,6 +41,8 @@ class Integrator:
     """Whether `spectral_radius` sets its damping of modes that the step does not resolve."""
     evaluations: int = 1
     """Minimum number of evaluations of the right-hand side per step."""
+    matrices: int = 0
+    """How many matrices over the whole state its workspace holds."""
     algebra: tuple[float, float] = (0.0, 0.0)
     """Operations of its linear algebra: factors of n^3 for each factorisation and of n^2 for each evaluation."""
 

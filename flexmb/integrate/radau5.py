@@ -287,7 +287,7 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
 
 
 INTEGRATOR = Integrator(
-    "radau5", radau5, order=5, linearises=True, keeps_jacobian=True,
+    "radau5", radau5, order=5, linearises=True, keeps_jacobian=True, matrices=4,
     algebra=(10.0 / 24.0, 4.0),  # a real and a complex matrix of the speeds, half the state
     summary="modes or springs that are damped or hardly ring; moderate accuracy; the smallest cost of a step",
 )  # fmt: skip

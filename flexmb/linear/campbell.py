@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
+from flexmb.linear.equations import built
 from flexmb.linear.linear_model import Complex, LinearModel, Stability, modal_assurance
 from flexmb.linear.linearize import linear_model, warn_beyond_level
 from flexmb.linear.spin import steady_spin
 from flexmb.linear.variations import Equations
 from flexmb.output.whole import whole_file
 from flexmb.scene.schema import Scene
-from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import State
@@ -65,7 +65,7 @@ class Campbell:
         from flexmb.linear.campbell_picture import write_campbell_plot  # loads matplotlib
 
         self._refuse_torn()
-        shown = self.eigenvalues[:, :modes]
+        shown = self.eigenvalues[:, : None if modes is None else arguments.count("modes", modes)]
         is_growing = shown.real > np.array([found.tolerance for found in self.stability])[:, None]
         return write_campbell_plot(Path(path), self.scene, self.hinge, self.rates, self.names, shown, is_growing)
 
@@ -92,7 +92,7 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
     `steady_spin` raises.
     """
     if isinstance(system, Scene):
-        system = compile(system)
+        system = built(system)
     rates = arguments.finite("rates", np.atleast_1d(arguments.array("rates", rates))).copy()
     if rates.ndim != 1 or not len(rates):
         raise ValueError(f"rates: give at least one, in a row, not an array of shape {rates.shape}")

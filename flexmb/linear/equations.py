@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from flexmb.building.numbering import speeds_at_least
 from flexmb.linear.variations import Equations
+from flexmb.scene.check import check_scene
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
+from flexmb.scene.sizes import refuse_large_matrix
 from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
+
+MATRICES = 3  # over the states: A, C, and A as it is made
+
+
+def built(given: System | Scene) -> System:
+    """The system of a scene, or the given one; ValueError if a linear model of it would not fit into memory, before
+    anything is built or compiled."""
+    if isinstance(given, Scene):
+        check_scene(given)
+    nu = speeds_at_least(given) if isinstance(given, Scene) else given.nu
+    refuse_large_matrix(2 * nu, "a linear model", "take a scene of fewer bodies or modes: it is dense", MATRICES)
+    return compile(given) if isinstance(given, Scene) else given
 
 
 def equations_of(system: System) -> Equations:
@@ -29,7 +44,7 @@ def entering(system: System | Scene, state: State | None) -> tuple[Equations, St
     if not isinstance(system, System | Scene):
         raise TypeError(f"a System or a Scene is needed, not {type(system).__name__}")
     refuse_feedback(system if isinstance(system, Scene) else system.scene, "a linear model of the motion alone")
-    equations = equations_of(system if isinstance(system, System) else compile(system))
+    equations = equations_of(built(system))
     if state is None:
         return equations, equations.system.initial_state
     equations.system.layout.entering(state)

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from flexmb.linear.equations import entering
+from flexmb.linear.equations import built, entering
 from flexmb.linear.newton import Stability, balanced, squares, verdict
 from flexmb.scene.schema import Scene
-from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
 
@@ -53,7 +52,7 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> Equilibri
     sampled controllers, ValueError or TypeError for a guess that is not a state of this system or leaves closures open.
     """
     if isinstance(system, Scene) and system.controllers:
-        system = compile(system)
+        system = built(system)
     if isinstance(system, System) and system.scene.controllers:
         from flexmb.linear.controlled_equilibrium import resting  # imported only for scenes with controllers
 

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexmb.linear.equations import entering
+from flexmb.linear.equations import built, entering
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, Variations
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
-from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
@@ -36,7 +35,7 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     level "ruthless", ValueError or TypeError for a state that does not belong to this system or leaves closures open.
     """
     if isinstance(system, Scene) and system.controllers:
-        system = compile(system)
+        system = built(system)
     if isinstance(system, System) and system.scene.controllers:
         from flexmb.linear.closed_loop import closed_loop  # imported only for scenes with controllers
 

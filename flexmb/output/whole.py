@@ -15,6 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from flexmb.output.csv_cells import as_text
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -58,11 +60,12 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 
 def write_csv(path: Path, header: Sequence[str], rows: Iterable[Iterable[float | str]]) -> None:
-    """Write a table of numbers, or names, as CSV; numbers with 17 digits, which are read back exactly."""
+    """Write a table of numbers, or names, as CSV; numbers with 17 digits, which are read back exactly; names are no
+    formulas."""
     with whole_file(path) as beside, beside.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(header)
-        writer.writerows([value if isinstance(value, str) else f"{value:.17g}" for value in row] for row in rows)
+        writer.writerow(map(as_text, header))
+        writer.writerows([as_text(cell) if isinstance(cell, str) else f"{cell:.17g}" for cell in row] for row in rows)
 
 
 def save_figure(figure: Figure, path: Path, **settings: Any) -> Path:

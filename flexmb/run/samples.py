@@ -1,4 +1,4 @@
-"""The output times of a run, and the memory that its outputs take."""
+"""The output times of a run, and the memory that a run takes, which is estimated before the scene is built."""
 
 from __future__ import annotations
 
@@ -6,15 +6,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from flexmb.building.numbering import speeds_at_least
+from flexmb.integrate.settings import Settings
+from flexmb.scene.schema import Scene
+from flexmb.scene.sizes import refuse_bytes, refuse_large_matrix
+from flexmb.system import algorithms
+from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.typing import Real
 
-OUTPUT_BYTES = 2**32
-"""Limit (bytes) of the memory for the outputs of one run."""
 # Bytes per number, which is stored in a row and again by name; bytes per sample for its time and for NumPy's overhead.
 _NUMBER_BYTES, _SAMPLE_BYTES = 16, 200
-_TOO_MANY = f"outputs would take more than {OUTPUT_BYTES / 2**30:g} GiB; ask for fewer, or divide the run into several"
+_FEWER = "ask for fewer, or divide the run into several"
 
 
 def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: float = 0.0) -> Real:
@@ -24,8 +28,7 @@ def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: f
         number = arguments.whole("samples", samples)
         if number < 2:
             raise ValueError(f"samples is {number}: ask for at least 2 output times, the start and the end")
-        if number > OUTPUT_BYTES // _SAMPLE_BYTES:
-            raise ValueError(f"samples is {number}: {_TOO_MANY}")
+        _refuse_samples(number, _SAMPLE_BYTES)
         times = np.linspace(t_start, t_end, number)
         if np.all(np.diff(times) > 0.0):
             return times
@@ -39,17 +42,28 @@ def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: f
     return times.copy()
 
 
-def refuse_too_many(samples: int, system: System) -> None:
-    """ValueError if the outputs would exceed OUTPUT_BYTES."""
-    most = OUTPUT_BYTES // sample_bytes(system)
-    if samples > most:
-        raise ValueError(f"samples is {samples}, but this scene allows {most}: {_TOO_MANY}")
+def refuse_large_run(scene: Scene | System, samples: int, settings: Settings, algorithm: Algorithm) -> None:
+    """ValueError if the outputs of a run, or the matrices of its method or its algorithm, would not fit into memory.
+
+    Of a checked scene it is estimated before anything is built or compiled.
+    """
+    nu = speeds_at_least(scene) if isinstance(scene, Scene) else scene.nu
+    _refuse_samples(samples, sample_bytes(scene, nu))
+    if matrices := settings.integrator.matrices:
+        others = 'take method "dop853" or "rk4", whose cost is O(N)'
+        refuse_large_matrix(2 * nu, f'method "{settings.method}"', others, matrices)
+    if matrices := algorithms.chosen(algorithm).matrices:
+        refuse_large_matrix(nu, f'algorithm "{algorithm}"', 'take "articulated", which needs none', matrices)
 
 
-def sample_bytes(system: System) -> int:
-    """Upper bound (bytes) of the memory for one output time of a run."""
-    scene = system.scene
+def _refuse_samples(samples: int, each: int) -> None:
+    refuse_bytes(float(samples) * each, f"samples is {samples}: outputs take", _FEWER)
+
+
+def sample_bytes(scene: Scene | System, nu: int) -> int:
+    """Bound (bytes) of the memory for one output time of a run with so many speeds."""
+    scene = scene if isinstance(scene, Scene) else scene.scene
     loaded = (scene.hinges, scene.wheels, scene.constraints, scene.point_masses, scene.connectors)
     places = sum(map(len, loaded))
-    numbers = system.nq + 3 * system.nu + 24 * len(scene.markers) + 6 * places + 11
+    numbers = 4 * nu + len(scene.hinges) + 24 * len(scene.markers) + 6 * places + 11  # a quaternion has one more in q
     return _NUMBER_BYTES * numbers + _SAMPLE_BYTES

@@ -23,7 +23,7 @@ from flexmb.run.outputs import observed
 from flexmb.run.propagate import integration, unmoved
 from flexmb.run.restart import Restart
 from flexmb.run.run_arrays import Way
-from flexmb.run.samples import refuse_too_many, sample_times
+from flexmb.run.samples import refuse_large_run, sample_times
 from flexmb.run.switching import refuse_times
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
@@ -104,6 +104,7 @@ def simulate(
         check_and_warn(scene, t_end, t)
     chosen = Settings(method, **settings).checked(max(abs(t), abs(t_end)))
     times = sample_times(samples, t_end, t)
+    refuse_large_run(scene, len(times), chosen, algorithm)
     system = scene if isinstance(scene, System) else assembled(scene)
     return run_stages([RunPart(system, times)], state, chosen, algorithm, stabilise)
 
@@ -124,7 +125,7 @@ def run_stages(
     """
     stabilise = arguments.number("stabilise", stabilise)
     for system, times in stages:
-        refuse_too_many(len(times), system)
+        refuse_large_run(system, len(times), settings, algorithm)
         if settings.integrator.linearises:
             refuse_without_jacobian(system, algorithm, settings.method)
     whole: Trajectory | None = None
@@ -144,7 +145,7 @@ def run_stages(
 
 def run_with_course(system: System, times: Real, settings: Settings) -> tuple[Trajectory, list[Leg]]:
     """The trajectory of a scene from its own initial state, as `simulate` makes it, and its parts between events."""
-    refuse_too_many(len(times), system)
+    refuse_large_run(system, len(times), settings, "articulated")
     course: list[Leg] = []
     made = _run(RunPart(system, times), None, settings, "articulated", 0.0, course)
     run, warned, was_interrupted = _looked_at(system, *made)
@@ -158,7 +159,7 @@ def run_with_course(system: System, times: Real, settings: Settings) -> tuple[Tr
 def run_of_many(system: System, times: Real, settings: Settings, algorithm: Algorithm) -> Trajectory:
     """The trajectory of a scene from its own initial state, as `simulate` makes it, without its warnings: one of many
     that are compared with one another. Whether beams bent more than their points can follow is not looked at."""
-    refuse_too_many(len(times), system)
+    refuse_large_run(system, len(times), settings, algorithm)
     if settings.integrator.linearises:
         refuse_without_jacobian(system, algorithm, settings.method)
     run, _, was_interrupted = _run(RunPart(system, times), None, settings, algorithm, 0.0)

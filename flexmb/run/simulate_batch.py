@@ -14,10 +14,11 @@ from flexmb.jit.lanes import LANES
 from flexmb.run.batch_trajectory import BatchTrajectory
 from flexmb.run.interruption import interruptible
 from flexmb.run.lane_runs import BatchRun, Runs, runs
-from flexmb.run.samples import OUTPUT_BYTES, sample_times
+from flexmb.run.samples import sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
 from flexmb.run.switching import refuse_times
 from flexmb.scene.schema import Scene
+from flexmb.scene.sizes import refuse_bytes
 from flexmb.system.batch import Batch, number_of_threads
 from flexmb.system.compile import compile_batch
 from flexmb.system.tree_system import System
@@ -87,12 +88,9 @@ def _given(batch: Batch, q: Any, u: Any) -> tuple[Any, Any]:
 
 
 def _refuse_too_many(n: int, samples: int, batch: Batch) -> None:
-    size = 8 * n * samples * (batch.nq + batch.nu + 1)
-    if size > OUTPUT_BYTES:
-        raise ValueError(
-            f"{n} copies at {samples} output times take {size / 2**30:.1f} GiB, but {OUTPUT_BYTES / 2**30:g} GiB are "
-            "allowed: ask for fewer samples, or run fewer copies at once"
-        )
+    size = 8.0 * n * samples * (batch.nq + batch.nu + 1)
+    remedy = "ask for fewer samples, or run fewer copies at once"
+    refuse_bytes(size, f"{n} copies at {samples} output times take", remedy)
 
 
 def _gathered(batch: Batch, times: Real, found: Runs, n: int) -> BatchTrajectory:

@@ -24,6 +24,7 @@ from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes
 from flexmb.system.observables import ENERGIES, Observation
 from flexmb.system.section_loads import SectionBalance, SectionLoads
+from flexmb.tables import arguments
 from flexmb.tables.state import State
 from flexmb.typing import Real
 
@@ -139,11 +140,13 @@ class Trajectory(RunArrays):
     def state_at(self, sample: int) -> State:
         """The state at an output time, by its number; negative ones count from the end. IndexError without it."""
         refuse_torn(self)
+        sample = arguments.position("sample", sample, len(self.t))
         return State(self.q[sample], self.u[sample], float(self.t[sample]))
 
     def values_at(self, sample: int) -> dict[str, float]:
         """The state at an output time by names of coordinates and speeds, as `simulate` accepts it."""
         refuse_torn(self)
+        sample = arguments.position("sample", sample, len(self.t))
         values = zip((*self.q_names, *self.u_names), (*self.q[sample], *self.u[sample]), strict=True)
         return {name: float(value) for (name, _), value in values}
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+SEARCHED = 5_000  # known words among which a near one is looked for: of more it takes seconds for each unknown one
 LISTED = 24  # known words that a message lists; of more it names the nearest
 
 
@@ -80,7 +81,10 @@ def in_short(scene: str, doubts: Sequence[Doubt]) -> str:
 
 def closest(word: str, known: Iterable[str]) -> str:
     """The remedy for an unknown word: the nearest known word; if none is near, all known words, if they are few."""
-    words = sorted(known)
+    words = list(known)
+    if len(words) > SEARCHED:
+        return f"there are {len(words)}, too many to look for one that is near"
+    words.sort()
     near = get_close_matches(word, words, n=1)
     if near:
         return f'did you mean "{near[0]}"?'

@@ -17,6 +17,7 @@ from flexmb.scene.bodies import BeamBody, BeamStation
 from flexmb.scene.collocation import partial_integrals
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.rounding import ROUNDING
+from flexmb.scene.sizes import refuse_beyond
 from flexmb.typing import Real
 
 _Station = tuple[float, tuple[float, float, float]]  # x in m, curvature in 1/m
@@ -64,11 +65,8 @@ def rest_sections(body: BeamBody, x: Real) -> tuple[Real, Real]:
     if not is_curved(body):
         zero = np.zeros_like(x)
         return np.column_stack([x, zero, zero]), np.tile(np.eye(3), (len(x), 1, 1))
-    if not (turn := turn_at_rest(body)) <= MOST_TURN:
-        raise ValueError(
-            f'body "{body.name}" turns by {turn:.6g} rad at rest, and the limit is {MOST_TURN:g} rad: correct '
-            "curvature_1_m, or divide the beam into several that are welded together"
-        )
+    remedy = "correct curvature_1_m, or divide the beam into several that are welded together"
+    refuse_beyond(turn_at_rest(body), MOST_TURN, f'body "{body.name}" turns at rest by', remedy, "rad")
     spans = _spans(_stations(body))
     at = np.searchsorted([span.start for span in spans], x, side="right") - 1
     quaternion, position = np.zeros((len(x), 4)), np.zeros((len(x), 3))

@@ -13,8 +13,7 @@ from flexmb.scene.sections import has_plain_sections
 from flexmb.scene.strains import families
 
 MOST_BYTES = 2**32
-"""Limit of the memory that the model of one body may need while it is made, the same as for the outputs of a run and
-for one matrix over all speeds."""
+"""Limit (bytes) of the memory for the model of one body, the outputs of a run, or matrices over all speeds."""
 MOST_MODES = 2_000  # of one body: the dense eigenproblem of its matrices takes minutes
 ENDLESS = 10**18  # larger integers, which files can contain, are replaced by this one, so that floats do not overflow
 _COORDINATES = {"axial": 1, "torsion": 1, "bending_y": 2, "bending_z": 2}  # per element; bending with shear: twice
@@ -26,6 +25,11 @@ _POINTS = {"line": 6, "rotary": 6, "section": 24}  # inertia points per element
 _SPEED = 8.6e5  # cube of the number of coordinates per millisecond, of the dense eigenproblem
 _SPEED_COUPLED = 1.7e6  # where sections may couple the families, of all their coordinates
 PLENTY, PER_MODE = 200, 8  # doubt "many_elements": more than PLENTY and more than PER_MODE for each mode
+
+
+def counted(number: int) -> str:
+    """A number in a message; Python does not write those of more than 4300 digits."""
+    return str(number) if abs(number) <= ENDLESS else f"{'-' if number < 0 else ''}more than {ENDLESS:g}"
 
 
 class Estimate(NamedTuple):
@@ -60,13 +64,25 @@ def beam_estimate(body: BeamBody, modes: int) -> Estimate:
     return Estimate(memory, 1e-3 * size**3 / _SPEED)
 
 
-def refuse_large_matrix(n: int, what: str, remedy: str) -> None:
-    """ValueError if a matrix (n,n) of real numbers would exceed MOST_BYTES; called before it is allocated."""
-    if (size := 8 * n**2) > MOST_BYTES:
-        raise ValueError(
-            f"{what} would be a matrix of {n} x {n} numbers, which takes {size / 2**30:.3g} GiB, but "
-            f"{MOST_BYTES / 2**30:g} GiB are allowed: {remedy}"
-        )
+def refuse_beyond(amount: float, most: float, what: str, remedy: str, unit: str = "") -> None:
+    """ValueError unless an amount of work, estimated before it is begun, is at most `most`: NaN is refused too.
+
+    `what` takes or does the amount, as in "the outputs take" with the unit "GiB".
+    """
+    if not amount <= most:
+        unit = unit and f" {unit}"
+        raise ValueError(f"{what} {amount:.6g}{unit}, but {most:g}{unit} are allowed: {remedy}")
+
+
+def refuse_bytes(size: float, what: str, remedy: str) -> None:
+    """ValueError if that many bytes, estimated before they are allocated, exceed MOST_BYTES."""
+    refuse_beyond(size / 2**30, MOST_BYTES / 2**30, what, remedy, "GiB")
+
+
+def refuse_large_matrix(n: int, what: str, remedy: str, matrices: int = 1) -> None:
+    """ValueError if so many matrices (n,n) of real numbers would exceed MOST_BYTES."""
+    some = "a matrix" if matrices == 1 else f"{matrices} matrices"
+    refuse_bytes(8.0 * matrices * n**2, f"{what} would need {some} of {n} x {n} numbers, which take", remedy)
 
 
 def modes_memory(level: Level, points: float, modes: int) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,10 +11,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from flexmb.output.csv_cells import from_text, plain_number
+from flexmb.scene.reading import MIB, Unreadable, read_text
 from flexmb.tables import arguments
 from flexmb.typing import Real
 
 TIME = "t"
+LIMIT = 128 * MIB
 
 
 class Measurements(NamedTuple):
@@ -33,23 +37,27 @@ def measurements(data: str | os.PathLike[str] | Mapping[str, Any]) -> Measuremen
 
 def _read(path: Path) -> dict[str, Real]:
     """Columns of a CSV file by the names in its header, without units in brackets after a space."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        rows = [row for row in csv.reader(file) if row]
+    try:
+        reader = csv.reader(io.StringIO(read_text(path, LIMIT), newline=""), strict=True)
+        rows = [(reader.line_num, row) for row in reader if row]
+    except (Unreadable, csv.Error) as error:
+        raise ValueError(f"{path}: it cannot be read as a CSV file: {error}") from None
     if len(rows) < 2:
         raise ValueError(f"{path}: there are no measurements: give a header and at least one row")
-    names = [cell.strip().split(" [")[0] for cell in rows[0]]
+    names = [from_text(cell.strip()).split(" [")[0] for cell in rows[0][1]]
     if len(set(names)) < len(names):
-        raise ValueError(f"{path}: two columns have one name in {', '.join(names)}")
+        raise ValueError(f"{path}: two columns have one name in {', '.join(names):.200}")
     values = np.full((len(rows) - 1, len(names)), np.nan)
-    for i, row in enumerate(rows[1:]):
+    for i, (line, row) in enumerate(rows[1:]):
         if len(row) != len(names):
-            raise ValueError(f"{path}: line {i + 2} has {len(row)} cells, but the header {len(names)}")
+            raise ValueError(f"{path}: line {line} has {len(row)} cells, but the header {len(names)}")
         for j, cell in enumerate(row):
             if cell.strip():
                 try:
-                    values[i, j] = float(cell)
+                    values[i, j] = plain_number(cell)
                 except ValueError:
-                    raise ValueError(f"{path}: line {i + 2} has {cell!r} in column {names[j]}: give numbers") from None
+                    what = f"line {line} has {cell!r:.60} in column {names[j]:.60}"
+                    raise ValueError(f"{path}: {what}: give numbers such as -1.25e-3") from None
     return dict(zip(names, values.T, strict=True))
 
 

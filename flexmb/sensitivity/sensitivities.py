@@ -10,13 +10,15 @@ import numpy as np
 
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
+from flexmb.parameters.numbers import numbers
 from flexmb.run.driver import Leg
-from flexmb.run.samples import sample_times
+from flexmb.run.samples import refuse_large_run, sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
+from flexmb.scene.sizes import refuse_bytes
 from flexmb.sensitivity.channels import chosen, refuse_unknown_outputs
 from flexmb.sensitivity.following import Following
 from flexmb.sensitivity.gate import Admitted, admitted
@@ -99,6 +101,10 @@ def sensitivities(
     t_end = arguments.number("t_end", t_end)
     check_and_warn(scene, t_end, 0.0)
     given, times = Settings(method, **settings).checked(abs(t_end)), sample_times(samples, t_end, 0.0)
+    count = len(numbers(scene, by))
+    size = 8.0 * len(times) * len(of) * count
+    refuse_bytes(size, f"{len(of)} outputs by {count} numbers at {len(times)} times take", "ask for fewer")
+    refuse_large_run(scene, len(times), given, "articulated")
     gated = admitted(scene, by)
     refuse_unknown_outputs(gated.system, of)
     trajectory, course = run_with_course(gated.system, times, given)

@@ -63,6 +63,8 @@ class DynamicsAlgorithm:
     """For closed chains; None if the algorithm is for trees only."""
     jacobian: bool = False
     """Whether it has the Jacobians that stiff integrators need."""
+    matrices: int = 0
+    """How many matrices over all speeds its tables hold."""
     errata: Set[Erratum] | None = None
     """The defects of Frisch's print that it reproduces; None if its equations are not Frisch's."""
 

@@ -17,4 +17,5 @@ ALGORITHM = DynamicsAlgorithm(
         lambda: (system.constants, system.composite_workspace()), composite.rhs, coordinates.project
     ),
     closed_motion=lambda closures, t, y: closures.composite_motion(t, y),
+    matrices=2,
 )

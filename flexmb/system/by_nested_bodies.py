@@ -40,7 +40,7 @@ def _declared(name: Algorithm, summary: str, errata: Set[Erratum]) -> DynamicsAl
         system.nested_system(errata)  # raises here rather than in the run
         return Route(lambda: fresh(system), evaluation.rhs, coordinates.project)
 
-    return DynamicsAlgorithm(name, summary, kernel, own, fresh, observe, route=route, errata=errata)
+    return DynamicsAlgorithm(name, summary, kernel, own, fresh, observe, route=route, matrices=4, errata=errata)
 
 
 FRISCH = _declared("frisch", "the nested-body equations of 1975, corrected", CORRECTED)

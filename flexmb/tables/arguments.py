@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 _FLOAT = np.dtype(float)
+_MOST_BITS = 128  # of integers; Python refuses to write those of 4300 digits
 _DEEPEST = 3  # levels of nested sequences that are searched for masked arrays
 
 
@@ -97,10 +98,12 @@ def number(name: str, value: Any) -> float:
 
 
 def whole(name: str, value: Any) -> int:
-    """The value as an integer; TypeError for others."""
+    """The value as an integer; TypeError for others, ValueError for one beyond all counts."""
     if not isinstance(value, Integral) or isinstance(value, bool):
         raise TypeError(f"{name} is {value!r}: give a whole number")
-    return int(value)
+    if (bits := (found := int(value)).bit_length()) > _MOST_BITS:
+        raise ValueError(f"{name} is a number of {bits} bits: give one of {_MOST_BITS} bits at most")
+    return found
 
 
 def count(name: str, value: Any) -> int:
@@ -108,6 +111,14 @@ def count(name: str, value: Any) -> int:
     found = whole(name, value)
     if found < 1:
         raise ValueError(f"{name} is {found}: at least 1 is needed")
+    return found
+
+
+def position(name: str, value: Any, length: int) -> int:
+    """A place in a sequence, negative if counted from its end; TypeError, or IndexError where there is none."""
+    found = whole(name, value)
+    if not -length <= found < length:
+        raise IndexError(f"{name} is {found}: there are {length}")
     return found
 
 

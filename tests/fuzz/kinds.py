@@ -45,6 +45,7 @@ from tests.fuzz import mutate
 from tests.fuzz.kind import Kind
 from tests.fuzz.kinds_of_imports import of_imports
 from tests.fuzz.kinds_of_sessions import of_sessions
+from tests.fuzz.kinds_of_tables import of_tables
 
 TIMES = np.linspace(0.0, 1.0, 6)
 SHIPPED = Path(__file__).resolve().parents[2] / "cases"
@@ -85,6 +86,7 @@ def kinds(folder: Path) -> dict[str, Kind]:
         "map verdicts": Kind("maps.json", (_verdicts(),), jsonl, (ValueError,), _maps),
         **of_sessions(folder),
         **of_imports(folder),
+        **of_tables(_scene),
     }
 
 

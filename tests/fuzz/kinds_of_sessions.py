@@ -92,9 +92,13 @@ def _reference() -> tuple[bytes, bytes]:
 def _restarts(folder: Path) -> tuple[bytes, ...]:
     builder = fm.SceneBuilder("pendulum", gravity=(0.0, -9.81, 0.0))
     builder.rigid_body("rod", mass=1.0, com=(0.5, 0.0, 0.0), inertia=(0.01, 0.1, 0.1))
-    scene = builder.revolute("pivot", "ground", "rod", axis=(0, 0, 1), angle=0.3).scene()
+    plain = builder.revolute("pivot", "ground", "rod", axis=(0, 0, 1), angle=0.3).scene()
+    falls = fm.SceneEvent(
+        name="falls", watch="pivot.rotation", level=0.29, actions=(fm.Latch(coordinate="pivot.rotation"),)
+    )
     found = []
-    for method, step in (("dop853", None), ("rk4", 0.01)):
+    eventful = msgspec.structs.replace(plain, events=(falls,))
+    for scene, method, step in ((plain, "dop853", None), (plain, "rk4", 0.01), (eventful, "dop853", None)):
         run = fm.simulate(scene, 0.1, method, step=step, samples=3)  # type: ignore[arg-type]
         assert run.restart is not None
         run.restart.save(folder / "seed.npz")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
+import sys
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,6 +19,7 @@ from crosscheck.verify.columns import Columns
 from tests.fuzz import kinds as subject
 from tests.fuzz.campaign import campaign, table
 from tests.fuzz.worker import BAD, content, read
+from tests.repo.project import ROOT
 
 MUTANTS = 1000  # some forty of each kind
 BY_LINES = {"records", "map records"}  # a broken line is set aside, and a file hardly ever refused
@@ -109,3 +113,73 @@ def test_mutants_of_archives_are_whole_archives(kinds) -> None:
             (folder / "probe.npz").write_bytes(data)
             whole += zipfile.is_zipfile(folder / "probe.npz")
     assert whole > 20
+
+
+PRIMITIVES = re.compile(
+    r"(.+\.)?(read_text|read_bytes|parse_toml|ZipFile)|(np|numpy)\.load|(json|tomllib|pickle)\.loads?"
+    r"|(.+\.)?json\.decode|csv\.(reader|DictReader)|.*fromstring|(.+\.)?open"
+)
+"""Calls that turn a file or its text into values."""
+NOT_OF_USERS = {
+    "crosscheck/cli/": "shows or copies files that other functions have read",
+    "crosscheck/conformance/": "reads no file of users",
+    "crosscheck/engines/": "reads its own sources",
+    "crosscheck/export/": "programs and pages of an archive, which lie in it beside its checksums",
+    "crosscheck/records/": "locks and sources; records are read by `read`, which is tried",
+    "crosscheck/references/": "compares stored files with new ones byte by byte",
+    "crosscheck/report/": "pages of its own",
+    "crosscheck/running/": "its own workers' files, and digests",
+    "crosscheck/pytest_plugin/": "what this very session has written, under a lock",
+    "crosscheck/terminal/": "reads no file of users",
+    "crosscheck/drawing/": "reads no file of users",
+    "crosscheck/library/digests.py": "digests",
+    "crosscheck/library/reference.py:scene_digest": "a digest of a scene that is read before",
+    "flexmb/jit/": "kernels and their sources",
+    "flexmb/ready/": "kernels",
+    "flexmb/output/": "writes",
+    "flexmb/cli/": "shows",
+    "flexmb/control/lookup.py": "sources of users' functions, which are run anyhow",
+    "flexmb/scene/values.py": "words of an option",
+}
+"""Where functions call one of these without being tried here, and why that is right."""
+
+
+def _writes(call: ast.Call) -> bool:
+    words = [each.value for each in call.args if isinstance(each, ast.Constant)]
+    return any(isinstance(word, str) and word in ("w", "wb", "a", "ab") for word in words)
+
+
+def _readers() -> set[tuple[str, str]]:
+    """Files and names of all functions of both packages that call a primitive."""
+    found = set[tuple[str, str]]()
+    for file in sorted((*(ROOT / "flexmb").rglob("*.py"), *(ROOT / "crosscheck").rglob("*.py"))):
+        for function in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(function, ast.FunctionDef):
+                calls = [node for node in ast.walk(function) if isinstance(node, ast.Call)]
+                if any(PRIMITIVES.fullmatch(ast.unparse(call.func)) and not _writes(call) for call in calls):
+                    found.add((file.relative_to(ROOT).as_posix(), function.name))
+    return found
+
+
+def test_every_reader_of_files_is_tried(kinds: tuple[Path, dict[str, subject.Kind]]) -> None:
+    """Readers are found by what they call; those that no kind reaches are listed with a reason."""
+    folder, found = kinds
+    reached = set[tuple[str, str]]()
+
+    def seen(frame: object, event: str, _: object) -> None:
+        if event == "call":
+            code = frame.f_code  # type: ignore[attr-defined]
+            reached.add((code.co_filename.removeprefix(f"{ROOT}{os.sep}"), code.co_name))
+
+    for kind in found.values():
+        for seed in (*kind.seeds[:2], kind.seeds[-1]):
+            (folder / kind.file).write_bytes(seed)
+            sys.setprofile(seen)
+            try:
+                read(kind, folder / kind.file)
+            finally:
+                sys.setprofile(None)
+        subject._prepare(folder)
+    missing = [":".join(place) for place in sorted(_readers() - reached)]
+    missing = [place for place in missing if not place.startswith(tuple(NOT_OF_USERS))]
+    assert not missing, f"no kind of file reaches {missing}: add a kind, or say why there is none"

@@ -26,6 +26,7 @@ from flexmb.scene.loaded import called
 from flexmb.scene.problems import Defect, Doubt, SceneError, SceneWarning, in_short
 from flexmb.scene.schema import Scene
 
+_LARGEST_BITS = 1000  # of integers that are finite as floats
 EVERYWHERE = (finite_numbers, unit_vectors, unit_quaternions)
 STRUCTURE = (unique_names, references, tree)
 PHYSICS = (
@@ -74,7 +75,9 @@ def check_run(scene: Scene, t_end: float, t_start: float = 0.0) -> None:
 
 
 def _run_time(t_end: float | None, t_start: float) -> Iterator[Defect]:
-    if t_end is not None and not (isfinite(t_end) and t_end > t_start):
+    if isinstance(t_end, int) and t_end.bit_length() > _LARGEST_BITS:
+        yield Defect("t_end", f"the run ends at a number of {t_end.bit_length()} bits", "give a positive, finite time")
+    elif t_end is not None and not (isfinite(t_end) and t_end > t_start):
         remedy = f"give a finite time after its start at {t_start:g} s" if t_start else "give a positive, finite time"
         yield Defect("t_end", f"the run ends at {t_end} s", remedy)
 

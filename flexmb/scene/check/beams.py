@@ -13,7 +13,7 @@ from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 from flexmb.scene.sections import twists_with_inertia
-from flexmb.scene.sizes import MOST_BYTES, PER_MODE, PLENTY, beam_estimate
+from flexmb.scene.sizes import MOST_BYTES, PER_MODE, PLENTY, beam_estimate, counted
 from flexmb.scene.strains import families, strain_count
 
 
@@ -43,7 +43,7 @@ def _mesh(place: Place, body: BeamBody) -> Iterator[Defect]:
     if body.length_m <= 0.0:
         yield Defect(str(place.key("length_m")), f"the length is {body.length_m:g} m", "give a positive length")
     if body.elements < 1:
-        yield Defect(str(place.key("elements")), f"{body.elements} elements", "use one element at least")
+        yield Defect(str(place.key("elements")), f"{counted(body.elements)} elements", "use one element at least")
 
 
 def _size(place: Place, body: BeamBody) -> Iterator[Defect]:
@@ -51,7 +51,8 @@ def _size(place: Place, body: BeamBody) -> Iterator[Defect]:
     modes = max(0, mode_count(body))
     estimate, enough = beam_estimate(body, modes), max(PLENTY, PER_MODE * modes)
     if estimate.memory > MOST_BYTES:
-        what = f"{body.elements} elements and {modes} modes would take {estimate.words} to make the modes of one beam"
+        numbers = f"{counted(body.elements)} elements and {counted(modes)} modes"
+        what = f"{numbers} would take {estimate.words} to make the modes of one beam"
         yield Defect(str(place), what, f"give {PLENTY} or fewer, and as few modes as the motion has")
     elif body.elements > enough:
         what = f"{body.elements} elements for {modes} modes take {estimate.words}, and change no digit of the motion"
@@ -88,9 +89,9 @@ def _modes(place: Place, body: BeamBody) -> Iterator[Defect]:
         yield Defect(str(place.key("families")), f"the families are {own}", "list each wanted family once")
     if modes.count < 0 or mode_count(body) < 1:
         remedy = 'give one at least, or "static" ones, or make the level "rigid"'
-        yield Defect(str(place.key("count")), f"{modes.count} modes", remedy)
+        yield Defect(str(place.key("count")), f"{counted(modes.count)} modes", remedy)
     elif body.elements >= 1 and mode_count(body) > (available := available_modes(body)):
-        what = f"{mode_count(body)} modes, but {body.elements} elements give {available} of these families"
+        what = f"{counted(mode_count(body))} modes, but {body.elements} elements give {available} of these families"
         yield Defect(str(place.key("count")), what, "use more elements, more families, or fewer modes")
     yield from damping(place, modes, mode_count(body))
 

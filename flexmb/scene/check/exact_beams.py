@@ -12,7 +12,7 @@ from flexmb.scene.problems import Defect, Doubt, Place, closest
 from flexmb.scene.rest_curve import MOST_TURN, is_bent, is_curved, turn_at_rest
 from flexmb.scene.schema import Scene
 from flexmb.scene.sections import has_plain_sections
-from flexmb.scene.sizes import MOST_MODES
+from flexmb.scene.sizes import MOST_MODES, counted
 from flexmb.scene.strains import (
     FEWEST_POINTS,
     MORE_POINTS,
@@ -52,14 +52,15 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
         remedy = f"use {most + 1} points at least; {max(FEWEST_POINTS, most + MORE_POINTS)} are the default"
         yield Defect(str(modes.key("points")), what, remedy)
     elif points_of_piece(body) > MOST_POINTS:
-        yield Defect(str(modes.key("points")), f"{points_of_piece(body)} points", f"use {MOST_POINTS} at most")
+        yield Defect(str(modes.key("points")), f"{counted(points_of_piece(body))} points", f"use {MOST_POINTS} at most")
     for shear, key in (("shear_y", "GAy_N"), ("shear_z", "GAz_N")):
         if shear in found and any(each.stiffness is None and getattr(each, key) is None for each in body.stations):
             spot = str(place.key("stations"))
             yield Defect(spot, f"{shear} has polynomials, and a station no {key}", f"give {key} at every station")
     yield from _still(modes, body, found)
     if (count := sum(found.values()) * max(piece_count(body), 1)) > MOST_MODES:
-        what = f"{count} polynomials in all its pieces: one body with so many takes minutes and gigabytes to make"
+        numbers = f"{counted(count)} polynomials in all its pieces"
+        what = f"{numbers}: one body with so many takes minutes and gigabytes to make"
         remedy = f"give {MOST_MODES} at most; several bodies that are welded together cost O(N)"
         yield Defect(str(modes.key("pieces")), what, remedy)
     yield from damping(modes, body.modes, count)
@@ -85,9 +86,9 @@ def _numbers(place: Place, body: BeamBody) -> Iterator[Defect]:
     for key, count in counts.items():
         if not 0 <= count <= MOST_POLYNOMIALS:
             remedy = f"give 0 to {MOST_POLYNOMIALS}, and more pieces where these are not enough"
-            yield Defect(str(place.key(key)), f"{count} polynomials", remedy)
+            yield Defect(str(place.key(key)), f"{counted(count)} polynomials", remedy)
     if not 1 <= modes.pieces <= MOST_PIECES:
-        yield Defect(str(place.key("pieces")), f"{modes.pieces} pieces", f"give 1 to {MOST_PIECES}")
+        yield Defect(str(place.key("pieces")), f"{counted(modes.pieces)} pieces", f"give 1 to {MOST_PIECES}")
     places = {node.name: node.x_m for node in body.nodes}
     for i, name in enumerate(modes.cuts):
         spot = str(place.key("cuts", i))

@@ -57,7 +57,7 @@ def test_turns_without_a_check_of_the_scene():
     )
     for curvature in (2e4, 9e15, np.inf, np.nan):
         turning = tuple(msgspec.structs.replace(each, curvature_1_m=(curvature, 0.0, 0.0)) for each in coiled.stations)
-        with pytest.raises(ValueError, match=r'"coil" turns by .* rad at rest, and the limit is 10000 rad: correct'):
+        with pytest.raises(ValueError, match=r'"coil" turns at rest by .* rad, but 10000 rad are allowed: correct'):
             rest_sections(msgspec.structs.replace(coiled, stations=turning), np.ones(1))
 
 

@@ -27,7 +27,7 @@ def test_a_matrix_that_does_not_fit_is_refused_with_its_size(asked: str, monkeyp
     system = fm.compile(scene)
     call, remedy = REFUSED[asked]
     monkeypatch.setattr(sizes, "MOST_BYTES", 8 * 2**2 - 1)
-    with pytest.raises(ValueError, match=f"matrix of 2 x 2 numbers, which takes .* GiB are allowed: {remedy}"):
+    with pytest.raises(ValueError, match=f"matrix of 2 x 2 numbers, which take .* GiB are allowed: {remedy}"):
         call(system, system.initial_state)
     monkeypatch.setattr(sizes, "MOST_BYTES", 8 * 2**2)
     call(system, system.initial_state)

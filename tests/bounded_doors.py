@@ -1,0 +1,244 @@
+"""Every number of a user that sets a size or the length of a loop, given absurdly: a process of limited memory.
+
+Prints a line of JSON for each door and number: what came of it, its message, and the processor time it took.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+import os
+import re
+import resource
+import signal
+import sys
+import tempfile
+import time
+import typing
+import warnings
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from typer.testing import CliRunner
+
+import flexmb as fm
+from tests.flexmb.interchange.test_superelement_files import NODES, written
+
+ABSURD: tuple[float, ...] = (10**15, 1e15, math.inf, math.nan, -1, 0, 10**400, 10**5000)
+LIMIT_S = 2.0  # of the processor, for one refusal
+CEILING = 2**30  # bytes of address space beyond what the process has when all doors are known
+NUMBER = re.compile(r"\b(int|float)\b")
+CASES = Path(__file__).resolve().parents[1] / "cases"
+
+
+class Door(NamedTuple):
+    """A call with one number; `taken` are those of the absurd numbers that make sense there."""
+
+    call: Callable[[Any], Any]
+    taken: tuple[float, ...] = ()
+
+
+class _TooLong(BaseException):
+    """Raised by the clock."""
+
+
+def beam(elements: int = 4, modes: Any = 2) -> fm.Scene:
+    """A clamped panel."""
+    plain = fm.BeamStation(x_m=0.0, EA_N=1e6, EIy_Nm2=1e3, EIz_Nm2=1e3, GJ_Nm2=1e3, mass_per_length_kg_m=1.0)
+    made = fm.SceneBuilder("x").rigid_body("hub", mass=1.0, inertia=(0.1, 0.1, 0.1)).free("base", "ground", "hub")
+    made.beam("panel", length=1.0, elements=elements, section=plain, modes=modes)
+    return made.weld("root", "hub", "panel").scene()
+
+
+def functions() -> dict[str, Door]:
+    """By the function and its argument; t_end = 1e15 is bounded by max_steps."""
+    builder = fm.SceneBuilder("pendulum", gravity=(0.0, -9.81, 0.0))
+    builder.rigid_body("rod", mass=1.0, com=(0.5, 0.0, 0.0), inertia=(0.01, 0.1, 0.1)).marker("tip", "rod")
+    scene = builder.revolute("pivot", "ground", "rod", axis=(0, 0, 1), angle=0.3).scene()
+    system, one = fm.compile(scene), np.zeros((1, 1))
+    batch, run = fm.compile_batch([scene]), fm.simulate(scene, 0.1, samples=3)
+    runs = fm.simulate_batch(system, 0.1, samples=3)
+    by, of, given, huge = ["rod.mass_kg"], ["energy.total"], {"rod.mass_kg": 0.1}, (10**15, 1e15)
+
+    def stage(n: Any, samples: Any = 3) -> Any:
+        return fm.simulate_stages(scene, [fm.RunStage(n, samples=samples)], max_steps=20)
+
+    def many(n: int) -> Any:
+        return fm.simulate(scene, 0.1, samples=3, max_steps=n)
+
+    return {
+        "simulate.t_end": Door(lambda n: fm.simulate(scene, n, samples=3, max_steps=20), huge),
+        "simulate.t_start": Door(lambda n: fm.simulate(scene, 0.1, samples=3, t_start=n), (-1, 0)),
+        "simulate.samples": Door(lambda n: fm.simulate(scene, 0.1, samples=n)),
+        "simulate.stabilise": Door(lambda n: fm.simulate(scene, 0.1, samples=3, stabilise=n), (0,)),
+        "simulate.max_steps": Door(many, (10**15,)),
+        "simulate.step": Door(lambda n: fm.simulate(scene, 0.1, "rk4", samples=3, step=n), huge),
+        "simulate.rtol": Door(lambda n: fm.simulate(scene, 0.1, samples=3, rtol=n)),
+        "simulate_stages.t_start": Door(
+            lambda n: fm.simulate_stages(scene, [fm.RunStage(0.1, samples=3)], t_start=n, max_steps=20), (*huge, -1, 0)
+        ),
+        "simulate_stages.stabilise": Door(
+            lambda n: fm.simulate_stages(scene, [fm.RunStage(0.1, samples=3)], stabilise=n), (0,)
+        ),
+        "RunStage.duration_s": Door(stage, huge),
+        "RunStage.samples": Door(lambda n: stage(0.1, n)),
+        "simulate_batch.t_end": Door(lambda n: fm.simulate_batch(system, n, samples=3, max_steps=20), huge),
+        "simulate_batch.samples": Door(lambda n: fm.simulate_batch(system, 0.1, samples=n)),
+        "simulate_batch.threads": Door(lambda n: fm.simulate_batch(system, 0.1, samples=3, threads=n), (10**15,)),
+        "Batch.accelerations.threads": Door(lambda n: batch.accelerations(one, one, threads=n), (10**15,)),
+        "System.accelerations_batch.threads": Door(
+            lambda n: system.accelerations_batch(one, one, threads=n), (10**15,)
+        ),
+        "Batch.system.copy": Door(batch.system, (10**15, 0)),
+        "BatchTrajectory.message.copy": Door(runs.message, (-1, 0)),
+        "Trajectory.state_at.sample": Door(run.state_at, (-1, 0)),
+        "Trajectory.values_at.sample": Door(run.values_at, (-1, 0)),
+        "sensitivities.t_end": Door(lambda n: fm.sensitivities(scene, n, by, of, samples=3), huge),
+        "sensitivities.samples": Door(lambda n: fm.sensitivities(scene, 0.1, by, of, samples=n)),
+        "uncertainty.t_end": Door(lambda n: fm.uncertainty(scene, n, given, of, samples=3), huge),
+        "uncertainty.samples": Door(lambda n: fm.uncertainty(scene, 0.1, given, of, samples=n)),
+        "gradient.t_end": Door(lambda n: fm.gradient(scene, n, by, fm.FinalValue("energy.total")), huge),
+        "TimeIntegral.panels": Door(
+            lambda n: fm.gradient(scene, 0.1, by, fm.TimeIntegral("energy.total", panels=n))
+        ),
+        "fit.max_runs": Door(lambda n: fm.fit(scene, {"t": [0.0, 0.1], "tip.position.x": [0.5, 0.4]}, by, max_runs=n),
+                             (10**15,)),
+        "advise.tolerance": Door(lambda n: fm.advise(scene, n, t_end=0.1)),
+        "advise.t_end": Door(lambda n: fm.advise(scene, 1e-2, t_end=n), huge),
+        "steady_spin.rate": Door(lambda n: fm.steady_spin(scene, "pivot", n), (*huge, -1, 0)),
+        "campbell.rates": Door(lambda n: fm.campbell(scene, "pivot", [n]), (*huge, -1, 0)),
+        "check_scene.t_end": Door(lambda n: fm.check_scene(scene, t_end=n), huge),
+        "SceneBuilder.scene.t_end": Door(lambda n: builder.scene(t_end=n), huge),
+        "SceneBuilder.beam.elements": Door(lambda n: beam(elements=n)),
+        "SceneBuilder.beam.modes": Door(lambda n: beam(modes=n), (0,)),
+        "Modes.pieces": Door(lambda n: beam(modes=fm.Modes(count=2, pieces=n))),
+        "Modes.points": Door(lambda n: beam(modes=fm.Modes(count=2, points=n))),
+    }  # fmt: skip
+
+
+NO_SIZE = {
+    "LinearModel.displaced": {"size", "phase"},
+    "TimeIntegral.at": {"t"},
+    "System.scene_state": {"t"},
+    "System.state": {"t"},
+    "check_scene": {"t_start"},
+    "Campbell.plot": {"modes"},  # a slice of what there is
+    "System.route": {"stabilise"},
+    "fit": {"sigma"},
+}
+"""Numbers of public functions that are a state, a time or a scale: they set no size."""
+LAYERS = (
+    "FinalValue.probes", "Misfit.probes", "TimeIntegral.probes", "System.observe", "System.check", "System.fault",
+    "System.evaluate", "Batch.constants",
+)  # fmt: skip
+"""Methods for the library's own modules, whose arguments come from it."""
+
+
+def found_numbers() -> set[str]:
+    """The numbers that public functions and methods take, "function.argument", but for those of bodies in a scene."""
+    found = set[str]()
+    for name in fm.__all__:
+        item = getattr(fm, name)
+        members = {name: item}
+        if inspect.isclass(item):
+            own = not item.__module__.startswith("flexmb.scene") or name == "SceneBuilder"
+            members = {f"{name}.{each}": value for each, value in vars(item).items() if own and each[0] != "_"}
+        for place, call in members.items():
+            if inspect.isfunction(call) and not place.startswith(LAYERS):
+                for each in inspect.signature(call).parameters.values():
+                    plain = re.sub(r"(Mapping|tuple|Sequence|dict|list)\[.*\]", "", str(each.annotation))
+                    physics = place.startswith("SceneBuilder.") and "int" not in plain and each.name != "t_end"
+                    if NUMBER.search(plain) and not physics and each.name not in NO_SIZE.get(place, ()):
+                        found.add(f"{place}.{each.name}")
+    return found
+
+
+def commands() -> dict[str, tuple[Any, str, str]]:
+    """Numeric options of both command lines, "program command option": the application, the command and its word."""
+    found: dict[str, tuple[Any, str, str]] = {}
+    for program in ("flexmb", "crosscheck"):
+        app = import_module(f"{program}.cli").app
+        for each in app.registered_commands:
+            name = each.name or each.callback.__name__
+            for argument in inspect.signature(each.callback, eval_str=True).parameters.values():
+                kind, *about = typing.get_args(argument.annotation) or (argument.annotation,)
+                if NUMBER.search(str(kind)):
+                    words = [word for part in about for word in getattr(part, "param_decls", None) or ()]
+                    word = next((word for word in words if word.startswith("--")), None)
+                    found[f"{program} {name} {argument.name}"] = (
+                        app, name, word or f"--{argument.name.replace('_', '-')}"
+                    )  # fmt: skip
+    return found
+
+
+SCENE = str(CASES / "pendulums" / "double" / "scene.toml")
+WORDS = {
+    "simulate": (SCENE, "--t-end", "0.01", "--out", "out"), "check": (SCENE,), "equivalence": ("panel.toml", "panel"),
+    "advise": (SCENE,), "linearize": (SCENE,), "campbell": (SCENE, "shoulder", "--rates", "0:1:2"),
+    "reduce": ("K.mtx", "M.mtx", "nodes.csv", "--interface", "1", "--out", "x.sid"), "stability": ("no map",),
+    "sweep": ("none.toml",), "contract": ("nobody",),
+}  # fmt: skip
+"""The other words of a command; all other commands take a case, and there is none of that name."""
+
+
+def main() -> None:
+    """Try all doors; the memory is limited once everything is imported and compiled."""
+    warnings.simplefilter("ignore")
+    os.chdir(tempfile.mkdtemp())
+    written("mtx", Path())
+    Path("nodes.csv").write_text(NODES)
+    fm.save_scene(beam(), "panel.toml")
+    doors, options = functions(), commands()
+    size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (size + CEILING, size + CEILING))
+    signal.signal(signal.SIGVTALRM, _ring)
+    print(json.dumps({"doors": sorted(doors), "found": sorted(found_numbers())}), flush=True)
+    for name, door in doors.items():
+        for n in ABSURD:
+            if not any(n is each or (type(n) is type(each) and n == each) for each in door.taken):
+                _report(name, n, _tried(lambda door=door, n=n: door.call(n)))
+    for name, (app, command, word) in options.items():
+        for n in ("1000000000000000", "inf", "nan", "-1", "9" * 5000):
+            if f"{name} {n}" in sys.argv[1:]:
+                continue
+            words = [command, *WORDS.get(command, ("no case",)), f"{word}={n}"]
+            _report(name, n, _tried(lambda app=app, words=words: _invoked(app, words)))
+
+
+def _report(name: str, n: Any, outcome: tuple[str, str, float]) -> None:
+    many = isinstance(n, int) and n.bit_length() > 1000
+    print(json.dumps([name, "many digits" if many else str(n)[:16], *outcome]), flush=True)
+
+
+def _invoked(app: Any, words: list[str]) -> str:
+    done = CliRunner().invoke(app, words)
+    if done.exit_code == 2 and isinstance(done.exception, SystemExit):
+        raise ValueError(" ".join(done.output.split()))
+    raise AssertionError(f"exit code {done.exit_code}, {done.exception!r}")
+
+
+def _tried(call: Callable[[], Any]) -> tuple[str, str, float]:
+    begun = time.process_time()
+    signal.setitimer(signal.ITIMER_VIRTUAL, 10.0 * LIMIT_S)
+    try:
+        call()
+        outcome = "taken", ""
+    except (ValueError, TypeError, IndexError) as error:
+        outcome = "refused", str(error)
+    except BaseException as error:
+        outcome = type(error).__name__, str(error)
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+    return outcome[0], outcome[1][:3000], time.process_time() - begun
+
+
+def _ring(*_: Any) -> None:
+    raise _TooLong
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,93 @@
+"""Work is bounded before it is done: an absurd number of a user is refused with its place and a number, at once."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+
+import flexmb as fm
+from flexmb.scene import sizes
+from flexmb.system import compile as compiling
+from tests.bounded_doors import LIMIT_S, commands
+from tests.repo.project import ROOT
+
+LARGE = "1000000000000000"
+TAKEN = {
+    f"flexmb simulate t_end {LARGE}", f"flexmb advise t_end {LARGE}",  # max_steps bounds the run
+    f"flexmb simulate atol {LARGE}", "flexmb simulate from_time -1", f"flexmb check t_end {LARGE}",
+    f"flexmb campbell modes {LARGE}",  # of those that there are
+    f"flexmb equivalence angle {LARGE}", "flexmb equivalence angle -1",
+}  # fmt: skip
+"""Options of the command lines that may be so large or so small."""
+
+
+@pytest.fixture(scope="module")
+def answers() -> tuple[dict[str, list[str]], list[Any]]:
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.bounded_doors", *TAKEN], capture_output=True, text=True, check=False, cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"}, timeout=500,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-2000:]
+    head, *lines = map(json.loads, done.stdout.splitlines())
+    return head, lines
+
+
+def test_every_number_of_a_public_function_is_tried(answers) -> None:
+    head, _ = answers
+    assert sorted(set(head["found"]) - set(head["doors"])) == [], "give it a door in tests/bounded_doors.py"
+
+
+def test_absurd_numbers_are_refused_by_name_at_once(answers) -> None:
+    _, lines = answers
+    bad = [
+        (name, number, outcome, message[:200], f"{spent:.1f} s")
+        for name, number, outcome, message, spent in lines
+        if not (outcome == "refused" and spent < LIMIT_S and re.search(_named(name), message) and len(message) < 2000)
+    ]
+    assert not bad, "\n".join(map(str, bad))
+    assert len(lines) > 5 * len(commands())
+
+
+def _named(place: str) -> str:
+    """What a message must contain: the last name of the place, as an argument, a key or an option."""
+    words = {
+        "duration_s": "stages|t_end", "tol": "tolerance", "from_time": "t_start|its start", "t_start": "t_start|t_end",
+        "modes": "modes?|elements|count",
+    }  # fmt: skip
+    last = re.split(r"[. ]", place)[-1]
+    return words.get(last, f"{last}|{last.replace('_', '-')}|nobody|none\\.toml|no (case|map)")
+
+
+@pytest.mark.parametrize(
+    ("call", "remedy"),
+    [
+        (lambda scene: fm.simulate(scene, 0.1, algorithm="composite", samples=2), 'take "articulated"'),
+        (lambda scene: fm.simulate(scene, 0.1, algorithm="frisch", samples=2), 'take "articulated"'),
+        (lambda scene: fm.simulate(scene, 0.1, "radau5", samples=2), '"dop853" or "rk4"'),
+        (lambda scene: fm.simulate(scene, 0.1, "exponential", samples=2), '"dop853" or "rk4"'),
+        (lambda scene: fm.simulate(scene, 0.1, "generalised_alpha", step=0.01, samples=2), '"dop853" or "rk4"'),
+        (lambda scene: fm.simulate(scene, 0.1, samples=200), "ask for fewer"),
+        (lambda scene: fm.sensitivities(scene, 0.1, ["a.mass_kg"], ["energy.total"], samples=200), "ask for fewer"),
+        (fm.linearize, "fewer bodies or modes"),
+        (fm.equilibrium, "fewer bodies or modes"),
+        (lambda scene: fm.steady_spin(scene, "i", 1.0), "fewer bodies or modes"),
+        (lambda scene: fm.campbell(scene, "i", [1.0]), "fewer bodies or modes"),
+    ],
+)
+def test_a_scene_that_is_too_large_is_refused_before_it_is_built(call, remedy: str, monkeypatch) -> None:
+    builder, names = fm.SceneBuilder("sixty"), ["a", *(f"body {i}" for i in range(2, 61))]
+    for before, name in zip(("ground", *names), names, strict=False):
+        builder.rigid_body(name, mass=1.0, com=(1, 0, 0), inertia=(0.1, 0.1, 0.1))
+        builder.revolute("i" if name == "a" else f"to {name}", before, name, axis=(0, 0, 1))
+    scene = builder.scene()
+    monkeypatch.setattr(sizes, "MOST_BYTES", 30_000)
+    monkeypatch.setattr(compiling, "System", None)
+    monkeypatch.setattr(compiling, "assembled", None)
+    with pytest.raises(ValueError, match=f"GiB are allowed: .*{remedy}"):
+        call(scene)
