@@ -31,7 +31,7 @@ from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
 from flexmb.tables.per_thread import Own, per_thread
-from flexmb.tables.state import State, finite_result
+from flexmb.tables.state import DynamicsError, State, finite_result
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 
@@ -291,7 +291,10 @@ class _Differentiation:
         return found
 
     def _at(self, scene: Scene) -> Real:
-        tables = _tables(self._plant.with_numbers(scene), self._starts)
+        try:
+            tables = _tables(self._plant.with_numbers(scene), self._starts)
+        except DynamicsError as error:  # that closures cannot be closed, or have no dynamics, at such a value
+            raise ValueError(str(error)) from None
         changed = [name for name, each in structure(tables).items() if each != self._structure.get(name)]
         if changed:
             what = _OF_TABLES.get(changed[0], f"what the tables contain depends on it: {changed[0]}")

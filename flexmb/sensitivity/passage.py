@@ -83,11 +83,9 @@ class Passage:
             start = self._start
             if loops is None:
                 return Course(y, start)
-            states = np.zeros((len(loops.continuous), start.shape[1]))
-            variation.take(Course(y, np.vstack([start[:-1], states, start[-1:]])))
+            variation.take(self._started(loops, y))  # with the initial states of controllers, which may begin elsewhere
             loops.begin(t)
-            states[:] = loops.blocks.joined(list(loops.law[:, loops.continuous]))
-            return Course(y, np.vstack([start[:-1], states, start[-1:]]))
+            return self._started(loops, y)
         at = Course(y, after.D.copy())
         if np.any(after.dt) and loops is not None and loops.is_due(t):
             raise EventError(
@@ -99,6 +97,11 @@ class Passage:
         if np.any(after.dt):
             at = Course(y, at.Y - np.outer(variation.slope(t, at).y, after.dt))
         return at
+
+    def _started(self, loops: Loops, y: Real) -> Course:
+        """The state at the start of the run with the states that controllers have."""
+        states = loops.blocks.joined(list(loops.law[:, loops.continuous]))
+        return Course(y, np.vstack([self._start[:-1], states, self._start[-1:]]))
 
     def ended(self, variation: Variation, end: Course) -> Jumped:
         """What the events at the end of a part of the run do to the derivatives there; kept as `after`."""

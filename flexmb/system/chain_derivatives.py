@@ -44,7 +44,7 @@ class ChainDerivatives(DifferentiableMotion):
         """As of a tree, by the recursion of the tree; states that are given must fulfil the closures."""
         refuse_feedback(self.scene, "system.derivative_evaluator", INSTEAD)
         self._determine_rows("system.derivative_evaluator")
-        return fresh_derivative_evaluator(self, _OF_CHAINS)
+        return fresh_derivative_evaluator(self, self.refusal, _OF_CHAINS)
 
     def _variation(self, t: float, y: Real) -> FreeVariation:
         from flexmb.closure.variation import variation  # imported here, because it imports SciPy, which is slow

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from flexmb.entry.derivative_call import derivative_call, differentiate
-from flexmb.system.evaluator import Evaluator
+from flexmb.system.evaluator import Evaluator, Refusal
 from flexmb.system.mechanics import Mechanics
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.system.derivatives import DifferentiableMotion
 
 
 class DerivativeEvaluator(Evaluator):
@@ -48,11 +45,10 @@ def _another(system: Any) -> Any:
 
 
 def fresh_derivative_evaluator(
-    system: DifferentiableMotion, route: DerivativeRoute | None = None
+    system: Mechanics, refuse: Refusal | None, route: DerivativeRoute | None = None
 ) -> DerivativeEvaluator:
-    """An evaluator with tables of its own, by default of a tree."""
+    """An evaluator with tables of its own, by default of a tree; refuse: is called before each evaluation."""
     chosen = route or OF_TREES
-    refuse = system.refuse_corners if system.has_corners else None
     return DerivativeEvaluator(system, chosen, chosen.fresh(system), refuse)
 
 

@@ -37,6 +37,7 @@ from flexmb.system.derivative_records import (
     OfGivenMotion,
     by_names,
 )
+from flexmb.system.evaluator import Refusal
 from flexmb.system.free_motion import FreeMotion
 from flexmb.system.kinks import has_corners, refuse_kinks
 from flexmb.system.load_axes import Axes, referred
@@ -77,7 +78,7 @@ class DifferentiableMotion(FreeMotion):
         NotImplementedError for scenes with controllers, and closures on bodies of level `ruthless`.
         """
         refuse_feedback(self.scene, "system.derivative_evaluator", INSTEAD)
-        return fresh_derivative_evaluator(self)
+        return fresh_derivative_evaluator(self, self.refusal)
 
     def inverse_dynamics_derivatives(self, state: State, accelerations: Real) -> InverseDynamicsDerivatives:
         """Derivatives of `inverse_dynamics` at these accelerations (nu,); of closed chains those of the tree alone."""
@@ -260,6 +261,11 @@ class DifferentiableMotion(FreeMotion):
     def has_corners(self) -> bool:
         """Whether a law of the scene has corners, at which no derivatives exist."""
         return has_corners(self.constants)
+
+    @property
+    def refusal(self) -> Refusal | None:
+        """What refuses corners; None where no law has any."""
+        return self.refuse_corners if self.has_corners else None
 
     def refuse_corners(self, t: float, y: Real) -> None:
         """NotDifferentiableError where a law has a corner at y = [q, u, work]: the one check of all derivatives."""

@@ -39,8 +39,8 @@ NOT_IN_SCENES = {
     "UserLaw.initial": "laws of users, see test_sensitivities", "UserLaw.parameters": "likewise",
     **{f"{law}.{key}": "as of a Pid" for law in ("GainTable", "Saturation", "StateSpace", "UserLaw")
        for key in ("period_s", "offset_s", "delay_s")},
-    "ModalBody.gradient_stiffness": "stiffness under loads, from other codes", "ModalBody.gravity_stiffness": "likewise",
-    "ModalNode.force_stiffness": "likewise",
+    "ModalBody.gradient_stiffness": "stiffness under loads, from other codes",
+    "ModalBody.gravity_stiffness": "likewise", "ModalNode.force_stiffness": "likewise",
 }  # fmt: skip
 PLACES = 2
 """Numbers under one key of one kind of struct that are walked in a scene: the first ones that are not zero."""
@@ -218,10 +218,11 @@ pytestmark = pytest.mark.filterwarnings("ignore::flexmb.SceneWarning")  # of wha
 
 @pytest.mark.parametrize("name", ["controllers", "connectors and events"])
 def test_some_numbers_agree_with_differences(name):
-    """Those of changes, and every fortieth."""
+    """Those of changes, of the initial state of a controller, and every fortieth."""
     scene = catalogue()[name]
     every = [path for path, _ in places(scene)]
     chosen = [path for path in every if path.startswith("events.") and "level" not in path][:3]
+    chosen += [path for path in every if ".initial." in path][:1]
     found = walked(scene, [*chosen, *every[:: max(40, len(every) // 4)]])
     assert found["compared"] >= 3
 
