@@ -21,7 +21,6 @@ import numpy as np
 from flexmb.integrate.settings import Settings
 from flexmb.parameters.numbers import numbers
 from flexmb.run.driver import Leg
-from flexmb.run.samples import refuse_large_run
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
@@ -187,7 +186,6 @@ def fit(
     found, given = numbers(scene, parameters), measurements(data)
     names = tuple(each.name for each in found)
     refuse_unknown("fit", settings)
-    refuse_large_run(scene, len(given.t), Settings("dop853"), "articulated")
     problem = _Problem(scene, names, np.array([each.scale for each in found]), given, settings)
     start = np.array([each.value for each in found]) / problem.scales
     limits = _limits(bounds or {}, names, start, problem.scales)
