@@ -235,12 +235,14 @@ def test_accepted_figures_are_read_as_strictly(accepted: dict, said: str) -> Non
         (case_module.ComparisonSide, "``comparison``:"),
         (case_module.Control, "``control``:"),
         (case_module.Conservation, "``conservation``:"),
+        (case_module.OpenChannels, "``open``:"),
         (case_module.Chart, "``chart``:"),
     ],
 )
 def test_the_reference_of_the_run_file_has_every_key(kind: type, heading: str) -> None:
     reference = case_module.__doc__.split("All keys,")[1].split("``library/check``")[0]
     (item,) = [part for part in reference.split("\n- ") if part.startswith(heading)]
-    tables = {"variant", "comparison", "control", "conservation", "chart", "reference"} if kind is RunFile else set()
+    tables = {"variant", "comparison", "control", "conservation", "open", "chart", "reference"}
+    tables = tables if kind is RunFile else set()
     keys = {each.encode_name for each in msgspec.structs.fields(kind)} - tables
     assert {key for key in keys if f"``{key}``" not in item} == set()
