@@ -236,7 +236,7 @@ class Mechanics(SceneArrays):
     def turns(self, t: float, q: Real, u: Real) -> Real:
         """Angular velocities (N,3) rad/s of the bodies' frames, in their own axes."""
         self.observation.out.rates[:] = 0.0
-        self._observe_motion(t, np.concatenate([q, u, [0.0]]))
+        self._observe_motion(arguments.number("t", t), self._fitting(np.concatenate([q, u, [0.0]])))
         return np.array(self.own_workspace.body["velocity"][:, :3])
 
     def _fitting(self, y: Real) -> Real:

@@ -146,6 +146,7 @@ def test_what_observes_for_the_library_itself_refuses_a_time_that_is_none(t):
     for observe in (
         lambda: tree.observe_recursion(t, W.y), lambda: tree.observe_rates(t, W.y, W.rates),
         lambda: tree.observe_motion(t, W.y, W.rates, W.rates, loads),
+        lambda: tree.turns(t, tree.initial_state.q, tree.initial_state.u),
         lambda: tree.observe_row(t, W.y, "articulated", row),
         lambda: chain.observe_row(t, np.append(chain.initial_state.y, 0.0), "articulated", row),
     ):  # fmt: skip

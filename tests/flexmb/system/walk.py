@@ -18,7 +18,7 @@ from tests.flexmb.system import public_calls
 # What is not called here, and why. Whatever else is public must be among the calls.
 INSIDE = {  # of the mechanics, for numbers that have been examined
     "nested_system", "precision_if_doubtful", "observe_recursion", "observe_rates", "observe_motion", "observe_row",
-    "check_status", "check_precision", "all_loads", "referred_loads", "with_numbers", "fault_name",
+    "check_status", "check_precision", "all_loads", "referred_loads", "with_numbers", "fault_name", "turns",
 }  # fmt: skip
 SYSTEMS = "System", "ClosedSystem"
 UNTRIED = {  # what users may ask all the same: docs/threads.md
