@@ -55,7 +55,9 @@ def reaches_laws(system: System, number: Number) -> bool:
     """Whether the numbers of controllers, or of what they drive, differ with a number of the system's scene."""
     return any(
         _concerns_laws(number, system.scene, are_driven)
-        and not np.array_equal(*(_of_laws(system, each, are_driven) for each in (system.scene, number.nearby)))
+        and not np.array_equal(
+            _of_laws(system, system.scene, are_driven), _of_laws(system, number.nearby, are_driven)
+        )
         for are_driven in (False, True)
     )
 
@@ -83,7 +85,7 @@ def event_rates(scene: Scene, numbers: Sequence[Number | None], scales: Real) ->
 def reaches_event(scene: Scene, number: Number) -> bool:
     """Whether the level of an event or a restitution differs with a number."""
     other = number.nearby
-    return any(not np.array_equal(*(_of_event(of, each.name) for of in (scene, other))) for each in scene.events)
+    return any(not np.array_equal(_of_event(scene, each.name), _of_event(other, each.name)) for each in scene.events)
 
 
 def _of_event(scene: Scene, name: str) -> Real:
