@@ -47,8 +47,8 @@ def refuse_large_run(scene: Scene | System, samples: int, settings: Settings, al
 
     Of a checked scene it is estimated before anything is built or compiled.
     """
-    nu = speeds_at_least(scene) if isinstance(scene, Scene) else scene.nu
-    _refuse_samples(samples, sample_bytes(scene, nu))
+    _refuse_samples(samples, sample_bytes(scene))
+    nu = _speeds(scene)
     if matrices := settings.integrator.matrices:
         others = 'take method "dop853" or "rk4", whose cost is O(N)'
         refuse_large_matrix(2 * nu, f'method "{settings.method}"', others, matrices)
@@ -60,8 +60,13 @@ def _refuse_samples(samples: int, each: int) -> None:
     refuse_bytes(float(samples) * each, f"samples is {samples}: outputs take", _FEWER)
 
 
-def sample_bytes(scene: Scene | System, nu: int) -> int:
-    """Bound (bytes) of the memory for one output time of a run with so many speeds."""
+def _speeds(scene: Scene | System) -> int:
+    return speeds_at_least(scene) if isinstance(scene, Scene) else scene.nu
+
+
+def sample_bytes(scene: Scene | System) -> int:
+    """Bound (bytes) of the memory for one output time of a run."""
+    nu = _speeds(scene)
     scene = scene if isinstance(scene, Scene) else scene.scene
     loaded = (scene.hinges, scene.wheels, scene.constraints, scene.point_masses, scene.connectors)
     places = sum(map(len, loaded))

@@ -218,7 +218,7 @@ def test_the_memory_of_outputs_is_what_is_reckoned_with():
         taken.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert run.finished
-    assert 0.25 < (taken[1] - taken[0]) / (200 * sample_bytes(system, system.nu)) <= 1.0
+    assert 0.25 < (taken[1] - taken[0]) / (200 * sample_bytes(system)) <= 1.0
 
 
 def test_numbers_of_any_real_type_run_alike():
