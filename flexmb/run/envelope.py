@@ -132,6 +132,10 @@ class Envelope:
     def __post_init__(self) -> None:
         name_parts(self, _PARTS)
 
+    def __repr__(self) -> str:
+        """Its size, for an interactive prompt."""
+        return f"<Envelope of {len(self.channels)} channels over {self.steps} steps to t = {self.t_end:g} s>"
+
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write one row for each channel: name, unit, least and greatest value with their times, error."""
         write_csv(Path(path), CSV_HEADER, _rows(self.channels))
