@@ -15,11 +15,12 @@ import msgspec
 import numpy as np
 import pytest
 
+import crosscheck
+import flexmb
 from crosscheck.verify.columns import Columns
 from tests.fuzz import kinds as subject
 from tests.fuzz.campaign import campaign, table
 from tests.fuzz.worker import BAD, content, read
-from tests.repo.project import ROOT
 
 MUTANTS = 1000  # some forty of each kind
 BY_LINES = {"records", "map records"}  # a broken line is set aside, and a file hardly ever refused
@@ -144,6 +145,13 @@ NOT_OF_USERS = {
 """Where functions call one of these without being tried here, and why that is right."""
 
 
+PACKAGES = [Path(str(package.__file__)).parent for package in (flexmb, crosscheck)]  # as installed, side by side
+
+
+def _place(file: Path) -> str:
+    return file.as_posix().removeprefix(f"{PACKAGES[0].parent.as_posix()}/")
+
+
 def _writes(call: ast.Call) -> bool:
     words = [each.value for each in call.args if isinstance(each, ast.Constant)]
     return any(isinstance(word, str) and word in ("w", "wb", "a", "ab") for word in words)
@@ -152,12 +160,12 @@ def _writes(call: ast.Call) -> bool:
 def _readers() -> set[tuple[str, str]]:
     """Files and names of all functions of both packages that call a primitive."""
     found = set[tuple[str, str]]()
-    for file in sorted((*(ROOT / "flexmb").rglob("*.py"), *(ROOT / "crosscheck").rglob("*.py"))):
+    for file in sorted(file for package in PACKAGES for file in package.rglob("*.py")):
         for function in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(function, ast.FunctionDef):
                 calls = [node for node in ast.walk(function) if isinstance(node, ast.Call)]
                 if any(PRIMITIVES.fullmatch(ast.unparse(call.func)) and not _writes(call) for call in calls):
-                    found.add((file.relative_to(ROOT).as_posix(), function.name))
+                    found.add((_place(file), function.name))
     return found
 
 
@@ -169,7 +177,7 @@ def test_every_reader_of_files_is_tried(kinds: tuple[Path, dict[str, subject.Kin
     def seen(frame: object, event: str, _: object) -> None:
         if event == "call":
             code = frame.f_code  # type: ignore[attr-defined]
-            reached.add((code.co_filename.removeprefix(f"{ROOT}{os.sep}"), code.co_name))
+            reached.add((_place(Path(code.co_filename)), code.co_name))
 
     for kind in found.values():
         for seed in (*kind.seeds[:2], kind.seeds[-1]):
