@@ -121,6 +121,7 @@ def functions() -> dict[str, Door]:
 
 
 NO_SIZE = {
+    "EquilibriumPath.at": {"value"},
     "LinearModel.displaced": {"size", "phase"},
     "TimeIntegral.at": {"t"},
     "System.scene_state": {"t"},

@@ -89,8 +89,7 @@ def random_scene(seed: int, recipe: Recipe = FULL) -> s.Scene:
     """A checked scene of `recipe`; bodies "b0", "b1" ..., their hinges "h0" ..., markers "m0" ... at random nodes."""
     rng = np.random.default_rng(seed)
     gravity = vector(rng, 5.0) if recipe.grounded else np.zeros(3)
-    allow = ("uncut_beam",) if "exact" in recipe.levels else ()
-    scene = SceneBuilder(f"random tree {seed}", gravity=gravity, allow=allow)
+    scene = SceneBuilder(f"random tree {seed}", gravity=gravity, allow=("uncut_beam", "level_range"))
     kinds = list(rng.permutation(recipe.hinges))
     carriers = list(rng.permutation(recipe.carriers))
     nodes: list[list[str]] = []

@@ -321,8 +321,8 @@ def _result(key: Key, group: list[RunRecord], claim: str) -> Result:
     rungs = {run.rung: run for run in same}  # of two ladders of the same length the later runs count
     runs = tuple(rungs[rung] for rung in sorted(rungs))
     finest = runs[-1]
-    ending = next((run for run in runs[:-1] if run.status not in ("finished", "diverged")), None)
-    if ending is not None:  # whatever its place on the ladder: a code that fails a coarse effort is not in order
+    ending = next((run for run in reversed(runs) if run.status not in ("finished", "diverged")), None)
+    if ending is not None and ending.rung < ending.rungs - 1:  # a code that fails a coarse effort is not in order
         message = f"effort {ending.effort} {_past(ending.status)}: {ending.message}"
         return Result(variant, engine, ending.status, message, runs)
     if finest.rung < finest.rungs - 1:

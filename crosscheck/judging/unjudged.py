@@ -28,7 +28,10 @@ ROUNDING = 1e-9  # relative, and in SI units: a distance within it is none, what
 OPEN = "the case has no goal for it"
 UNSAID = f"{OPEN}, and no [[open]] with a reason"
 TOLD_BY = {"energy.total": "work"}
-"""What the drift of a conserved quantity judges besides the channel of its verdict."""
+"""What the drift of a conserved quantity judges besides the channel of its verdict, where it begins at zero.
+
+A drift is a change since the start: a work that is wrong by a constant leaves it as it is.
+"""
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ def unjudged(
         if verdict.kind != "control" and verdict.status in ACCOUNTING
         for side in verdict.sides
     }
-    told |= {(variant, engine, TOLD_BY[channel]) for variant, engine, channel in _conserved(verdicts)}
+    told |= set(_by_drift(case, verdicts))
     told |= {(each.variant, each.engine, each.channel) for each in inapplicable}
     results = [case.get(variant.name, engine) for variant in case.case.run.variants for engine in variant.engines]
     left = _Left(case)
@@ -100,11 +103,13 @@ def unjudged(
     )
 
 
-def _conserved(verdicts: Iterable[Verdict]) -> Iterator[tuple[str, str, str]]:
-    """Variant, engine and channel of each conserved quantity that accounts for another channel."""
+def _by_drift(case: CaseResults, verdicts: Iterable[Verdict]) -> Iterator[tuple[str, str, str]]:
+    """Variant, engine and channel of what the drift of a conserved quantity accounts for."""
     for each in verdicts:
         if each.kind == "conservation" and each.status in ACCOUNTING and each.channel in TOLD_BY:
-            yield each.variant_a, each.engine_a, each.channel
+            result, channel = case.get(each.variant_a, each.engine_a), TOLD_BY[each.channel]
+            if channel in result.channels and np.all(np.abs(result.values(channel)[:1]) <= ROUNDING):
+                yield result.variant, result.engine, channel
 
 
 @dataclass(frozen=True)

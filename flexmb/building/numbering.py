@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import assert_never
+
 import numpy as np
 
 from flexmb.building.links import BodyLink
@@ -16,13 +18,20 @@ from flexmb.tables.state import Layout
 def speeds_at_least(scene: s.Scene) -> int:
     """The number of speeds of a scene that has been checked, without those of SID bodies: counted before it is built,
     which takes a minute for 100,000 bodies."""
-    flexible = [body for body in scene.bodies if isinstance(body, s.BeamBody | s.ModalBody) and body.level != "rigid"]
-    modes = sum(
-        mode_count(body) if isinstance(body, s.BeamBody) else modal_arrays(body).translation_modes.shape[2]
-        for body in flexible
-    )
     items = (*scene.hinges, *scene.point_masses)
-    return sum(kind_of(item)[0].speeds for item in items) + modes + len(scene.wheels)
+    return sum(kind_of(item)[0].speeds for item in items) + sum(map(_modes, scene.bodies)) + len(scene.wheels)
+
+
+def _modes(body: s.RigidBody | s.BeamBody | s.ModalBody | s.SidBody) -> int:
+    match body:
+        case s.RigidBody() | s.SidBody():
+            return 0
+        case s.BeamBody():
+            return 0 if body.level == "rigid" else mode_count(body)
+        case s.ModalBody():
+            return 0 if body.level == "rigid" else int(modal_arrays(body).translation_modes.shape[2])
+        case _:
+            assert_never(body)
 
 
 class Numbering:

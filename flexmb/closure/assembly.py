@@ -227,13 +227,15 @@ class Decomposed(NamedTuple):
 
 class Weighed(NamedTuple):
     """The responses of all rows to changes Z z that leave the held values as they are, whose square z'z is the kinetic
-    energy plus the weighted strain energy: B'Z = U s V'. Z (nu,z); strain (z,nq+nu+1): derivative of the latter."""
+    energy plus the weighted strain energy: B'Z = U s V'. Z (nu,z); strain (z,nq+nu+1): derivative of the latter;
+    least: singular values up to these are rounding, as that of rows which only held values move."""
 
     U: Real
     s: Real
     Vt: Real
     Z: Real
     strain: Real
+    least: Real
 
     @property
     def largest(self) -> float:
@@ -247,12 +249,12 @@ class Weighed(NamedTuple):
     def relaxing(self, values: Real, change: Real) -> Real:
         """x (nu,) that closes values (G,) and reduces most the weighted strain energy of a change of [q, u, work]."""
         downhill = self.strain @ change
-        kept = self.s > DEPENDENT * self.largest
+        kept = self.s > self.least
         stopped = self.U[:, kept] @ (self.s[kept] * (self.Vt[kept] @ downhill))
         return np.asarray(self.Z @ (downhill + self._damped(values - stopped, 0.0)))
 
     def _damped(self, values: Real, floor: float) -> Real:
-        kept = self.s > (0.0 if floor > 0.0 else DEPENDENT * self.largest)
+        kept = self.s > (0.0 if floor > 0.0 else self.least)
         s = self.s[kept]
         found: Real = self.Vt[kept].T @ (s / (s * s + floor) * (self.U[:, kept].T @ values))
         return found
@@ -277,7 +279,10 @@ def decomposed(
         inertia += strain[:, each.coordinates] @ modes
     root = np.linalg.cholesky(inertia)
     Z, strain = np.linalg.solve(root, Z.T).T, np.linalg.solve(root, strain)
-    return Weighed(*np.linalg.svd(half @ Z, full_matrices=False), Z, strain)
+    U, s, Vt = np.linalg.svd(half @ Z, full_matrices=False)
+    reference = np.linalg.norm(half, 2) if half.size else 0.0  # of all changes, also of those that are held
+    least = DEPENDENT * np.maximum(np.max(s, initial=0.0), reference * np.linalg.norm(Z @ Vt.T, axis=0))
+    return Weighed(U, s, Vt, Z, strain, least)
 
 
 def _decomposed(of: GroupResponse) -> Group:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, Literal, TypeVar
 
 import msgspec
@@ -190,6 +191,8 @@ AtPlace = TypeVar("AtPlace", BeamStation, TipMass, BeamNode)
 
 def _at_end(item: AtPlace, length: float) -> AtPlace:
     """The item itself, or at the end of the beam from which only rounding separates it."""
+    if not math.isfinite(length):  # no place is near the ends of such a beam, which checks refuse
+        return item
     ends = [end for end in (0.0, length) if item.x_m != end and abs(item.x_m - end) <= ROUNDING * length]
     return structs.replace(item, x_m=ends[0]) if ends else item
 

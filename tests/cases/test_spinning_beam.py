@@ -21,6 +21,8 @@ from flexmb.scene.schema import AngularCoordinate, Ramp, Scene, StrainPolynomial
 from flexmb.surrogate import finite_segments, substructured
 from flexmb.system.compile import compile
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*leaves out that this pulls it straight")  # fast turns are meant
+
 FAMILY = Path(__file__).parents[2] / "cases" / "spinning_beam"
 SPIN_UP_S = 15.0
 PAST_MINIMUM_S = 8.0

@@ -37,6 +37,7 @@ from crosscheck.running.scheduler import Event
 from crosscheck.terminal.listings import cases_table, engines_table
 from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.verdicts import print_outcome
+from flexmb.output.csv_cells import as_text, from_text
 from flexmb.output.printable import chart_text, printable
 from tests.crosscheck.sessions import CASE, PROVIDER
 
@@ -253,5 +254,6 @@ def test_csv_headers_come_back(tmp_path: Path) -> None:
     run.to_csv(tmp_path / "t.csv")
     with (tmp_path / "t.csv").open(newline="", encoding="utf-8") as stream:
         header, *rows = csv.reader(stream)
-    assert header == [f"{name} [{unit}]" for name, unit, _ in run.columns()]
+    assert header == [as_text(f"{name} [{unit}]") for name, unit, _ in run.columns()]
+    assert [from_text(name) for name in header] == [f"{name} [{unit}]" for name, unit, _ in run.columns()]
     assert [len(row) for row in rows] == [len(header)] * 2

@@ -141,9 +141,13 @@ def test_the_library_bites(tmp_path: Path) -> None:
 
 @pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_where_closures_say_it_begins_the_scene_s_value_is_no_fault() -> None:
-    """The prescribed crank moves the slider; that of the rod's hinge is found beside the rod's modes, and counts."""
+    """The prescribed crank moves the slider and, since hinges close a loop before modes, the rod; a free one counts."""
     (case,) = resolve(("slider_crank_simeon",))
     found = litter(subject(case, "native"))
     alike = {each.target for each in found.passed_over if "the closures say" in each.reason}
-    assert alike == {"guide"}
-    assert "initial_rate of pin" in found.mutants
+    assert alike == {"guide", "pin"}
+    assert not any(name.startswith("initial_") for name in found.mutants)
+    (case,) = resolve(("closed_chains/four_bar",))
+    found = litter(subject(case, "native"))
+    assert not [each for each in found.passed_over if "the closures say" in each.reason]
+    assert {"initial_rate of drive", "initial_rate of pin", "initial_place of pin"} <= set(found.mutants)

@@ -63,7 +63,12 @@ class Single:
         return model
 
 
-@pytest.mark.parametrize("clause", POINTWISE_CLAUSES + RUNS)
+LONG = "a-thrown-body-flies"  # more than a minute, of small steps in Python
+
+
+@pytest.mark.parametrize(
+    "clause", [pytest.param(each, marks=[pytest.mark.slow] * (each == LONG)) for each in POINTWISE_CLAUSES + RUNS]
+)
 def test_a_correct_engine_in_single_precision_keeps_the_clause_if_it_says_so(clause: str) -> None:
     found = try_clause(Single(SmallEngine(), "single"), CLAUSES[clause])
     assert (found.status, found.precision) == ("holds", "single"), found

@@ -139,13 +139,31 @@ def test_within_a_variant_the_refined_run_does_not_matter() -> None:
 
 
 @pytest.mark.parametrize("rung", range(NEEDED - 1))
-@pytest.mark.parametrize("status", ["failed", "crashed", "did not finish", "refused", None])
-def test_a_lower_effort_without_result_leaves_the_uncertainty_unknown(rung: int, status: str | None) -> None:
+@pytest.mark.parametrize("status", ["failed", "crashed", "did not finish", "refused"])
+def test_an_engine_that_fails_a_lower_effort_has_failed(rung: int, status: str) -> None:
     one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})
-    gone = [] if status is None else [ended(one[rung], status, "no memory left")]
-    verdict = single(judged(ONE_PAIR, [*one[:rung], *gone, *one[rung + 1 :], *two]))
-    assert verdict.status == "unresolved"
-    assert ("is not recorded" if status is None else "no memory left") in verdict.reason
+    one[rung] = ended(one[rung], status, "no memory left")
+    verdict = single(judged(ONE_PAIR, [*one, *two]))
+    assert (verdict.status, verdict.ok) == (status, False)
+    assert f"effort {one[rung].effort} " in verdict.reason and "no memory left" in verdict.reason
+
+
+@pytest.mark.parametrize("last", range(NEEDED))
+def test_of_several_efforts_that_fail_the_finest_is_named(last: int) -> None:
+    one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})
+    for rung in range(last):
+        one[rung] = ended(one[rung], "crashed", f"of effort {rung}")
+    one[last] = ended(one[last], "failed", "the finest of them")
+    verdict = single(judged(ONE_PAIR, [*one, *two]))
+    assert (verdict.status, verdict.ok) == ("failed", False)
+    assert "the finest of them" in verdict.reason and "of effort" not in verdict.reason
+
+
+@pytest.mark.parametrize("rung", range(NEEDED - 1))
+def test_a_lower_effort_that_is_not_recorded_leaves_the_uncertainty_unknown(rung: int) -> None:
+    one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})
+    verdict = single(judged(ONE_PAIR, [*one[:rung], *one[rung + 1 :], *two]))
+    assert (verdict.status, "is not recorded" in verdict.reason) == ("unresolved", True)
 
 
 def test_a_lower_effort_without_the_channel_leaves_the_uncertainty_unknown() -> None:

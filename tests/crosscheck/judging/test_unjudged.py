@@ -102,6 +102,9 @@ def test_the_drift_of_the_energy_accounts_for_the_work_that_is_taken_off_it() ->
     runs = [*ladder("one", {TIP: way()} | energies), *ladder("two", {TIP: way()} | energies)]
     left = [each.channel for each in judged(text, runs, whole=True).unjudged]
     assert left == ["work", "work"] and judged(text + conserved, runs, whole=True).unjudged == ()
+    off = energies | {"work": np.ones((len(TIMES), 1))}  # no drift shows it
+    outcome = judged(text + conserved, [*runs[:3], *ladder("two", {TIP: way()} | off)], whole=True, strict=True)
+    assert [(each.engine, each.channel) for each in outcome.unaccounted] == [("two", "work")] and not outcome.ok
 
 
 def test_what_engines_of_the_case_offer_is_no_error_where_some_were_asked_for_alone(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from tests.flexmb.closure import mechanisms as m
 def test_the_inertia_at_the_closures_is_that_of_the_mass_matrix(scene):
     system, tree = flexmb.compile(scene), flexmb.System(scene)
     state = system.initial_state
+    assert np.max(np.abs(state.u)) < 100.0  # rounding of rows that only held modes move must not drive hinges
     found = system.closure_operators(state)
     free = system.constants.speed["prescribed"] < 0
     M, J = system.mass_matrix(state)[np.ix_(free, free)], found.J[:, free]

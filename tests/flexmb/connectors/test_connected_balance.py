@@ -12,6 +12,8 @@ from tests.bounds import observed_order
 from tests.flexmb import spectral
 from tests.flexmb.connectors.connected_scenes import everything, free_flying, started
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*leaves out that this pulls it straight")  # fast turns are meant
+
 END = 0.3  # s: some periods of the springs; modes and stop are faster
 EXACT = {"method": "dop853", "rtol": 1e-12, "atol": 1e-13, "samples": 21}
 BALANCED = 1e-10  # of the energies that change: the error of the integration at these tolerances

@@ -22,6 +22,8 @@ from flexmb.tables.status import OK
 from tests.bounds import observed_order
 from tests.flexmb.control.scenes import DAMPING, STIFFNESS, pendulum, rotor, tossed
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*leaves out that this pulls it straight")  # fast turns are meant
+
 ADAPTIVE = ("radau5", "exponential")
 TORQUE = fm.ControlSignal(source="law")
 PID = fm.Pid(name="law", inputs=("angle",), kp=4.0, ki=3.0, kd=1.0, filter_s=1e-3, setpoint=0.2)

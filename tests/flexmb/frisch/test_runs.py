@@ -9,6 +9,8 @@ import flexmb
 from tests.flexmb.frisch.scenes import at_level, random_scene
 from tests.repo.project import ROOT
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*leaves out that this pulls it straight")  # fast turns are meant
+
 CASES = {
     "three-wheel gyrostat with a flexible appendage": "wheel_gyrostat/flexible_appendage",
     "deploying boom": "deploying_boom/flexible",

@@ -19,6 +19,8 @@ from flexmb.scene.bodies import Modes
 from tests.bounds import algebra, backward_error, relative
 from tests.flexmb.interchange.made_bodies import at_level, beam, free_beam, swinging
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*leaves out that this pulls it straight")  # fast turns are meant
+
 ROUTES = algebra(speeds=8, depth=2, points=500)
 BODIES = {"clamped": (beam(), "root"), "free-free": (free_beam(), "middle")}
 

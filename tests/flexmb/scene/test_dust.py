@@ -147,3 +147,5 @@ def test_a_place_that_rounding_put_beside_an_end_of_a_beam_is_that_end():
     assert [each.x_m for each in (*made.stations, *made.nodes)] == [0.0, 0.3, 0.3] and 3 * 0.1 > 0.3
     data["nodes"] = [{"name": "end", "x_m": 0.3 + 1e-12}]
     assert to_struct(data, BeamBody).nodes[0].x_m == 0.3 + 1e-12
+    data["length_m"] = float("inf")  # is refused by checks, and no place is near its ends
+    assert to_struct(data, BeamBody).nodes[0].x_m == 0.3 + 1e-12

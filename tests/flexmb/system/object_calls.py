@@ -115,7 +115,7 @@ def _of_linear_models(w: World) -> Calls:
     pushed = {"scene": guided(), "number": "loads.push.function.value", "values": np.array([0.0, 1.0])}
     found.add("equilibrium_path", fm.equilibrium_path, pushed, lambda it: (it.values, it.states), number=names,
               scene=chosen(None, "scene.toml", 1, fm.System, tree), values=series)  # fmt: skip
-    found.add("EquilibriumPath.at", fm.equilibrium_path(**pushed).at, {"value": 1.0}, value=wrong_only_number)
+    found.add("EquilibriumPath.at", fm.equilibrium_path(**pushed).at, {"value": 1}, value=wrong_only_number)
     found.add("steady_spin", fm.steady_spin, {"system": tree, "hinge": "rotor", "rate": 0.5, "guess": state},
               lambda it: it.state, system=systems, hinge=names, rate=numbers, guess=but_none(states))  # fmt: skip
     found.add("campbell", fm.campbell, {"system": tree, "hinge": "rotor", "rates": np.array([0.5, 1.0])},

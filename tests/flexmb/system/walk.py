@@ -19,6 +19,7 @@ from tests.flexmb.system import public_calls
 INSIDE = {  # of the mechanics, for numbers that have been examined
     "nested_system", "precision_if_doubtful", "observe_recursion", "observe_rates", "observe_motion", "observe_row",
     "check_status", "check_precision", "all_loads", "referred_loads", "with_numbers", "fault_name", "turns",
+    "refuse_corners",
 }  # fmt: skip
 SYSTEMS = "System", "ClosedSystem"
 UNTRIED = {  # what users may ask all the same: docs/threads.md
