@@ -322,9 +322,11 @@ def _result(key: Key, group: list[RunRecord], claim: str) -> Result:
     runs = tuple(rungs[rung] for rung in sorted(rungs))
     finest = runs[-1]
     ending = next((run for run in reversed(runs) if run.status not in ("finished", "diverged")), None)
-    if ending is not None and ending.rung < ending.rungs - 1:  # a code that fails a coarse effort is not in order
+    refuses_some = {run.status == "refused" for run in runs} == {True, False}  # a scene is refused as a whole
+    if ending is not None and (refuses_some or ending.rung < ending.rungs - 1):  # whoever fails any effort has failed
         message = f"effort {ending.effort} {_past(ending.status)}: {ending.message}"
-        return Result(variant, engine, ending.status, message, runs)
+        status = "failed" if ending.status == "refused" and refuses_some else ending.status
+        return Result(variant, engine, status, message, runs)
     if finest.rung < finest.rungs - 1:
         message = "the finest effort is not recorded: the session was cut short"
         return Result(variant, engine, "did not run", message, runs)

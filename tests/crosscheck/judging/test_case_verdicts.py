@@ -144,8 +144,17 @@ def test_an_engine_that_fails_a_lower_effort_has_failed(rung: int, status: str) 
     one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})
     one[rung] = ended(one[rung], status, "no memory left")
     verdict = single(judged(ONE_PAIR, [*one, *two]))
-    assert (verdict.status, verdict.ok) == (status, False)
+    assert (verdict.status, verdict.ok) == ("failed" if status == "refused" else status, False)
     assert f"effort {one[rung].effort} " in verdict.reason and "no memory left" in verdict.reason
+
+
+@pytest.mark.parametrize("some", [True, False])
+def test_a_scene_is_refused_as_a_whole(some: bool) -> None:
+    """Whoever refuses the finest effort alone has failed: else all efforts but one could be passed over."""
+    one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})
+    one = [ended(run, "refused", "no such hinge") if not some or run is one[-1] else run for run in one]
+    verdict = single(judged(ONE_PAIR, [*one, *two]))
+    assert (verdict.status, verdict.ok) == ("failed" if some else "refused", False)
 
 
 @pytest.mark.parametrize("last", range(NEEDED))
