@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from typer.main import get_command
 from typer.testing import CliRunner
 
+import crosscheck
 import flexmb.cli
 from crosscheck import cli
 from crosscheck.engines.registry import BUILT_IN, OWN_CODE
@@ -130,13 +131,16 @@ def test_an_engine_that_is_asked_for_and_not_installed_is_refused(
     assert f"pip install {engine}" in found.output and len(found.output.strip().splitlines()) == 1
 
 
+INSTALLED = Path(str(crosscheck.__file__)).parents[1]
+
+
 def test_remedies_name_what_pip_finds() -> None:
     """The distributions of the extras, and no extra of this project, which is in no index."""
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     known = {re.split(r"[^\w-]", each)[0] for name in ("peers", "more-peers") for each in extras[name]}
     said = set()
     for name, place in BUILT_IN.items():
-        folder = ROOT.joinpath(*place.partition(":")[0].split("."))
+        folder = INSTALLED.joinpath(*place.partition(":")[0].split("."))
         text = "".join(file.read_text(encoding="utf-8") for file in folder.glob("*.py")) if folder.is_dir() else ""
         found = re.findall(r"pip install ([\w-]+)", text) + re.findall(r'needed\("\w+", "([\w-]+)"\)', text)
         assert name in OWN_CODE or len(found) == 1, (name, found)
