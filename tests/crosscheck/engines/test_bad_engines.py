@@ -35,7 +35,7 @@ DEADLY = ("leaves_at_import", "falls_at_import", "interrupts_at_import")  # of t
 MILD = (*ANSWERS, *TIDY, *(name for name in MODULES if name not in DEADLY))
 HARD = (*CRASHES, *DEADLY, *UNTIDY)
 LATE = (*ENDLESS, *HANGING_MODULES)
-LIMIT_S = 3.0  # for those that wait; who eats is to be stopped by what it holds, however slow the machine
+LIMIT_S = 8.0  # for those that wait; who eats is to be stopped by what it holds, however slow the machine
 LIMIT_BYTES = 700e6
 
 
