@@ -8,7 +8,7 @@ those of a bar rather than infinite.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal
+from typing import Literal, assert_never
 
 import numpy as np
 
@@ -54,8 +54,10 @@ def strains(body: BeamBody) -> tuple[Strain, ...]:
             return ()
         case "exact":
             return tuple(polynomials(body))
-        case _:
+        case "ruthless" | "linear" | "full" | "stiffened":
             return _of_families(body, families(body))
+        case _:
+            assert_never(body.level)
 
 
 def polynomials(body: BeamBody) -> dict[Strain, int]:
