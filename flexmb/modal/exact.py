@@ -21,6 +21,7 @@ from flexmb.modal.section import section_table
 from flexmb.modal.stations import Lump, lumps, section_masses
 from flexmb.modal.strain_field import Hung, StrainField, gauss_weights, hung, strain_field, strain_stiffness
 from flexmb.scene.bodies import IDENTITY, BeamBody, Quaternion
+from flexmb.scene.collocation import gauss_rule
 from flexmb.scene.pieces import edges as piece_edges
 from flexmb.scene.pieces import piece_count
 from flexmb.scene.quaternions import rotation_matrix
@@ -161,7 +162,7 @@ def _stiffness(body: BeamBody) -> Real:
     table = section_table(body)
     edges = np.unique(np.concatenate([piece_edges(body), table.x]))
     edges = edges[edges <= body.length_m]
-    xi, w = np.polynomial.legendre.leggauss(max(polynomials(body).values()) + 1)
+    xi, w = gauss_rule(max(polynomials(body).values()) + 1)
     half = np.diff(edges) / 2.0
     x = (edges[:-1, None] + half[:, None] * (1.0 + xi)).ravel()
     return strain_stiffness(body, table.at(table.stiffness, x), x, (half[:, None] * w).ravel())

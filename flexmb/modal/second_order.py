@@ -20,6 +20,7 @@ import numpy as np
 
 from flexmb.modal.beam import BeamElements
 from flexmb.modal.flexible_model import SecondOrder
+from flexmb.scene.collocation import gauss_rule
 from flexmb.typing import Real
 
 GAUSS_POINTS = 6
@@ -48,7 +49,7 @@ def _axis(elements: BeamElements, columns: Real, x: Real) -> SecondOrder:
     int_0^x theta_2 = x int theta_2' - int x theta_2' by parts, which needs no nested integral.
     """
     breaks = np.union1d(elements.mesh.nodes, x)
-    s, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    s, w = gauss_rule(GAUSS_POINTS)
     half = np.diff(breaks) / 2.0
     at = (breaks[:-1] + half)[:, None] + half[:, None] * s
     pieces = np.array([_integrals(elements, columns, *piece) for piece in zip(at, half[:, None] * w, strict=True)])

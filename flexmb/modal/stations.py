@@ -15,6 +15,7 @@ import numpy as np
 from flexmb.modal.interpolation import ElementMesh
 from flexmb.modal.section import SectionTable
 from flexmb.scene.bodies import BeamBody
+from flexmb.scene.collocation import gauss_rule
 from flexmb.scene.sections import inertia_matrices, mass_centres
 from flexmb.typing import Real
 
@@ -64,7 +65,7 @@ def quadrature(mesh: ElementMesh, table: SectionTable, cuts: Sequence[float] | R
     others = np.concatenate([table.x, cuts])
     inside = others[(others > mesh.nodes[0]) & (others < mesh.nodes[-1])]
     breaks = np.unique(np.concatenate([mesh.nodes, inside]))
-    s, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    s, w = gauss_rule(GAUSS_POINTS)
     half = np.diff(breaks) / 2.0
     middle = breaks[:-1] + half
     return (middle[:, None] + half[:, None] * s).ravel(), (half[:, None] * w).ravel()

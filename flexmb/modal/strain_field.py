@@ -20,7 +20,7 @@ import numpy as np
 
 from flexmb.modal.section import section_table
 from flexmb.scene.bodies import BeamBody
-from flexmb.scene.collocation import partial_integrals
+from flexmb.scene.collocation import gauss_rule, partial_integrals
 from flexmb.scene.pieces import edges
 from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.strains import STRAINS, points_of_piece, polynomials
@@ -177,12 +177,12 @@ def _moments(body: BeamBody, left: Real, h: Real, shapes: _Polynomials) -> Real:
     """WHOLE, LINEAR and SQUARE (3,n,3,m) of the intervals from `left` (n,) of length h (n,), which lie in the piece
     that begins at or before it, by Gauss points enough for all digits."""
     degree = max(polynomials(body).values())
-    xi, w = np.polynomial.legendre.leggauss(degree + 12)
+    xi, w = gauss_rule(degree + 12)
     factors = 0.5 * w * np.array([1.0, 6.0, 30.0])[:, None] * np.polynomial.legendre.legvander(xi, 2).T
+    points = left + 0.5 * h * (1.0 + xi[:, None])
+    rotations = rest_sections(body, points.ravel())[1].reshape(*points.shape, 3, 3)
     found = np.zeros((3, *shapes.at(left)[:, 3:].shape))
-    for at, factor in zip(xi, factors.T, strict=True):
-        x = left + 0.5 * h * (1.0 + at)
-        _, rotation = rest_sections(body, x)
+    for x, rotation, factor in zip(points, rotations, factors.T, strict=True):
         found += factor[:, None, None, None] * (h[:, None, None] * (rotation @ shapes.at(x, within=left)[:, 3:]))
     return found
 
@@ -204,7 +204,7 @@ def _grid(body: BeamBody) -> tuple[list[tuple[float, float, int]], Real, Real]:
         count = whole if share > 1.0 - 1e-9 else min(whole, max(3, int(np.ceil(whole * share)) + 1))
         intervals.append((float(left), float(right), count))
     gauss = np.concatenate(
-        [left + (right - left) / 2.0 * (1.0 + np.polynomial.legendre.leggauss(n)[0]) for left, right, n in intervals]
+        [left + (right - left) / 2.0 * (1.0 + gauss_rule(n)[0]) for left, right, n in intervals]
     )
     return intervals, gauss, breaks
 
@@ -238,7 +238,7 @@ def _weights(x: Real, grid: list[tuple[float, float, int]], gauss: Real) -> Real
 def gauss_weights(body: BeamBody) -> tuple[Real, Real]:
     """The Gauss points of the beam (q,) m, and their weights (q,) m."""
     grid, gauss, _ = _grid(body)
-    weights = [(right - left) / 2.0 * np.polynomial.legendre.leggauss(n)[1] for left, right, n in grid]
+    weights = [(right - left) / 2.0 * gauss_rule(n)[1] for left, right, n in grid]
     return gauss, np.concatenate(weights)
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.scene.bodies import BeamBody, BeamStation
-from flexmb.scene.collocation import partial_integrals
+from flexmb.scene.collocation import gauss_rule, partial_integrals
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.sizes import refuse_beyond
@@ -29,12 +29,12 @@ MOST_TURN = 10_000.0
 """Radians by which an unloaded axis may turn: each takes a third of a millisecond. Coils of 1,500 turns stay below."""
 
 
-class _Span(NamedTuple):
-    """Gauss points at `start` + length/2 (1 + xi), where quaternions change at the rates (n,4) and the axis runs along
-    the directions (n,3), from quaternion and position at the start."""
+class _Spans(NamedTuple):
+    """Spans (S,) with p Gauss points at `start` + length/2 (1 + xi). There quaternions change at the rates (S,p,4), and
+    the axis runs along the directions (S,p,3), from quaternion (S,4) and position (S,3) at the start."""
 
-    start: float
-    length: float
+    start: Real
+    length: Real
     quaternion: Real
     position: Real
     rates: Real
@@ -68,13 +68,11 @@ def rest_sections(body: BeamBody, x: Real) -> tuple[Real, Real]:
     remedy = "correct curvature_1_m, or divide the beam into several that are welded together"
     refuse_beyond(turn_at_rest(body), MOST_TURN, f'body "{body.name}" turns at rest by', remedy, "rad")
     spans = _spans(_stations(body))
-    at = np.searchsorted([span.start for span in spans], x, side="right") - 1
-    quaternion, position = np.zeros((len(x), 4)), np.zeros((len(x), 3))
-    for i, (place, s) in enumerate(zip(np.maximum(at, 0), x, strict=True)):
-        span = spans[place]
-        row = span.length / 2.0 * partial_integrals(np.array([2.0 * (s - span.start) / span.length - 1.0]), POINTS)[0]
-        quaternion[i], position[i] = span.quaternion + row @ span.rates, span.position + row @ span.directions
-    return position, rotation_matrix(quaternion)
+    at = np.maximum(np.searchsorted(spans.start, x, side="right") - 1, 0)
+    start, length, quaternion, position, rates, directions = (each[at] for each in spans)
+    rows = length[:, None] / 2.0 * partial_integrals(2.0 * (x - start) / length - 1.0, POINTS)
+    turned = quaternion + np.einsum("np,npk->nk", rows, rates)
+    return position + np.einsum("np,npk->nk", rows, directions), rotation_matrix(turned)
 
 
 def _stations(body: BeamBody) -> tuple[_Station, ...]:
@@ -87,10 +85,10 @@ def _turn(left: _Station, right: _Station) -> float:
 
 
 @lru_cache(maxsize=128)
-def _spans(stations: tuple[_Station, ...]) -> list[_Span]:
+def _spans(stations: tuple[_Station, ...]) -> _Spans:
     quaternion, position = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
     spans = []
-    xi, _ = np.polynomial.legendre.leggauss(POINTS)
+    xi, _ = gauss_rule(POINTS)
     inner, whole = partial_integrals(xi, POINTS), partial_integrals(np.ones(1), POINTS)[0]
     for (left, first), (right, last) in pairwise(stations):
         count = max(1, ceil(_turn((left, first), (right, last))))
@@ -108,9 +106,9 @@ def _spans(stations: tuple[_Station, ...]) -> list[_Span]:
             at_points = np.linalg.solve(system, np.tile(quaternion, POINTS)).reshape(POINTS, 4)
             rates = np.einsum("jab,jb->ja", rate, at_points)
             directions = rotation_matrix(at_points)[:, :, 0]
-            spans.append(_Span(start, stop - start, quaternion, position, rates, directions))
+            spans.append((start, stop - start, quaternion, position, rates, directions))
             quaternion, position = quaternion + half * whole @ rates, position + half * whole @ directions
-    return spans
+    return _Spans(*map(np.array, zip(*spans, strict=True)))
 
 
 def _ends(left: float, right: float, count: int) -> tuple[Real, Real]:
