@@ -10,6 +10,8 @@ ten times as many examples at random.
 import gc
 import os
 from collections import Counter
+from fnmatch import fnmatchcase
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -31,12 +33,27 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("filterwarnings", "error:.* holds addresses of this process:RuntimeWarning")
 
 
+TESTS = Path(__file__).parent
+LONG = [line for line in (TESTS / "slow.txt").read_text(encoding="utf-8").splitlines() if line and line[0] != "#"]
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Tests that draw are slow ones where draws are searched; before pytest itself selects by marks."""
+    """What counts as slow, before pytest itself selects by marks: the tests of slow.txt and, where draws are searched,
+    all that draw."""
+    by_file = dict[Path, list[pytest.Item]]()
     for item in items:
+        by_file.setdefault(item.path, []).append(item)
         if _searches(config) and getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
             item.add_marker(pytest.mark.slow)
+    for line in LONG:
+        file, _, name = line.partition("::")
+        found = [item for item in by_file.get(TESTS / file, ()) if fnmatchcase(item.name, name)]
+        for item in found:
+            item.add_marker(pytest.mark.slow)
+        whole = TESTS / file in by_file and not any("::" in arg for arg in config.args)
+        if not found and (whole or not (TESTS / file).exists()):
+            raise pytest.UsageError(f"tests/slow.txt: no test is {line}: correct or remove the line")
 
 
 def pytest_collection_finish() -> None:

@@ -155,7 +155,7 @@ def test_special_kernels_of_rigid_trees_on_single_axes(seed):
 @pytest.mark.parametrize(("recipe", "seed"), [("armed rigid", 0), ("full", 0), ("ruthless", 0), ("mixed", 1)])
 def test_inverse_dynamics_against_the_dense_route(recipe, seed):
     """tau = M rates + c at random rates, by displacement, speed and rate. A planted error of 1e-9 is noticed."""
-    scene = trees.random_scene(seed, replace(RECIPES[recipe], bodies=6))
+    scene = trees.random_scene(seed, replace(RECIPES[recipe], bodies=4))
     system, dense = flexmb.compile(scene), DenseSystem(scene)
     c, state, nu = system.constants, system.initial_state, system.nu
     rates = np.random.default_rng(seed).normal(size=nu)
@@ -173,7 +173,8 @@ def test_inverse_dynamics_against_the_dense_route(recipe, seed):
     def changes(q: np.ndarray, u: np.ndarray) -> list[np.ndarray]:
         return [np.imag(part) / H for part in (dense.mass_matrix(q) @ rates, dense.bias(q, u))]
 
-    for j in np.flatnonzero(c.speed["prescribed"] < 0):
+    free = np.flatnonzero(c.speed["prescribed"] < 0)
+    for j in np.random.default_rng(seed).permutation(free)[:10]:  # the dense route takes a second for each
         unit = 1j * H * np.eye(nu)[j]
         moved = changes(state.q + N @ unit, state.u + 0j), changes(state.q + 0j, state.u + unit)
         for which, parts in enumerate(moved):

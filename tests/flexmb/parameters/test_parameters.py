@@ -199,14 +199,15 @@ RECIPES = {
 NO_DERIVATIVE = (".x_m",)
 
 
+@pytest.mark.parametrize("count", [5, pytest.param(12, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("recipe", "seed"), [(name, i) for i, name in enumerate(RECIPES)])
-def test_random_numbers_of_random_scenes_against_recompiled_systems(recipe, seed):
+def test_random_numbers_of_random_scenes_against_recompiled_systems(recipe, seed, count):
     """Whatever is in a scene: extrapolated differences find the same. A planted error of 1e-5 is noticed."""
     scene = trees.random_scene(seed, replace(RECIPES[recipe], bodies=5))
     system = flexmb.compile(scene)
     state, rng = system.initial_state, np.random.default_rng(seed)
     known = {name: value for name, value in recompiled.floats(scene) if not name.endswith(NO_DERIVATIVE)}
-    names = [str(name) for name in rng.choice(list(known), 12, replace=False)]
+    names = [str(name) for name in rng.choice(list(known), count, replace=False)]
     names = [name for name in names if reaches(system, name)]
     p = system.parameters(names)
     found, udot = p.accelerations(state), system.accelerations(state)
@@ -217,7 +218,7 @@ def test_random_numbers_of_random_scenes_against_recompiled_systems(recipe, seed
         allowed = 2.0 * doubt + 1e-13 * np.max(np.abs(udot)) / size
         assert np.max(np.abs(found[:, j] - expected)) <= allowed, name
         noticed += np.max(np.abs(1e-5 * found[:, j])) > allowed
-    assert noticed >= 3
+    assert noticed >= count // 4
 
 
 def reaches(system: flexmb.System, name: str) -> bool:
