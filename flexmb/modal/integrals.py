@@ -93,15 +93,20 @@ def modal_integrals(model: FlexibleModel) -> ModalIntegrals:
         s1=np.einsum("p,pan->an", m, phi),
         J0=np.einsum("p,pca,pcb->ab", m, r_cross, r_cross),
         J1=np.einsum("p,pnca,pcb->nab", m, phi_cross, r_cross),
-        J2=np.einsum("p,pnca,pkcb->nkab", m, phi_cross, phi_cross, optimize=True),
+        J2=np.swapaxes(_summed(m[:, None, None, None] * phi_cross, phi_cross, (0, 2)), 1, 2),
         C0=np.einsum("p,pab,pbn->an", m, r_cross, phi),
-        C1=np.einsum("p,pkab,pbn->kan", m, phi_cross, phi, optimize=True),
-        M_ff=np.einsum("p,pan,pak->nk", m, phi, phi, optimize=True),
+        C1=np.tensordot(m[:, None, None, None] * phi_cross, phi, axes=((0, 3), (0, 1))),
+        M_ff=_summed(m[:, None, None] * phi, phi, (0, 1)),
         turning=_turning(model, offset),
         spatial_mass=_spatial_mass(model),
         stiffness=model.stiffness,
         damping=model.damping,
     )
+
+
+def _summed(a: Real, b: Real, axes: tuple[int, int]) -> Real:
+    """Products summed over the same axes of both; by einsum, the search for an order would take longer than the sum."""
+    return np.tensordot(a, b, axes=(axes, axes))
 
 
 def _turning(model: FlexibleModel, offset: NDArray[np.bool_]) -> TurningPoints:
@@ -118,8 +123,8 @@ def _spatial_mass(model: FlexibleModel) -> Real:
     c = cross_matrix(model.com_offset)
     U = np.concatenate([model.translation - c @ model.rotation, -cross_matrix(model.position) - c, one], axis=2)
     W = np.concatenate([model.rotation, one, np.zeros((count, 3, 3))], axis=2)
-    weighted = np.einsum("p,pai,paj->ij", model.mass, U, U, optimize=True)
-    return weighted + np.einsum("pai,pab,pbj->ij", W, model.inertia, W, optimize=True)
+    moving = _summed(model.mass[:, None, None] * U, U, (0, 1))
+    return moving + _summed(W, model.inertia @ W, (0, 1))
 
 
 def still_points(model: FlexibleModel, chosen: NDArray[np.intp]) -> TurningPoints:
