@@ -20,7 +20,7 @@ def gauss_rule(points: int) -> tuple[Real, Real]:
 @lru_cache(maxsize=256)
 def _coefficients(points: int) -> Real:
     """(points,points), read-only: Legendre's coefficients of the polynomial through values at the Gauss points."""
-    found: Real = np.linalg.inv(np.polynomial.legendre.legvander(gauss_rule(points)[0], points - 1))
+    found = np.asarray(np.linalg.inv(np.polynomial.legendre.legvander(gauss_rule(points)[0], points - 1)), float)
     found.flags.writeable = False
     return found
 
