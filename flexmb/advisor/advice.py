@@ -131,8 +131,8 @@ def advise(
     largest error, relative to its scale; `budget`: its runs may take so many times the operations that they may by
     default (about 20 s for each reference and for the search). All runs go to the end of the horizon, and cost is
     measured in counted operations, so that the advice does not depend on the machine. Raises SceneError for an invalid
-    scene, ValueError for a quantity that does not exist; if no model is adequate, `refusal` of the advice says why, and `remedies` what
-    helps.
+    scene, ValueError for a quantity that does not exist; if no model is adequate, `refusal` of the advice says why, and
+    `remedies` what helps.
     """
     refuse_feedback(scene, "advise")
     budget = arguments.number("budget", budget)
