@@ -108,6 +108,7 @@ def functions() -> dict[str, Door]:
         "fit.max_runs": Door(lambda n: fm.fit(scene, {"t": [0.0, 0.1], "tip.position.x": [0.5, 0.4]}, by, max_runs=n),
                              (10**15,)),
         "advise.tolerance": Door(lambda n: fm.advise(scene, n, t_end=0.1)),
+        "advise.budget": Door(lambda n: fm.advise(scene, 1e-2, t_end=0.1, budget=n), (*huge, -1, 0)),
         "advise.t_end": Door(lambda n: fm.advise(scene, 1e-2, t_end=n), huge),
         "steady_spin.rate": Door(lambda n: fm.steady_spin(scene, "pivot", n), (*huge, -1, 0)),
         "campbell.rates": Door(lambda n: fm.campbell(scene, "pivot", [n]), (*huge, -1, 0)),

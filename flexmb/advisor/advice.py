@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from textwrap import fill
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from flexmb.advisor.methods import RunMethod
 from flexmb.advisor.modal_response import RigidRun, modal_response, rigid_run
 from flexmb.advisor.models import EXACT, LEVELS, BodyModel, Model, built, flexible_bodies, levels
 from flexmb.advisor.quantity import Quantity, measured, quantities, scales
+from flexmb.advisor.remedies import remedies
 from flexmb.advisor.search import search
 from flexmb.scene.bodies import BeamBody, Level, ModalBody
 from flexmb.scene.check import check_and_warn
@@ -26,6 +29,10 @@ BUDGET = 4e10
 """The search for cheaper models ends when its runs have taken this many operations (about 20 s)."""
 REFERENCE = 4e10
 """A reference whose predicted cost exceeds this number of operations is not run."""
+MOST_BUDGET = 1e6
+"""Largest factor of both."""
+PARAGRAPH = 100
+"""Columns of an advice in words."""
 FAR = 0.2
 """Deflection over length, predicted by linear modes, beyond which references are of level exact."""
 NEGLECTED = 0.1
@@ -63,7 +70,7 @@ class Advice:
     the `predicted` one, and the one `measured` over the whole horizon with the chosen method, which includes the
     `uncertainty` of the reference. Operations of the run are `predicted_operations` and the counted `operations`; the
     `seconds` of integration are shown but not used. If not accepted, `refusal` says why no model is known to be
-    adequate. `trials` lists all models that were run, `notes` are further remarks.
+    adequate, and `remedies` what to change. `trials` lists all models that were run, `notes` are further remarks.
     """
 
     name: str
@@ -71,6 +78,7 @@ class Advice:
     tolerance: float
     quantities: tuple[Quantity, ...]
     refusal: str = ""
+    remedies: tuple[str, ...] = ()
     bodies: tuple[BodyAdvice, ...] = ()
     method: RunMethod | None = None
     scene: Scene | None = None
@@ -89,36 +97,66 @@ class Advice:
     def accepted(self) -> bool:
         return not self.refusal
 
+    def __str__(self) -> str:
+        """A paragraph: the question, what is advised with its error and cost, or why nothing is and what to change."""
+        asked = " and ".join(map(str, self.quantities))
+        text = f"{self.name}: {asked} to {self.tolerance:g} of its scale, from 0 to {self.t_end:g} s. "
+        if self.accepted:
+            models = "; ".join(f"{each.body} as {each.rung}" for each in self.bodies) or "the scene as it is"
+            text += (
+                f"Take {models}, and integrate by {self.method}. The error of that run is {self.measured:.2g}, of "
+                f"which {self.uncertainty:.2g} is the uncertainty of what it was measured against, {self.reference}; "
+                f"{self.predicted:.2g} was predicted. It takes {self.operations:.2g} counted operations in "
+                f"{self.evaluations} evaluations."
+            )
+        else:
+            text += f"Refused: {self.refusal}. What helps: {'; '.join(self.remedies)}."
+        if len(self.trials) > 1:
+            good = sum(trial.adequate for trial in self.trials)
+            text += f" {len(self.trials)} models were run, of which {good} are adequate."
+        text += "".join(f" {note[0].upper()}{note[1:]}." for note in self.notes)
+        return fill(text, PARAGRAPH, break_long_words=False, break_on_hyphens=False)
+
 
 def advise(
     scene: Scene,
     tolerance: float,
     quantity: str | Quantity | Sequence[str | Quantity] | None = None,
     t_end: float = 10.0,
+    budget: float = 1.0,
 ) -> Advice:
     """The cheapest model of every flexible body, and method, that give `quantity` to `tolerance` up to `t_end` (s).
 
     `quantity`: one or several as in `flexmb.advisor.quantity`, by default the positions of all markers; `tolerance`:
-    largest error, relative to its scale. All runs go to the end of the horizon, and cost is measured in counted
-    operations, so that the advice does not depend on the machine. Raises SceneError for an invalid scene, ValueError
-    for a quantity that does not exist; if no model is adequate, `refusal` of the advice says why.
+    largest error, relative to its scale; `budget`: its runs may take so many times the operations that they may by
+    default (about 20 s for each reference and for the search). All runs go to the end of the horizon, and cost is
+    measured in counted operations, so that the advice does not depend on the machine. Raises SceneError for an invalid
+    scene, ValueError for a quantity that does not exist; if no model is adequate, `refusal` of the advice says why, and
+    `remedies` what helps.
     """
     refuse_feedback(scene, "advise")
-    asked = prepare(scene, tolerance, quantity, t_end)
+    budget = arguments.number("budget", budget)
+    if not 0.0 < budget <= MOST_BUDGET:
+        raise ValueError(f"the budget is {budget:g}: give a factor above 0, at most {MOST_BUDGET:g}")
+    asked = prepare(scene, tolerance, quantity, t_end, budget)
     advice = Advice(scene.name, t_end, tolerance, asked.bench.wanted, notes=asked.notes)
+
+    def refused(why: str, **more: Any) -> Advice:
+        return replace(advice, refusal=why, remedies=remedies(scene, asked.bench.wanted, tolerance, budget), **more)
+
     try:
         confirmation = asked.confirmation()
     except NoReference as problem:
-        return replace(advice, refusal=str(problem))
+        return refused(str(problem))
     known, ladders, bench, notes = asked.known, asked.ladders, asked.bench, asked.notes
-    found = search(ladders, confirmation, BUDGET)
+    found = search(ladders, confirmation, budget * BUDGET)
     if found is None and confirmation.refine():  # with a smaller uncertainty some may be adequate
-        found = search(ladders, confirmation, BUDGET)
+        found = search(ladders, confirmation, budget * BUDGET)
     steps = {(name, step.rung): step for name, each in ladders.items() for step in each}
     trials = tuple(_trial(model, steps, confirmation) for model in confirmation.measured)
     if found is None:
         described = _described(confirmation.reference)
-        return replace(advice, refusal=_none_adequate(trials, tolerance), trials=trials, reference=described)
+        return refused(_none_adequate(trials, tolerance), trials=trials, reference=described)
     run = bench.run(found.model, found.method)
     if found.exhausted:
         notes += ("the search for cheaper models ended at its budget of operations",)
@@ -144,7 +182,8 @@ class Prepared:
     """A question and the predictions that are made before any candidate runs.
 
     `known`: the indicators of each body, empty if the rigid scene does not run; `cost` and `hidden` as for
-    `Confirmation`; `ladders`: the steps of each body; `notes`: why there are no indicators.
+    `Confirmation`; `ladders`: the steps of each body; `notes`: why there are no indicators;
+    `budget` as for `advise`.
     """
 
     bench: Bench
@@ -154,17 +193,19 @@ class Prepared:
     hidden: float
     ladders: dict[str, tuple[Step, ...]]
     notes: tuple[str, ...]
+    budget: float
 
     def confirmation(self) -> Confirmation:
         """Run the references; returns what measures candidates against them. Raises NoReference."""
         far = frozenset(name for name, each in self.known.items() if each.deflection > FAR)
         known = references(self.bench.scene, far if self.known else softest(self.bench.scene))
-        return Confirmation(self.bench, self.tolerance, self.hidden, self.cost, REFERENCE, known)
+        return Confirmation(self.bench, self.tolerance, self.hidden, self.cost, self.budget * REFERENCE, known)
 
 
 def prepare(
-    scene: Scene, tolerance: float, quantity: str | Quantity | Sequence[str | Quantity] | None, t_end: float
-) -> Prepared:
+    scene: Scene, tolerance: float, quantity: str | Quantity | Sequence[str | Quantity] | None, t_end: float,
+    budget: float = 1.0,
+) -> Prepared:  # fmt: skip
     """Check the question, run the rigid scene, predict. Raises as `advise` does."""
     t_end, tolerance = arguments.number("t_end", t_end), arguments.number("tolerance", tolerance)
     check_and_warn(scene, t_end)
@@ -177,7 +218,7 @@ def prepare(
         known, slow = _indicators(base, scene, bench.wanted), base.run.statistics.evaluations
     return Prepared(
         bench, tolerance, known, cost(scene, t_end, slow), _hidden(scene, known),
-        _ladders(scene, known, tolerance), (base,) if isinstance(base, str) else (),
+        _ladders(scene, known, tolerance), (base,) if isinstance(base, str) else (), budget,
     )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ def advice_tables(advice: Advice, trials: bool = True) -> RenderableType:
         parts += [_run(advice)]
     else:
         parts += [Text("refused: ", style="bold red") + Text(advice.refusal)]
+        parts += [Text(f"what helps: {remedy}") for remedy in advice.remedies]
     if trials and len(advice.trials) > 1:
         parts.append(_trials(advice))
     parts += [Text(f"note: {note}", style="yellow") for note in advice.notes]

@@ -84,7 +84,7 @@ def rungs(
         counts = sorted({n for n in COUNTS if n < every} | {every})
         by_modes = (BodyModel("modes", n, level) for level in levels(body) for n in counts)
         return (BodyModel("rigid"), BodyModel("sprung"), *by_modes)
-    sets: list[tuple[str, ...]] = [()]
+    sets: list[tuple[str, ...]] = [_named(body)]
     some = tuple(family for family in all_families(body) if family in moving)
     if some and some != all_families(body):
         sets.append(some)
@@ -104,8 +104,14 @@ def rungs(
 
 
 def _stretches(body: BeamBody) -> bool:
-    """Whether the beam has stretch or shear."""
-    return not set(all_strains(body)) <= set(CURVATURES)
+    """Whether the beam has stretch or shear beside curvatures."""
+    own, curvatures = set(all_strains(body)), set(CURVATURES)
+    return not own <= curvatures and not own.isdisjoint(curvatures)
+
+
+def _named(body: BeamBody) -> tuple[str, ...]:
+    """The families of a beam without curvatures; none, which stands for its own, if it has one."""
+    return all_families(body) if set(all_strains(body)).isdisjoint(CURVATURES) else ()
 
 
 def _strains(polynomials: int, pieces: int, stretching: bool, families: tuple[str, ...] = ()) -> BodyModel:
@@ -138,7 +144,7 @@ def references(scene: Scene, bend_far: frozenset[str] = frozenset()) -> tuple[tu
         return BodyModel("modes", body.modes.count + more, LEVELS[-1], body.modes.static)
 
     def strains(body: BeamBody, count: int, pieces: int) -> BodyModel:
-        return _strains(count, pieces, _stretches(body))
+        return _strains(count, pieces, _stretches(body), _named(body))
 
     def exact(body: BeamBody | ModalBody, count: int, pieces: int) -> BodyModel:
         if isinstance(body, BeamBody) and body.name in far:

@@ -57,7 +57,8 @@ def with_strains(
 
     They have `polynomials` of each curvature of `families` (of the beam's own if empty); if `stretching` two fewer, but
     one at least, of the stretch and the shears that it has. An initial modal state is projected as by `with_modes`.
-    Raises ValueError for a beam that has no such strain or no stretch, and for several pieces of one that starts bent.
+    A beam without curvatures has its stretch and shears instead. Raises ValueError for a beam that has no stretch
+    beside its curvatures, and for several pieces of one that starts bent.
     """
     body = next(each for each in scene.bodies if each.name == name)
     if not isinstance(body, BeamBody):
@@ -111,9 +112,7 @@ def _strains(beam: BeamBody, count: int, stretching: bool, families: tuple[str, 
     own = all_strains(beam)
     if families:
         own = tuple(each for each in own if each in families or dict(SHEARED).get(each) in families)
-    curved = tuple(each for each in own if each in CURVATURES)
-    if not curved:
-        raise ValueError(f'beam "{beam.name}" has no curvature among {", ".join(own)}')
+    curved = tuple(each for each in own if each in CURVATURES) or own  # a rod that only stretches has no other strain
     if stretching and own == curved:
         raise ValueError(f'beam "{beam.name}" has no stretch or shear: its families and its theory exclude them')
     return polynomials_of(own if stretching else curved, count)

@@ -22,6 +22,7 @@ def advise(
     t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s; it starts at 0.")] = 10.0,
     out: Annotated[Path, typer.Option("--out", "-o", help="File of the reduced scene.")] = Path("out/advised.toml"),
     trials: Annotated[bool, typer.Option("--trials/--no-trials", help="Show every model that was run.")] = True,
+    budget: Annotated[float, typer.Option("--budget", help="Factor of the operations that runs may take.")] = 1.0,
     no_user_code: NoUserCode = False,
 ) -> None:
     """
@@ -51,7 +52,7 @@ def advise(
         loaded = load_scene(scene)
         check_folder(out.parent)
         with console.status(Text(f"trying models of {scene} (the first run after an update compiles)")):
-            advice = search(loaded, tol, quantity, t_end)
+            advice = search(loaded, tol, quantity, t_end, budget)
         console.print(advice_tables(advice, trials))
         if advice.scene is None or advice.method is None:
             raise typer.Exit(EXIT_STOPPED)

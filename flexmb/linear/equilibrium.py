@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from flexmb.linear.equations import built, entering
 from flexmb.linear.newton import Stability, balanced, squares, verdict
+from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
@@ -46,7 +48,8 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> Equilibri
     loop rests, the controllers' own states included. From a guess where loads oppose every displacement it is the
     equilibrium that follows as what is out of balance there fades away, if that is stable, else one that overdamped
     motion leads to; near an unstable one that: `stability` of the result says. Loads that bend a structure far are
-    followed through by `equilibrium_path`.
+    followed through by `equilibrium_path`. Warns (`SceneWarning`) of beams of level exact whose stretch is held
+    although loads would change their length by a thousandth (`allow = ["held_stretch"]` waives it).
 
     Raises EquilibriumError where none is found, NotImplementedError for closures on bodies of level "ruthless" and
     sampled controllers, ValueError or TypeError for a guess that is not a state of this system or leaves closures open.
@@ -62,4 +65,16 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> Equilibri
     held = equations.held(guess.t)
     state = balanced(held, replace(guess, u=np.zeros_like(guess.u)))
     at = held.variations(state)
+    _warn_of_held_stretch(held.system, state)
     return as_equilibrium(state, verdict(squares(at, held.forces(at))))
+
+
+def _warn_of_held_stretch(system: System, state: State) -> None:
+    """A SceneWarning for beams that loads would stretch, were that not held, for the caller of `equilibrium`."""
+    if not len(system.constants.section):
+        return
+    from flexmb.system.held_stretch import unstretched  # imported here because few scenes have such beams
+
+    loads = {name: load[None] for name, load in system.evaluate(state.t, state.q, state.u).loads.items()}
+    for each in unstretched(system, np.array([state.t]), state.q[None], state.u[None], loads):
+        warnings.warn(f'scene "{system.scene.name}": {each}', SceneWarning, stacklevel=3)

@@ -87,8 +87,9 @@ def simulate(
     all its coordinates, followed by ".speeds" for all its speeds; closed chains take the nearest state that closes
     their closures. Or state is a `Restart`, from which a run of the same scene and method is resumed bit-identically.
 
-    Warns (`SceneWarning`) of doubtful input, of beams of level exact that bent more than their points can follow, and
-    of bodies that turned faster than their level describes (`allow = ["level_range"]` waives it).
+    Warns (`SceneWarning`) of doubtful input, of beams of level exact that bent more than their points can follow, of
+    such beams whose stretch is held although loads would change their length by a thousandth (`allow =
+    ["held_stretch"]` waives it), and of bodies that turned faster than their level describes ("level_range").
     Raises SceneError for an invalid scene or one whose profiles end before t_end, NotImplementedError for one that is
     not supported yet, ValueError or TypeError for invalid settings, and ClosureError if no initial state closes the
     closures, if they leave no motion, or if the given state is far from closing them. A run that fails raises nothing:
@@ -218,9 +219,10 @@ def _followed(
 def _looked_at(
     system: System, trajectory: Trajectory, warned: list[Warning], was_interrupted: bool
 ) -> tuple[Trajectory, list[Warning], bool]:
-    """The same, with what there is to say of beams that bent too far for their points, and of bodies that turned too
-    fast for their level."""
-    for doubt in (*_beyond_points(system, trajectory), *_beyond_level(system, trajectory)):
+    """The same, with what there is to say of beams that bent too far for their points or are held against a stretch,
+    and of bodies that turned too fast for their level."""
+    looks = _beyond_points, _beyond_level, _held_stretch
+    for doubt in (doubt for look in looks for doubt in look(system, trajectory)):
         warned = [*warned, SceneWarning(f'scene "{system.scene.name}": {doubt}')]
         trajectory = replace(trajectory, message=f"{trajectory.message}; {doubt}")
     return trajectory, warned, was_interrupted
@@ -233,6 +235,16 @@ def _beyond_points(system: System, trajectory: Trajectory) -> list[str]:
     from flexmb.system.enough_points import unfollowed  # imported here because few scenes have such beams
 
     return [str(each) for each in unfollowed(system, trajectory.t, trajectory.q)]
+
+
+def _held_stretch(system: System, trajectory: Trajectory) -> list[str]:
+    """What there is to say of beams of level exact that a finished run would have stretched, were that not held."""
+    if not len(system.constants.section) or not trajectory.finished:
+        return []
+    from flexmb.system.held_stretch import unstretched  # imported here because few scenes have such beams
+
+    found = unstretched(system, trajectory.t, trajectory.q, trajectory.u, trajectory.loads)
+    return [str(each) for each in found]
 
 
 def _beyond_level(system: System, trajectory: Trajectory) -> list[str]:

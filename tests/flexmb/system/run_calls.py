@@ -88,7 +88,8 @@ def _sensitive(w: World) -> Calls:
               parameters=chosen(None, 5, [], ["nobody"]),
               sigma=chosen("1", -1.0, 0.0, np.nan, {"nobody": 1.0}))  # fmt: skip
     found.add("advise", lambda **given: fm.advise(w.scene, **given),
-              {"tolerance": 1e-2, "quantity": "marker:centre.position@1", "t_end": 0.01},
+              {"tolerance": 1e-2, "quantity": "marker:centre.position@1", "t_end": 0.01, "budget": 1.0},
               lambda it: replace(it, seconds=0.0), tolerance=chosen(*NO_NUMBER, 0.0, 1.0, -1.0),
-              t_end=chosen(*NO_NUMBER, 0.0, -1.0), quantity=chosen("nobody", 5, ("nobody",)))  # fmt: skip
+              t_end=chosen(*NO_NUMBER, 0.0, -1.0), budget=chosen(*NO_NUMBER, 0.0, -1.0),
+              quantity=chosen("nobody", 5, ("nobody",)))  # fmt: skip
     return found

@@ -1,0 +1,61 @@
+"""What to change in a question or in its scene where advice is refused, by what makes its runs hard to resolve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from flexmb.advisor.models import flexible_bodies
+from flexmb.advisor.quantity import Quantity
+from flexmb.closure.closures import ClosureError
+from flexmb.scene.bodies import BeamBody, ModalBody
+from flexmb.scene.check.walk import values
+from flexmb.scene.convert import ROOT
+from flexmb.scene.functions import Pulse
+from flexmb.scene.schema import Scene
+from flexmb.system.compile import compile
+from flexmb.tables.state import DynamicsError
+
+AT_REST = 1e-9  # acceleration in SI units that is rounding
+
+
+def remedies(scene: Scene, wanted: tuple[Quantity, ...], tolerance: float, budget: float) -> tuple[str, ...]:
+    """Sentences, those first that change the scene so that fewer modes are excited, or ring less long; one at least."""
+    return tuple(_remedies(scene, wanted, tolerance, budget))
+
+
+def _remedies(scene: Scene, wanted: tuple[Quantity, ...], tolerance: float, budget: float) -> Iterator[str]:
+    if _jumps_at_the_start(scene):
+        yield (
+            "start from equilibrium (`fm.equilibrium`), or let loads and drives grow smoothly: this scene is let go "
+            "out of balance, which excites all modes at once"
+        )
+    pulses = [str(place) for place, _, value in values(ROOT, scene) if isinstance(value, Pulse)]
+    if pulses:
+        yield f"a smoother pulse, of two smooth steps, in place of that of {', '.join(pulses)}, which jumps"
+    undamped = [body.name for body in flexible_bodies(scene) if _rings(body)]
+    if undamped:
+        yield f"damping of {', '.join(undamped)}, whose modes ring to the end: `damping_ratio` or `viscosity_s`"
+    yield f"a longer budget, of {2.0 * budget:g} or more in place of {budget:g}, so that finer models may run"
+    loads = [str(each) for each in wanted if "load" in each.pattern or "drive" in each.pattern]
+    of = f", or another quantity than {', '.join(loads)}, which high modes move more than a path" if loads else ""
+    yield f"a larger tolerance than {tolerance:g}, or a shorter time{of}"
+
+
+def _jumps_at_the_start(scene: Scene) -> bool:
+    """Whether the scene starts with accelerations, although at rest."""
+    try:
+        system = compile(scene)
+        start = system.initial_state
+        first = system.evaluate(start.t, start.q, start.u).accelerations
+    except (ClosureError, DynamicsError, ValueError, NotImplementedError):
+        return False
+    return not np.any(start.u) and bool(np.any(np.abs(first) > AT_REST))
+
+
+def _rings(body: BeamBody | ModalBody) -> bool:
+    """Whether a body has no damping of its own."""
+    if isinstance(body, ModalBody):
+        return not np.any(np.array(body.damping))
+    return not np.any(body.modes.damping_ratio) and body.modes.viscosity_s == 0.0
