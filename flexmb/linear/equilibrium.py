@@ -11,6 +11,7 @@ from flexmb.linear.equations import built, entering
 from flexmb.linear.newton import Stability, balanced, squares, verdict
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
+from flexmb.system.watches import of_states, warn
 from flexmb.tables.state import State
 
 
@@ -50,16 +51,24 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> Equilibri
 
     Raises EquilibriumError where none is found, NotImplementedError for closures on bodies of level "ruthless" and
     sampled controllers, ValueError or TypeError for a guess that is not a state of this system or leaves closures open.
+    Warns (`SceneWarning`) of beams of level exact that bend more than their points or polynomials can follow.
     """
+    state, system = found_equilibrium(system, guess)
+    warn(of_states(system, [state]))
+    return state
+
+
+def found_equilibrium(system: System | Scene, guess: State | None) -> tuple[Equilibrium, System]:
+    """The same without warnings, with the system."""
     if isinstance(system, Scene) and system.controllers:
         system = built(system)
     if isinstance(system, System) and system.scene.controllers:
         from flexmb.linear.controlled_equilibrium import resting  # imported only for scenes with controllers
 
         state = resting(system, system.initial_state if guess is None else guess)
-        return as_equilibrium(state, None)
+        return as_equilibrium(state, None), system
     equations, guess = entering(system, guess)
     held = equations.held(guess.t)
     state = balanced(held, replace(guess, u=np.zeros_like(guess.u)))
     at = held.variations(state)
-    return as_equilibrium(state, verdict(squares(at, held.forces(at))))
+    return as_equilibrium(state, verdict(squares(at, held.forces(at)))), equations.system

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from itertools import pairwise
-from math import ceil, hypot
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from flexmb.scene.bodies import BeamBody, BeamStation
 from flexmb.scene.collocation import partial_integrals
 from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.rest_turn import turn_at_rest, turn_between
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.sizes import refuse_beyond
 from flexmb.typing import Real
@@ -51,11 +52,6 @@ def is_bent(station: BeamStation, length: float) -> bool:
     return any(not abs(each) * length <= ROUNDING for each in station.curvature_1_m)  # so is what is no number
 
 
-def turn_at_rest(body: BeamBody) -> float:
-    """Upper bound (rad) of the angle by which the sections of an unloaded beam turn from its root to its tip."""
-    return sum(_turn(left, right) for left, right in pairwise(_stations(body)))
-
-
 def rest_sections(body: BeamBody, x: Real) -> tuple[Real, Real]:
     """Position (n,3) and rotation (n,3,3), section to body axes, of the unloaded sections at x (n,) m.
 
@@ -68,22 +64,19 @@ def rest_sections(body: BeamBody, x: Real) -> tuple[Real, Real]:
     remedy = "correct curvature_1_m, or divide the beam into several that are welded together"
     refuse_beyond(turn_at_rest(body), MOST_TURN, f'body "{body.name}" turns at rest by', remedy, "rad")
     spans = _spans(_stations(body))
-    at = np.searchsorted([span.start for span in spans], x, side="right") - 1
-    quaternion, position = np.zeros((len(x), 4)), np.zeros((len(x), 3))
-    for i, (place, s) in enumerate(zip(np.maximum(at, 0), x, strict=True)):
-        span = spans[place]
-        row = span.length / 2.0 * partial_integrals(np.array([2.0 * (s - span.start) / span.length - 1.0]), POINTS)[0]
-        quaternion[i], position[i] = span.quaternion + row @ span.rates, span.position + row @ span.directions
+    starts = np.array([span.start for span in spans])
+    at = np.maximum(np.searchsorted(starts, x, side="right") - 1, 0)
+    lengths, quaternions, positions, rates, directions = (
+        np.array([span[i] for span in spans])[at] for i in range(1, len(_Span._fields))
+    )
+    row = lengths[:, None] / 2.0 * partial_integrals(2.0 * (x - starts[at]) / lengths - 1.0, POINTS)
+    quaternion = quaternions + np.einsum("nj,nja->na", row, rates)
+    position = positions + np.einsum("nj,nja->na", row, directions)
     return position, rotation_matrix(quaternion)
 
 
 def _stations(body: BeamBody) -> tuple[_Station, ...]:
     return tuple((station.x_m, station.curvature_1_m) for station in body.stations)
-
-
-def _turn(left: _Station, right: _Station) -> float:
-    """Upper bound (rad) of the turn between two stations."""
-    return max(hypot(*left[1]), hypot(*right[1])) * (right[0] - left[0])
 
 
 @lru_cache(maxsize=128)
@@ -93,7 +86,7 @@ def _spans(stations: tuple[_Station, ...]) -> list[_Span]:
     xi, _ = np.polynomial.legendre.leggauss(POINTS)
     inner, whole = partial_integrals(xi, POINTS), partial_integrals(np.ones(1), POINTS)[0]
     for (left, first), (right, last) in pairwise(stations):
-        count = max(1, ceil(_turn((left, first), (right, last))))
+        count = max(1, ceil(turn_between(first, last, right - left)))
         for start, stop in zip(*_ends(left, right, count), strict=True):
             if stop == start:
                 continue
