@@ -46,6 +46,7 @@ from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
+from flexmb.system.watches import WAIVERS
 
 _TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 _RUNGS = 4  # of steps
@@ -118,7 +119,7 @@ class NativeEngine:
         return before[1] if before is not None and before[0] is scene else self._made(scene)
 
     def _made(self, scene: Scene) -> NativeModel:
-        system = compile(structs.replace(scene, allow=(*scene.allow, "level_range")))  # levels are what cases compare
+        system = compile(structs.replace(scene, allow=(*scene.allow, *WAIVERS)))  # levels are what cases compare
         system.route(self._algorithm)
         if INTEGRATORS[self._method].linearises:
             refuse_without_jacobian(system, self._algorithm, self._method)

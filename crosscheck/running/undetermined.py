@@ -24,6 +24,7 @@ from flexmb.scene.stops import leaving
 from flexmb.scene.tree import coordinates
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
+from flexmb.system.watches import WAIVERS
 from flexmb.tables.features import asking
 from flexmb.tables.state import State
 
@@ -74,7 +75,7 @@ def _open(scene: Scene) -> set[str]:
 def _open_in_run(scene: Scene, t_end: float) -> set[str]:
     """At some times of flexmb's run, and after each of its events."""
     try:
-        allowed = structs.replace(scene, allow=(*scene.allow, "level_range"))
+        allowed = structs.replace(scene, allow=(*scene.allow, *WAIVERS))
         run = simulate(allowed, t_end, samples=PLACES, rtol=1e-8, atol=1e-10, max_steps=STEPS)
     except (ClosureError, NotImplementedError):
         return set()

@@ -12,12 +12,13 @@ from scipy.optimize import linear_sum_assignment
 
 from flexmb.linear.equations import built
 from flexmb.linear.linear_model import Complex, LinearModel, Stability, modal_assurance
-from flexmb.linear.linearize import linear_model, warn_beyond_level
-from flexmb.linear.spin import steady_spin
+from flexmb.linear.linearize import linear_model, looked_at
+from flexmb.linear.spin import spun
 from flexmb.linear.variations import Equations
 from flexmb.output.whole import whole_file
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
+from flexmb.system.watches import warn
 from flexmb.tables import arguments
 from flexmb.tables.state import State
 from flexmb.typing import Real
@@ -87,8 +88,8 @@ class Campbell:
 def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
     """Eigenvalues against the spin rate (rad/s) of a revolute hinge or wheel, in the order of `rates`.
 
-    The initial guess of every steady state is that of the previous rate. Warns (`SceneWarning`) where a body turns
-    faster than its level describes: unstable there may be the level, and not the machine. Raises what
+    The initial guess of every steady state is that of the previous rate. Warns (`SceneWarning`) as `steady_spin` does:
+    where a body turns faster than its level describes, unstable may be the level, and not the machine. Raises what
     `steady_spin` raises.
     """
     if isinstance(system, Scene):
@@ -104,9 +105,9 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
     names: tuple[str, ...] = ()
     before: tuple[LinearModel, Complex] | None = None
     for rate in rates:
-        spin = steady_spin(system, hinge, float(rate), guess)
+        spin = spun(system, hinge, float(rate), guess)
         model, guess = linear_model(spin.equations, spin.state), spin.state
-        turning.append((spin.equations, spin.equations.on_functions(spin.state)))
+        turning.append(spin.moving)
         found, current = _spectrum(model)
         if before is None:
             names = tuple(_dominant(model, shape) for shape in current.T)
@@ -120,7 +121,7 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
         values.append(found)
         before = model, current
         verdicts.append(model.stability)
-    warn_beyond_level(turning)
+    warn(looked_at(turning))
     return Campbell(
         system.scene.name, hinge, rates, np.array(values), np.array(macs), names, tuple(verdicts)
     )  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,9 +9,9 @@ import numpy as np
 
 from flexmb.linear.equations import built, entering
 from flexmb.linear.newton import Stability, balanced, squares, verdict
-from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
+from flexmb.system.watches import of_states, warn
 from flexmb.tables.state import State
 
 
@@ -48,33 +47,29 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> Equilibri
     loop rests, the controllers' own states included. From a guess where loads oppose every displacement it is the
     equilibrium that follows as what is out of balance there fades away, if that is stable, else one that overdamped
     motion leads to; near an unstable one that: `stability` of the result says. Loads that bend a structure far are
-    followed through by `equilibrium_path`. Warns (`SceneWarning`) of beams of level exact whose stretch is held
-    although loads would change their length by a thousandth (`allow = ["held_stretch"]` waives it).
+    followed through by `equilibrium_path`.
 
     Raises EquilibriumError where none is found, NotImplementedError for closures on bodies of level "ruthless" and
     sampled controllers, ValueError or TypeError for a guess that is not a state of this system or leaves closures open.
+    Warns (`SceneWarning`) of beams of level exact that bend more than their points or polynomials can follow, or whose
+    held stretch loads would change by a thousandth (`allow` waives each, see `Scene`).
     """
+    state, system = found_equilibrium(system, guess)
+    warn(of_states(system, [state]))
+    return state
+
+
+def found_equilibrium(system: System | Scene, guess: State | None) -> tuple[Equilibrium, System]:
+    """The same without warnings, with the system."""
     if isinstance(system, Scene) and system.controllers:
         system = built(system)
     if isinstance(system, System) and system.scene.controllers:
         from flexmb.linear.controlled_equilibrium import resting  # imported only for scenes with controllers
 
         state = resting(system, system.initial_state if guess is None else guess)
-        return as_equilibrium(state, None)
+        return as_equilibrium(state, None), system
     equations, guess = entering(system, guess)
     held = equations.held(guess.t)
     state = balanced(held, replace(guess, u=np.zeros_like(guess.u)))
     at = held.variations(state)
-    _warn_of_held_stretch(held.system, state)
-    return as_equilibrium(state, verdict(squares(at, held.forces(at))))
-
-
-def _warn_of_held_stretch(system: System, state: State) -> None:
-    """A SceneWarning for beams that loads would stretch, were that not held, for the caller of `equilibrium`."""
-    if not len(system.constants.section):
-        return
-    from flexmb.system.held_stretch import unstretched  # imported here because few scenes have such beams
-
-    loads = {name: load[None] for name, load in system.evaluate(state.t, state.q, state.u).loads.items()}
-    for each in unstretched(system, np.array([state.t]), state.q[None], state.u[None], loads):
-        warnings.warn(f'scene "{system.scene.name}": {each}', SceneWarning, stacklevel=3)
+    return as_equilibrium(state, verdict(squares(at, held.forces(at)))), equations.system

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from flexmb.linear.equations import equations_of
-from flexmb.linear.equilibrium import Equilibrium, as_equilibrium, equilibrium
+from flexmb.linear.equilibrium import Equilibrium, as_equilibrium, found_equilibrium
 from flexmb.linear.linear_model import Complex
 from flexmb.linear.newton import EquilibriumError, squares, verdict
 from flexmb.linear.variations import Equations, RestForces, Variations
@@ -29,6 +29,7 @@ from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.scene.values import with_values
 from flexmb.system.compile import compile
+from flexmb.system.watches import of_states, warn
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
@@ -84,6 +85,7 @@ def equilibrium_path(scene: Scene, number: str, values: Sequence[float] | Real) 
     At a bifurcation it goes straight on. EquilibriumError where there is no equilibrium at the first value or the path
     does not reach the last; PathError for a number that the scene does not have; ValueError unless `values` are two or
     more, all rising or all falling; NotImplementedError as for `equilibrium`, and for scenes with controllers.
+    Warns as `equilibrium` does.
     """
     if not isinstance(scene, Scene):
         raise TypeError(f"a Scene is needed, not {type(scene).__name__}: the path changes a number of it")
@@ -95,6 +97,7 @@ def equilibrium_path(scene: Scene, number: str, values: Sequence[float] | Real) 
     family = _Family(scene, number, asked)
     points = list(_followed(family, asked))
     states = tuple(as_equilibrium(each.at.state, verdict(each.squares)) for _, each in points)
+    warn(of_states(family.system, states))
     critical = [(kind, each, state) for (kind, each), state in zip(points, states, strict=True) if kind is not None]
     found = tuple(CriticalPoint(kind, each.p, state) for kind, each, state in critical)
     passed = np.array([each.p for _, each in points])
@@ -124,24 +127,24 @@ class _Point(NamedTuple):
 
 
 class _Family:
-    """The scenes with all values of one number; range of these."""
+    """The scenes with all values of one number; the system at the first one; range of the values."""
 
     def __init__(self, scene: Scene, number: str, asked: Real) -> None:
         Number(scene, number)  # PathError unless it is one real number
         first: Scene = with_values(scene, {number: float(asked[0])})
-        self.number, self._system = Number(first, number), compile(first)
+        self.number, self.system = Number(first, number), compile(first)
         self.name, self.range = scene.name, float(np.ptp(asked))
         self._made = dict[float, Equations]()
 
     def start(self) -> tuple[Equations, Variations]:
         """The equations at the first value, and its equilibrium."""
         equations = self.equations(self.number.value)
-        return equations, equations.variations(equilibrium(self._system))
+        return equations, equations.variations(found_equilibrium(self.system, None)[0])
 
     def equations(self, p: float) -> Equations:
         """At rest, with functions of time at their values at t = 0."""
         if p not in self._made:
-            system = self._system.with_numbers(self.number.scene_at(p))
+            system = self.system.with_numbers(self.number.scene_at(p))
             self._made = dict([*self._made.items()][-1:])  # a point and one beside it
             self._made[p] = equations_of(system).held(0.0)
         return self._made[p]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,9 +9,9 @@ import numpy as np
 from flexmb.linear.equations import built, entering
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, Variations
-from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
+from flexmb.system.watches import Seen, of_states, warn
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
@@ -29,7 +28,7 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     chain the states are the independent coordinates; the dependent ones are among the outputs. For a scene with
     controllers it is the model of the closed loop about the controllers' initial states, which come last in x. Sensor
     signals are among the outputs: "gyro[0]", or "angle" for a single number; loads and accelerations have direct
-    feedthrough, D. Warns (`SceneWarning`) of bodies that turn faster than their level describes. Raises DynamicsError
+    feedthrough, D. Warns (`SceneWarning`) as `simulate` does of levels, points and polynomials. Raises DynamicsError
     where the accelerations do not exist, `NotDifferentiableError` (one of them) where a controller is exactly at a
     limit, or a connector just at a stop or slack, NotImplementedError for sampled controllers and closures on bodies of
     level "ruthless", ValueError or TypeError for a state that does not belong to this system or leaves closures open.
@@ -41,21 +40,17 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
 
         state = system.initial_state if state is None else state
         system.layout.entering(state)
+        warn(of_states(system, [state]))
         return closed_loop(system, state, held_model if held else linear_model)
     equations, state = entering(system, state)
     equations = equations.held(state.t) if held else equations
-    warn_beyond_level([(equations, equations.on_functions(state))])
+    warn(looked_at([(equations, equations.on_functions(state))]))
     return linear_model(equations, state)
 
 
-def warn_beyond_level(states: Sequence[tuple[Equations, State]]) -> None:
-    """A SceneWarning for bodies that turn faster than their level describes, for the caller of the calling function."""
-    from flexmb.system.level_range import too_fast  # imported here because many scenes have no flexible bodies
-
-    system = states[0][0].system
-    t, u = (np.array([getattr(state, key) for _, state in states]) for key in ("t", "u"))
-    for each in too_fast(system, t, u, lambda n: states[n][0].turns(states[n][1])):
-        warnings.warn(f'scene "{system.scene.name}": {each}', SceneWarning, stacklevel=3)
+def looked_at(states: Sequence[tuple[Equations, State]]) -> Seen:
+    """States of one system as watches of accuracy see them, each with the equations that it moves by."""
+    return of_states(states[0][0].system, [state for _, state in states], lambda n: states[n][0].turns(states[n][1]))
 
 
 def held_model(equations: Equations, state: State) -> LinearModel:

@@ -8,13 +8,14 @@ import numpy as np
 
 from flexmb.linear.equations import entering
 from flexmb.linear.linear_model import LinearModel
-from flexmb.linear.linearize import linear_model, warn_beyond_level
+from flexmb.linear.linearize import linear_model, looked_at
 from flexmb.linear.newton import balanced
 from flexmb.linear.variations import Equations
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.problems import closest
 from flexmb.scene.schema import Revolute, Scene
 from flexmb.system.tree_system import System
+from flexmb.system.watches import warn
 from flexmb.tables import arguments
 from flexmb.tables.state import State
 
@@ -32,12 +33,16 @@ class SteadySpin:
     state: State
     equations: Equations
 
+    @property
+    def moving(self) -> tuple[Equations, State]:
+        """The equations, and the state with all speeds that they prescribe."""
+        return self.equations, self.equations.on_functions(self.state)
+
     def linearize(self) -> LinearModel:
         """The linear model about it, with displacements in the rotating frame and constant coefficients."""
         if not isinstance(self.equations, Equations):
             raise TypeError(f"equations is a {type(self.equations).__name__}: give those of steady_spin")
         self.equations.system.layout.entering(self.state)
-        warn_beyond_level([(self.equations, self.equations.on_functions(self.state))])
         return linear_model(self.equations, self.state)
 
 
@@ -48,8 +53,16 @@ def steady_spin(system: System | Scene, hinge: str, rate: float, guess: State | 
     keep the speeds they have in the guess (default: the initial state), other speeds are zero. ValueError where the
     motion of what turns depends on the angle (gravity across the axis, loads in World axes), or where closures make it
     turn other hinges: there is no steady spin.
-    EquilibriumError where no deformation is found.
+    EquilibriumError where no deformation is found. Warns (`SceneWarning`) as `simulate` does of levels, points and
+    polynomials.
     """
+    found = spun(system, hinge, rate, guess)
+    warn(looked_at([found.moving]))
+    return found
+
+
+def spun(system: System | Scene, hinge: str, rate: float, guess: State | None = None) -> SteadySpin:
+    """The same without warnings: one of several that are looked at together."""
     if isinstance(system, System | Scene):
         scene = system if isinstance(system, Scene) else system.scene
         refuse_feedback(scene, "a steady spin or Campbell diagram", CLOSED)

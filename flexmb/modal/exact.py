@@ -44,6 +44,8 @@ def exact_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
 
     `like`: see `flexmb.modal.flexible.flexible_model`. Raises ValueError for modes without inertia.
     """
+    if like is not None:  # whose points it has: default ones depend on lengths and curvatures
+        body = msgspec.structs.replace(body, modes=msgspec.structs.replace(body.modes, points=points_of_piece(like)))
     try:
         field, points, M = _polynomial_beam(body, _nodes_at(body), None if like is None else _hung(like))
         modes = _modes(body, field, _stiffness(body), M)

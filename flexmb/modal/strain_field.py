@@ -23,7 +23,7 @@ from flexmb.scene.bodies import BeamBody
 from flexmb.scene.collocation import gauss_rule, partial_integrals
 from flexmb.scene.pieces import edges
 from flexmb.scene.rest_curve import rest_sections
-from flexmb.scene.strains import STRAINS, points_of_piece, polynomials
+from flexmb.scene.strains import STRAINS, points_of_part, points_of_piece, polynomials
 from flexmb.typing import Index, Real
 
 WHOLE, LINEAR, SQUARE, STRETCH = range(4)
@@ -38,7 +38,8 @@ class StrainField:
     x (n,) m along the beam; before (n,): the section from which R is advanced, -1 for the root; position (n,3) m and
     tangent (n,3) at rest; rows (n,4,3,m): WHOLE, LINEAR, SQUARE, STRETCH for each mode; weight (n,q) m: A_ij, whose
     columns are the q Gauss points; gauss (q,): their numbers. The first `steps` sections are these points and the ends
-    of the intervals that they lie in; others turn from these.
+    of the intervals that they lie in; others turn from these. columns (p,m): the modes in Legendre's polynomials, in
+    the order of `strain_field`; None where they are these polynomials.
     """
 
     x: Real
@@ -49,6 +50,7 @@ class StrainField:
     weight: Real
     gauss: Index
     steps: int
+    columns: Real | None = None
 
     @property
     def mode_count(self) -> int:
@@ -65,7 +67,8 @@ class StrainField:
 
     def with_modes(self, columns: Real) -> StrainField:
         """The field of other modes, which are the `columns` (m,k) of the present ones."""
-        return replace(self, rows=self.rows @ columns)
+        known = columns if self.columns is None else self.columns @ columns
+        return replace(self, rows=self.rows @ columns, columns=known)
 
     def shapes(self) -> tuple[Real, Real]:
         """Mode shapes (n,3,m) at rest: rotations and translations of the sections."""
@@ -201,8 +204,7 @@ def _grid(body: BeamBody) -> tuple[list[tuple[float, float, int]], Real, Real]:
     for left, right in zip(breaks[:-1], breaks[1:], strict=True):
         piece = np.searchsorted(ends, 0.5 * (left + right)) - 1
         share = (right - left) / (ends[piece + 1] - ends[piece])
-        count = whole if share > 1.0 - 1e-9 else min(whole, max(3, int(np.ceil(whole * share)) + 1))
-        intervals.append((float(left), float(right), count))
+        intervals.append((float(left), float(right), points_of_part(whole, share)))
     gauss = np.concatenate(
         [left + (right - left) / 2.0 * (1.0 + gauss_rule(n)[0]) for left, right, n in intervals]
     )

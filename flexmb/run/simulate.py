@@ -33,6 +33,7 @@ from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
+from flexmb.system.watches import Seen, said
 from flexmb.tables import arguments
 from flexmb.tables.state import PrecisionWarning, State
 from flexmb.tables.status import Status
@@ -87,9 +88,9 @@ def simulate(
     all its coordinates, followed by ".speeds" for all its speeds; closed chains take the nearest state that closes
     their closures. Or state is a `Restart`, from which a run of the same scene and method is resumed bit-identically.
 
-    Warns (`SceneWarning`) of doubtful input, of beams of level exact that bent more than their points can follow, of
-    such beams whose stretch is held although loads would change their length by a thousandth (`allow =
-    ["held_stretch"]` waives it), and of bodies that turned faster than their level describes ("level_range").
+    Warns (`SceneWarning`) of doubtful input, of beams of level exact that bent more than their points or polynomials
+    can follow or whose held stretch loads would change by a thousandth, and of bodies that turned faster than their
+    level describes (`allow` waives each, see `Scene`).
     Raises SceneError for an invalid scene or one whose profiles end before t_end, NotImplementedError for one that is
     not supported yet, ValueError or TypeError for invalid settings, and ClosureError if no initial state closes the
     closures, if they leave no motion, or if the given state is far from closing them. A run that fails raises nothing:
@@ -159,7 +160,7 @@ def run_with_course(system: System, times: Real, settings: Settings) -> tuple[Tr
 
 def run_of_many(system: System, times: Real, settings: Settings, algorithm: Algorithm) -> Trajectory:
     """The trajectory of a scene from its own initial state, as `simulate` makes it, without its warnings: one of many
-    that are compared with one another. Whether beams bent more than their points can follow is not looked at."""
+    that are compared with one another. Watches of accuracy do not look at it."""
     refuse_large_run(system, len(times), settings, algorithm)
     if settings.integrator.linearises:
         refuse_without_jacobian(system, algorithm, settings.method)
@@ -219,42 +220,14 @@ def _followed(
 def _looked_at(
     system: System, trajectory: Trajectory, warned: list[Warning], was_interrupted: bool
 ) -> tuple[Trajectory, list[Warning], bool]:
-    """The same, with what there is to say of beams that bent too far for their points or are held against a stretch,
-    and of bodies that turned too fast for their level."""
-    looks = _beyond_points, _beyond_level, _held_stretch
-    for doubt in (doubt for look in looks for doubt in look(system, trajectory)):
-        warned = [*warned, SceneWarning(f'scene "{system.scene.name}": {doubt}')]
-        trajectory = replace(trajectory, message=f"{trajectory.message}; {doubt}")
-    return trajectory, warned, was_interrupted
-
-
-def _beyond_points(system: System, trajectory: Trajectory) -> list[str]:
-    """What there is to say of beams of level exact that a finished run bent more than their points can follow."""
-    if not len(system.constants.section) or not trajectory.finished:
-        return []
-    from flexmb.system.enough_points import unfollowed  # imported here because few scenes have such beams
-
-    return [str(each) for each in unfollowed(system, trajectory.t, trajectory.q)]
-
-
-def _held_stretch(system: System, trajectory: Trajectory) -> list[str]:
-    """What there is to say of beams of level exact that a finished run would have stretched, were that not held."""
-    if not len(system.constants.section) or not trajectory.finished:
-        return []
-    from flexmb.system.held_stretch import unstretched  # imported here because few scenes have such beams
-
-    found = unstretched(system, trajectory.t, trajectory.q, trajectory.u, trajectory.loads)
-    return [str(each) for each in found]
-
-
-def _beyond_level(system: System, trajectory: Trajectory) -> list[str]:
-    """What there is to say of bodies that turned faster than their level of fidelity describes, in a failed run too."""
-    if all(link.is_rigid for link in system.links):
-        return []
-    from flexmb.system.level_range import too_fast  # imported here because many scenes have no flexible bodies
-
+    """The same, with what watches of accuracy say of the samples."""
     t, q, u = trajectory.t, trajectory.q, trajectory.u
-    return [str(each) for each in too_fast(system, t, u, lambda n: system.turns(float(t[n]), q[n], u[n]))]
+    failed = not trajectory.finished
+    seen = Seen(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]), failed, trajectory.loads)
+    for each in said(seen):
+        warned = [*warned, SceneWarning(f'scene "{system.scene.name}": {each}')]
+        trajectory = replace(trajectory, message=f"{trajectory.message}; {each}")
+    return trajectory, warned, was_interrupted
 
 
 def _again(stage: RunPart, state: Given, algorithm: Algorithm, stabilise: float, settings: Settings) -> Trajectory:

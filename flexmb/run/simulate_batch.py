@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, Unpack
 
 import numpy as np
@@ -17,12 +19,16 @@ from flexmb.run.lane_runs import BatchRun, Runs, runs
 from flexmb.run.samples import sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
 from flexmb.run.switching import refuse_times
+from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes
 from flexmb.system.batch import Batch, number_of_threads
 from flexmb.system.compile import compile_batch
+from flexmb.system.free_motion import FreeMotion
 from flexmb.system.tree_system import System
+from flexmb.system.watches import Said, Seen, said
 from flexmb.tables import arguments
+from flexmb.tables.status import OK
 from flexmb.typing import Real
 
 
@@ -48,7 +54,8 @@ def simulate_batch(
 
     A run that fails raises nothing and does not affect the others: `status` and `message` of the result say why it
     stopped. Raises SceneError, ValueError, TypeError or NotImplementedError as `simulate` does, ValueError for states
-    that do not fit the copies, and KeyboardInterrupt for Ctrl-C.
+    that do not fit the copies, and KeyboardInterrupt for Ctrl-C. Warns (`SceneWarning`) as `simulate` does, of many
+    copies once.
     """
     refuse_unknown("simulate_batch", settings)
     batch = copies.batch if isinstance(copies, System) else copies
@@ -71,7 +78,33 @@ def simulate_batch(
         _, interrupted = interruptible(BatchRun(batch, times, chosen, found), (len(rows[0]), number), stop)
         if interrupted:
             raise KeyboardInterrupt
-    return _gathered(batch, times, found, len(rows[0]))
+    made = _gathered(batch, times, found, len(rows[0]))
+    for warning in _watched(made):
+        warnings.warn(warning, SceneWarning, stacklevel=2)
+    return made
+
+
+def _watched(runs: BatchTrajectory) -> Iterator[str]:
+    """What watches of accuracy say of the finished copies: of each body and each watch once, and of how many copies."""
+    batch, done = runs.batch, np.flatnonzero(runs.status == OK)
+    if not len(done) or all(link.is_rigid for link in batch.systems[0].links):
+        return
+    together = [done] if batch.shares_constants else [done[i : i + 1] for i in range(len(done))]
+    found: dict[tuple[str, str], list[Said]] = {}
+    for copies in together:
+        system = batch.system(int(copies[0]))
+        t = np.tile(runs.t, len(copies))
+        q, u = (each[copies].reshape(len(t), -1) for each in (runs.q, runs.u))
+        turns = partial(_turns, system, t, q, u)
+        for each in said(Seen(system, t, q, u, turns)):
+            found.setdefault((each.waiver, each.finding.body), []).append(each)
+    for alike in found.values():
+        more = f" (and {len(alike) - 1} more copies like it)" if len(alike) > 1 else ""
+        yield f'scene "{batch.systems[0].scene.name}": {alike[0]}{more}'
+
+
+def _turns(system: FreeMotion, t: Real, q: Real, u: Real, n: int) -> Real:
+    return system.turns(float(t[n]), q[n], u[n])
 
 
 def _given(batch: Batch, q: Any, u: Any) -> tuple[Any, Any]:

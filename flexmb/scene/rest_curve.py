@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from itertools import pairwise
-from math import ceil, hypot
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from flexmb.scene.bodies import BeamBody, BeamStation
 from flexmb.scene.collocation import gauss_rule, partial_integrals
 from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.rest_turn import turn_at_rest, turn_between
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.sizes import refuse_beyond
 from flexmb.typing import Real
@@ -51,11 +52,6 @@ def is_bent(station: BeamStation, length: float) -> bool:
     return any(not abs(each) * length <= ROUNDING for each in station.curvature_1_m)  # so is what is no number
 
 
-def turn_at_rest(body: BeamBody) -> float:
-    """Upper bound (rad) of the angle by which the sections of an unloaded beam turn from its root to its tip."""
-    return sum(_turn(left, right) for left, right in pairwise(_stations(body)))
-
-
 def rest_sections(body: BeamBody, x: Real) -> tuple[Real, Real]:
     """Position (n,3) and rotation (n,3,3), section to body axes, of the unloaded sections at x (n,) m.
 
@@ -79,11 +75,6 @@ def _stations(body: BeamBody) -> tuple[_Station, ...]:
     return tuple((station.x_m, station.curvature_1_m) for station in body.stations)
 
 
-def _turn(left: _Station, right: _Station) -> float:
-    """Upper bound (rad) of the turn between two stations."""
-    return max(hypot(*left[1]), hypot(*right[1])) * (right[0] - left[0])
-
-
 @lru_cache(maxsize=128)
 def _spans(stations: tuple[_Station, ...]) -> _Spans:
     quaternion, position = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
@@ -91,7 +82,7 @@ def _spans(stations: tuple[_Station, ...]) -> _Spans:
     xi, _ = gauss_rule(POINTS)
     inner, whole = partial_integrals(xi, POINTS), partial_integrals(np.ones(1), POINTS)[0]
     for (left, first), (right, last) in pairwise(stations):
-        count = max(1, ceil(_turn((left, first), (right, last))))
+        count = max(1, ceil(turn_between(first, last, right - left)))
         for start, stop in zip(*_ends(left, right, count), strict=True):
             if stop == start:
                 continue

@@ -148,7 +148,8 @@ class ModalState(SceneStruct, frozen=True, kw_only=True):
 
 Waiver = Literal[
     "wave_speed", "thick_section", "shear_stiffness", "many_elements", "modal_frequency", "negative_stiffness",
-    "negative_damping", "friction_peak", "uncut_beam", "level_range", "held_stretch",
+    "negative_damping", "friction_peak", "uncut_beam", "level_range", "few_points", "few_polynomials",
+    "held_stretch",
 ]  # fmt: skip
 
 
@@ -161,8 +162,9 @@ class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
     "many_elements", more elements than the modes need, which only cost time and memory. For raw modes:
     "modal_frequency", the lowest frequency times the size. For hinges, wheels and modes: "negative_stiffness",
     "negative_damping". For friction: "friction_peak", a peak of less than 99 % of static friction because of smoothing.
-    For beams of level "exact": "uncut_beam", something inside a piece that makes strains jump; "held_stretch", loads
-    that would change the length of a beam whose stretch is held by a thousandth.
+    For beams of level "exact": "uncut_beam", something inside a piece that makes strains jump; "few_points" and
+    "few_polynomials", at rest or in a motion that bends the beam more than they can follow; "held_stretch", loads that
+    would change the length of a beam whose stretch is held by a thousandth.
     For bodies with modes: "level_range", a turn that is fast beside the first frequency, at a level without stiffening.
     A scene without dimensions, or in other consistent units than SI (mm, tonne, s, N), lists "wave_speed",
     "thick_section", "shear_stiffness" and "modal_frequency".

@@ -8,12 +8,14 @@ those of a bar rather than infinite.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import ceil
 from typing import Literal, assert_never
 
 import numpy as np
 
 from flexmb.scene.bodies import FAMILIES, BeamBody, BeamStation, Family, StrainPolynomials
 from flexmb.scene.pieces import piece_count
+from flexmb.scene.rest_turn import MOST_FOLLOWED, RestTurn, follow, turns_of_pieces
 from flexmb.scene.sections import (
     ABOUT_Y,
     ABOUT_Z,
@@ -29,11 +31,16 @@ Strain = Literal["axial", "shear_y", "shear_z", "torsion", "bending_z", "bending
 STRAINS: tuple[Strain, ...] = ("axial", "shear_y", "shear_z", "torsion", "bending_z", "bending_y")
 """In the order of the rows [stretch, shears; twist, curvatures about y and z]."""
 CURVATURES: tuple[Strain, ...] = ("torsion", "bending_z", "bending_y")
+BENDINGS: tuple[Strain, Strain] = ("bending_z", "bending_y")
 SHEARED: tuple[tuple[Strain, Strain], ...] = (("shear_y", "bending_y"), ("shear_z", "bending_z"))
 """The shear of each bending plane, of theory "timoshenko"."""
 
+LEAST_OF_PART, WHOLE_PIECE = 3, 1.0 - 1e-9
 # Gauss points of a piece beyond its polynomials, and at least (docs/notation.md, section 5)
 MORE_POINTS, FEWEST_POINTS = 3, 6
+REST_LEFT_OUT = 1e-4
+"""Of what turns at rest, by default points: the unloaded axis, an integral of it, is then right to 1e-5 of its length
+(tests/flexmb/scene/test_rest_turn.py)."""
 
 
 def families(body: BeamBody) -> tuple[Family, ...]:
@@ -99,10 +106,24 @@ def strain_count(body: BeamBody) -> int:
 
 
 def points_of_piece(body: BeamBody) -> int:
-    """Gauss points along each piece."""
+    """Gauss points along each piece, as many as its polynomials and its curvature at rest take if none are given."""
     if body.modes.points is not None:
         return body.modes.points
-    return max(FEWEST_POINTS, MORE_POINTS + max(polynomials(body).values(), default=0))
+    at_rest = max((points_at_rest(part, REST_LEFT_OUT) for part in turns_of_pieces(body)), default=0)
+    return max(FEWEST_POINTS, MORE_POINTS + max(polynomials(body).values(), default=0), at_rest)
+
+
+def points_at_rest(part: RestTurn, left_out: float) -> int:
+    """Points along a piece of which this part of it gets as many as its turn takes (`points_of_part`)."""
+    needed = follow(part.turn, left_out)
+    if part.share > WHOLE_PIECE or needed <= LEAST_OF_PART:
+        return needed
+    return min(MOST_FOLLOWED, ceil((needed - 1) / part.share))
+
+
+def points_of_part(points: int, share: float) -> int:
+    """Points of a part of a piece with `points`: strains, whose polynomials are the piece's, vary less along it."""
+    return points if share > WHOLE_PIECE else min(points, max(LEAST_OF_PART, ceil(points * share) + 1))
 
 
 def borrows_inertia(body: BeamBody) -> bool:

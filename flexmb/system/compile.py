@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, get_args
 
+from msgspec.structs import replace
+
 from flexmb.jain.elimination import Elimination
-from flexmb.scene.bodies import SidBody
+from flexmb.scene.bodies import BeamBody, SidBody
 from flexmb.scene.check import check_and_warn, check_scene
 from flexmb.scene.check.starting import built
 from flexmb.scene.garbage import collector_paused
+from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import Scene
+from flexmb.scene.strains import points_of_piece
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.features import Kernels, asking
@@ -70,7 +74,27 @@ def compile_batch(scenes: Sequence[Scene]) -> Batch:
     scenes = listed("scenes", scenes)
     for scene in scenes:
         check_and_warn(scene)
-    return Batch([assembled(scene, "explicit") for scene in scenes])
+    return Batch([assembled(scene, "explicit") for scene in _with_equal_points(scenes)])
+
+
+def _with_equal_points(scenes: Sequence[Scene]) -> list[Scene]:
+    """The scenes, with as many default points of each curved beam as any of them has: these depend on numbers in which
+    copies may differ, and are part of their structure."""
+    most: dict[str, int] = {}
+    for body in (each for scene in scenes for each in scene.bodies):
+        if isinstance(body, BeamBody) and body.level == "exact" and body.modes.points is None and is_curved(body):
+            most[body.name] = max(most.get(body.name, 0), points_of_piece(body))
+    return [_with_points(scene, most) for scene in scenes] if most else list(scenes)
+
+
+def _with_points(scene: Scene, points: dict[str, int]) -> Scene:
+    """The scene with these points of beams that have default ones."""
+    bodies = tuple(
+        replace(body, modes=replace(body.modes, points=points[body.name]))
+        if isinstance(body, BeamBody) and body.name in points and body.modes.points is None else body
+        for body in scene.bodies
+    )  # fmt: skip
+    return replace(scene, bodies=bodies)
 
 
 def _read(scene: Scene) -> Scene:

@@ -18,10 +18,11 @@ from flexmb.modal.exact import field_of_points
 from flexmb.modal.strain_field import WHOLE, StrainField
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.pieces import piece_count
+from flexmb.scene.rest_turn import MOST_FOLLOWED, follow, turns_of_pieces
 from flexmb.scene.strains import points_of_piece
 from flexmb.system.moved_sections import moved_sections
 from flexmb.system.scene_arrays import SceneArrays
-from flexmb.typing import Index, Real
+from flexmb.typing import Real
 
 ALLOWED = 1e-4
 """rad, and parts of the beam's length: a third of what four polynomials leave of a beam that swings bent by 82 degrees,
@@ -47,13 +48,17 @@ class Unfollowed(NamedTuple):
     rotation: float
     enough: int | None
 
-    def __str__(self) -> str:
-        remedy = "cut it into more `pieces`" if self.enough is None else f"give its modes points = {self.enough}"
+    @property
+    def what(self) -> str:
         return (
             f'beam "{self.body}" bends more than its points can follow: at t = {self.t:g} s, {self.points} of them '
             f"along each piece put its sections {self.position:.1e} m and {self.rotation:.1e} rad from where its "
-            f"strains have them; {remedy}"
+            f"strains have them"
         )
+
+    @property
+    def remedy(self) -> str:
+        return "cut it into more `pieces`" if self.enough is None else f"give its modes points = {self.enough}"
 
 
 def unfollowed(arrays: SceneArrays, t: Real, q: Real) -> Iterator[Unfollowed]:
@@ -65,33 +70,42 @@ def unfollowed(arrays: SceneArrays, t: Real, q: Real) -> Iterator[Unfollowed]:
         if body is None or field is None:
             continue
         eta = q[:, arrays.coordinate(f"{body.name}.modes")]
-        most = [_error(body, eta[i], float(t[i])) for i in _suspects(field, eta)]
+        most = [_error(body, eta[i], float(t[i]), turn) for i, turn in _suspects(field, eta)]
         yield from sorted((each for each in most if each is not None), key=lambda each: -each.rotation)[:1]
 
 
-def _suspects(field: StrainField, eta: Real) -> Index:
-    """The numbers of the strains eta (T,m) that are worth a closer look, at most two."""
+def _suspects(field: StrainField, eta: Real) -> list[tuple[int, float]]:
+    """The numbers of the strains eta (T,m) that are worth a closer look, at most two, and their turn (rad) in all."""
     turns = np.linalg.norm(np.einsum("jam,tm->tja", field.rows[: field.steps, WHOLE], eta), axis=2)
     largest, whole = turns.max(axis=1), turns.sum(axis=1)
-    found = np.unique([np.argmax(largest), np.argmax(whole)])
-    return found[largest[found] > SMALL_TURN]
+    found = {int(np.argmax(each)) for each in (largest, whole)}
+    return [(i, float(whole[i])) for i in sorted(found) if largest[i] > SMALL_TURN]
 
 
-def _error(body: BeamBody, eta: Real, t: float) -> Unfollowed | None:
-    """What the points of the beam leave of these strains (m,), if it is more than ALLOWED."""
+def _error(body: BeamBody, eta: Real, t: float, turn: float) -> Unfollowed | None:
+    """What the points of the beam leave of these strains (m,), which turn by so many rad, if it is more than ALLOWED.
+    """
     points = points_of_piece(body)
-    finest = 2 * points + 8
+    at_rest = max((part.turn for part in turns_of_pieces(body)), default=0.0)
+    finest = max(2 * points + 8, follow(turn + at_rest, ALLOWED**2))
     if 12.0 * finest * piece_count(body) * len(eta) > _MOST:
         return None
     truth = _seen(body, finest, eta)
-    position, rotation = _apart(_seen(body, points, eta), truth)
-    if position <= ALLOWED * body.length_m and rotation <= ALLOWED:
+
+    def left(points: int) -> tuple[float, float]:
+        return _apart(_seen(body, points, eta), truth)
+
+    def is_enough(left: tuple[float, float]) -> bool:
+        return left[0] <= ALLOWED * body.length_m and left[1] <= ALLOWED
+
+    position, rotation = left(points)
+    if is_enough((position, rotation)):
         return None
-    for more in range(points + 1, finest):
-        off, turned = _apart(_seen(body, more, eta), truth)
-        if off <= ALLOWED * body.length_m and turned <= ALLOWED:
-            return Unfollowed(body.name, t, points, position, rotation, more)
-    return Unfollowed(body.name, t, points, position, rotation, None)
+    few, enough = points, finest
+    while enough - few > 1:
+        middle = (few + enough) // 2
+        few, enough = (few, middle) if is_enough(left(middle)) else (middle, enough)
+    return Unfollowed(body.name, t, points, position, rotation, enough if enough < min(finest, MOST_FOLLOWED) else None)
 
 
 def _seen(body: BeamBody, points: int, eta: Real) -> tuple[Real, Real]:

@@ -20,7 +20,6 @@ from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
-WAIVER = "held_stretch"
 ALLOWED = 1e-3
 """Mean strain along the axis up to which nothing is said: what a steel at 200 MPa stretches."""
 LOOKED_AT = 3
@@ -36,26 +35,30 @@ class Unstretched(NamedTuple):
     t: float
     strain: float
 
-    def __str__(self) -> str:
+    remedy = 'give it "axial" among the families of its modes, or polynomials'
+
+    @property
+    def what(self) -> str:
+        """By how much, and when."""
         what = "lengthen" if self.strain > 0.0 else "shorten"
         return (
             f'beam "{self.body}" is held against stretch, and at t = {self.t:g} s its loads would {what} it by '
-            f'{abs(self.strain):.2g} of its length; give it "axial" among the families of its modes, or polynomials'
+            f"{abs(self.strain):.2g} of its length"
         )
 
 
 def unstretched(system: System, t: Real, q: Real, u: Real, loads: Mapping[str, Real]) -> Iterator[Unstretched]:
     """The beams that loads in some of the states at t (T,) s would stretch by more than ALLOWED, at the worst of them.
 
-    loads: (T,6) of hinges and closures, by name. Nothing where the scene's `allow` lists "held_stretch", and of scenes
-    with controllers, whose loads do not follow from a state.
+    loads: (T,6) of hinges and closures, by name. Nothing of scenes with controllers, whose loads do not follow from a
+    state.
     """
     held = [
         body
         for body in system.scene.bodies
         if isinstance(body, BeamBody) and body.level == "exact" and "axial" not in strains(body)
     ]
-    if WAIVER in system.scene.allow or system.scene.controllers or not held or not len(t):
+    if system.scene.controllers or not held or not len(t):
         return
     force, turn = _largest(system, u, loads)
     for body in held:

@@ -16,8 +16,7 @@ import numpy as np
 from flexmb.building.links import BodyLink
 from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import BeamBody
-from flexmb.scene.problems import Doubt, Place
-from flexmb.system.tree_system import System
+from flexmb.system.mechanics import Mechanics
 from flexmb.typing import Real
 
 UNPULLED = ("ruthless", "linear", "full")
@@ -26,7 +25,6 @@ ALLOWED = 0.2
 """(w / omega_1)^2 up to which nothing is said: there the lowest frequency is off by 11 %."""
 LOOKED_AT = 32
 """States of a run that are looked at: those with the fastest turns of hinges."""
-WAIVER = "level_range"
 
 
 class TooFast(NamedTuple):
@@ -44,32 +42,25 @@ class TooFast(NamedTuple):
         """(w / omega_1)^2."""
         return (self.rate / self.first) ** 2
 
-    def __str__(self) -> str:
+    @property
+    def what(self) -> str:
         beyond = f'; level "{self.level}" is unstable there' if self.share >= 1.0 and self.level != "ruthless" else ""
         return (
             f'body "{self.body}" turns at {self.rate:.3g} rad/s at t = {self.t:g} s, {self.rate / self.first:.2g} of '
             f'its first frequency of {self.first:.3g} rad/s, and level "{self.level}" leaves out that this pulls it '
-            f"straight, an effect of (spin / first frequency)^2 = {self.share:.2g}{beyond}; {self.remedy}"
+            f"straight, an effect of (spin / first frequency)^2 = {self.share:.2g}{beyond}"
         )
 
-    def doubt(self, place: Place) -> Doubt:
-        """As a doubt about the body's place in a scene."""
-        what, _, remedy = str(self).rpartition("; ")
-        return Doubt(str(place), what, remedy, WAIVER)
 
-
-def too_fast(system: System, t: Real, u: Real, turns: Callable[[int], Real]) -> Iterator[TooFast]:
+def too_fast(system: Mechanics, t: Real, u: Real, turns: Callable[[int], Real]) -> Iterator[TooFast]:
     """The bodies that turn beyond their level's range in states at t (T,) s with speeds u (T,nu): once each.
 
-    turns: angular velocities (N,3) rad/s of the bodies in a state, by its number, as `System.turns`. Nothing where the
-    scene's `allow` lists "level_range".
+    turns: angular velocities (N,3) rad/s of the bodies in a state, by its number, as `System.turns`.
     """
-    if WAIVER in system.scene.allow or not len(t):
-        return
-    firsts: dict[int, float] | None = system.kept.get(WAIVER)
+    firsts: dict[int, float] | None = system.kept.get("level_range")
     if firsts is None:
         found = {k: _first(link) for k, link in enumerate(system.links)}
-        firsts = system.kept.setdefault(WAIVER, {k: first for k, first in found.items() if first > 0.0})
+        firsts = system.kept.setdefault("level_range", {k: first for k, first in found.items() if first > 0.0})
     if not firsts:
         return
     fastest = {k: (0.0, 0.0) for k in firsts}
@@ -90,7 +81,7 @@ def _remedy(link: BodyLink) -> str:
     return 'take level "stiffened", which needs a second-order field or geometric stiffness'
 
 
-def _suspects(system: System, u: Real, slow: float) -> list[int]:
+def _suspects(system: Mechanics, u: Real, slow: float) -> list[int]:
     """The numbers of the states with the largest speeds of hinges; those of modes turn no body as a whole.
 
     Where all speeds together are below `slow` (rad/s), nothing turns faster.

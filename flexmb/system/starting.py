@@ -12,8 +12,9 @@ from flexmb.scene.check.walk import entries
 from flexmb.scene.problems import Doubt
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import assembled
-from flexmb.system.level_range import LOOKED_AT, too_fast
+from flexmb.system.level_range import LOOKED_AT
 from flexmb.system.tree_system import System
+from flexmb.system.watches import Seen, said
 from flexmb.tables.state import State, pack
 
 
@@ -22,8 +23,8 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
 
     Tables of prescribed motions must cover t_start (s), and with `t_end` (s) the run from t_start to t_end. A scene
     without such defects is compiled, with its SID files and with its loops closed, and everything is evaluated once at
-    its start: what fails there is a defect too. Bodies that turn too fast for their level at the start, or by
-    prescribed motions until t_end, are doubtful.
+    its start: what fails there is a defect too. Bodies that turn too fast for their level or bend beyond their points
+    and polynomials at the start, or by prescribed motions until t_end, are doubtful.
 
     A doubtful scene can be run; doubts that its `allow` lists are not returned. `compile`, `simulate` and the command
     lines show the same doubts as a `SceneWarning`, which `pytest -W error::flexmb.SceneWarning` and the option
@@ -34,16 +35,16 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
         system = assembled(scene)
         start = system.initial_state
         system.evaluate(start.t, start.q, start.u)
-    return (*doubts, *_beyond_level(system, start, start.t if t_end is None else t_end))
+    return (*doubts, *_watched(system, start, start.t if t_end is None else t_end))
 
 
-def _beyond_level(system: System, start: State, t_end: float) -> Iterator[Doubt]:
-    """Bodies that turn too fast for their level at the start, or by prescribed motions up to t_end (s)."""
+def _watched(system: System, start: State, t_end: float) -> Iterator[Doubt]:
+    """What watches say of the start, and of prescribed motions up to t_end (s)."""
     t = np.linspace(start.t, t_end, LOOKED_AT)
     y = np.tile(pack(start), (len(t), 1))
     for each, row in zip(t, y, strict=True):
         system.project(float(each), row, system.constants)  # to prescribed coordinates and speeds
     q, u = y[:, : system.nq], y[:, system.nq : -1]
     place = {body.name: place for place, body in entries(system.scene, "bodies")}
-    for each in too_fast(system, t, u, lambda n: system.turns(float(t[n]), q[n], u[n])):
-        yield each.doubt(place[each.body])
+    for each in said(Seen(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]))):
+        yield each.doubt(place[each.finding.body])

@@ -9,29 +9,39 @@ from flexmb.scene.bodies import BeamBody, Modes
 from flexmb.scene.convert import ROOT
 from flexmb.scene.pieces import across, piece_count
 from flexmb.scene.problems import Defect, Doubt, Place, closest
-from flexmb.scene.rest_curve import MOST_TURN, is_bent, is_curved, turn_at_rest
+from flexmb.scene.rest_curve import MOST_TURN, is_bent, is_curved
+from flexmb.scene.rest_turn import MOST_FOLLOWED, follow, turn_at_rest, turns_of_pieces
 from flexmb.scene.schema import Scene
 from flexmb.scene.sections import has_plain_sections
 from flexmb.scene.sizes import MOST_MODES, counted
 from flexmb.scene.strains import (
+    BENDINGS,
     FEWEST_POINTS,
     MORE_POINTS,
+    REST_LEFT_OUT,
     SHEARED,
     STRAINS,
     Strain,
+    points_at_rest,
+    points_of_part,
     points_of_piece,
     polynomials,
 )
 
-MOST_PIECES, MOST_POLYNOMIALS, MOST_POINTS = 1000, 40, 200
+MOST_PIECES, MOST_POLYNOMIALS, MOST_POINTS = 1000, 40, MOST_FOLLOWED
 """Beyond these a number is taken for a slip. The fastest frequency grows with the fourth power of the polynomials: with
 40 of them it would be some hundred thousand times the first (docs/exact.md has it for 4, 6 and 8)."""
+
+POINTS_DOUBTED, POLYNOMIALS_DOUBTED, POLYNOMIALS_ENOUGH = 1e-2, 1e-1, 1e-2
+"""Of what turns at rest, left out: points that leave the first put the axis some 1e-4 of its length off; polynomials
+that leave the second make the first frequency of a coil some 1 % too high, as two do that of a straight beam."""
 
 
 def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
     """Strains, points and damping of a beam of level exact."""
     modes = place.key("modes")
-    yield from _numbers(modes, body)
+    wrong = [*_numbers(modes, body)]
+    yield from wrong
     if (turn := turn_at_rest(body)) > MOST_TURN:
         worst = max(range(len(body.stations)), key=lambda i: hypot(*body.stations[i].curvature_1_m))
         what = f"at rest the beam turns by {turn:.6g} rad, and the limit is {MOST_TURN:g} rad"
@@ -51,8 +61,10 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
         what = f"{points} points for {most} polynomials of one strain leave motions without inertia"
         remedy = f"use {most + 1} points at least; {max(FEWEST_POINTS, most + MORE_POINTS)} are the default"
         yield Defect(str(modes.key("points")), what, remedy)
-    elif points_of_piece(body) > MOST_POINTS:
-        yield Defect(str(modes.key("points")), f"{counted(points_of_piece(body))} points", f"use {MOST_POINTS} at most")
+    elif (points := body.modes.points or 0) > MOST_POINTS:
+        yield Defect(str(modes.key("points")), f"{counted(points)} points", f"use {MOST_POINTS} at most")
+    elif not wrong and turn <= MOST_TURN:
+        yield from _unfollowed(modes, body, found)
     for shear, key in (("shear_y", "GAy_N"), ("shear_z", "GAz_N")):
         if shear in found and any(each.stiffness is None and getattr(each, key) is None for each in body.stations):
             spot = str(place.key("stations"))
@@ -64,6 +76,29 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
         remedy = f"give {MOST_MODES} at most; several bodies that are welded together cost O(N)"
         yield Defect(str(modes.key("pieces")), what, remedy)
     yield from damping(modes, body.modes, count)
+
+
+def _unfollowed(place: Place, body: BeamBody, found: dict[Strain, int]) -> Iterator[Doubt]:
+    """Points and polynomials that cannot follow the axis at rest, along the piece that needs most of them."""
+    parts, points = turns_of_pieces(body), points_of_piece(body)
+    if not parts:
+        return
+    worst = max(parts, key=lambda part: follow(part.turn, POINTS_DOUBTED) / points_of_part(points, part.share))
+    if points_of_part(points, worst.share) < follow(worst.turn, POINTS_DOUBTED):
+        enough = max(points_at_rest(worst, REST_LEFT_OUT), 1 + max(found.values()))
+        what = f"at rest the beam turns by {worst.turn:.3g} rad along a piece, which {points} points do not follow"
+        yield Doubt(str(place.key("points")), what, _more("points", enough, MOST_POINTS), "few_points")
+    turn = max(sum(part.turn for part in parts if part.piece == piece) for piece in {part.piece for part in parts})
+    least = min((found[strain] for strain in BENDINGS if strain in found), default=MOST_POLYNOMIALS)
+    if least < follow(turn, POLYNOMIALS_DOUBTED):
+        what = f"at rest the beam turns by {turn:.3g} rad along a piece, and its strains with it: {least} polynomials"
+        key = "count" if body.modes.polynomials is None else "polynomials"
+        remedy = _more(key, follow(turn, POLYNOMIALS_ENOUGH), MOST_POLYNOMIALS)
+        yield Doubt(str(place.key(key)), f"{what} make it too stiff", remedy, "few_polynomials")
+
+
+def _more(key: str, enough: int, most: int) -> str:
+    return f"give its modes {key} = {enough}" if enough < most else "cut it into more `pieces`"
 
 
 def _still(place: Place, body: BeamBody, found: dict[Strain, int]) -> Iterator[Defect]:

@@ -340,6 +340,9 @@ BAD = {
 # A body that lost its hinge to a wrong name is itself reported too.
 ORPHANING = ("unknown child", "ground as child", "body named ground")
 
+_COIL = both(STATELESS, put("bodies", 1, "level", "exact"), put(*MODES, "families", ["bending_z"]),
+             put(*STATION, "curvature_1_m", [0.0, 0.0, 20.0 / 3.0]))  # fmt: skip
+
 # What a sound scene may have and few do; last the word that waives it.
 DOUBTFUL = {
     "stiffness in kN": (put(*STATION, "EA_N", 70e9), ["stations[1].EA_N"], ["waves"], ["1000", "units"], "wave_speed"),
@@ -376,4 +379,10 @@ DOUBTFUL = {
              put("hinges", 2, "parent_node", "middle")),
         ["$.bodies[1].modes.cuts", 'body "boom"'], ["strains jump at x = 1.5 m", 'hinge "cardan" at node "middle"'],
         ["cut the beam there"], "uncut_beam"),
+    "a coil with few points": (
+        both(_COIL, put(*MODES, "count", 14), put(*MODES, "points", 15)),
+        ["$.bodies[1].modes.points", 'body "boom"'], ["turns by 20 rad", "15 points"], ["points = 20"], "few_points"),
+    "a coil with few polynomials": (
+        _COIL, ["$.bodies[1].modes.count", 'body "boom"'], ["turns by 20 rad", "3 polynomials"], ["count = 17"],
+        "few_polynomials"),
 }  # fmt: skip

@@ -14,6 +14,7 @@ from flexmb.scene.check import SceneError, SceneWarning, check_and_warn, check_s
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.files import dumps, loads
 from flexmb.scene.problems import Doubt, in_short
+from flexmb.system.watches import WAIVERS
 from tests.flexmb.scene.bad_scenes import BAD, DOUBTFUL, ORPHANING, satellite
 
 
@@ -64,8 +65,8 @@ def test_a_doubtful_scene_is_warned_of_until_it_is_waived(good, name):
 
 
 def test_every_waiver_is_needed_by_something():
-    """The range of a level is known when a scene is compiled (tests/flexmb/levels/test_level_range.py)."""
-    assert {waiver for *_, waiver in DOUBTFUL.values()} | {"level_range", "held_stretch"} == set(get_args(s.Waiver))
+    """What motions exceed is known when there is one (tests/flexmb/levels/test_watches.py)."""
+    assert {waiver for *_, waiver in DOUBTFUL.values()} | set(WAIVERS) == set(get_args(s.Waiver))
 
 
 def test_an_unknown_waiver_is_refused(good):

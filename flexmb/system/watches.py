@@ -1,0 +1,139 @@
+"""The watches of accuracy: whether motions went beyond what points, polynomials and levels of fidelity can describe.
+
+A watch is declared once, in WATCHES, with the word of a scene's `allow` that waives it. Whatever answers a question
+about a motion has the states of its answer looked at here: runs and their batches, equilibria and paths of them, steady
+spins, linear models, Campbell diagrams, and `check_scene` at the start. Whether loads would stretch what is held needs
+loads, which runs, equilibria, spins and linear models have.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from flexmb.scene.problems import Doubt, Place, SceneWarning
+from flexmb.scene.schema import Waiver
+from flexmb.system.tree_system import System
+from flexmb.tables.state import State
+from flexmb.typing import Real
+
+
+class Seen(NamedTuple):
+    """States that are looked at: coordinates q (T,nq) and speeds u (T,nu) at t (T,) s.
+
+    turns: angular velocities (N,3) rad/s of the bodies in a state, by its number. failed: whether a run ended early,
+    which may have diverged. loads: those (T,6) of hinges and closures, by name, None where they were not asked for.
+    """
+
+    system: System
+    t: Real
+    q: Real
+    u: Real
+    turns: Callable[[int], Real]
+    failed: bool = False
+    loads: Mapping[str, Real] | None = None
+
+
+class Finding(Protocol):
+    """What a watch says of a body, and the remedy, with the number to set."""
+
+    @property
+    def body(self) -> str: ...
+
+    @property
+    def what(self) -> str: ...
+
+    @property
+    def remedy(self) -> str: ...
+
+
+class Said(NamedTuple):
+    """A finding of a watch, with the word that waives it."""
+
+    finding: Finding
+    waiver: Waiver
+
+    def __str__(self) -> str:
+        return f"{self.finding.what}; {self.finding.remedy}"
+
+    def doubt(self, place: Place) -> Doubt:
+        """As a doubt about the body's place in a scene."""
+        return Doubt(str(place), self.finding.what, self.finding.remedy, self.waiver)
+
+
+def _level_range(seen: Seen) -> Iterator[Finding]:
+    from flexmb.system.level_range import too_fast  # imported here because many scenes have no flexible bodies
+
+    return too_fast(seen.system, seen.t, seen.u, seen.turns)
+
+
+def _few_points(seen: Seen) -> Iterator[Finding]:
+    from flexmb.system.enough_points import unfollowed  # imported here because few scenes have such beams
+
+    return unfollowed(seen.system, seen.t, seen.q)
+
+
+def _few_polynomials(seen: Seen) -> Iterator[Finding]:
+    from flexmb.system.enough_polynomials import unresolved  # imported here because few scenes have such beams
+
+    return unresolved(seen.system, seen.t, seen.q)
+
+
+def _held_stretch(seen: Seen) -> Iterator[Finding]:
+    from flexmb.system.held_stretch import unstretched  # imported here because few scenes have such beams
+
+    return unstretched(seen.system, seen.t, seen.q, seen.u, seen.loads) if seen.loads is not None else iter(())
+
+
+class _Watch(NamedTuple):
+    waiver: Waiver
+    look: Callable[[Seen], Iterator[Finding]]
+    strains: bool = False  # whether it looks at strains of level exact, which say nothing once a run has diverged
+
+
+WATCHES = (
+    _Watch("level_range", _level_range),
+    _Watch("few_points", _few_points, strains=True),
+    _Watch("few_polynomials", _few_polynomials, strains=True),
+    _Watch("held_stretch", _held_stretch, strains=True),
+)
+
+WAIVERS: tuple[Waiver, ...] = tuple(watch.waiver for watch in WATCHES)
+"""For scenes whose levels, points and polynomials are compared with one another."""
+
+
+def said(seen: Seen) -> list[Said]:
+    """What all watches say that the scene does not waive."""
+    system = seen.system
+    if not len(seen.t) or all(link.is_rigid for link in system.links):
+        return []
+    skipped = seen.failed or not len(system.constants.section)
+    return [
+        Said(each, watch.waiver)
+        for watch in WATCHES
+        if watch.waiver not in system.scene.allow and not (watch.strains and skipped)
+        for each in watch.look(seen)
+    ]
+
+
+def of_states(system: System, states: Sequence[State], turns: Callable[[int], Real] | None = None) -> Seen:
+    """States of a system that are no samples of a run; turns: see `Seen`, by the system's own functions of time if left
+    out."""
+    t, q, u = (np.array([getattr(state, key) for state in states]) for key in ("t", "q", "u"))
+    loads = _loads(system, states) if len(system.constants.section) and not system.scene.controllers else None
+    return Seen(system, t, q, u, turns or (lambda n: system.turns(float(t[n]), q[n], u[n])), loads=loads)
+
+
+def _loads(system: System, states: Sequence[State]) -> dict[str, Real]:
+    """Loads (T,6) of hinges and closures, by name."""
+    found = [system.evaluate(state.t, state.q, state.u).loads for state in states]
+    return {name: np.array([each[name] for each in found]) for name in (found[0] if found else ())}
+
+
+def warn(seen: Seen, stacklevel: int = 3) -> None:
+    """A SceneWarning for each finding, for the caller of the calling function."""
+    for each in said(seen):
+        warnings.warn(f'scene "{seen.system.scene.name}": {each}', SceneWarning, stacklevel=stacklevel)

@@ -1,0 +1,145 @@
+"""Watches of accuracy: every door that answers a question about a motion tells what points and polynomials leave out.
+
+The doors are the public functions that take a scene, found by their signatures.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import warnings
+from typing import get_args
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+import flexmb as fm
+from flexmb.scene import schema as s
+from flexmb.system.enough_polynomials import ALLOWED
+from flexmb.system.watches import WAIVERS, WATCHES
+from tests.flexmb.levels.strain_beams import PLANE, beam
+from tests.repo.project import ROOT
+
+NUMBER, WATCHED = "push.function.value", ["energy.total"]
+
+
+def bent(count=2, points=None, force=7.0):
+    """A rod of length 1 on a hinge that a force on its tip, which turns with it, keeps bent far."""
+    builder = beam(s.Modes(count=count, points=points, families=PLANE, viscosity_s=0.3))
+    builder.revolute("hub", "ground", "rod", axis=(0, 0, 1), prescribed=fm.Constant(value=0.0))
+    builder.force("push", "rod", node="tip", direction=(0, 1, 0), frame="node",
+                  function=fm.Constant(value=force))  # fmt: skip
+    return replace(builder.marker("tip", "rod", node="tip").scene(), allow=("wave_speed", "uncut_beam"))
+
+
+RUN = {"rtol": 1e-4}
+ANSWERS = {
+    "simulate": lambda scene: fm.simulate(scene, 2.0, samples=21, **RUN),
+    "simulate_stages": lambda scene: fm.simulate_stages(scene, [fm.RunStage(2.0, samples=21)], **RUN),
+    "simulate_batch": lambda scene: fm.simulate_batch([scene, scene], 2.0, samples=21, **RUN),
+    "equilibrium": fm.equilibrium,
+    "equilibrium_path": lambda scene: fm.equilibrium_path(scene, NUMBER, [0.5, 7.0]),
+    "linearize": lambda scene: fm.linearize(scene, quietly(fm.equilibrium, fm.compile(scene))),
+    "steady_spin": lambda scene: fm.steady_spin(scene, "hub", 0.01),
+    "campbell": lambda scene: fm.campbell(scene, "hub", [0.0, 0.01]),
+    "sensitivities": lambda scene: fm.sensitivities(scene, 2.0, [NUMBER], WATCHED, samples=21, **RUN),
+    "uncertainty": lambda scene: fm.uncertainty(scene, 2.0, {NUMBER: 0.1}, WATCHED, samples=21, **RUN),
+    "gradient": lambda scene: fm.gradient(scene, 2.0, [NUMBER], fm.FinalValue("energy.total"), **RUN),
+    "check_scene": lambda scene: warned_by(fm.check_scene(started_bent(scene))),
+}
+"""Each door with a scene that bends too far."""
+OTHERS = {
+    "compile": "answers nothing yet, and shows what the check knows",
+    "compile_batch": "the same",
+    "save_scene": "writes the scene",
+    "open_loop": "returns another scene",
+    "fit": "does not speak of trial values",
+    "advise": "measures models against finer ones",
+}
+QUICK = ("simulate", "simulate_batch", "equilibrium")
+
+
+def quietly(call, *arguments):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return call(*arguments)
+
+
+def started_bent(scene):
+    """With the strains of its equilibrium at the start."""
+    system = fm.compile(scene)
+    modes = quietly(fm.equilibrium, system).q[system.coordinate("rod.modes")]
+    return replace(scene, modal_states=(s.ModalState(body="rod", coordinates=tuple(modes.tolist())),))
+
+
+def warned_by(doubts):
+    """The doubts as warnings, to compare them with those of other doors."""
+    for each in doubts:
+        warnings.warn(f"{each.what}; {each.remedy}", fm.SceneWarning, stacklevel=1)
+
+
+def told(call, scene):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        call(scene)
+    return [str(each.message) for each in caught if issubclass(each.category, fm.SceneWarning)]
+
+
+def test_every_door_is_known():
+    """Every public function that takes a scene, a system or a batch answers, or says why it does not."""
+    found = set()
+    for name in fm.__all__:
+        call = getattr(fm, name)
+        if inspect.isfunction(call):
+            kinds = " ".join(str(each.annotation) for each in inspect.signature(call).parameters.values())
+            if re.search(r"\b(Scene|System|Batch)\b", kinds):
+                found.add(name)
+    assert found == set(ANSWERS) | set(OTHERS)
+    assert len(WAIVERS) == len(WATCHES) and set(WAIVERS) <= set(get_args(s.Waiver))
+
+
+@pytest.mark.parametrize(
+    "door", [pytest.param(door, marks=() if door in QUICK else pytest.mark.slow) for door in ANSWERS]
+)
+def test_every_door_tells_of_few_polynomials_and_points(door):
+    """Once each, with the number to set, and by the word that waives it not."""
+    for scene, pattern, waiver in (
+        (bent(), r"give its modes \d+ polynomials of bending_y", "few_polynomials"),
+        (bent(count=4, points=5), r"give its modes points = \d+", "few_points"),
+    ):
+        words = [word for word in told(ANSWERS[door], scene) if re.search(pattern, word)]
+        assert len(words) == 1 and 'beam "rod"' in words[0], words
+        waived = replace(scene, allow=(*scene.allow, waiver))
+        assert not any(re.search(pattern, word) for word in told(ANSWERS[door], waived))
+
+
+def test_the_polynomials_that_are_named_are_enough():
+    """At rest under the same force with three more the tip moves by less than a tenth of ALLOWED; from two polynomials
+    by more. Nothing is said of small turns, even if two polynomials were exact."""
+
+    def tip(count):
+        system = fm.compile(replace(bent(count, force=4.0), allow=("wave_speed", *WAIVERS)))
+        state = fm.equilibrium(system)
+        return system.evaluate(0.0, state.q, state.u).markers["tip"].position
+
+    (word,) = told(fm.equilibrium, bent(force=4.0))
+    enough = int(re.search(r"(\d+) polynomials of", word)[1])
+    truth = tip(enough + 3)
+    assert np.linalg.norm(tip(enough) - truth) < 0.1 * ALLOWED < np.linalg.norm(tip(2) - truth)
+    assert told(fm.equilibrium, bent(enough, force=4.0)) == [] == told(fm.equilibrium, bent(force=0.5))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "path", sorted(path.relative_to(ROOT) for path in (ROOT / "cases").rglob("*.toml") if "exact" in path.read_text()
+                   and 'level = "exact"' in path.read_text()), ids=str,
+)  # fmt: skip
+def test_sound_scenes_are_silent(path):
+    """A tenth of a second of each case's scene, at rest and in motion, and its start."""
+    try:
+        scene = fm.load_scene(ROOT / path)
+    except fm.SceneError:
+        return  # a file of runs, or one that a case changes before it is a scene
+    assert not [each for each in fm.check_scene(scene) if each.waiver in WAIVERS]
+    assert told(lambda scene: fm.simulate(scene, 0.1, "radau5", samples=11, rtol=1e-3, atol=1e-5), scene) == []
