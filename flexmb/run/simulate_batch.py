@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
 from typing import Any, Unpack
 
 import numpy as np
@@ -17,6 +18,7 @@ from flexmb.run.lane_runs import BatchRun, Runs, runs
 from flexmb.run.samples import sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
 from flexmb.run.switching import refuse_times
+from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes
 from flexmb.system.batch import Batch, number_of_threads
@@ -46,6 +48,7 @@ def simulate_batch(
     and scenes with closures or controllers, run one copy after the other. In lanes all modes are eliminated explicitly.
     threads: number of threads, by default one per processor.
 
+    Warns (`SceneWarning`) of doubtful input, and of bodies that turned faster than their level describes.
     A run that fails raises nothing and does not affect the others: `status` and `message` of the result say why it
     stopped. Raises SceneError, ValueError, TypeError or NotImplementedError as `simulate` does, ValueError for states
     that do not fit the copies, and KeyboardInterrupt for Ctrl-C.
@@ -71,7 +74,10 @@ def simulate_batch(
         _, interrupted = interruptible(BatchRun(batch, times, chosen, found), (len(rows[0]), number), stop)
         if interrupted:
             raise KeyboardInterrupt
-    return _gathered(batch, times, found, len(rows[0]))
+    gathered = _gathered(batch, times, found, len(rows[0]))
+    for doubt in _beyond_level(gathered):
+        warnings.warn(doubt, SceneWarning, stacklevel=2)
+    return gathered
 
 
 def _given(batch: Batch, q: Any, u: Any) -> tuple[Any, Any]:
@@ -91,6 +97,27 @@ def _refuse_too_many(n: int, samples: int, batch: Batch) -> None:
     size = 8.0 * n * samples * (batch.nq + batch.nu + 1)
     remedy = "ask for fewer samples, or run fewer copies at once"
     refuse_bytes(size, f"{n} copies at {samples} output times take", remedy)
+
+
+def _beyond_level(runs: BatchTrajectory) -> Iterator[str]:
+    """What there is to say of bodies that turned faster than their level describes: of each, in the copy where it
+    turned fastest."""
+    batch = runs.batch
+    if all(link.is_rigid for link in batch.systems[0].links):
+        return
+    from flexmb.system.level_range import TooFast, too_fast  # imported here because many scenes have no flexible bodies
+
+    worst = dict[str, tuple[TooFast, int]]()
+    together = [list(range(len(runs.status)))] if batch.shares_constants else [[i] for i in range(len(runs.status))]
+    for copies in together:
+        known = np.isfinite(runs.work[copies])
+        t, q, u = (each[known] for each in (np.broadcast_to(runs.t, known.shape), runs.q[copies], runs.u[copies]))
+        system, which = batch.systems[0 if batch.shares_constants else copies[0]], np.nonzero(known)[0]
+        for each in too_fast(system, t, u, lambda n, s=system, t=t, q=q, u=u: s.turns(float(t[n]), q[n], u[n])):
+            if each.body not in worst or each.share > worst[each.body][0].share:
+                worst[each.body] = each, copies[which[each.state]]
+    for each, copy in worst.values():
+        yield f'scene "{batch.systems[0].scene.name}", copy {copy}: {each}'
 
 
 def _gathered(batch: Batch, times: Real, found: Runs, n: int) -> BatchTrajectory:
