@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,10 +12,10 @@ from flexmb.scene.check.starting import started
 from flexmb.scene.check.walk import entries
 from flexmb.scene.problems import Doubt
 from flexmb.scene.schema import Scene
-from flexmb.system.compile import assembled
-from flexmb.system.level_range import LOOKED_AT, too_fast
-from flexmb.system.tree_system import System
-from flexmb.tables.state import State, pack
+
+if TYPE_CHECKING:
+    from flexmb.system.tree_system import System
+    from flexmb.tables.state import State
 
 
 def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) -> tuple[Doubt, ...]:
@@ -30,6 +31,8 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
     `--strict` turn into an error. Raises TypeError for anything but a Scene.
     """
     doubts = check.check_scene(scene, t_end, t_start)
+    from flexmb.system.compile import assembled  # imported here because a scene with defects needs no compiler
+
     with started(scene):
         system = assembled(scene)
         start = system.initial_state
@@ -39,6 +42,11 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
 
 def _beyond_level(system: System, start: State, t_end: float) -> Iterator[Doubt]:
     """Bodies that turn too fast for their level at the start, or by prescribed motions up to t_end (s)."""
+    if all(link.is_rigid for link in system.links):
+        return
+    from flexmb.system.level_range import LOOKED_AT, too_fast  # imported here because many scenes have no such bodies
+    from flexmb.tables.state import pack
+
     t = np.linspace(start.t, t_end, LOOKED_AT)
     y = np.tile(pack(start), (len(t), 1))
     for each, row in zip(t, y, strict=True):
