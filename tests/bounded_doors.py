@@ -1,31 +1,42 @@
 """Every number of a user that sets a size or the length of a loop, given absurdly: a process of limited memory.
 
+So is every whole number and time of run files and files of sweeps.
+
 Prints a line of JSON for each door and number: what came of it, its message, and the processor time it took.
 """
 
 from __future__ import annotations
 
+import copy
 import inspect
 import json
 import math
 import os
 import re
 import resource
+import shutil
 import signal
 import sys
 import tempfile
 import time
+import tomllib
 import typing
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 from typer.testing import CliRunner
 
 import flexmb as fm
+from crosscheck.library.case import RunFile
+from crosscheck.library.find import load_case
+from crosscheck.sampling.file import SweepFile
+from crosscheck.sampling.run import run_sweep
 from tests.flexmb.interchange.test_superelement_files import NODES, written
 
 ABSURD: tuple[float, ...] = (10**15, 1e15, math.inf, math.nan, -1, 0, 10**400, 10**5000)
@@ -177,6 +188,18 @@ def commands() -> dict[str, tuple[Any, str, str]]:
     return found
 
 
+_SWEEP = """
+title = "sizes"
+scene = "panel.toml"
+engines = ["native"]
+seed = 3
+number = 4
+duration_s = 0.1
+samples = 3
+parameter = [{ path = "gravity_m_s2.0", distribution = "uniform", low = 0.0, high = 1.0 }]
+quantity = [{ name = "energy", channel = "energy.total", value = "final" }]
+"""
+SWEEPS = (_SWEEP, _SWEEP.replace("seed", 'sampling = "latin_hypercube"\nseed'))
 SCENE = str(CASES / "pendulums" / "double" / "scene.toml")
 WORDS = {
     "simulate": (SCENE, "--t-end", "0.01", "--out", "out"), "check": (SCENE,), "equivalence": ("panel.toml", "panel"),
@@ -187,6 +210,108 @@ WORDS = {
 """The other words of a command; all other commands take a case, and there is none of that name."""
 
 
+Steps = tuple[str | int, ...]
+
+
+class Key(NamedTuple):
+    """A key of a file that sets a size or a time: where it is in a file that is right, which is read by `read`."""
+
+    content: dict[str, Any]
+    place: Steps
+    read: Callable[[str], Any]
+
+    def with_number(self, n: Any) -> Any:
+        """What reading the file with another number there gives."""
+        content = item = copy.deepcopy(self.content)
+        for step in self.place[:-1]:
+            item = item[step]
+        item[self.place[-1]] = n
+        return self.read("\n".join(f"{key} = {_inline(value)}" for key, value in content.items()))
+
+
+def _inline(value: Any) -> str:
+    """A value as TOML in one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {_inline(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    return str(value) if isinstance(value, float) else json.dumps(value)
+
+
+def keys_of_files() -> dict[str, Key]:
+    """By file and key, all whole numbers and times (s) of run files and sweeps, in the first file with its table."""
+    found, tables = dict[str, Key](), set[type]()
+    runs = ((RunFile, file, partial(_read_case, file.parent)) for file in sorted(CASES.glob("*/*/run.toml")))
+    sweeps = ((SweepFile, each, _read_sweep) for each in SWEEPS)
+    for root, given, read in (*runs, *sweeps):
+        content = tomllib.loads(given if isinstance(given, str) else given.read_text(encoding="utf-8"))
+        for kind, place, numbers in _tables(root, content, ()):
+            for key in numbers:
+                found.setdefault(f"{root.__name__} {kind.__name__}.{key}", Key(content, (*place, key), read))
+            tables.add(kind)
+    missing = (_kinds(RunFile) | _kinds(SweepFile)) - tables
+    assert not missing, f"no file has {missing}"
+    return found
+
+
+def _kinds(kind: Any) -> set[type]:
+    """The structs that a type is made of and that have such numbers, itself among them."""
+    found, waiting = set[type](), [kind]
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, type) and issubclass(each, msgspec.Struct):
+            if each not in found:
+                found.add(each)
+                waiting += typing.get_type_hints(each).values()
+        else:
+            waiting += typing.get_args(each)
+    return {each for each in found if _sizes(each)}
+
+
+def _sizes(kind: type) -> list[str]:
+    hints = typing.get_type_hints(kind)
+    return [
+        each.encode_name
+        for each in msgspec.structs.fields(kind)
+        if int in (hints[each.name], *typing.get_args(hints[each.name])) or each.name.endswith("_s")
+    ]
+
+
+def _tables(kind: Any, content: Any, place: Steps) -> Iterator[tuple[type, Steps, list[str]]]:
+    """The tables of a file that are structs: kind, place, keys of sizes."""
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        yield kind, place, _sizes(kind)
+        hints = typing.get_type_hints(kind)
+        for each in msgspec.structs.fields(kind):
+            if each.encode_name in content:
+                yield from _tables(hints[each.name], content[each.encode_name], (*place, each.encode_name))
+    elif isinstance(content, list):
+        for i, each in enumerate(content):
+            yield from _tables(typing.get_args(kind)[0], each, (*place, i))
+    elif isinstance(content, dict):
+        for each in typing.get_args(kind):
+            if isinstance(each, type) and issubclass(each, msgspec.Struct):
+                yield from _tables(each, content, place)
+
+
+def _read_case(folder: Path, text: str) -> None:
+    """Read a case, and make the scenes of all its variants."""
+    own = Path("a case")
+    shutil.rmtree(own, ignore_errors=True)
+    shutil.copytree(folder, own)
+    (own / "accepted.toml").unlink(missing_ok=True)
+    (own / "run.toml").write_text(text)
+    case = load_case(own)
+    for variant in case.run.variants:
+        case.scene(variant)
+
+
+def _read_sweep(text: str) -> None:
+    """Read a sweep, and make its samples, without running them."""
+    Path("sweep.toml").write_text(text)
+    run_sweep(Path("sweep.toml"), Path("swept"), fresh=True, scheduler=lambda *_: (_ for _ in ()))
+
+
 def main() -> None:
     """Try all doors; the memory is limited once everything is imported and compiled."""
     warnings.simplefilter("ignore")
@@ -194,7 +319,7 @@ def main() -> None:
     written("mtx", Path())
     Path("nodes.csv").write_text(NODES)
     fm.save_scene(beam(), "panel.toml")
-    doors, options = functions(), commands()
+    doors, options, keys = functions(), commands(), keys_of_files()
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (size + CEILING, size + CEILING))
     signal.signal(signal.SIGVTALRM, _ring)
@@ -203,6 +328,10 @@ def main() -> None:
         for n in ABSURD:
             if not any(n is each or (type(n) is type(each) and n == each) for each in door.taken):
                 _report(name, n, _tried(lambda door=door, n=n: door.call(n)))
+    for name, key in keys.items():
+        for n in (10**15, 1e15, math.inf, math.nan, -1, 0):
+            if f"{name} {_short(n)}" not in sys.argv[1:]:
+                _report(name, n, _tried(lambda key=key, n=n: key.with_number(n)))
     for name, (app, command, word) in options.items():
         for n in ("1000000000000000", "inf", "nan", "-1", "9" * 5000):
             if f"{name} {n}" in sys.argv[1:]:
@@ -212,8 +341,11 @@ def main() -> None:
 
 
 def _report(name: str, n: Any, outcome: tuple[str, str, float]) -> None:
-    many = isinstance(n, int) and n.bit_length() > 1000
-    print(json.dumps([name, "many digits" if many else str(n)[:16], *outcome]), flush=True)
+    print(json.dumps([name, _short(n), *outcome]), flush=True)
+
+
+def _short(n: Any) -> str:
+    return "many digits" if isinstance(n, int) and n.bit_length() > 1000 else str(n)[:16]
 
 
 def _invoked(app: Any, words: list[str]) -> str:

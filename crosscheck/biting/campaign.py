@@ -29,10 +29,11 @@ from crosscheck.library.patterns import most_specific
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord
 from crosscheck.records.session import last_session
+from crosscheck.running.execute import PROVIDER
 from crosscheck.running.job import MAIN, Job
 from crosscheck.running.plan import plan, variant_scene
 from crosscheck.running.scheduler import BY_DEFAULT, Limits
-from crosscheck.running.sweep import PROVIDER, Listener, run_planned
+from crosscheck.running.sweep import Listener, run_planned
 from flexmb.output.whole import take_away, write_whole
 from flexmb.run.channels import distance, family, magnitude
 from flexmb.scene.schema import Scene

@@ -26,10 +26,11 @@ from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord, RunRecord
 from crosscheck.records.packing import pack, unpack
 from crosscheck.records.session import last_session
+from crosscheck.running.execute import PROVIDER
 from crosscheck.running.job import MAIN, Job
 from crosscheck.running.plan import plan, scene_identity
 from crosscheck.running.scheduler import BY_DEFAULT, Limits
-from crosscheck.running.sweep import PROVIDER, Listener, run_planned
+from crosscheck.running.sweep import Listener, run_planned
 from flexmb.output.whole import take_away, write_whole
 from flexmb.run.channels import magnitude
 from flexmb.scene.check import check_scene

@@ -50,20 +50,17 @@ def bench(
     **Examples**: `crosscheck bench tops/gyrostat` · `crosscheck bench canonical --rounds 30 --json bench.json` ·
     `crosscheck bench closed_chains/four_bar -e native -e pinocchio --accuracy 1e-6`
     """
+    shown = common.verbosity(quiet, False)
+    if not 0.0 < accuracy < inf:
+        common.refuse(f"--accuracy {accuracy:g}: give a positive number such as 1e-4")
+    chosen = common.asked(cases, engine or (), variant or (), time_limit)
     from crosscheck.terminal.live import LiveProgress
     from crosscheck.terminal.timings import print_bench
     from crosscheck.timing.bench import bench as bench_case
     from crosscheck.timing.benchmark_json import MISSING, available, benchmark_document
 
-    common.check_limit(time_limit)
-    if not 0.0 < accuracy < inf:
-        common.refuse(f"--accuracy {accuracy:g}: give a positive number such as 1e-4")
     if not available():
         common.refuse(MISSING)
-    shown = common.verbosity(quiet, False)
-    chosen = common.found(tuple(cases))
-    common.require_variants(chosen, variant or ())
-    common.require_engines(engine or ())
     benches = []
     with common.in_one_line():
         if json_file is not None:

@@ -37,15 +37,12 @@ def chart(
 
     **Examples**: `crosscheck chart tops/gyrostat --out charts` · `crosscheck chart canonical -e native -e mujoco`
     """
+    shown = common.verbosity(quiet, False)
+    chosen = common.asked(cases, engine or (), variant or (), time_limit)
     from crosscheck.terminal.live import LiveProgress
     from crosscheck.timing.chart import chart as chart_case
     from crosscheck.timing.page import INDEX, write_case, write_index  # it loads matplotlib
 
-    common.check_limit(time_limit)
-    shown = common.verbosity(quiet, False)
-    chosen = common.found(tuple(cases))
-    common.require_variants(chosen, variant or ())
-    common.require_engines(engine or ())
     done = []
     with common.sole_writer(out):
         (out / INDEX).unlink(missing_ok=True)  # of earlier charts, should this command be killed

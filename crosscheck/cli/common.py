@@ -197,11 +197,11 @@ def require_engines(names: Iterable[str], broken: bool = False) -> None:
 
     With `broken` only those that are not installed end it.
     """
-    from crosscheck.running.installed import require_engines as require
-
     names = tuple(names)
     if not names:
         return
+    from crosscheck.running.installed import require_engines as require
+
     try:
         require(names, broken)
     except CaseError as error:
@@ -215,6 +215,20 @@ def require_variants(cases: tuple[Case, ...], names: Iterable[str]) -> None:
         if name not in known:
             refuse(f'no variant "{name}" in {", ".join(each.name for each in cases[:3])}'
                    f'{" and others" if len(cases) > 3 else ""}: {closest(name, set(known))}')  # fmt: skip
+
+
+def asked(
+    cases: Iterable[str], engines: Iterable[str] = (), variants: Iterable[str] = (), time_limit: float | None = None
+) -> tuple[Case, ...]:
+    """The cases asked for, or the end of the program with exit code 2 at the first word that names nothing.
+
+    Commands call it before they import what runs cases, and engines come first: reading all cases takes seconds.
+    """
+    check_limit(time_limit)
+    require_engines(engines)
+    chosen = found(tuple(cases))
+    require_variants(chosen, variants)
+    return chosen
 
 
 def claimed(

@@ -38,13 +38,11 @@ def invariance(
 
     **Examples**: `crosscheck invariance torque_driven` · `crosscheck invariance four_bar -e pinocchio`
     """
+    chosen = common.asked(cases, (engine,), time_limit=time_limit)
     from crosscheck.biting.invariance_runs import VERDICTS, run_invariances
     from crosscheck.terminal.invariances import print_invariances
     from crosscheck.terminal.live import LiveProgress
 
-    common.check_limit(time_limit)
-    chosen = common.found(tuple(cases))
-    common.require_engines((engine,))
     with common.sole_writer(out):
         with LiveProgress(common.console, Verbosity.NORMAL) as live:
             limits = Limits(jobs, time_limit)

@@ -47,13 +47,11 @@ def mutate(
     **Examples**: `crosscheck mutate torque_driven` · `crosscheck mutate all --jobs 2` ·
     `crosscheck mutate ./my_case --all-targets --verbose`
     """
+    chosen = common.asked(cases, (engine,), time_limit=time_limit)
     from crosscheck.biting.campaign import SCORES, run_campaign
     from crosscheck.terminal.bites import print_bites
     from crosscheck.terminal.live import LiveProgress
 
-    common.check_limit(time_limit)
-    chosen = common.found(tuple(cases))
-    common.require_engines((engine,))
     with common.sole_writer(out):
         with LiveProgress(common.console, Verbosity.NORMAL) as live:
             limits = Limits(jobs, time_limit)

@@ -40,14 +40,14 @@ def regenerate(
     **Examples**: `crosscheck regenerate wheel_gyrostat/torque_free` · `crosscheck regenerate all --check` ·
     `crosscheck regenerate ./my_case`
     """
+    chosen = common.asked(cases, time_limit=time_limit)
     from crosscheck.references.regenerate import regenerate as make_again
     from crosscheck.terminal.live import LiveProgress
 
-    common.check_limit(time_limit)
     good = True
     with common.in_one_line():
         runs_on = scheduler_at(scheduler)
-        for case in common.found(tuple(cases)):
+        for case in chosen:
             try:
                 with LiveProgress(common.console) as live:
                     limits = Limits(jobs, time_limit)

@@ -84,13 +84,13 @@ def run(
     `crosscheck run all -e mycode --alone --out results` · `crosscheck run ./my_case --accept` ·
     `crosscheck run all --strict --time-limit 600` · `crosscheck run 'pendulums/*' -e mycode --baseline main.json`
     """
+    common.check_limit(time_limit)
+    shown = common.verbosity(quiet, verbose)
+    chosen, asked, records = _chosen(cases, engine, alone), tuple(engine or ()), out / "records.jsonl"
     from crosscheck.cli.baseline import hold_against, read_baseline
     from crosscheck.records.session import last_session
     from crosscheck.report import write_all
 
-    common.check_limit(time_limit)
-    shown = common.verbosity(quiet, verbose)
-    chosen, asked, records = _chosen(cases, engine, alone), tuple(engine or ()), out / "records.jsonl"
     chosen = common.claimed(chosen, expect, goal, efforts, asked)
     before = None if baseline is None else read_baseline(baseline, out)
     with common.sole_writer(out, strict):
@@ -118,12 +118,12 @@ def report(
 
     **Exit code** as of `run`.
     """
-    from crosscheck.records.session import standing
-    from crosscheck.report import write_all
-
     if not records.is_file():
         common.refuse(f"{records} is no file")
     shown = common.verbosity(quiet, verbose)
+    from crosscheck.records.session import standing
+    from crosscheck.report import write_all
+
     with common.sole_writer(out):
         outcome, page = write_all(records, out, strict, standing, single_file)
     _conclude(outcome, page, records, shown, out if as_json else None, open_report)
@@ -131,10 +131,9 @@ def report(
 
 def _chosen(cases: list[str], engines: list[str] | None, alone: bool) -> tuple[Case, ...]:
     """The cases asked for; refuses engines that are not there, or have no part in any of them."""
+    chosen = common.asked(cases, engines or ())
     from crosscheck.library.selection import without_part
 
-    common.require_engines(engines or ())  # before cases are read: that of all of them takes seconds
-    chosen = common.found(tuple(cases))
     chosen = _alone(chosen) if alone else chosen
     if idle := without_part((case.run for case in chosen), tuple(engines or ())):
         common.refuse(idle)

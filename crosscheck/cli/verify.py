@@ -71,14 +71,14 @@ def verify(
     **Exit code**: 0 every channel in the file agrees; 1 some do not; 2 the file cannot be compared.
     """
     with in_one_line():
-        from crosscheck.verify.against_case import outcome_json, verify_csv
-
+        require_engines(() if engine is None else (engine,))
         cases = found((case,))
         if len(cases) > 1:
             refuse(f'"{case}" is {len(cases)} cases: name one of {", ".join(each.name for each in cases)}')
         (chosen,) = cases
         require_variants(cases, () if variant is None else (variant,))
-        require_engines(() if engine is None else (engine,))
+        from crosscheck.verify.against_case import outcome_json, verify_csv
+
         if template:
             _write_template(csv, chosen, variant)
             return

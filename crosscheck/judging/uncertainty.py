@@ -51,7 +51,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 
 from flexmb.run.channels import distance
 from flexmb.typing import Real
@@ -189,6 +188,8 @@ def observed_order(steps: Sequence[float], wider: float, gap: float) -> float | 
     low, high = 1e-3, LARGEST_ORDER
     if not mismatch(low) < 0.0 < mismatch(high) < np.inf:
         return None
+    from scipy.optimize import brentq  # imported here because it is slow to import
+
     return float(brentq(mismatch, low, high))
 
 

@@ -17,9 +17,10 @@ from crosscheck.judging.results import collect
 from crosscheck.library.find import Case
 from crosscheck.records.archive import read
 from crosscheck.records.session import last_session
+from crosscheck.running.execute import PROVIDER
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import PROVIDER, run_planned
+from crosscheck.running.sweep import run_planned
 from flexmb.output.whole import write_whole
 
 DONE, LOCK = "session", ".crosscheck.lock"

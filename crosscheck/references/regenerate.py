@@ -26,10 +26,11 @@ from crosscheck.references.anchors import meet
 from crosscheck.references.change import beyond_uncertainty, largest_share
 from crosscheck.references.files import knowledge_text, write_both
 from crosscheck.references.routes import RouteSignals, run_routes
+from crosscheck.running.execute import PROVIDER
 from crosscheck.running.plan import sample_times
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import BY_DEFAULT, Limits, Scheduler
-from crosscheck.running.sweep import PROVIDER, Listener
+from crosscheck.running.sweep import Listener
 from flexmb.scene.reading import read_text
 from flexmb.typing import Real
 

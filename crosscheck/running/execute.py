@@ -22,6 +22,7 @@ from crosscheck.running.rung import Solved, solve_rung
 from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 
+PROVIDER = "crosscheck.engines.registry:engines"
 FULLY_STORED = 4  # the finest efforts, which the uncertainty needs in every channel
 
 

@@ -11,10 +11,9 @@ from crosscheck.engines.answers import checked_version, clean, describe
 from crosscheck.engines.contract import EngineMissing
 from crosscheck.engines.registry import BUILT_IN, BrokenPlugIn, plug_ins
 from crosscheck.library.case_error import CaseError
-from crosscheck.running.execute import NoSuchEngine, find_engine, known_engine
+from crosscheck.running.execute import PROVIDER, NoSuchEngine, find_engine, known_engine
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Scheduler, Work
-from crosscheck.running.sweep import PROVIDER
 
 ANSWER_LIMIT_S = 60.0
 ABSENT, USELESS = "not installed", "does not work"  # why an engine cannot be used

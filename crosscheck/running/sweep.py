@@ -16,14 +16,13 @@ from crosscheck.records.archive import Archive, read
 from crosscheck.records.contracts import contracts
 from crosscheck.records.kinds import CaseRecord, Confirmed, Record, RunRecord
 from crosscheck.records.machine import environment
-from crosscheck.running.execute import execute
+from crosscheck.running.execute import PROVIDER, execute
 from crosscheck.running.expected import expected_seconds
 from crosscheck.running.job import Done, Job
 from crosscheck.running.plan import plan
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import BY_DEFAULT, Event, Limits, Scheduler, Work
 
-PROVIDER = "crosscheck.engines.registry:engines"
 Listener = Callable[[Sequence[Job], Event], None]
 
 

@@ -20,11 +20,11 @@ from crosscheck.records.archive import Archive, decoded_lines
 from crosscheck.records.kinds import Confirmed
 from crosscheck.records.machine import environment
 from crosscheck.records.made_by import made_by
+from crosscheck.running.execute import PROVIDER
 from crosscheck.running.job import MAIN, Done, Job
 from crosscheck.running.plan import sample_times, scene_identity
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler, Work
-from crosscheck.running.sweep import PROVIDER
 from crosscheck.sampling.file import SweepFile, load_sweep
 from crosscheck.sampling.points import sample_values
 from crosscheck.sampling.sample import SampleJob, SampleRecord, Written, run_sample

@@ -12,8 +12,9 @@ from math import inf
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import Case
+from crosscheck.running.execute import PROVIDER
 from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import PROVIDER, Listener
+from crosscheck.running.sweep import Listener
 from crosscheck.timing.facts import EngineFacts, facts_of
 from crosscheck.timing.rivals import Rival, Rivals, Rung, find_rivals, timed
 from crosscheck.timing.turns import Timed

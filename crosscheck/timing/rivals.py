@@ -24,11 +24,12 @@ from crosscheck.library.find import Case
 from crosscheck.records.archive import read
 from crosscheck.records.held import Asked, RecordedReference
 from crosscheck.records.kinds import RunRecord
+from crosscheck.running.execute import PROVIDER
 from crosscheck.running.held import held_reference
 from crosscheck.running.job import Job
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import PROVIDER, Listener, run_planned
+from crosscheck.running.sweep import Listener, run_planned
 from crosscheck.timing.turns import Timed, in_turns
 from flexmb.run.channels import distance
 from flexmb.typing import Real

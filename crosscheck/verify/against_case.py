@@ -18,9 +18,9 @@ from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
+from crosscheck.running.execute import PROVIDER
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Scheduler
-from crosscheck.running.sweep import PROVIDER
 from crosscheck.verify.columns import FEWEST, Columns, TimesError, VerifyError, read_columns
 from crosscheck.verify.diagnosis import diagnose, other_clock
 from crosscheck.verify.evidence import Evidence

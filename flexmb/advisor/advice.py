@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from flexmb.advisor.bench import Bench
+from flexmb.advisor.bench import SAMPLES, Bench
 from flexmb.advisor.confirm import Confirmation, NoReference, Reference
 from flexmb.advisor.indicators import Indicators, indicators, of_level, predicted
 from flexmb.advisor.ladder import Cost, Step, cost, model_cost, references, rungs, softest, step
@@ -19,6 +19,8 @@ from flexmb.advisor.models import EXACT, LEVELS, BodyModel, Model, built, flexib
 from flexmb.advisor.quantity import Quantity, measured, quantities, scales
 from flexmb.advisor.remedies import remedies
 from flexmb.advisor.search import search
+from flexmb.integrate.settings import Settings
+from flexmb.run.samples import refuse_large_run
 from flexmb.scene.bodies import BeamBody, Level, ModalBody
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.open_loop import refuse_feedback
@@ -209,6 +211,7 @@ def prepare(
     """Check the question, run the rigid scene, predict. Raises as `advise` does."""
     t_end, tolerance = arguments.number("t_end", t_end), arguments.number("tolerance", tolerance)
     check_and_warn(scene, t_end)
+    refuse_large_run(scene, SAMPLES, Settings(), "articulated")
     if not 0.0 < tolerance < 1.0:
         raise ValueError(f"the tolerance is {tolerance:g}: give a fraction, such as 1e-3")
     bench = Bench(scene, t_end, quantities(quantity, scene))

@@ -21,11 +21,11 @@ import numpy as np
 from flexmb.control.feedback import Feedback
 from flexmb.control.law_derivatives import LawDerivatives, law_derivatives
 from flexmb.control.loop_run import FreshStart
+from flexmb.linear.equations import built
 from flexmb.linear.sensed import ChangedRow, sensed
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.closed import ClosedSystem
-from flexmb.system.compile import compile
 from flexmb.system.derivative_records import EvaluationDerivatives, OfControlledMotion, by_names
 from flexmb.system.derivatives import FreeRow, free_row
 from flexmb.system.kinks import NotDifferentiableError
@@ -68,10 +68,11 @@ class ControlledMotion:
     """
 
     def __init__(self, system: System | Scene) -> None:
-        """SceneError for a function of a user that cannot be loaded."""
+        """SceneError for a function of a user that cannot be loaded, ValueError for a scene so large that its
+        derivatives do not fit into memory, before it is built."""
         if not isinstance(system, System | Scene):
             raise TypeError(f"a System or a Scene is needed, not {type(system).__name__}")
-        self._shared = compile(system) if isinstance(system, Scene) else system
+        self._shared = built(system)
         self._feedback  # noqa: B018  (raises what cannot be built)
 
     @per_thread

@@ -19,7 +19,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from flexmb.linear.equations import equations_of
+from flexmb.linear.equations import built, equations_of
 from flexmb.linear.equilibrium import Equilibrium, as_equilibrium, found_equilibrium
 from flexmb.linear.linear_model import Complex
 from flexmb.linear.newton import EquilibriumError, squares, verdict
@@ -28,7 +28,6 @@ from flexmb.parameters.numbers import Number
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.scene.values import with_values
-from flexmb.system.compile import compile
 from flexmb.system.watches import of_states, warn
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError, State
@@ -132,7 +131,7 @@ class _Family:
     def __init__(self, scene: Scene, number: str, asked: Real) -> None:
         Number(scene, number)  # PathError unless it is one real number
         first: Scene = with_values(scene, {number: float(asked[0])})
-        self.number, self.system = Number(first, number), compile(first)
+        self.number, self.system = Number(first, number), built(first)
         self.name, self.range = scene.name, float(np.ptp(asked))
         self._made = dict[float, Equations]()
 

@@ -40,8 +40,15 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
 
         state = system.initial_state if state is None else state
         system.layout.entering(state)
-        warn(of_states(system, [state]))
-        return closed_loop(system, state, held_model if held else linear_model)
+        seen = list[tuple[Equations, State]]()
+
+        def of_motion(equations: Equations, at: State) -> LinearModel:
+            seen.append((equations, equations.on_functions(at)))
+            return held_model(equations, at) if held else linear_model(equations, at)
+
+        model = closed_loop(system, state, of_motion)
+        warn(looked_at(seen))
+        return model
     equations, state = entering(system, state)
     equations = equations.held(state.t) if held else equations
     warn(looked_at([(equations, equations.on_functions(state))]))

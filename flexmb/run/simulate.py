@@ -74,13 +74,14 @@ def simulate(
     as far as they are linear, whatever the step; both adapt their steps as "dop853" does. "generalised_alpha" takes
     equal steps and damps the modes that they do not resolve, by `spectral_radius` from 1 (no damping) to 0 (all in one
     step), 0.8 if left out; rtol and atol bound the remaining error of its Newton iterations. See docs/integrators.md.
-    max_steps: a run of more steps stops, 1,000,000 if left out. samples: how many equally spaced output times, both
-    ends included, or the times themselves, from start to end. algorithm: "articulated", the O(N) recursion;
-    "composite", the mass matrix and its Cholesky factors; or Frisch's equations, "frisch" or "frisch_as_printed", which
-    take bodies of level `full` as `linear`. Accelerations and loads of the output are theirs too. stabilise: how
-    closures are kept closed. 0: after every step coordinates and speeds are projected back to where all closures are
-    closed, to 1e-13 of the mechanism's size. With a rate k (1/s) errors g of closures decay by g'' + 2 k g' + k^2 g = 0
-    (Baumgarte), which costs less and leaves a drift; k times the step should stay below 1.
+    max_steps: a run of more steps stops, 1,000,000 if left out; nothing else bounds a run to a late `t_end`, as nobody
+    knows the steps of an adaptive method beforehand. samples: how many equally spaced output times, both ends included,
+    or the times themselves, from start to end. algorithm: "articulated", the O(N) recursion; "composite", the mass
+    matrix and its Cholesky factors; or Frisch's equations, "frisch" or "frisch_as_printed", which take bodies of level
+    `full` as `linear`. Accelerations and loads of the output are theirs too. stabilise: how closures are kept closed.
+    0: after every step coordinates and speeds are projected back to where all closures are closed, to 1e-13 of the
+    mechanism's size. With a rate k (1/s) errors g of closures decay by g'' + 2 k g' + k^2 g = 0 (Baumgarte), which
+    costs less and leaves a drift; k times the step should stay below 1.
 
     t_start (s): any finite time, the argument of functions of time at the start; 0 or the state's own time if left out.
     state: a `State`, such as `Trajectory.last_state`; or values of coordinates and speeds by name, all others being

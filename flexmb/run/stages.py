@@ -9,15 +9,16 @@ from typing import Any, Unpack
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.origin import Given, start_time
-from flexmb.run.samples import sample_times
+from flexmb.run.samples import refuse_large_run, sample_times
 from flexmb.run.simulate import RunPart, RunSettings, refuse_unknown, run_stages
-from flexmb.run.switching import refuse_times
 from flexmb.run.trajectory import Trajectory
+from flexmb.scene.check import check_and_warn, check_run
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.compile import compile
+from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
@@ -55,30 +56,44 @@ def simulate_stages(
     settings or output times of any stage, and ValueError for stages that do not fit each other.
     """
     refuse_unknown("simulate_stages", settings)
-    systems = _systems(scene, stages)
-    t, parts = start_time(t_start, state), list[RunPart]()
-    for stage, system in zip(stages, systems, strict=True):
+    scenes = _scenes(scene, stages)
+    t, times = start_time(t_start, state), list[Real]()
+    for i, (stage, each) in enumerate(zip(stages, scenes, strict=True)):
         start, t = t, t + stage.duration_s
-        refuse_times(system, start, t)
-        parts.append(RunPart(system, sample_times(stage.samples, t, start)))
-    chosen = Settings(method, **settings).checked(max(abs(parts[0].times[0]), abs(t)))
+        if i and each is scenes[i - 1]:
+            check_run(each, t, start)
+        else:
+            check_and_warn(each, t, start)
+        times.append(sample_times(stage.samples, t, start))
+    chosen = Settings(method, **settings).checked(max(abs(times[0][0]), abs(t)))
+    for each, own in zip(scenes, times, strict=True):
+        refuse_large_run(each, len(own), chosen, algorithm)
+    parts = [RunPart(system, own) for system, own in zip(_systems(scenes), times, strict=True)]
     return run_stages(parts, state, chosen, algorithm, stabilise)
 
 
-def _systems(scene: Scene, stages: Sequence[RunStage]) -> list[System]:
-    """The systems of all stages; a scene that does not change is compiled once. ValueError if they do not fit."""
+def _scenes(scene: Scene, stages: Sequence[RunStage]) -> list[Scene]:
+    """The scenes of all stages; one that does not change is the same object. ValueError for a duration that is none."""
     if not stages:
         raise ValueError("there are no stages: give at least one")
-    found: list[System] = []
+    found: list[Scene] = []
     for i, stage in enumerate(stages):
         if arguments.number(f"stages[{i}].duration_s", stage.duration_s) <= 0.0:
             raise ValueError(f"stages[{i}] lasts {stage.duration_s:g} s: give a positive duration")
-        if found and found[-1].scene.events:
+        if found and found[-1].events:
             raise NotImplementedError(
                 f"stages[{i - 1}] has events, which change its scene: use events on time in place of later stages"
             )
         scene = (stage.scene or scene).with_values(stage.values)
-        found.append(found[-1] if found and found[-1].scene == scene else compile(scene))
+        found.append(found[-1] if found and found[-1] == scene else scene)
+    return found
+
+
+def _systems(scenes: Sequence[Scene]) -> list[System]:
+    """The systems of checked scenes, each built once; ValueError if they do not fit each other."""
+    found: list[System] = []
+    for i, scene in enumerate(scenes):
+        found.append(found[-1] if i and scene is scenes[i - 1] else assembled(scene))
         for what, names in (("coordinates", 0), ("speeds", 1)):
             strange = set(found[i].state_names[names]) ^ set(found[0].state_names[names])
             if strange:

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal, TypeVar
 import msgspec
 from msgspec import structs
 
+from flexmb.scene.convert import NamedKeys
 from flexmb.scene.rounding import ROUNDING
 
 Vector = tuple[float, float, float]
@@ -25,7 +26,7 @@ ZERO: Vector = (0.0, 0.0, 0.0)
 FAMILIES: tuple[Family, ...] = ("axial", "torsion", "bending_y", "bending_z")
 
 
-class SceneStruct(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SceneStruct(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, metaclass=NamedKeys):
     """Base of all structs of the schema, which are frozen and refuse unknown keys."""
 
 

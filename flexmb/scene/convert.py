@@ -23,6 +23,28 @@ KINDS = {
 }  # fmt: skip
 
 
+class NamedKeys(msgspec.StructMeta):
+    """What makes the structs of scenes: a call with other keys than theirs is a TypeError that names struct and key."""
+
+    def __call__(cls, *given: Any, **keys: Any) -> Any:
+        """Make a struct."""
+        try:
+            return _make(cls, *given, **keys)
+        except TypeError as error:
+            known = msgspec.structs.fields(cls)  # type: ignore[arg-type]  # its classes are structs
+            names = [each.name for each in known]
+            if given:
+                raise TypeError(f"{cls.__name__} takes values by key only: {', '.join(names) or 'none'}") from error
+            if strange := [key for key in keys if key not in names]:
+                raise TypeError(f'{cls.__name__} has no key "{strange[0]}": {closest(strange[0], names)}') from error
+            if missing := [each.name for each in known if each.required and each.name not in keys]:
+                raise TypeError(f'{cls.__name__} needs the key "{missing[0]}", which is not given') from error
+            raise
+
+
+_make = msgspec.StructMeta.__call__
+
+
 def plain(value: Any) -> Any:
     """Structs, arrays and numpy scalars as dicts, lists and numbers."""
     return msgspec.to_builtins(value, enc_hook=_array_to_list)

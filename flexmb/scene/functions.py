@@ -9,8 +9,12 @@ from __future__ import annotations
 
 import msgspec
 
+from flexmb.scene.convert import NamedKeys
 
-class _Function(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"):
+
+class _Function(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", metaclass=NamedKeys
+):
     """Base of all functions of time."""
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from flexmb.integrate.settings import Settings
 from flexmb.parameters.numbers import numbers
 from flexmb.run.driver import Leg
+from flexmb.run.samples import refuse_large_run
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
@@ -142,6 +143,7 @@ class _Problem:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", SceneWarning)
                 check_and_warn(scene, float(self.times[-1]))
+                refuse_large_run(scene, len(self.times), self.settings, "articulated")
                 system = prepared(scene)
                 self._last = key, _Run(scene, system, *run_with_course(system, self.times, self.settings))
         return self._last[1]

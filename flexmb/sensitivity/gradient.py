@@ -8,13 +8,16 @@ from typing import Unpack
 
 import numpy as np
 
+from flexmb.building.numbering import speeds_at_least
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
+from flexmb.run.samples import refuse_large_run
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
+from flexmb.scene.sizes import refuse_bytes
 from flexmb.sensitivity.adjoint.whole import Adjoint
 from flexmb.sensitivity.channels import refuse_unknown_outputs
 from flexmb.sensitivity.gate import admitted
@@ -79,7 +82,12 @@ def gradient(
     t_end, terms = arguments.number("t_end", t_end), terms_of(of)
     check_and_warn(scene, t_end, 0.0)
     refuse_beyond_adjoint(scene)
-    given, gated = Settings(method, **settings).checked(abs(t_end)), admitted(scene, by)
+    given = Settings(method, **settings).checked(abs(t_end))
+    refuse_large_run(scene, 2, given, "articulated")
+    n = 2 * speeds_at_least(scene)
+    remedy = "take a scene of fewer bodies or modes, or `sensitivities` by fewer numbers"
+    refuse_bytes(8.0 * n * (n + len(by)), f"derivatives of {n} coordinates and speeds by themselves take", remedy)
+    gated = admitted(scene, by)
     refuse_unknown_outputs(gated.system, [name for term in terms for name in term.channels])
     for term in terms:
         list(term.probes(t_end, []))  # refuses what does not fit the run

@@ -63,16 +63,16 @@ def too_fast(system: Mechanics, t: Real, u: Real, turns: Callable[[int], Real]) 
         firsts = system.kept.setdefault("level_range", {k: first for k, first in found.items() if first > 0.0})
     if not firsts:
         return
-    fastest = {k: (0.0, 0.0) for k in firsts}
+    fastest = {k: (0.0, 0) for k in firsts}
     for n in _suspects(system, u, np.sqrt(ALLOWED) * min(firsts.values())):
         w = turns(n)
         for k in firsts:
             rate = _across(system.links[k], w[k])
-            fastest[k] = max(fastest[k], (rate, float(t[n])))
-    for k, (rate, when) in fastest.items():
+            fastest[k] = max(fastest[k], (rate, n))
+    for k, (rate, n) in fastest.items():
         if rate**2 > ALLOWED * firsts[k] ** 2:
             link = system.links[k]
-            yield TooFast(link.name, link.level.name, when, rate, firsts[k], _remedy(link))
+            yield TooFast(link.name, link.level.name, float(t[n]), rate, firsts[k], _remedy(link))
 
 
 def _remedy(link: BodyLink) -> str:

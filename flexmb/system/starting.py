@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +12,10 @@ from flexmb.scene.check.starting import started
 from flexmb.scene.check.walk import entries
 from flexmb.scene.problems import Doubt
 from flexmb.scene.schema import Scene
-from flexmb.system.compile import assembled
-from flexmb.system.level_range import LOOKED_AT
-from flexmb.system.tree_system import System
-from flexmb.system.watches import Seen, said
-from flexmb.tables.state import State, pack
+
+if TYPE_CHECKING:
+    from flexmb.system.tree_system import System
+    from flexmb.tables.state import State
 
 
 def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) -> tuple[Doubt, ...]:
@@ -31,6 +31,8 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
     `--strict` turn into an error. Raises TypeError for anything but a Scene.
     """
     doubts = check.check_scene(scene, t_end, t_start)
+    from flexmb.system.compile import assembled  # imported here because a scene with defects needs no compiler
+
     with started(scene):
         system = assembled(scene)
         start = system.initial_state
@@ -40,6 +42,10 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
 
 def _watched(system: System, start: State, t_end: float) -> Iterator[Doubt]:
     """What watches say of the start, and of prescribed motions up to t_end (s)."""
+    from flexmb.system.level_range import LOOKED_AT
+    from flexmb.system.watches import Seen, said  # imported here as they need the compiler
+    from flexmb.tables.state import pack
+
     t = np.linspace(start.t, t_end, LOOKED_AT)
     y = np.tile(pack(start), (len(t), 1))
     for each, row in zip(t, y, strict=True):

@@ -153,6 +153,27 @@ def test_the_list_of_cases_reads_cases_and_loads_no_mechanics() -> None:
     assert not libraries(modules, OF_CASES) and not compiled(modules)
 
 
+def test_words_that_name_nothing_are_refused_before_what_runs_cases_is_loaded() -> None:
+    """A second of processor time at most, two thirds of which are Python, NumPy and the reading of words."""
+    lines = (
+        "run pendulum -e pinochio", "run pendulumm", "bench all -e pinochio", "chart all -e pinochio",
+        "mutate all -e pinochio", "invariance all -e pinochio", "verify pendulum none.csv -e pinochio",
+        "contract pinochio", "regenerate pendulumm", "report none.jsonl",
+    )  # fmt: skip
+    refused = "".join(f"assert called(*{line.split()!r}) == 2, printed.getvalue()\n" for line in lines)
+    modules = called("crosscheck", f"{refused}assert 'did you mean \"pinocchio\"?' in printed.getvalue()")
+    assert not libraries(modules, OF_CASES | {"psutil"}) and not compiled(modules)
+    assert not {name for name in modules if name.startswith(("crosscheck.report", "crosscheck.judging"))}
+
+
+def test_a_scene_with_defects_is_refused_without_the_compiler(tmp_path: Path) -> None:
+    """What sound ones need, as they are compiled and evaluated once."""
+    file = tmp_path / "scene.toml"
+    file.write_text((shipped_folder() / "pendulums" / "double" / "scene.toml").read_text().replace("ground", "grund"))
+    modules = called("flexmb", f'assert called("check", {str(file)!r}) == 2')
+    assert not libraries(modules, OF_CASES) and "flexmb.system.compile" not in modules
+
+
 def test_a_worker_loads_what_its_engine_needs() -> None:
     """A session starts one for every engine: none of them plans, draws or judges, and only our own brings the compiler.
 

@@ -21,8 +21,8 @@ from crosscheck.library.find import load_case, shipped_folder
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord, RunRecord
 from crosscheck.records.packing import Packed, pack, unpack
+from crosscheck.running.execute import PROVIDER
 from crosscheck.running.plan import plan
-from crosscheck.running.sweep import PROVIDER
 from flexmb.typing import Real
 from tests.crosscheck.sessions import run_here
 

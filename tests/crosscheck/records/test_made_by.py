@@ -24,10 +24,10 @@ from crosscheck.records.kinds import Confirmed, Environment, RunRecord
 from crosscheck.records.made_by import RECORDING, made_by
 from crosscheck.records.session import last_session, standing
 from crosscheck.records.sources import sources
-from crosscheck.running.execute import execute
+from crosscheck.running.execute import PROVIDER, execute
 from crosscheck.running.plan import plan, scene_identity
 from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import PROVIDER, sweep
+from crosscheck.running.sweep import sweep
 from tests.crosscheck.sessions import CASE, copy_case
 
 # Loaded in a run of an engine, yet without a part in its numbers.

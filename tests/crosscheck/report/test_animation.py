@@ -18,9 +18,8 @@ from crosscheck.records.kinds import RunRecord
 from crosscheck.records.packing import pack
 from crosscheck.report.animation import animations, wheel_angle
 from crosscheck.report.store import Store
-from crosscheck.running.execute import execute
+from crosscheck.running.execute import PROVIDER, execute
 from crosscheck.running.plan import plan, variant_scene
-from crosscheck.running.sweep import PROVIDER
 from flexmb.interchange.sid import sid_of, write_sid
 from flexmb.scene.bodies import BeamStation, Modes, SidBody
 from flexmb.scene.build import SceneBuilder

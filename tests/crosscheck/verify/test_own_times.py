@@ -13,7 +13,7 @@ from crosscheck.library.case import CaseError
 from crosscheck.library.find import load_case
 from crosscheck.library.reference import current_reference
 from crosscheck.references.other_times import reference_at
-from crosscheck.running.sweep import PROVIDER
+from crosscheck.running.execute import PROVIDER
 from crosscheck.verify.against_case import CsvOutcome, verify_csv
 from crosscheck.verify.columns import VerifyError
 from flexmb.typing import Real

@@ -68,6 +68,29 @@ def test_linear_models_and_campbell_diagrams_warn_once():
     fm.linearize(arm(0.6 * FIRST, "stiffened"))
 
 
+def test_linear_models_of_closed_loops_warn():
+    builder = fm.SceneBuilder("driven").beam("ruler", length=1.0, elements=8, section=RULER, modes=Modes(count=4))
+    builder.revolute("hub", "ground", "ruler", axis=(0, 0, 1), rate=0.6 * FIRST).marker("tip", "ruler", node="tip")
+    builder.sense_marker("place", "tip", "position").pid("law", "place[1]", kp=0.1)
+    builder.force("push", "ruler", node="tip", direction=(0, 1, 0), function=fm.ControlSignal(source="law"))
+    for held in (False, True):
+        with pytest.warns(fm.SceneWarning, match="first frequency") as caught:
+            fm.linearize(builder.scene(), held=held)
+        assert len(caught) == 1
+
+
+def test_batches_warn_once():
+    scenes = [arm(share * FIRST) for share in (0.1, 0.6, 0.7, 0.2)]
+    system = fm.compile(scenes[0])
+    states = np.array([fm.compile(scene).initial_state.u for scene in scenes])
+    for copies, given in ((scenes, {}), (system, {"u": states})):
+        with pytest.warns(fm.SceneWarning, match='"arm": .*first frequency') as caught:
+            fm.simulate_batch(copies, 0.02, samples=3, **given)
+        assert len(caught) == 1
+    fm.simulate_batch([arm(0.6 * FIRST, "stiffened")] * 2, 0.02, samples=3)
+    fm.simulate_batch([replace(arm(0.6 * FIRST), allow=("level_range",))] * 2, 0.02, samples=3)
+
+
 def test_the_check_knows_rates_at_the_start_and_prescribed_ones(tmp_path):
     spun = arm(0.0, prescribed=fm.SpinUp(rate=0.6 * FIRST, duration_s=5.0))
     assert fm.check_scene(spun) == () == fm.check_scene(arm(0.6 * FIRST, "stiffened"))
