@@ -185,3 +185,9 @@ def _supply_drives(c, w, d, cc, cw, x):
 def move(y, increment, result, s):
     """Coordinates of result = those of y after motion for a unit of time at the constant speeds `increment` (nu,)."""
     retraction.move_by(y, increment, result, s.c)
+
+
+@kernel
+def resolve(y, u, x, how, s):
+    """See `flexmb.motion.retraction`."""
+    retraction.resolve_by(y, u, x, how, s.c)

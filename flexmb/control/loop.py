@@ -45,6 +45,12 @@ def move(y, increment, result, s):
 
 
 @kernel
+def resolve(y, u, x, how, s):
+    """Resolve speeds, or their rates, as for the mechanics alone."""
+    nothing_at(s.address[a.AXES], (y, u, x, how, s.address[a.CONSTANTS]))
+
+
+@kernel
 def observe(s, same, out):
     """Observe with the mechanics' kernel where `rhs` was just evaluated."""
     nothing_at(s.address[a.OBSERVING], (s.address[a.CONSTANTS], s.address[a.WORKSPACE], out))

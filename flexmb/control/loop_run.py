@@ -88,7 +88,7 @@ class LoopRun(LoopTables):
             if made.continuous[0]:
                 tangent = self._tangent(linear, len(y))  # and no stiff part: it knows no states of controllers
                 linear = linear._replace(jacobian=jacobian, exact=made, tangent=tangent, stiff=None)
-            posed: Any = stiff_problem(*kernels, linear._replace(move=loop.move), leaps)
+            posed: Any = stiff_problem(*kernels, linear._replace(move=loop.move, resolve=loop.resolve), leaps)
         else:
             posed = problem(*kernels, leaps)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))

@@ -13,7 +13,7 @@ from flexmb.control.wiring import numbers_of, widest, wired
 from flexmb.entry.observation import sense_markers
 from flexmb.integrate.problem import Linear
 from flexmb.jit.direct import address, addresses
-from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
+from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID, WHOLE
 from flexmb.scene.control import Controller
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
@@ -63,9 +63,11 @@ class LoopTables:
         self._instants, self._end = instants((), 0.0, 0.0, ()), 0.0
         """Instants of the last run up to its end."""
 
-    def with_retraction(self, move: Any) -> None:
+    def with_retraction(self, linear: Linear) -> None:
         """Add the retraction for Lie-group methods, see `flexmb.integrate.problem.StiffProblem`."""
-        self._where[a.RETRACTION], _ = addresses(move, VOID, VECTOR, VECTOR, VECTOR, self._tables[0])
+        constants = self._tables[0]
+        self._where[a.RETRACTION], _ = addresses(linear.move, VOID, VECTOR, VECTOR, VECTOR, constants)
+        self._where[a.AXES], _ = addresses(linear.resolve, VOID, VECTOR, VECTOR, VECTOR, WHOLE, constants)
 
     def heed(self, stop: Index) -> None:
         """Let an exception in a Python law end the run, by stop[0] = 1."""

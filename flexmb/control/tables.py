@@ -25,7 +25,8 @@ SAMPLE, APPLY = range(2)
 MOTION, MANIFOLD, RETRACTION, CONSTANTS, WORKSPACE, MARKERS, TREE, TREE_WORKSPACE, OBSERVING, OUTPUTS = range(10)
 BACK, LEAP, BESIDE = range(10, 13)  # of closed chains; 0 elsewhere
 ASKING = 13  # callback to Python for loads where no kernel computes them; 0 where one does
-ADDRESSES = 14
+AXES = 14  # of increments
+ADDRESSES = 15
 # Indices in `LoopTangent.address`.
 JACOBIAN, EXACT, TANGENT = range(3)
 

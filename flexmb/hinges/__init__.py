@@ -1,4 +1,4 @@
-"""Hinges: one file per kind, which declares all of it as `HINGE` (see `flexmb.hinges.kind`), with four kernels.
+"""Hinges: one file per kind, which declares all of it as `HINGE` (see `flexmb.hinges.kind`), with five kernels.
 
 ``pose(q, i, sequence, parameters)``
     Relative pose of the outboard frame O in the inboard frame O+: R (9) maps O components to O+ components, p (3) is
@@ -11,7 +11,11 @@
     Configuration rate qdot(q, u), written to dq[i:i+nq].
 ``retract(q, i, increment, j, result)``
     The coordinates at the end of a unit of time at the constant speeds `increment`, written to result[i:i+nq]: of
-    kinds with a quaternion. Where coordinates are scalars, the increments are added to them.
+    kinds with a quaternion. Where coordinates are scalars, the increments are added to them. The increment of a
+    position is in O+ axes.
+``resolve(q, i, u, x, j, how)``
+    Resolves x[j:j+n] between the axes of u and those of increments, in place, where these differ: see `resolve` of
+    `flexmb.motion.retraction`.
 
 q, u and increment are the whole vectors; the hinge's coordinates begin at q[i], its speeds at u[j]. `sequence` (3,)
 holds the axis numbers of a gimbal, `parameters` (3,) real numbers of the hinge, such as the pitch of a screw. Axes of

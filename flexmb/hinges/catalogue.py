@@ -32,6 +32,7 @@ pose = numbered("pose", HINGE, [kind.pose for kind in KINDS])
 motion = numbered("motion", HINGE, [kind.motion for kind in KINDS])
 rate = numbered("rate", HINGE, [kind.rate for kind in KINDS])
 retract = numbered("retract", HINGE, [kind.retract for kind in KINDS])
+resolve = numbered("resolve", HINGE, [kind.resolve for kind in KINDS])
 
 def kind_of(item: Item) -> tuple[HingeKind, Reduced]:
     """The kind of a hinge or point mass of a scene, and its axes as the kernels of that kind take them."""

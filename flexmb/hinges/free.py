@@ -4,14 +4,10 @@ from flexmb.hinges import attitude
 from flexmb.hinges.kind import HingeKind, Item, Names, Reduced
 from flexmb.jit.kernel import helper
 from flexmb.scene.schema import Free
-from flexmb.spatial.rotation import (
-    exponential_coefficients,
-    left_jacobian_times,
-    quaternion_matrix,
-    quaternion_rate,
-)
+from flexmb.spatial.rotation import quaternion_matrix, quaternion_rate
 from flexmb.spatial.scalar import sqrt
-from flexmb.spatial.vector import cross, dot, times
+from flexmb.spatial.vector import add, cross, store3, times, times_t, vec3
+from flexmb.tables.axes import RATES, TURNING
 
 
 @helper
@@ -52,13 +48,20 @@ def rate(q, i, u, j, dq):
 
 @helper
 def retract(q, i, increment, j, result):
-    """The screw motion of constant speeds, as the velocity is held in turning axes: x + R J_l(theta) v."""
-    theta = (increment[j], increment[j + 1], increment[j + 2])
-    v = (increment[j + 3], increment[j + 4], increment[j + 5])
-    path = times(_attitude(q, i), left_jacobian_times(theta, exponential_coefficients(dot(theta, theta)), v))
+    """On R3 x SO(3): a body that nothing pushes moves straight on, however it turns."""
     for n in range(3):
-        result[i + n] = q[i + n] + path[n]
-    attitude.turn(q, i + 3, theta, result)
+        result[i + n] = q[i + n] + increment[j + 3 + n]
+    attitude.turn(q, i + 3, vec3(increment, j), result)
+
+
+@helper
+def resolve(q, i, u, x, j, how):
+    """Velocities turn with the body; their rates as seen from O+ have w x v in addition."""
+    R, v = _attitude(q, i), vec3(x, j + 3)
+    if how == TURNING:
+        store3(x, j + 3, times_t(R, v))
+    else:
+        store3(x, j + 3, times(R, add(v, cross(vec3(u, j), vec3(u, j + 3))) if how == RATES else v))
 
 
 def reduced(item: Item) -> Reduced | None:
@@ -86,6 +89,7 @@ HINGE = HingeKind(
     motion=motion,
     rate=rate,
     retract=retract,
+    resolve=resolve,
     reduced=reduced,
     quaternion=3,
     displacements=(3, 4, 5),

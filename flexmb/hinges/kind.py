@@ -53,9 +53,14 @@ def nothing_turns(q, i, increment, j, result):
     """Without a quaternion `flexmb.motion.retraction` adds the increments itself, which is faster there."""
 
 
+@helper
+def nothing_to_resolve(q, i, u, x, j, how):
+    """All speeds are rates of scalars, or those of a rotation, which is updated in its own axes."""
+
+
 @dataclass(frozen=True, eq=False)
 class HingeKind:
-    """One kind of hinge. See `flexmb.hinges` for its kernels `pose`, `motion`, `rate` and `retract`.
+    """One kind of hinge. See `flexmb.hinges` for its kernels `pose`, `motion`, `rate`, `retract` and `resolve`.
 
     `reduced` gives the hinges and point masses of a scene that are of this kind in their kernels' terms, None for all
     others. `state` gives their initial coordinates and speeds, `names` the (name, unit) of both, `ball` stiffness
@@ -70,6 +75,7 @@ class HingeKind:
     rate: Callable[..., Any]
     retract: Callable[..., Any]
     reduced: Callable[[Item], Reduced | None]
+    resolve: Callable[..., Any] = nothing_to_resolve
     axis: int = NO_AXIS  # of a single speed along z: ANGULAR_Z or LINEAR_Z
     quaternion: int = -1  # where it begins among the coordinates; -1 where there is none
     displacements: tuple[int, ...] = ()  # speeds (m/s); all others are angular

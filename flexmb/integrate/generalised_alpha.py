@@ -6,8 +6,10 @@ Chung, Hulbert, J. Appl. Mech. 60 (1993), 371; on Lie groups Bruels, Cardona, J.
     q_1 = q_0 o exp(h u_0 + h^2 ((1/2 - beta) a_0 + beta a_1)),     u_1 = u_0 + h ((1 - gamma) a_0 + gamma a_1),
     (1 - alpha_m) a_1 + alpha_m a_0 = (1 - alpha_f) udot_1 + alpha_f udot_0.
 
-The order is 2; the parameter is the spectral radius at infinite frequency: 1 damps nothing, 0 removes in one step all
-modes that the step does not resolve.
+What is added up here is resolved in the axes of increments, `StiffProblem.resolve`: velocities of free hinges in those
+of the inboard body. In axes that turn with the body, u_1 would have the error of a rotation, and the linear momentum of
+a body that nothing pushes would turn. The order is 2; the parameter is the spectral radius at infinite frequency: 1
+damps nothing, 0 removes in one step all modes that the step does not resolve.
 """
 
 from __future__ import annotations
@@ -37,6 +39,7 @@ from flexmb.integrate.stiff_place import (
 )
 from flexmb.integrate.watch import Ends
 from flexmb.jit.kernel import handed_in, handed_on, helper, kernel, sweep
+from flexmb.tables.axes import FIXED, RATES, TURNING
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, OUT_OF_RANGE
 
 _ITERATIONS = 12  # maximum number of Newton iterations
@@ -47,12 +50,14 @@ _SAME = 1e-9  # relative difference of steps that share factors
 
 
 class NewmarkArrays(NamedTuple):
-    """Arrays of a step: J (n,n); matrix of Newton's method (nu,nu); a, udot at both ends (nu,); slopes (n,)."""
+    """Arrays of a step: J (n,n); matrix of Newton's method (nu,nu); speeds at the start, a and udot at both ends (nu,),
+    all in the axes of increments; slopes (n,)."""
 
     J: np.ndarray
     matrix: np.ndarray
     pivots: np.ndarray
     blocks: RateBlocks
+    begun: np.ndarray
     a: np.ndarray
     a_new: np.ndarray
     rate: np.ndarray
@@ -130,13 +135,20 @@ def _add_motion(s, given, factor, row):
 def end_of_step(problem, y, h, s, accuracy):
     """y_new and a_new from udot at both ends; components after the speeds are not changed."""
     alpha_m, alpha_f, beta, gamma = parameters(accuracy.radius)
-    nq = accuracy.coordinates
+    nq, speeds = accuracy.coordinates, speeds_of(s.y_new, s, accuracy)
     for j in range(s.a.shape[0]):
         a = ((1.0 - alpha_f) * s.rate_new[j] + alpha_f * s.rate[j] - alpha_m * s.a[j]) / (1.0 - alpha_m)
         s.a_new[j] = a
-        s.increment[j] = h * (y[nq + j] + h * ((0.5 - beta) * s.a[j] + beta * a))
-        s.y_new[nq + j] = y[nq + j] + h * ((1.0 - gamma) * s.a[j] + gamma * a)
+        s.increment[j] = h * (s.begun[j] + h * ((0.5 - beta) * s.a[j] + beta * a))
+        s.y_new[nq + j] = s.begun[j] + h * ((1.0 - gamma) * s.a[j] + gamma * a)
     problem.move(y, s.increment, s.y_new, problem.constants)
+    problem.resolve(s.y_new, speeds, speeds, TURNING, problem.constants)
+
+
+@helper
+def speeds_of(y, s, accuracy):
+    """The speeds (nu,) of a state, which are a part of it."""
+    return y[accuracy.coordinates : accuracy.coordinates + s.a.shape[0]]
 
 
 @helper
@@ -146,22 +158,21 @@ def newton(problem, t_new, y, h, s, accuracy, counts):
     The first guess is the solution with f linearised at the start, so that stiff modes start close to their solution.
     """
     nq, nu = accuracy.coordinates, s.a.shape[0]
+    copy(speeds_of(y, s, accuracy), s.begun)
+    problem.resolve(y, speeds_of(y, s, accuracy), s.begun, FIXED, problem.constants)
     copy(s.rate, s.rate_new)
     end_of_step(problem, y, h, s, accuracy)
     _foresee(problem, y, s, nq)
-    for j in range(nu):
-        s.rate_new[j] += s.correction[j]
+    _add_correction(problem, s, accuracy)
     end_of_step(problem, y, h, s, accuracy)
     permitted = _INEXACT if suffices(s.stiff) else _ITERATIONS
     for iteration in range(1, permitted + 1):
         status = derivative(problem, t_new, s.y_new, s.f_new, counts)
         if status != OK:  # an iterate that is not finite does not mean that the motion diverges
             return NOT_CONVERGED if status == NONFINITE else status, iteration
-        for j in range(nu):
-            s.correction[j] = s.f_new[nq + j] - s.rate_new[j]
+        _residual(problem, s, accuracy)
         _correct(problem, h, s, accuracy)
-        for j in range(nu):
-            s.rate_new[j] += s.correction[j]
+        _add_correction(problem, s, accuracy)
         copy(s.y_new, s.y_before)
         end_of_step(problem, y, h, s, accuracy)
         if not all_finite(s.y_new):
@@ -172,6 +183,25 @@ def newton(problem, t_new, y, h, s, accuracy, counts):
         if size <= 1.0 or largest(s.correction) <= _ROUNDING * largest(s.rate_new):
             return OK, iteration
     return NOT_CONVERGED, permitted
+
+
+@helper
+def _residual(problem, s, accuracy):
+    """What udot at y_new lacks, in the axes of speeds, which are those of J."""
+    speeds = speeds_of(s.y_new, s, accuracy)
+    copy(speeds_of(s.f_new, s, accuracy), s.correction)
+    problem.resolve(s.y_new, speeds, s.correction, RATES, problem.constants)
+    for j in range(s.correction.shape[0]):
+        s.correction[j] -= s.rate_new[j]
+    problem.resolve(s.y_new, speeds, s.correction, TURNING, problem.constants)
+
+
+@helper
+def _add_correction(problem, s, accuracy):
+    """Add the correction, in the axes of speeds at y_new, to udot at the end."""
+    problem.resolve(s.y_new, speeds_of(s.y_new, s, accuracy), s.correction, FIXED, problem.constants)
+    for j in range(s.correction.shape[0]):
+        s.rate_new[j] += s.correction[j]
 
 
 @helper
@@ -199,11 +229,33 @@ def _correct(problem, h, s, accuracy):
 
 
 @helper
-def _linearise(problem, t, y, s, counts):
+def _linearise(problem, t, y, s, accuracy, counts):
     """Linearise at (t, y): the Jacobian, or the place of the stiff part where this suffices; returns a status code."""
     if suffices(s.stiff):
         return settle_at(problem, t, y, s.stiff)
-    return linearisation(problem, t, y, s.J, counts)
+    status = linearisation(problem, t, y, s.J, counts)
+    _add_turning(problem, y, s, accuracy)
+    return status
+
+
+@helper
+def _add_turning(problem, y, s, accuracy):
+    """Add to J what `RATES` adds to udot: products of two different speeds, so that a difference over 1 is exact."""
+    nq, nu, speeds = accuracy.coordinates, s.a.shape[0], speeds_of(y, s, accuracy)
+    moved, still, column = s.increment, s.rate_new, s.correction
+    for i in range(nu):
+        still[i] = 0.0
+    problem.resolve(y, speeds, still, RATES, problem.constants)
+    problem.resolve(y, speeds, still, TURNING, problem.constants)
+    for j in range(nu):
+        copy(speeds, moved)
+        moved[j] += 1.0
+        for i in range(nu):
+            column[i] = 0.0
+        problem.resolve(y, moved, column, RATES, problem.constants)
+        problem.resolve(y, moved, column, TURNING, problem.constants)
+        for i in range(nu):
+            s.J[nq + i, nq + j] += column[i] - still[i]
 
 
 @sweep
@@ -221,7 +273,7 @@ def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
     if status != NOT_CONVERGED and status != OUT_OF_RANGE:
         return status, h_factored if iterations < _WORN else 0.0
     for _ in range(2):  # without the Jacobian where it may be missed, then with it
-        status = _linearise(problem, step.start, y, s, counts)
+        status = _linearise(problem, step.start, y, s, accuracy, counts)
         if status != OK:
             return status, 0.0
         status = NOT_CONVERGED
@@ -249,8 +301,9 @@ def attempt(problem, step, h, ends, s, known, accuracy, counts):
         status = derivative(problem, step.start, ends.y, s.f, counts)
         if status != OK:
             return status
-        for j in range(s.a.shape[0]):
-            s.rate[j] = s.a[j] = s.f[accuracy.coordinates + j]
+        copy(speeds_of(s.f, s, accuracy), s.rate)
+        problem.resolve(ends.y, speeds_of(ends.y, s, accuracy), s.rate, RATES, problem.constants)
+        copy(s.rate, s.a)
         known[FRESH] = 0.0
     status, known[FACTORED] = step_once(problem, step, ends.y, h, known[FACTORED], s, accuracy, counts)
     if status == OK:
@@ -323,8 +376,8 @@ def arrays(n, coordinates, a, rate, f):
     """Arrays for n components, the first of which are coordinates; a, udot and the slope at the start are given."""
     nu = a.shape[0]
     return NewmarkArrays(
-        np.zeros((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), rate_blocks(coordinates), a, np.empty(nu), rate,
-        np.empty(nu), np.empty(nu), np.empty(nu), f, np.empty(n), np.zeros(n), np.empty(n),
+        np.zeros((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), rate_blocks(coordinates), np.empty(nu), a,
+        np.empty(nu), rate, np.empty(nu), np.empty(nu), np.empty(nu), f, np.empty(n), np.zeros(n), np.empty(n),
         stiff_place(n, coordinates, nu),
     )  # fmt: skip
 

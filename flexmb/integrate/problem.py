@@ -38,9 +38,10 @@ class StiffProblem(NamedTuple):
 
     jacobian(t, y, J, exact, tangent) puts df/dy (n,n) into J and returns a status code.
     move(y, increment, result, constants) puts y = [q, u, ...] with q o exp(increment) into result, for methods on Lie
-    groups; increment (nu,). settles: whether `project` displaces stiff components: see `flexmb.integrate.settling`.
-    separates: whether the functions of `StiffKernels` exist, with its tables in `stiff`: Newton's method may then do
-    without the Jacobian, see `flexmb.integrate.stiff_place`.
+    groups; increment (nu,). resolve(y, u, x, how, constants) resolves x (nu,) between the axes of speeds u (nu,) and
+    those of increments, in place: see `flexmb.tables.axes`. settles: whether `project` displaces stiff components: see
+    `flexmb.integrate.settling`. separates: whether the functions of `StiffKernels` exist, with its tables in `stiff`:
+    Newton's method may then do without the Jacobian, see `flexmb.integrate.stiff_place`.
     """
 
     rhs: Pointer
@@ -51,6 +52,7 @@ class StiffProblem(NamedTuple):
     leap: Pointer
     jacobian: Pointer
     move: Pointer
+    resolve: Pointer
     exact: AnyBundle
     tangent: AnyBundle
     settles: bool
@@ -132,10 +134,11 @@ class StiffKernels(NamedTuple):
 
 
 class Linear(NamedTuple):
-    """What a `StiffProblem` has in addition to a `Problem`: kernels jacobian and move, bundles exact and tangent."""
+    """What a `StiffProblem` has in addition to a `Problem`: kernels jacobian, move, resolve, bundles exact, tangent."""
 
     jacobian: Any
     move: Any
+    resolve: Any
     exact: Any
     tangent: Any
     settles: bool = False
@@ -191,7 +194,7 @@ def stiff_problem(
     rhs: Any, project: Any, constants: Any, workspace: Any, linear: Linear, leaping: Leaping | None = None
 ) -> StiffProblem:
     """A `StiffProblem` from kernels and bundles, see `problem`."""
-    jacobian, move, exact, tangent, settles, stiff = linear
+    jacobian, move, resolve, exact, tangent, settles, stiff = linear
     nothing = StiffKernels(_no_settling, _no_shift, _no_motion, _no_answer, exact)
     settle_at, shift, along, restore, tables = stiff or nothing
     known = tables if stiff else AnyBundle._numba_type_
@@ -199,6 +202,7 @@ def stiff_problem(
         *problem(rhs, project, constants, workspace, leaping),
         pointer(jacobian, STATUS, REAL, VECTOR, MATRIX, exact, tangent),
         pointer(move, VOID, VECTOR, VECTOR, VECTOR, constants),
+        pointer(resolve, VOID, VECTOR, VECTOR, VECTOR, WHOLE, constants),
         AnyBundle(exact),
         AnyBundle(tangent),
         settles,

@@ -14,11 +14,11 @@ from flexmb.integrate.problem import Problem, StiffProblem
 from flexmb.jit.bundle import AnyBundle, bundle
 from flexmb.jit.direct import nothing_at, real_at, status_at
 from flexmb.jit.kernel import helper, kernel
-from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID, pointer
+from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID, WHOLE, pointer
 from flexmb.typing import Index, Real
 
 # Indices in `RecordedSteps.address` and, the first four, in that of `flexmb.sensitivity.adjoint.stages.Stages`.
-RHS, PROJECT, CONSTANTS, WORKSPACE, BACK, LEAP, MOVE = range(7)
+RHS, PROJECT, CONSTANTS, WORKSPACE, BACK, LEAP, MOVE, RESOLVE = range(8)
 ADDRESSES = 4
 """How many of them a problem without leaps, and without Jacobian, has."""
 
@@ -94,13 +94,20 @@ def move(y, increment, result, s):
     nothing_at(s.address[MOVE], (y, increment, result, s.address[CONSTANTS]))
 
 
+@kernel
+def resolve(y, u, x, how, s):
+    """See `StiffProblem`."""
+    nothing_at(s.address[RESOLVE], (y, u, x, how, s.address[CONSTANTS]))
+
+
 def recorded(posed: Problem | StiffProblem, room: int) -> tuple[Any, RecordedSteps]:
     """The same problem with a record of its steps, which has room for so many times and no states but the first."""
     kernels = [each.__wrapper_address__() for each in (posed.rhs, posed.project, posed.back, posed.leap)]
     tables = posed.constants.kernel_address, posed.workspace.kernel_address
-    moving = posed.move.__wrapper_address__() if isinstance(posed, StiffProblem) else 0
+    on_group = [posed.move, posed.resolve] if isinstance(posed, StiffProblem) else []
+    moving = [each.__wrapper_address__() for each in on_group]
     record = RecordedSteps(
-        address=np.array([*kernels[:2], *tables, *kernels[2:], moving]), every=np.array([room + 1]),
+        address=np.array([*kernels[:2], *tables, *kernels[2:], *moving]), every=np.array([room + 1]),
         count=np.zeros(1, np.int64), time=np.zeros(room), state=np.zeros((1, 0)),
     )  # fmt: skip
     own = posed._replace(
@@ -110,5 +117,8 @@ def recorded(posed: Problem | StiffProblem, room: int) -> tuple[Any, RecordedSte
         leap=pointer(leap, REAL, REAL, VECTOR, VECTOR, VECTOR, VECTOR, record),
     )  # fmt: skip
     if isinstance(own, StiffProblem):
-        own = own._replace(move=pointer(move, VOID, VECTOR, VECTOR, VECTOR, record))
+        own = own._replace(
+            move=pointer(move, VOID, VECTOR, VECTOR, VECTOR, record),
+            resolve=pointer(resolve, VOID, VECTOR, VECTOR, VECTOR, WHOLE, record),
+        )
     return own, record

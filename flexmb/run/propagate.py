@@ -83,7 +83,7 @@ class Integration:
             self._linear = route.linear(constants, self._workspace)
             self._problem: Any = stiff_problem(*motion, self._linear, route.leaping)
             if self.feedback is not None:
-                self.feedback.with_retraction(self._linear.move)
+                self.feedback.with_retraction(self._linear)
         else:
             self._problem = problem(*motion, route.leaping)
         self._leaping, self._constants = route.leaping, constants

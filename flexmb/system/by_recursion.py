@@ -23,7 +23,9 @@ def _fresh(system: Mechanics) -> tuple[Any, Any]:
 def _linear(system: Mechanics) -> Linear:
     exact = system.constants  # with every body eliminated explicitly, for Jacobians
     written = derivatives.derivative_workspace(exact, system.nq, system.nu)
-    return Linear(derivatives.jacobian, retraction.move, exact, written, stiff=_stiff(system))
+    return Linear(
+        derivatives.jacobian, retraction.move, retraction.resolve, exact, written, stiff=_stiff(system)
+    )  # fmt: skip
 
 
 def _stiff(system: Mechanics) -> StiffKernels | None:

@@ -322,7 +322,8 @@ class ClosedSystem(ChainDerivatives, System):
 
     def _linear(self, chain: Closed, _: Closed) -> Linear:
         tangent = chain_jacobian(chain, self.nq, self.nu)
-        return Linear(closed_jacobian.jacobian, closed_jacobian.move, chain, tangent, settles=True)
+        on_group = closed_jacobian.move, closed_jacobian.resolve
+        return Linear(closed_jacobian.jacobian, *on_group, chain, tangent, settles=True)
 
     def _on_chains(self, algorithm: Algorithm) -> Callable[[Closures, float, Real], ClosedMotion]:
         """The algorithm's function for closed chains; NotImplementedError if it has none."""

@@ -52,8 +52,9 @@ _ADVICE = {
     ),
     Status.OUT_OF_RANGE: (
         "the deflection of body {body} grew beyond ten times its size: its modes mean nothing there (a beam of level "
-        '"exact" is wound up by some 25 radians); look for an instability (an unstiffened beam spun above its first '
-        "frequency, loads that grow, equal steps that are too long), or divide the body into segments"
+        '"exact" is wound up by a turn from one of its points to the next); look for an instability (an unstiffened '
+        "beam spun above its first frequency, loads that grow, equal steps that are too long), give the beam more "
+        "points, or divide the body into segments"
     ),
     Status.CLOSURE_SINGULAR: (
         "closure {body} is singular: here the closures suppress fewer motions than at neighbouring places, and the "

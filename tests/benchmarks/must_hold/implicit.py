@@ -67,7 +67,7 @@ def _by_duals(scene: fm.Scene) -> Call:
 
 def _dual(system: ClosedSystem, chain: Closed, _: Closed) -> Linear:
     tangent = dual_jacobian.chain_tangent(chain.c, chain.cc, system.nq, system.nu)
-    return Linear(dual_jacobian.jacobian, jacobian.move, chain, tangent, settles=True)
+    return Linear(dual_jacobian.jacobian, jacobian.move, jacobian.resolve, chain, tangent, settles=True)
 
 
 def _simulated(scene: fm.Scene, method: fm.Method) -> Call:

@@ -124,7 +124,7 @@ def with_drill(monkeypatch):
     kinds = (*catalogue.KINDS, DRILL)
     for room in (catalogue, assemble, carried):
         monkeypatch.setattr(room, "KINDS", kinds)
-    for name in ("pose", "motion", "rate", "retract"):
+    for name in ("pose", "motion", "rate", "retract", "resolve"):
         monkeypatch.setattr(catalogue, name, numbered(name, HINGE, [getattr(kind, name) for kind in kinds]))
 
 

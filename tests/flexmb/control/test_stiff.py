@@ -63,7 +63,7 @@ def posed(scene: fm.Scene) -> Posed:
     feedback = Feedback(plant, chosen, route, tables)
     assert route.linear is not None
     linear = route.linear(*tables)
-    feedback.with_retraction(linear.move)
+    feedback.with_retraction(linear)
     begun = feedback.begin(
         origin(plant, 0.0, None, "radau5"), Clock(np.array([0.0, 1.0]), np.array([1.0])),
         Accuracy(1e-8, 1e-8, plant.nq + plant.nu, 1), linear,

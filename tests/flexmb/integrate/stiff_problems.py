@@ -123,6 +123,11 @@ def move(y, increment, result, constants):
         result[i] = y[i] + increment[i]
 
 
+@kernel
+def resolve(y, u, x, how, constants):
+    pass
+
+
 def coning(t: float) -> np.ndarray:
     """Closed form of CONING."""
     a, b, c = 0.5 * CONE_RATE * t, 0.5 * CONE_ANGLE, 0.5 * SPIN_RATE * t
@@ -154,7 +159,7 @@ class Result(NamedTuple):
 def solve(integrator, problem, y, times, rtol, atol, controlled, *, ends=None, max_steps=100_000, **more) -> Result:
     """Integrate `problem` = (constants, workspace) from y with an integrator; `more`: fields of `Accuracy`."""
     constants, workspace = problem
-    equations = stiff_problem(rhs, project, constants, workspace, Linear(jacobian, move, constants, workspace))
+    equations = stiff_problem(rhs, project, constants, workspace, Linear(jacobian, move, resolve, constants, workspace))
     times, y = np.asarray(times, float), np.array(y, float)
     ends = np.array([times[-1]] if ends is None else ends, float)
     out, counts = np.full((len(times), len(y)), np.nan), np.zeros(COUNTS, np.int64)

@@ -35,7 +35,7 @@ def tip(system: fm.System, state: fm.State) -> np.ndarray:
     return system.evaluate(state.t, state.q, state.u).markers["tip"].position
 
 
-@pytest.mark.parametrize("turns", [1.0, 2.5, 4.0])
+@pytest.mark.parametrize("turns", [1.0, 2.5, 4.0, 4.5, 5.0])
 def test_a_torque_winds_a_strip_into_a_circle(turns):
     """A linear problem, although the inertia changes: curvature T / EI everywhere."""
     one, found = (fm.equilibrium(strip(6, torque=2.0 * np.pi * each)) for each in (1.0, turns))
@@ -45,6 +45,17 @@ def test_a_torque_winds_a_strip_into_a_circle(turns):
     circle = np.array([np.sin(curvature), 1.0 - np.cos(curvature), 0.0]) / curvature
     system = fm.compile(strip(20, torque=curvature))
     assert tip(system, fm.equilibrium(system)) == pytest.approx(circle, abs=1e-9)
+
+
+def test_what_its_points_do_not_follow_is_refused():
+    """A turn from one of the 23 points to the next; what is within is at rest under its torque."""
+    one = fm.equilibrium(strip(20, torque=2.0 * np.pi))
+    for turns in (5.0, 20.0):
+        system = fm.compile(strip(20, torque=2.0 * np.pi * turns))
+        rates, beside = (system.accelerations(system.state(part * turns * one.q, one.u)) for part in (1.0, 0.99))
+        assert np.max(np.abs(rates)) < 1e-9 * np.max(np.abs(beside))
+    with pytest.raises(fm.DynamicsError, match="wound up by a turn from one of its points to the next"):
+        system.accelerations(system.state(30.0 * one.q, one.u))
 
 
 def test_elastica_by_any_polynomials_and_by_path():
