@@ -20,6 +20,7 @@ from flexmb.typing import Real
 
 GAUSS_POINTS = 6
 """Exact to degree 11: quintic deflections squared times a linearly varying section."""
+_GAUSS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
 
 
 @dataclass(frozen=True)
@@ -60,11 +61,14 @@ class Lump:
 
 
 def quadrature(mesh: ElementMesh, table: SectionTable, cuts: Sequence[float] | Real = ()) -> tuple[Real, Real]:
-    """Gauss points and weights (n,) on each piece between nodes, stations and cuts: kinks cost no accuracy."""
-    others = np.concatenate([table.x, cuts])
+    """Gauss points and weights (n,) on each piece between nodes, stations and cuts: kinks cost no accuracy.
+
+    Stations that are all alike make no kink, wherever the beam ends.
+    """
+    others = np.concatenate([() if table.uniform else table.x, cuts])
     inside = others[(others > mesh.nodes[0]) & (others < mesh.nodes[-1])]
     breaks = np.unique(np.concatenate([mesh.nodes, inside]))
-    s, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    s, w = _GAUSS
     half = np.diff(breaks) / 2.0
     middle = breaks[:-1] + half
     return (middle[:, None] + half[:, None] * s).ravel(), (half[:, None] * w).ravel()
