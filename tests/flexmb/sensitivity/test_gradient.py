@@ -13,6 +13,7 @@ from flexmb.parameters.numbers import Number
 from flexmb.ready import scenes
 from flexmb.sensitivity.adjoint import arc, part
 from flexmb.sensitivity.adjoint.sampling import SampledLoop
+from tests.flexmb.closure import mechanisms
 from tests.flexmb.sensitivity.differences import TIGHT
 from tests.flexmb.sensitivity.test_sensitivities import EVENTS, NUMBERS, arm
 from tests.repo.project import ROOT
@@ -329,3 +330,14 @@ def test_planar_loops_with_closures_of_every_kind(kind):
         warnings.simplefilter("ignore", fm.SceneWarning)  # the start is rough
         found = disagreement(made, 0.3, ["coupler.mass_kg", "crank.nodes.end.position_m.0"], ["B.rotation"])
     assert found < OTHER_STEPS
+
+
+def test_loads_that_closures_leave_undetermined_are_refused():
+    """In a plane loop with four hinges, loads out of the plane have no value, and their scalars no gradient."""
+    scene = mechanisms.four_bar()
+    by, channel = [f"{scene.bodies[0].name}.mass_kg"], "loop.force.z"
+    run = fm.sensitivities(scene, 0.01, by, [channel], samples=2)
+    assert np.all(np.isnan(run.values))
+    for term in (fm.FinalValue(channel), fm.TimeIntegral(channel)):
+        with pytest.raises(fm.DynamicsError, match="not determined"):
+            fm.gradient(scene, 0.01, by, term)
