@@ -70,8 +70,8 @@ def gradient(
 
     The steps of the run are passed backwards with the transposes of their stages, which is the exact derivative of what
     the method computed with these steps; events by the transposes of their derivatives. The cost hardly depends on how
-    many numbers there are. Raises what `sensitivities` raises, and DynamicsError for a run that ends before t_end, and for
-    outputs that redundant closures leave undetermined.
+    many numbers there are. Raises what `sensitivities` raises, and DynamicsError for a run that ends before t_end, and
+    for outputs that redundant closures leave undetermined.
     """
     refuse_unknown("gradient", settings)
     if method not in METHODS:
