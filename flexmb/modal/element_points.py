@@ -47,12 +47,13 @@ def section_points(elements: BeamElements, columns: Real, stations: Stations) ->
     are those of the section, so that the mass matrix is that of `axis_points`. Without turning tensors the kinetic
     energy is a polynomial in the modal coordinates. Sections without inertia keep one point.
     """
+    moved = elements.motion(stations.x, columns)
     if not np.any(stations.inertia):
-        return _massy(elements, columns, stations.x, stations.com, stations.mass)
+        return _massy(moved, stations.x, stations.com, stations.mass)
     a, b = _arms(stations)
     corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)]
     offsets = [stations.com + (sy * a + sz * b) for sy, sz in corners]
-    return join([_massy(elements, columns, stations.x, offset, stations.mass / 4.0) for offset in offsets])
+    return join([_massy(moved, stations.x, offset, stations.mass / 4.0) for offset in offsets])
 
 
 def _arms(stations: Stations) -> tuple[Real, Real]:
@@ -100,8 +101,9 @@ def massy_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:
     s_k are the eigenvalues of the second-moment tensor S = tr(J)/2 - J: mass, mass centre and inertia are exact. A lump
     without inertia is one point mass. Raises ValueError if S has a negative eigenvalue beyond rounding.
     """
+    moved = elements.motion(np.array([lump.x]), columns)
     if not np.any(lump.inertia):
-        return _massy(elements, columns, np.array([lump.x]), lump.com[None], np.array([lump.mass]))
+        return _massy(moved, np.array([lump.x]), lump.com[None], np.array([lump.mass]))
     second_moment, axes = np.linalg.eigh(np.trace(lump.inertia) / 2.0 * np.eye(3) - lump.inertia)
     floor = -8.0 * np.finfo(float).eps * np.trace(lump.inertia)  # a flat lump has a zero eigenvalue, up to rounding
     if second_moment.min() < floor:
@@ -112,12 +114,12 @@ def massy_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:
     # Two of the six masses are on each axis: 2 (mass / 6) (3 s_k / mass) = s_k.
     arms = (axes * np.sqrt(3.0 * np.maximum(second_moment, 0.0) / lump.mass)).T
     offset = lump.com + np.concatenate([arms, -arms])
-    return _massy(elements, columns, np.full(6, lump.x), offset, np.full(6, lump.mass / 6.0))
+    return _massy(np.repeat(moved, 6, axis=0), np.full(6, lump.x), offset, np.full(6, lump.mass / 6.0))
 
 
-def _massy(elements: BeamElements, columns: Real, x: Real, offset: Real, mass: Real) -> Points:
-    """Point masses (n,) at `offset` (n,3) from the axis points x (n,): displacement plus rotation x offset."""
-    moved = elements.motion(x, columns)
+def _massy(moved: Real, x: Real, offset: Real, mass: Real) -> Points:
+    """Point masses (n,) at `offset` (n,3) from the axis points x (n,), which are `moved` (n,6,m): displacement plus
+    rotation x offset."""
     translation = moved[:, :3] + np.cross(moved[:, 3:], offset[:, :, None], axis=1)
     nothing = np.zeros((len(x), 3))
     return Points(x, mass, on_axis(x) + offset, nothing, np.zeros((len(x), 3, 3)), translation, moved[:, 3:])

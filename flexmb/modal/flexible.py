@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar, assert_never
@@ -71,6 +72,8 @@ def _of_kind(body: BeamBody | ModalBody, kind: type[Body]) -> Body:
 def _beam(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
     if body.level == "exact":
         return exact_model(body, like)
+    if body.level != "stiffened":
+        return beam_model(body, like)
     return with_equivalent_masses(beam_model(body, like), None if like is None else beam_model(like))
 
 
@@ -79,17 +82,29 @@ def beam_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
 
     `like`: see `flexible_model`; the stiffness of modes that had one frequency in it may have other elements too.
     """
+    damping_ratio, viscosity = body.modes.damping_ratio, body.modes.viscosity_s
+    try:
+        undamped, modes = _undamped(_without_damping(body), None if like is None else _without_damping(like))
+        damping = damping_matrix(modes.roots, damping_ratio) + viscosity * modes.stiffness
+    except ValueError as error:
+        raise ValueError(f"beam '{body.name}': {error}") from error
+    return dataclasses.replace(undamped, damping=damping)
+
+
+def _without_damping(body: BeamBody) -> BeamBody:
+    return replace(body, modes=replace(body.modes, damping_ratio=0.0, viscosity_s=0.0))
+
+
+@lru_cache(maxsize=32)
+def _undamped(body: BeamBody, like: BeamBody | None) -> tuple[FlexibleModel, BeamModes]:
+    """The model and the modes of a beam whatever its damping, by numbers of which scenes are varied too."""
     elements = beam_elements(body)
     stations = inertia_stations(body, elements.mesh, elements.table)
     rigid_lumps = lumps(body)
     M = elements.mass(stations, rigid_lumps)
-    try:
-        modes = beam_modes(elements, elements.stiffness(), M, body.modes)
-        if like is not None:
-            modes = followed(modes, M, _modes_of(like))
-        damping = damping_matrix(modes.roots, body.modes.damping_ratio) + body.modes.viscosity_s * modes.stiffness
-    except ValueError as error:
-        raise ValueError(f"beam '{body.name}': {error}") from error
+    modes = beam_modes(elements, elements.stiffness(), M, body.modes)
+    if like is not None:
+        modes = followed(modes, M, _modes_of(like))
     points = points_of(body, elements, modes.columns, stations, rigid_lumps)
     return FlexibleModel(
         mass=points.mass,
@@ -99,11 +114,11 @@ def beam_model(body: BeamBody, like: BeamBody | None = None) -> FlexibleModel:
         translation=points.translation,
         rotation=points.rotation,
         stiffness=modes.stiffness,
-        damping=damping,
+        damping=np.zeros_like(modes.stiffness),
         nodes=_nodes(body, elements, modes.columns),
         clamped=body.modes.boundary == "clamped-free",
         second=second_order_of(body, elements, modes.columns, points.x, points.position - on_axis(points.x)),
-    )
+    ), modes
 
 
 @lru_cache(maxsize=8)  # one body is followed at a time, by models for all of its numbers

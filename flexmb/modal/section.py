@@ -38,6 +38,11 @@ class SectionTable:
     twist: Real
 
     @property
+    def uniform(self) -> bool:
+        """Whether all stations are alike."""
+        return all(bool(np.all(each == each[0])) for each in (self.stiffness, self.inertia, self.twist))
+
+    @property
     def sheared(self) -> bool:
         """Whether the beam has shear (Timoshenko)."""
         return bool(np.isfinite(self.stiffness[0, 1, 1]))

@@ -61,8 +61,11 @@ class Lump:
 
 
 def quadrature(mesh: ElementMesh, table: SectionTable, cuts: Sequence[float] | Real = ()) -> tuple[Real, Real]:
-    """Gauss points and weights (n,) on each piece between nodes, stations and cuts: kinks cost no accuracy."""
-    others = np.concatenate([table.x, cuts])
+    """Gauss points and weights (n,) on each piece between nodes, stations and cuts: kinks cost no accuracy.
+
+    Stations that are all alike make no kink, wherever the beam ends.
+    """
+    others = np.concatenate([() if table.uniform else table.x, cuts])
     inside = others[(others > mesh.nodes[0]) & (others < mesh.nodes[-1])]
     breaks = np.unique(np.concatenate([mesh.nodes, inside]))
     s, w = gauss_rule(GAUSS_POINTS)

@@ -11,6 +11,7 @@ and ordered in the scene; when a number changes, modes follow (`flexmb.modal.fol
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -25,7 +26,7 @@ from flexmb.parameters import kernels
 from flexmb.parameters.numbers import Number, numbers
 from flexmb.parameters.plant import Plant
 from flexmb.parameters.spectral import NotSmooth, derivative
-from flexmb.parameters.tables import ParameterBlock, Tables, blocks, diagonal, numbers_of, parts, structure
+from flexmb.parameters.tables import ParameterBlock, Tables, blocks, diagonal, moments, numbers_of, parts, structure
 from flexmb.parameters.together import derivatives_together
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
@@ -33,10 +34,7 @@ from flexmb.tables import arguments
 from flexmb.tables.per_thread import Own, per_thread
 from flexmb.tables.state import DynamicsError, State, finite_result
 from flexmb.tables.status import OK
-from flexmb.typing import Real
-
-MANY = 3
-"""Numbers whose derivatives are found together, where they concern different entries of the tables."""
+from flexmb.typing import Index, Real
 
 
 class ParameterError(ValueError):
@@ -73,7 +71,7 @@ class Parameters:
         self.errors = np.array([each.error for each in rates])
         self.reached = np.array([each.name in found.reached or bool(np.any(rate.values))
                                  for each, rate in zip(chosen, rates, strict=True)])  # fmt: skip
-        of_tables = np.stack([each.values for each in rates], axis=1) if chosen else np.zeros((found.size, 0))
+        of_tables = np.array([each.values[: found.size] for each in rates]).reshape(-1, found.size).T
         self.blocks: tuple[ParameterBlock, ...] = blocks(found.tables, found.diagonal, self.names, of_tables)
         self.initial_state: Real = of_tables[-len(found.tables.start) :].copy()
         for each in (self.errors, self.initial_state, self.reached):
@@ -247,20 +245,26 @@ class _Differentiation:
 
     def __init__(self, plant: Plant, starts: bool) -> None:
         self._plant, self._starts = plant, starts
-        self.reached: set[str] = set()
-        """Names of the numbers with which tables were seen to differ."""
+        self._firsts: dict[tuple[str, float], tuple[Index, Real]] = {}
+        """By name and first other value of a number, the entries of the tables that differ, and their values."""
         self.tables = _tables(plant, starts)
         self.diagonal = diagonal(self.tables)
         self._structure, self._parts = structure(self.tables), parts(self.tables, plant.nq)
-        self._middle = numbers_of(self.tables)
+        own = numbers_of(self.tables)
+        self.size = len(own)
+        """The count of all floats of the tables; what follows them tells the errors of some of them."""
+        integrals = moments(self.tables, self.tables)
+        ends = np.cumsum([self.size, *map(len, integrals)]).tolist()
+        self._parts += [slice(first, stop) for first, stop in itertools.pairwise(ends)]
+        self._middle = np.concatenate([own, *integrals])
 
     @property
-    def size(self) -> int:
-        """The count of all floats of the tables."""
-        return len(self._middle)
+    def reached(self) -> set[str]:
+        """Names of the numbers with which tables were seen to differ."""
+        return {name for (name, _), (places, _) in self._firsts.items() if len(places)}
 
     def by(self, number: Number) -> Any:
-        """Derivatives of `numbers_of` the tables by a number; ParameterError where there are none."""
+        """Derivatives of `numbers_of` the tables and of what follows them; ParameterError where there are none."""
 
         def at(value: float) -> Real:
             return self._middle if value == number.value else self._with(number, {number.name: value})
@@ -274,9 +278,7 @@ class _Differentiation:
             ) from None
 
     def by_all(self, chosen: Sequence[Number]) -> list[Any]:
-        """The same for many numbers. Of few, to see which entries each concerns costs more than it saves."""
-        if len(chosen) < MANY:
-            return [self.by(each) for each in chosen]
+        """The same for many numbers."""
 
         def tables(values: Mapping[str, float]) -> Real:
             return self._with(chosen[0], values) if values else self._middle
@@ -284,10 +286,21 @@ class _Differentiation:
         return derivatives_together(tables, chosen, self._parts, self.by)
 
     def _with(self, number: Number, values: Mapping[str, float]) -> Real:
-        """The tables with other values of a number and of others that belong to the same scene."""
+        """The tables with other values of a number and of others that belong to the same scene.
+
+        The entries that change with the first other value of a number are kept: tables with such values of numbers that
+        change no entry in common follow from them.
+        """
+        known = [self._firsts.get(each) for each in values.items()]
+        if all(each is not None for each in known):
+            found = self._middle.copy()
+            for places, entries in (each for each in known if each is not None):
+                found[places] = entries
+            return found
         found = self._at(number.scene_with(values))
-        if len(values) == 1 and not self.reached.issuperset(values) and not np.array_equal(found, self._middle):
-            self.reached.update(values)
+        if len(values) == 1 and not any(name in values for name, _ in self._firsts):
+            places = np.flatnonzero(found != self._middle)
+            self._firsts[next(iter(values.items()))] = places, found[places]
         return found
 
     def _at(self, scene: Scene) -> Real:
@@ -300,7 +313,7 @@ class _Differentiation:
             what = _OF_TABLES.get(changed[0], f"what the tables contain depends on it: {changed[0]}")
             raise ValueError(what)
         self.diagonal = np.minimum(self.diagonal, diagonal(tables))
-        return numbers_of(tables)
+        return np.concatenate([numbers_of(tables), *moments(tables, self.tables)])
 
 
 def _tables(plant: Plant, starts: bool) -> Tables:

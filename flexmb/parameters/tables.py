@@ -19,7 +19,7 @@ from flexmb.jit.lanes import LANES
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.levels.affine_integrals import moving_columns
 from flexmb.tables.arrays import Constants
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 # What is no function of the numbers that motions depend on: thresholds for rounding, weights that compare rows, which
 # modes move masses along an axis. Their derivatives are zero.
@@ -83,15 +83,52 @@ def numbers_of(tables: Tables) -> Real:
     return np.concatenate([column.values.ravel() for column in columns(tables)])
 
 
-def parts(tables: Tables, coordinates: int) -> list[slice]:
-    """The columns in that row; coordinates and speeds of the initial state apart."""
-    found, start = list[slice](), 0
+def parts(tables: Tables, coordinates: int) -> list[slice | Index]:
+    """The columns in that row; coordinates and speeds of the initial state apart.
+
+    Without the second-order fields of masses that stand for others: see `moments`.
+    """
+    found, start = list[slice | Index](), 0
+    summed = np.concatenate([np.zeros(0, np.intp), *(rows for _, rows in _summed(tables.tree))])
     for column in columns(tables):
         size = column.values.size
+        if column.table == "tree.second_shape":
+            places = np.arange(start, start + size).reshape(column.values.shape)
+            found.append(np.delete(places, summed, axis=0).ravel())
+            start += size
+            continue
         sizes = [size] if column.table != "start" else [coordinates, size - coordinates]
         for each in sizes:
             found.append(slice(start, start + each))
             start += each
+    return found
+
+
+def moments(tables: Tables, weights: Tables) -> list[Real]:
+    """By body, the integrals (k,) sum m a G of the second-order field G of point masses with a = 1, position and mode
+    shapes in the tables `weights`.
+
+    Mode shapes of two planes may be equal to nine digits. The direction of their difference, along which one of the
+    masses that stand for all others moves (`flexmb.modal.equivalent`), then has seven digits, and so has G there. What
+    motions depend on are these integrals, which have all digits but for sum m G G, whose part there is arbitrary.
+    """
+    found = []
+    modes = weights.tree.point_mode[:, 3:]
+    for points, rows in _summed(weights.tree):
+        of = weights.tree.point[points]
+        one = np.column_stack([np.ones(len(of)), of["position"], modes[points].reshape(len(of), -1)])
+        found.append(np.tensordot(one * of["mass"][:, None], tables.tree.second_shape["translation"][rows], (0, 0)))
+    return [each.ravel() for each in found]
+
+
+def _summed(tree: Constants) -> list[tuple[Index, Index]]:
+    """By body, its point masses with a second-order field that do not turn, and the rows of these fields."""
+    point, found = tree.point, list[tuple[Index, Index]]()
+    for body in tree.body:
+        own = np.arange(body["point_start"], body["point_stop"])
+        own = own[(point["second"][own] >= 0) & (point["mass"][own] > 0.0) & (point["turning"][own] == 0)]
+        if len(own):
+            found.append((own, point["second"][own]))
     return found
 
 

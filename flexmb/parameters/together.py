@@ -14,14 +14,14 @@ import numpy as np
 
 from flexmb.parameters.numbers import Number
 from flexmb.parameters.spectral import WIDTHS, Derivative, NotSmooth, derivative, nought
-from flexmb.typing import Flags, Real
+from flexmb.typing import Flags, Index, Real
 
 Tables = Callable[[Mapping[str, float]], Real]
 """All floats (n,) of the tables with other values, by name of the number; ValueError where there are none."""
 
 
 def derivatives_together(
-    tables: Tables, chosen: Sequence[Number], parts: Sequence[slice], by: Callable[[Number], Derivative]
+    tables: Tables, chosen: Sequence[Number], parts: Sequence[slice | Index], by: Callable[[Number], Derivative]
 ) -> list[Derivative]:
     """d tables/dp (n,) for each of these numbers; `by` finds it for one number, or says what is wrong with it."""
     if len(chosen) < 2:
@@ -61,7 +61,7 @@ def _groups(concerned: Sequence[Flags | None]) -> list[list[int]]:
 
 def _of_group(
     tables: Tables, chosen: Sequence[Number], concerned: Sequence[Flags | None], group: Sequence[int],
-    parts: Sequence[slice],
+    parts: Sequence[slice | Index],
 ) -> dict[int, Derivative]:  # fmt: skip
     """Derivatives by the numbers of a group, nothing where they are not found together.
 
@@ -84,7 +84,7 @@ def _of_group(
     return {k: Derivative(np.where(mask, rates.values / chosen[k].scale, 0.0), rates.error) for k, mask in own.items()}
 
 
-def _within(mask: Flags, part: slice) -> Flags:
+def _within(mask: Flags, part: slice | Index) -> Flags:
     found = np.zeros(len(mask), bool)
     found[part] = mask[part]
     return found

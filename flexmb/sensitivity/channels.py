@@ -15,6 +15,7 @@ from flexmb.scene.tree import watches_signals
 from flexmb.sensitivity.blocks import ObservedRates
 from flexmb.system.observables import ENERGIES
 from flexmb.system.tree_system import System
+from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 
 
@@ -61,6 +62,18 @@ def refuse_unknown_outputs(system: System, names: Sequence[str]) -> None:
             raise NotImplementedError(f"output {name!r}: derivatives of powers of controllers are not available")
         if name not in known and ".drive[" not in str(name):
             raise ValueError(f"there is no output {name!r}: {closest(str(name), known)}")
+
+
+def refuse_undetermined(trajectory: Trajectory, names: Sequence[str]) -> None:
+    """DynamicsError for channels of a finished run that redundant closures leave undetermined: a scalar of them has no
+    value, and thus no gradient."""
+    known = chosen(trajectory, [name for name in names if ".drive[" not in name] or ["work"])
+    for name, values in zip(known.names, known.values.T, strict=True):
+        if np.any(np.isnan(values)):
+            raise DynamicsError(
+                f'output "{name}" is not determined by the motion, because closures are redundant: take other outputs, '
+                "or leave out the closures, or their directions, that others imply"
+            )
 
 
 def chosen(trajectory: Trajectory, names: Sequence[str]) -> Chosen:

@@ -19,7 +19,7 @@ from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes
 from flexmb.sensitivity.adjoint.whole import Adjoint
-from flexmb.sensitivity.channels import refuse_unknown_outputs
+from flexmb.sensitivity.channels import refuse_undetermined, refuse_unknown_outputs
 from flexmb.sensitivity.gate import admitted
 from flexmb.sensitivity.refusals import refuse_beyond_adjoint
 from flexmb.sensitivity.scalars import ScalarTerm, terms_of
@@ -73,7 +73,8 @@ def gradient(
 
     The steps of the run are passed backwards with the transposes of their stages, which is the exact derivative of what
     the method computed with these steps; events by the transposes of their derivatives. The cost hardly depends on how
-    many numbers there are. Raises what `sensitivities` raises, and DynamicsError for a run that ends before t_end.
+    many numbers there are. Raises what `sensitivities` raises, and DynamicsError for a run that ends before t_end, and
+    for outputs that redundant closures leave undetermined.
     """
     refuse_unknown("gradient", settings)
     if method not in METHODS:
@@ -96,6 +97,7 @@ def gradient(
         raise DynamicsError(
             f"there is no gradient of a run that does not reach t = {t_end:g} s: {trajectory.message}"
         )
+    refuse_undetermined(trajectory, [name for term in terms for name in term.channels])
     adjoint, found = Adjoint(gated, terms, given), gated.numbers
     derivatives = adjoint(course)
     return Gradient(
