@@ -29,13 +29,13 @@ BEGIN_WITH, MOST = 4, 40
 
 
 class Unresolved(NamedTuple):
-    """At t (s), the `count` polynomials of a strain along a piece leave out some `position` (m); `enough`: how many
+    """At t (s), the `given` polynomials of a strain along a piece leave out some `position` (m); `enough`: how many
     would do, None where only more pieces help."""
 
     body: str
     t: float
     strain: Strain
-    count: int
+    given: int
     position: float
     enough: int | None
 
@@ -43,7 +43,7 @@ class Unresolved(NamedTuple):
     def what(self) -> str:
         return (
             f'beam "{self.body}" bends more finely than its polynomials can describe: at t = {self.t:g} s the last of '
-            f"the {self.count} of {self.strain} are so large that about {self.position:.1e} m of its shape is left out"
+            f"the {self.given} of {self.strain} are so large that about {self.position:.1e} m of its shape is left out"
         )
 
     @property

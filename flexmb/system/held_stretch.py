@@ -35,7 +35,9 @@ class Unstretched(NamedTuple):
     t: float
     strain: float
 
-    remedy = 'give it "axial" among the families of its modes, or polynomials'
+    @property
+    def remedy(self) -> str:
+        return 'give it "axial" among the families of its modes, or polynomials'
 
     @property
     def what(self) -> str:

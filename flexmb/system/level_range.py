@@ -16,7 +16,7 @@ import numpy as np
 from flexmb.building.links import BodyLink
 from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import BeamBody
-from flexmb.system.mechanics import Mechanics
+from flexmb.system.tree_system import System
 from flexmb.typing import Real
 
 UNPULLED = ("ruthless", "linear", "full")
@@ -52,7 +52,7 @@ class TooFast(NamedTuple):
         )
 
 
-def too_fast(system: Mechanics, t: Real, u: Real, turns: Callable[[int], Real]) -> Iterator[TooFast]:
+def too_fast(system: System, t: Real, u: Real, turns: Callable[[int], Real]) -> Iterator[TooFast]:
     """The bodies that turn beyond their level's range in states at t (T,) s with speeds u (T,nu): once each.
 
     turns: angular velocities (N,3) rad/s of the bodies in a state, by its number, as `System.turns`.
@@ -81,7 +81,7 @@ def _remedy(link: BodyLink) -> str:
     return 'take level "stiffened", which needs a second-order field or geometric stiffness'
 
 
-def _suspects(system: Mechanics, u: Real, slow: float) -> list[int]:
+def _suspects(system: System, u: Real, slow: float) -> list[int]:
     """The numbers of the states with the largest speeds of hinges; those of modes turn no body as a whole.
 
     Where all speeds together are below `slow` (rad/s), nothing turns faster.
