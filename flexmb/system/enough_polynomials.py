@@ -23,7 +23,7 @@ from flexmb.typing import Real
 
 ALLOWED = 3e-3
 """Parts of the beam's length: what four polynomials leave, by this measure, of a beam that a force bends by 83 degrees;
-its tip is then off by 1e-4 of the length at most (tests/flexmb/levels/test_exact_polynomials.py)."""
+its tip is then off by 1e-4 of the length at most (tests/flexmb/levels/test_watches.py)."""
 BEGIN_WITH, MOST = 4, 40
 """Polynomials that a piece should have where it bends far, and can have."""
 
