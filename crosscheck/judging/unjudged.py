@@ -17,14 +17,15 @@ import numpy as np
 from crosscheck.judging.against_reference import ReferenceSignals, at_samples, of_record, shared_times
 from crosscheck.judging.applicable import Inapplicable
 from crosscheck.judging.results import CaseResults, Result
+from crosscheck.judging.sizes import size_of
 from crosscheck.judging.verdict import WHOLE_RANGE, Signal, Status, Verdict, compare
 from crosscheck.library.case import Comparison
 from crosscheck.library.patterns import most_specific
 from flexmb.kept import kept
-from flexmb.run.channels import distance
+from flexmb.run.channels import distance, magnitude
 
 ACCOUNTING: tuple[Status, ...] = ("agree", "differ", "unresolved")
-ROUNDING = 1e-9  # relative, and in SI units: a distance within it is none, whatever is known of the uncertainties
+ROUNDING = 1e-9  # of a signal's size: a distance within it is none, whatever is known of the uncertainties
 OPEN = "the case has no goal for it"
 UNSAID = f"{OPEN}, and no [[open]] with a reason"
 TOLD_BY = {"energy.total": "work"}
@@ -108,7 +109,8 @@ def _by_drift(case: CaseResults, verdicts: Iterable[Verdict]) -> Iterator[tuple[
     for each in verdicts:
         if each.kind == "conservation" and each.status in ACCOUNTING and each.channel in TOLD_BY:
             result, channel = case.get(each.variant_a, each.engine_a), TOLD_BY[each.channel]
-            if channel in result.channels and np.all(np.abs(result.values(channel)[:1]) <= ROUNDING):
+            least = ROUNDING * (each.scale or 0.0)
+            if channel in result.channels and np.all(np.abs(result.values(channel)[:1]) <= least):
                 yield result.variant, result.engine, channel
 
 
@@ -179,8 +181,8 @@ def _sides(comparison: Comparison) -> list[tuple[str, str]]:
 
 
 def _same(channel: str, own: Signal, other: Signal) -> bool:
-    """Whether the distance of two signals is none but for rounding."""
+    """Whether the distance of two signals is none but for rounding of what the other's size is."""
     if own.values.shape != other.values.shape or own.values.size == 0:
         return False
-    apart = np.max(distance(channel, own.values, other.values))
-    return bool(apart <= ROUNDING * max(1.0, float(np.max(np.abs(other.values)))))
+    size = size_of(magnitude(channel, other.values), other.sizes, 0.0)
+    return bool(np.max(distance(channel, own.values, other.values)) <= ROUNDING * size)

@@ -151,6 +151,28 @@ def test_what_a_guest_offers_otherwise_fails_a_strict_session_only(values: Real,
     assert lax.ok and "! made/made, rigid, guest offers what nothing judges" in told(lax)[1]
 
 
+@pytest.mark.parametrize("size", [1e-15, 1e-9, 1.0, 1e9])
+def test_what_is_the_same_is_measured_by_the_size_of_the_channel(size: float) -> None:
+    """A distance of 1e-9 m/s is all that a very small system has, and nothing of a large one."""
+    named = [*NAMED[:3], *ladder("two", {TIP: way(), VELOCITY: size * way(axis=1)})]
+    named = [run for run in named if run.engine == "two"]
+    for factor, same in ((1.0, True), (1.0 + 1e-12, True), (-1.0, False), (0.0, False), (2.0, False)):
+        guest = ladder("guest", {TIP: way(), VELOCITY: factor * size * way(axis=1)}, spread=0.0)
+        outcome = judged(ONE_PAIR, [*ladder("one", {TIP: way()}), *named, *guest], asked=ASKED, strict=True)
+        assert outcome.ok == same, (size, factor)
+
+
+def test_work_begins_at_zero_by_the_size_of_the_energy() -> None:
+    """A work that is wrong by a constant has no drift: it may be as small as the rounding of a small energy only."""
+    conserved = '[[conservation]]\nvariant = "rigid"\nquantity = "energy"\nlimit = 1e-9\n'
+    for start, accounted in ((1e-22, True), (1e-12, False)):
+        energies = {"energy.total": np.full((len(TIMES), 1), 1e-12), "energy.kinetic": np.full((len(TIMES), 1), 1e-12)}
+        energies["work"] = np.full((len(TIMES), 1), start)
+        runs = [*ladder("one", {TIP: way()} | energies), *ladder("two", {TIP: way()} | energies)]
+        left = {each.channel for each in judged(ONE_PAIR + conserved, runs, whole=True).unjudged}
+        assert ("work" not in left) == accounted, start
+
+
 def test_what_nobody_else_offers_cannot_be_held_against_anything() -> None:
     outcome = session(way(), "marker:tip.angular_velocity", strict=True)
     (guest,) = outcome.unaccounted
