@@ -1,10 +1,11 @@
 """Channels that an engine offers and nothing judges: no comparison, conservation or reference with a goal names them.
 
 A verdict *agree*, *differ* or *unresolved* accounts for a channel, and so does being told as not applicable. Of an
-engine that the case names, the case leaves the rest open by `[[open]]` and says why; what it does not name is excused
-only where some of its engines were asked for alone. Of an engine that joins nobody has looked at it: it is held against
-the stored reference, or another engine of the variant, and excused if it agrees by the loosest goal that the case has
-for the variant, or is the same to rounding where uncertainties are unknown.
+engine that the case names, the case leaves the rest open by `[[open]]` and says why, or expects agreement with nothing
+of the whole run, and says why; what it does not name is excused only where some of its engines were asked for alone.
+Of an engine that joins nobody has looked at it: it is held against the stored reference, or another engine of the
+variant, and excused if it agrees by the loosest goal that the case has for the variant, or is the same to rounding
+where uncertainties are unknown.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from crosscheck.judging.sizes import size_of
 from crosscheck.judging.verdict import WHOLE_RANGE, Signal, Status, Verdict, compare
 from crosscheck.library.case import Comparison
 from crosscheck.library.patterns import most_specific
+from crosscheck.library.selection import expected_otherwise
 from flexmb.kept import kept
 from flexmb.run.channels import distance, magnitude
 
@@ -138,11 +140,13 @@ class _Left:
         return Unjudged(record.case, result.variant, result.engine, channel, f"{OPEN}; {reason}", excused)
 
     def _why_open(self, result: Result, channel: str) -> str:
-        """The reason that the case gives; "" if it gives none."""
-        for each in self.case.case.run.open:
+        """The reason that the case gives, also of a run that is expected to agree with nothing; "" if it gives none."""
+        run = self.case.case.run
+        for each in run.open:
             if each.concerns(result.variant, result.engine) and most_specific(each.channels, channel) is not None:
                 return each.reason
-        return ""
+        other = expected_otherwise(run, result.variant, result.engine)
+        return "" if other is None else f"what is expected of it is {other.expect}, in '{other.name}': {other.reason}"
 
     def _held(self, result: Result, channel: str) -> tuple[str, bool]:
         """What the first of those who have the channel says of it, and whether that is the same."""

@@ -540,7 +540,7 @@ def test_rounding_of_a_family_that_is_nothing_is_that_of_the_scene(
 
 
 def test_loads_of_free_hinges_and_work_are_measured_by_the_energy() -> None:
-    """Where all loads are rounding, or no work is done, neither is a size of its own: twice the kinetic energy is one."""
+    """Where all loads are rounding, or no work is done, they are no size of their own: the energy is one."""
     way = {"marker:m.position": np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])}
     zeros = {name: np.array([[1e-17, 0.0, 0.0]] * 2) for name in ("load:free.torque", "load:free.force")}
     rest = {"work": np.array([[0.0], [1e-17]]), "energy.total": np.full((2, 1), 3.0)}

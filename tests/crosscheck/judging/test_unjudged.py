@@ -70,6 +70,22 @@ def test_a_strict_session_of_the_whole_case_fails_by_what_the_case_neither_judge
     assert lax.ok and "! made/made, rigid, two offers what nothing judges" in told(lax)[1]
 
 
+def test_a_run_that_is_expected_to_agree_with_nothing_is_open_with_the_reason_of_that() -> None:
+    """As long as nothing is expected to agree with it: otherwise what that does not name is silent."""
+    differ = ONE_PAIR.replace("1e-3 }", '1e-3 }\nexpect = "differ"\nreason = "two is another model"')
+    differ += 'band = { "marker:tip.position" = [0.1, 10] }\n'
+    runs = [*NAMED[:3], *ladder("two", {TIP: way(2.0), VELOCITY: way(axis=1)})]
+    outcome = judged(differ, runs, whole=True, strict=True)
+    assert outcome.ok and {each.channel for each in outcome.unjudged} == {VELOCITY, "momentum.linear"}
+    assert {each.reason for each in outcome.unjudged} == {
+        "what is expected of it is differ, in 'both': two is another model"
+    }
+    agree = '[[comparison]]\nname = "more"\nvariant = "rigid"\ngoals = { "momentum.linear" = 1e-3 }\n'
+    runs = [*NAMED[:3], *ladder("two", {TIP: way(2.0), VELOCITY: way(axis=1), "momentum.linear": REST})]
+    outcome = judged(differ + agree, runs, whole=True, strict=True)
+    assert {each.channel for each in outcome.unaccounted} == {VELOCITY}
+
+
 def test_what_the_case_leaves_open_with_a_reason_is_told_with_it_and_is_no_error() -> None:
     outcome = whole(OPEN + OF_ONE, strict=True)
     assert outcome.ok and outcome.unaccounted == []
