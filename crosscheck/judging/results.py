@@ -89,7 +89,7 @@ class Result:
         ladder = [run for run in self._ladder() if run.status == "finished" and channel in run.channels]
         size = self._sizes.magnitude(channel, finest.evaluations)
         if _without_effect(ladder):
-            if known_to(channel) in finest.channels and self.rests:
+            if not all(map(is_judged, finest.channels)) and self.rests:  # the run is about the linearised motion
                 return self._with_own(channel, at_rest(len(self.values(channel)), size, finest.evaluations))
             ladder = ladder[-1:]
         rungs = [RungSignal(run.effort_value, self.values(channel, run), run.evaluations) for run in ladder]

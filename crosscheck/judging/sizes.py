@@ -3,7 +3,8 @@
 By symmetry a force, a momentum or a rate may vanish; then its range is only rounding, and a goal relative to that would
 mean nothing. Such a signal is measured by the size of its family. If the whole family vanishes, the size follows from
 other signals of the scene: of a linear momentum 2 T/v, of an angular one 2 T/w, of a force a torque over the extent, of
-frequencies and of derivatives by speeds w, of derivatives by displacements w^2.
+both, where a free hinge carries neither, 2 T by the angle and the distance, of work the energy, of frequencies and of
+derivatives by speeds w, of derivatives by displacements w^2.
 """
 
 from __future__ import annotations
@@ -64,9 +65,9 @@ class Sizes:
         action = 2.0 * self._magnitude_of("energy.kinetic")
         match family(channel).rpartition(".")[2]:
             case "torque":
-                return self._magnitude_of(".force") * extent
+                return _unless_rounding(self._magnitude_of(".force") * extent, action)
             case "force":
-                return _ratio(self._magnitude_of(".torque"), extent)
+                return _ratio(_unless_rounding(self._magnitude_of(".torque"), action), extent)
             case "position":
                 return extent
             case "velocity":
@@ -79,6 +80,8 @@ class Sizes:
                 return _ratio(action, max(speed, turning * extent))
             case "angular":
                 return _ratio(action, max(turning, _ratio(speed, extent)))
+            case "work":
+                return self._largest(magnitude, "energy")
             case "by_displacement":
                 return max(turning, _ratio(speed, extent)) ** 2
             case "by_speed" | "frequencies":
@@ -110,3 +113,8 @@ class Sizes:
 def _ratio(number: float, other: float) -> float:
     """The quotient, 0 for a divisor of 0."""
     return number / other if other > 0.0 else 0.0
+
+
+def _unless_rounding(size: float, other: float) -> float:
+    """The size, or the other one of which it is a mere rounding."""
+    return size if size > LEAST_OF_SCENE * other else other

@@ -1,10 +1,11 @@
 """Channels that an engine offers and nothing judges: no comparison, conservation or reference with a goal names them.
 
 A verdict *agree*, *differ* or *unresolved* accounts for a channel, and so does being told as not applicable. Of an
-engine that the case names, the case leaves the rest open by `[[open]]` and says why; what it does not name is excused
-only where some of its engines were asked for alone. Of an engine that joins nobody has looked at it: it is held against
-the stored reference, or another engine of the variant, and excused if it agrees by the loosest goal that the case has
-for the variant, or is the same to rounding where uncertainties are unknown.
+engine that the case names, the case leaves the rest open by `[[open]]` and says why, or expects agreement with nothing
+of the whole run, and says why; what it does not name is excused only where some of its engines were asked for alone.
+Of an engine that joins nobody has looked at it: it is held against the stored reference, or another engine of the
+variant, and excused if it agrees by the loosest goal that the case has for the variant, or is the same to rounding
+where uncertainties are unknown.
 """
 
 from __future__ import annotations
@@ -17,14 +18,16 @@ import numpy as np
 from crosscheck.judging.against_reference import ReferenceSignals, at_samples, of_record, shared_times
 from crosscheck.judging.applicable import Inapplicable
 from crosscheck.judging.results import CaseResults, Result
+from crosscheck.judging.sizes import size_of
 from crosscheck.judging.verdict import WHOLE_RANGE, Signal, Status, Verdict, compare
 from crosscheck.library.case import Comparison
 from crosscheck.library.patterns import most_specific
+from crosscheck.library.selection import expected_otherwise
 from flexmb.kept import kept
-from flexmb.run.channels import distance
+from flexmb.run.channels import distance, magnitude
 
 ACCOUNTING: tuple[Status, ...] = ("agree", "differ", "unresolved")
-ROUNDING = 1e-9  # relative, and in SI units: a distance within it is none, whatever is known of the uncertainties
+ROUNDING = 1e-9  # of a signal's size: a distance within it is none, whatever is known of the uncertainties
 OPEN = "the case has no goal for it"
 UNSAID = f"{OPEN}, and no [[open]] with a reason"
 TOLD_BY = {"energy.total": "work"}
@@ -108,7 +111,8 @@ def _by_drift(case: CaseResults, verdicts: Iterable[Verdict]) -> Iterator[tuple[
     for each in verdicts:
         if each.kind == "conservation" and each.status in ACCOUNTING and each.channel in TOLD_BY:
             result, channel = case.get(each.variant_a, each.engine_a), TOLD_BY[each.channel]
-            if channel in result.channels and np.all(np.abs(result.values(channel)[:1]) <= ROUNDING):
+            least = ROUNDING * (each.scale or 0.0)
+            if channel in result.channels and np.all(np.abs(result.values(channel)[:1]) <= least):
                 yield result.variant, result.engine, channel
 
 
@@ -136,11 +140,13 @@ class _Left:
         return Unjudged(record.case, result.variant, result.engine, channel, f"{OPEN}; {reason}", excused)
 
     def _why_open(self, result: Result, channel: str) -> str:
-        """The reason that the case gives; "" if it gives none."""
-        for each in self.case.case.run.open:
+        """The reason that the case gives, also of a run that is expected to agree with nothing; "" if it gives none."""
+        run = self.case.case.run
+        for each in run.open:
             if each.concerns(result.variant, result.engine) and most_specific(each.channels, channel) is not None:
                 return each.reason
-        return ""
+        other = expected_otherwise(run, result.variant, result.engine)
+        return "" if other is None else f"what is expected of it is {other.expect}, in '{other.name}': {other.reason}"
 
     def _held(self, result: Result, channel: str) -> tuple[str, bool]:
         """What the first of those who have the channel says of it, and whether that is the same."""
@@ -179,8 +185,8 @@ def _sides(comparison: Comparison) -> list[tuple[str, str]]:
 
 
 def _same(channel: str, own: Signal, other: Signal) -> bool:
-    """Whether the distance of two signals is none but for rounding."""
+    """Whether the distance of two signals is none but for rounding of what the other's size is."""
     if own.values.shape != other.values.shape or own.values.size == 0:
         return False
-    apart = np.max(distance(channel, own.values, other.values))
-    return bool(apart <= ROUNDING * max(1.0, float(np.max(np.abs(other.values)))))
+    size = size_of(magnitude(channel, other.values), other.sizes, 0.0)
+    return bool(np.max(distance(channel, own.values, other.values)) <= ROUNDING * size)

@@ -81,7 +81,8 @@ longest that names a channel counts. A goal is the largest uncertainty, relative
 comparison still counts as resolved.
 
 Every channel that an engine of the case offers is named by a goal or a conserved quantity, is in the stored reference
-with a goal, or is left ``open`` with the reason; otherwise a strict session of the case is not green.
+with a goal, or is left ``open`` with the reason, or its run is expected to agree with nothing, for the reason given
+there; otherwise a strict session of the case is not green.
 
 An expectation other than *agree* needs its reason in words, and bounds within which it is as expected:
 ``band`` for E (*differ*) or U (*unresolved*), for each pattern of channels ``[low, high]`` with high at

@@ -111,6 +111,19 @@ def held(run: RunFile, engines: Iterable[str]) -> dict[str, tuple[dict[str, floa
     return found
 
 
+def expected_otherwise(run: RunFile, variant: str, engine: str) -> Comparison | None:
+    """The first comparison of an engine's run of a variant, where none expects agreement; None if one does, or there is
+    none. Such a run has nothing to be held against: what is expected of it, and why, is what that comparison says.
+
+    `run` is a reduced run file.
+    """
+    about = [
+        each for each in run.comparisons
+        if (variant, engine) in ((side.variant, side.engine) for side in each.sides)
+    ]  # fmt: skip
+    return about[0] if about and all(each.expect != "agree" for each in about) else None
+
+
 def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
     """A message about engines that were asked for and take part in none of the run files; "" if there are none."""
     runs = tuple(runs)

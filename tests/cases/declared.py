@@ -19,26 +19,43 @@ from crosscheck.library.channels import CONSERVED, KINDS
 from crosscheck.library.find import Case, load_case, shipped_folder, shipped_names
 from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import KNOWLEDGE, has_reference
-from crosscheck.library.selection import held, select
+from crosscheck.library.selection import expected_otherwise, held, select
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.events import Latch
 from flexmb.scene.schema import Scene
 
+GIVES_NONE = {
+    "exudyn": ("work", "derivatives"),
+    "exudyn-beam": ("work", "derivatives"),
+    "mujoco": ("work",),
+    "native-frisch": ("derivatives.by_force",),
+    "native-frisch-as-printed": ("derivatives.by_force",),
+}
+"""What an engine never offers. Should it begin to, strict sessions are red until a case judges it or leaves it open."""
 PARTS = {kind.name: [part.name for part in kind.parts] for kind in KINDS}
 
 
 @dataclass(frozen=True)
 class Left:
-    """A channel that nothing judges though an engine may offer it, and whether the case leaves it open."""
+    """A channel that nothing judges though an engine may offer it.
+
+    `said`: `[[open]]` leaves it open; `otherwise`: of the whole run the case expects agreement with nothing.
+    """
 
     variant: str
     engine: str
     channel: str
-    open: bool
+    said: bool
+    otherwise: bool
+
+    @property
+    def open(self) -> bool:
+        """Whether the case leaves it open."""
+        return self.said or self.otherwise
 
 
-def offered(scene: Scene, variant: Variant) -> list[str]:
-    """Every channel that an engine may offer: names as `crosscheck.engines.signals` gives them.
+def offered(scene: Scene, variant: Variant, engine: str) -> list[str]:
+    """Every channel that the engine may offer: names as `crosscheck.engines.signals` gives them.
 
     Of a body that is taken apart a made-up joint stands for those between its parts.
     """
@@ -60,7 +77,8 @@ def offered(scene: Scene, variant: Variant) -> list[str]:
     ]
     found += [f"energy.{kind}" for kind in (*ENERGIES, "total")] + ["momentum.angular", "momentum.linear", "work"]
     found += [f"derivatives.{name}" for name in DERIVATIVES] if "derivatives" in variant.asks else []
-    return found + ([FREQUENCIES] if "frequencies" in variant.asks else [])
+    found += [FREQUENCIES] if "frequencies" in variant.asks else []
+    return [name for name in found if most_specific(GIVES_NONE.get(engine, ()), name) is None]
 
 
 def _driven(scene: Scene) -> Iterator[str]:
@@ -110,8 +128,9 @@ def left(case: Case) -> Iterator[Left]:
     """Everything that the case does not judge."""
     run = select(case.run, ())
     for variant in run.variants:
-        channels = offered(case.scene(variant), variant)
+        scene = case.scene(variant)
         for engine in variant.engines:
+            channels = offered(scene, variant, engine)
             patterns, known = judged(run, variant.name, engine), by_reference(case, variant.name, engine)
             opened = [
                 pattern
@@ -119,16 +138,18 @@ def left(case: Case) -> Iterator[Left]:
                 if item.concerns(variant.name, engine)
                 for pattern in item.channels
             ]
+            otherwise = expected_otherwise(run, variant.name, engine) is not None
             for channel in channels:
                 if channel not in known and most_specific(patterns, channel) is None:
-                    yield Left(variant.name, engine, channel, most_specific(opened, channel) is not None)
+                    said = most_specific(opened, channel) is not None
+                    yield Left(variant.name, engine, channel, said, otherwise)
 
 
 def idle(case: Case) -> list[str]:
     """Patterns of `[[open]]` that name nothing that is left."""
     found, open_ = list(left(case)), []
     for number, item in enumerate(case.run.open):
-        mine = [each.channel for each in found if item.concerns(each.variant, each.engine)]
+        mine = [each.channel for each in found if item.concerns(each.variant, each.engine) and not each.otherwise]
         open_ += [
             f"open[{number}]: {pattern}"
             for pattern in item.channels

@@ -11,7 +11,7 @@ from crosscheck.library.case import OpenChannels
 from crosscheck.library.find import load_case, shipped_folder, shipped_names
 from tests.cases.declared import idle, left
 
-MADE_OF_ALL = "linearised/hanging_pendulum", "closed_chains/geared_hoist", "spacecraft/slosh"
+MADE_OF_ALL = "closed_chains/andrews", "connectors/one_at_a_time", "spinning_beam/beam_s_supercritical"
 
 
 @pytest.mark.parametrize("name", shipped_names())
@@ -25,9 +25,9 @@ def test_every_channel_that_an_engine_may_offer_is_judged_or_left_open_with_a_re
 @pytest.mark.parametrize("name", MADE_OF_ALL)
 def test_a_channel_that_loses_its_goal_or_its_reason_is_noticed(name: str) -> None:
     case = load_case(shipped_folder() / name)
-    assert any(each.open for each in left(case))
+    assert any(each.said for each in left(case))
     unsaid = replace(case, run=msgspec.structs.replace(case.run, open=()))
-    assert not any(each.open for each in left(unsaid)) and list(left(unsaid))
+    assert not any(each.said for each in left(unsaid)) and not all(each.open for each in left(unsaid))
     without = replace(case, run=msgspec.structs.replace(case.run, comparisons=(), conservations=(), reference=None))
     assert {each.channel for each in left(without) if not each.open}
     more = OpenChannels(channels=("marker:nowhere",), reason="made up")

@@ -10,7 +10,7 @@ from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.figures import figures, recordable
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import CaseResults, Result, collect
-from crosscheck.judging.sizes import Sizes
+from crosscheck.judging.sizes import Sizes, size_of
 from crosscheck.judging.uncertainty import Uncertainty, spatial
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, conserve
 from crosscheck.library.accepted import Figure, dumps
@@ -537,3 +537,14 @@ def test_rounding_of_a_family_that_is_nothing_is_that_of_the_scene(
     signals = {"load:pivot.force": way(10.0), TIP: way(2.0), "load:pivot.torque": way(torque)}
     found = Sizes(signals, signals.__getitem__).magnitude("load:pivot.torque", evaluations)
     assert np.isclose(found, size, rtol=1e-5, atol=0.0)
+
+
+def test_loads_of_free_hinges_and_work_are_measured_by_the_energy() -> None:
+    """Where all loads are rounding, or no work is done, they are no size of their own: the energy is one."""
+    way = {"marker:m.position": np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])}
+    zeros = {name: np.array([[1e-17, 0.0, 0.0]] * 2) for name in ("load:free.torque", "load:free.force")}
+    rest = {"work": np.array([[0.0], [1e-17]]), "energy.total": np.full((2, 1), 3.0)}
+    signals = way | zeros | rest | {"energy.kinetic": np.array([[0.0], [3.0]])}
+    found = Sizes(signals, signals.__getitem__)
+    sizes = {name: size_of(1e-17, found.of(name), 1e-17) for name in (*zeros, "work")}
+    assert sizes == {"load:free.torque": 6.0, "load:free.force": 3.0, "work": 3.0}

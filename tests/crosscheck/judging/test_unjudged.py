@@ -70,6 +70,22 @@ def test_a_strict_session_of_the_whole_case_fails_by_what_the_case_neither_judge
     assert lax.ok and "! made/made, rigid, two offers what nothing judges" in told(lax)[1]
 
 
+def test_a_run_that_is_expected_to_agree_with_nothing_is_open_with_the_reason_of_that() -> None:
+    """As long as nothing is expected to agree with it: otherwise what that does not name is silent."""
+    differ = ONE_PAIR.replace("1e-3 }", '1e-3 }\nexpect = "differ"\nreason = "two is another model"')
+    differ += 'band = { "marker:tip.position" = [0.1, 10] }\n'
+    runs = [*NAMED[:3], *ladder("two", {TIP: way(2.0), VELOCITY: way(axis=1)})]
+    outcome = judged(differ, runs, whole=True, strict=True)
+    assert outcome.ok and {each.channel for each in outcome.unjudged} == {VELOCITY, "momentum.linear"}
+    assert {each.reason for each in outcome.unjudged} == {
+        "what is expected of it is differ, in 'both': two is another model"
+    }
+    agree = '[[comparison]]\nname = "more"\nvariant = "rigid"\ngoals = { "momentum.linear" = 1e-3 }\n'
+    runs = [*NAMED[:3], *ladder("two", {TIP: way(2.0), VELOCITY: way(axis=1), "momentum.linear": REST})]
+    outcome = judged(differ + agree, runs, whole=True, strict=True)
+    assert {each.channel for each in outcome.unaccounted} == {VELOCITY}
+
+
 def test_what_the_case_leaves_open_with_a_reason_is_told_with_it_and_is_no_error() -> None:
     outcome = whole(OPEN + OF_ONE, strict=True)
     assert outcome.ok and outcome.unaccounted == []
@@ -149,6 +165,28 @@ def test_what_a_guest_offers_otherwise_fails_a_strict_session_only(values: Real,
     assert "judged by nothing" in str(failure.get("message")) and root.get("failures") == "1"
     lax = session(values)
     assert lax.ok and "! made/made, rigid, guest offers what nothing judges" in told(lax)[1]
+
+
+@pytest.mark.parametrize("size", [1e-15, 1e-9, 1.0, 1e9])
+def test_what_is_the_same_is_measured_by_the_size_of_the_channel(size: float) -> None:
+    """A distance of 1e-9 m/s is all that a very small system has, and nothing of a large one."""
+    named = [*NAMED[:3], *ladder("two", {TIP: way(), VELOCITY: size * way(axis=1)})]
+    named = [run for run in named if run.engine == "two"]
+    for factor, same in ((1.0, True), (1.0 + 1e-12, True), (-1.0, False), (0.0, False), (2.0, False)):
+        guest = ladder("guest", {TIP: way(), VELOCITY: factor * size * way(axis=1)}, spread=0.0)
+        outcome = judged(ONE_PAIR, [*ladder("one", {TIP: way()}), *named, *guest], asked=ASKED, strict=True)
+        assert outcome.ok == same, (size, factor)
+
+
+def test_work_begins_at_zero_by_the_size_of_the_energy() -> None:
+    """A work that is wrong by a constant has no drift: it may be as small as the rounding of a small energy only."""
+    conserved = '[[conservation]]\nvariant = "rigid"\nquantity = "energy"\nlimit = 1e-9\n'
+    for start, accounted in ((1e-22, True), (1e-12, False)):
+        energies = {"energy.total": np.full((len(TIMES), 1), 1e-12), "energy.kinetic": np.full((len(TIMES), 1), 1e-12)}
+        energies["work"] = np.full((len(TIMES), 1), start)
+        runs = [*ladder("one", {TIP: way()} | energies), *ladder("two", {TIP: way()} | energies)]
+        left = {each.channel for each in judged(ONE_PAIR + conserved, runs, whole=True).unjudged}
+        assert ("work" not in left) == accounted, start
 
 
 def test_what_nobody_else_offers_cannot_be_held_against_anything() -> None:
