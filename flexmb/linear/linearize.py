@@ -11,7 +11,7 @@ from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, Variations
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
-from flexmb.system.watches import Seen, of_states, warn
+from flexmb.system.watches import WatchedStates, of_states, warn
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
@@ -55,7 +55,7 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     return linear_model(equations, state)
 
 
-def looked_at(states: Sequence[tuple[Equations, State]]) -> Seen:
+def looked_at(states: Sequence[tuple[Equations, State]]) -> WatchedStates:
     """States of one system as watches of accuracy see them, each with the equations that it moves by."""
     return of_states(states[0][0].system, [state for _, state in states], lambda n: states[n][0].turns(states[n][1]))
 

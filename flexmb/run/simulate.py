@@ -33,7 +33,7 @@ from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
-from flexmb.system.watches import Seen, said
+from flexmb.system.watches import WatchedStates, said
 from flexmb.tables import arguments
 from flexmb.tables.state import PrecisionWarning, State
 from flexmb.tables.status import Status
@@ -224,7 +224,7 @@ def _looked_at(
     """The same, with what watches of accuracy say of the samples."""
     t, q, u = trajectory.t, trajectory.q, trajectory.u
     failed = not trajectory.finished
-    seen = Seen(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]), failed, trajectory.loads)
+    seen = WatchedStates(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]), failed, trajectory.loads)
     for each in said(seen):
         warned = [*warned, SceneWarning(f'scene "{system.scene.name}": {each}')]
         trajectory = replace(trajectory, message=f"{trajectory.message}; {each}")

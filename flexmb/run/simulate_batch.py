@@ -26,7 +26,7 @@ from flexmb.system.batch import Batch, number_of_threads
 from flexmb.system.compile import compile_batch
 from flexmb.system.free_motion import FreeMotion
 from flexmb.system.tree_system import System
-from flexmb.system.watches import Said, Seen, said
+from flexmb.system.watches import Said, WatchedStates, said
 from flexmb.tables import arguments
 from flexmb.tables.status import OK
 from flexmb.typing import Real
@@ -96,7 +96,7 @@ def _watched(runs: BatchTrajectory) -> Iterator[str]:
         t = np.tile(runs.t, len(copies))
         q, u = (each[copies].reshape(len(t), -1) for each in (runs.q, runs.u))
         turns = partial(_turns, system, t, q, u)
-        for each in said(Seen(system, t, q, u, turns)):
+        for each in said(WatchedStates(system, t, q, u, turns)):
             found.setdefault((each.waiver, each.finding.body), []).append(each)
     for alike in found.values():
         more = f" (and {len(alike) - 1} more copies like it)" if len(alike) > 1 else ""

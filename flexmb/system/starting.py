@@ -43,7 +43,7 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
 def _watched(system: System, start: State, t_end: float) -> Iterator[Doubt]:
     """What watches say of the start, and of prescribed motions up to t_end (s)."""
     from flexmb.system.level_range import LOOKED_AT
-    from flexmb.system.watches import Seen, said  # imported here as they need the compiler
+    from flexmb.system.watches import WatchedStates, said  # imported here as they need the compiler
     from flexmb.tables.state import pack
 
     t = np.linspace(start.t, t_end, LOOKED_AT)
@@ -52,5 +52,5 @@ def _watched(system: System, start: State, t_end: float) -> Iterator[Doubt]:
         system.project(float(each), row, system.constants)  # to prescribed coordinates and speeds
     q, u = y[:, : system.nq], y[:, system.nq : -1]
     place = {body.name: place for place, body in entries(system.scene, "bodies")}
-    for each in said(Seen(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]))):
+    for each in said(WatchedStates(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]))):
         yield each.doubt(place[each.finding.body])

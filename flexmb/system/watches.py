@@ -21,7 +21,7 @@ from flexmb.tables.state import State
 from flexmb.typing import Real
 
 
-class Seen(NamedTuple):
+class WatchedStates(NamedTuple):
     """States that are looked at: coordinates q (T,nq) and speeds u (T,nu) at t (T,) s.
 
     turns: angular velocities (N,3) rad/s of the bodies in a state, by its number. failed: whether a run ended early,
@@ -37,7 +37,7 @@ class Seen(NamedTuple):
     loads: Mapping[str, Real] | None = None
 
 
-class Finding(Protocol):
+class AccuracyFinding(Protocol):
     """What a watch says of a body, and the remedy, with the number to set."""
 
     @property
@@ -53,7 +53,7 @@ class Finding(Protocol):
 class Said(NamedTuple):
     """A finding of a watch, with the word that waives it."""
 
-    finding: Finding
+    finding: AccuracyFinding
     waiver: Waiver
 
     def __str__(self) -> str:
@@ -64,25 +64,25 @@ class Said(NamedTuple):
         return Doubt(str(place), self.finding.what, self.finding.remedy, self.waiver)
 
 
-def _level_range(seen: Seen) -> Iterator[Finding]:
+def _level_range(seen: WatchedStates) -> Iterator[AccuracyFinding]:
     from flexmb.system.level_range import too_fast  # imported here because many scenes have no flexible bodies
 
     return too_fast(seen.system, seen.t, seen.u, seen.turns)
 
 
-def _few_points(seen: Seen) -> Iterator[Finding]:
+def _few_points(seen: WatchedStates) -> Iterator[AccuracyFinding]:
     from flexmb.system.enough_points import unfollowed  # imported here because few scenes have such beams
 
     return unfollowed(seen.system, seen.t, seen.q)
 
 
-def _few_polynomials(seen: Seen) -> Iterator[Finding]:
+def _few_polynomials(seen: WatchedStates) -> Iterator[AccuracyFinding]:
     from flexmb.system.enough_polynomials import unresolved  # imported here because few scenes have such beams
 
     return unresolved(seen.system, seen.t, seen.q)
 
 
-def _held_stretch(seen: Seen) -> Iterator[Finding]:
+def _held_stretch(seen: WatchedStates) -> Iterator[AccuracyFinding]:
     from flexmb.system.held_stretch import unstretched  # imported here because few scenes have such beams
 
     return unstretched(seen.system, seen.t, seen.q, seen.u, seen.loads) if seen.loads is not None else iter(())
@@ -90,7 +90,7 @@ def _held_stretch(seen: Seen) -> Iterator[Finding]:
 
 class _Watch(NamedTuple):
     waiver: Waiver
-    look: Callable[[Seen], Iterator[Finding]]
+    look: Callable[[WatchedStates], Iterator[AccuracyFinding]]
     strains: bool = False  # whether it looks at strains of level exact, which say nothing once a run has diverged
 
 
@@ -105,7 +105,7 @@ WAIVERS: tuple[Waiver, ...] = tuple(watch.waiver for watch in WATCHES)
 """For scenes whose levels, points and polynomials are compared with one another."""
 
 
-def said(seen: Seen) -> list[Said]:
+def said(seen: WatchedStates) -> list[Said]:
     """What all watches say that the scene does not waive."""
     system = seen.system
     if not len(seen.t) or all(link.is_rigid for link in system.links):
@@ -119,12 +119,12 @@ def said(seen: Seen) -> list[Said]:
     ]
 
 
-def of_states(system: System, states: Sequence[State], turns: Callable[[int], Real] | None = None) -> Seen:
-    """States of a system that are no samples of a run; turns: see `Seen`, by the system's own functions of time if left
-    out."""
+def of_states(system: System, states: Sequence[State], turns: Callable[[int], Real] | None = None) -> WatchedStates:
+    """States of a system that are no samples of a run; turns: see `WatchedStates`, by the system's own functions of time if
+    left out."""
     t, q, u = (np.array([getattr(state, key) for state in states]) for key in ("t", "q", "u"))
     loads = _loads(system, states) if len(system.constants.section) and not system.scene.controllers else None
-    return Seen(system, t, q, u, turns or (lambda n: system.turns(float(t[n]), q[n], u[n])), loads=loads)
+    return WatchedStates(system, t, q, u, turns or (lambda n: system.turns(float(t[n]), q[n], u[n])), loads=loads)
 
 
 def _loads(system: System, states: Sequence[State]) -> dict[str, Real]:
@@ -133,7 +133,7 @@ def _loads(system: System, states: Sequence[State]) -> dict[str, Real]:
     return {name: np.array([each[name] for each in found]) for name in (found[0] if found else ())}
 
 
-def warn(seen: Seen, stacklevel: int = 3) -> None:
+def warn(seen: WatchedStates, stacklevel: int = 3) -> None:
     """A SceneWarning for each finding, for the caller of the calling function."""
     for each in said(seen):
         warnings.warn(f'scene "{seen.system.scene.name}": {each}', SceneWarning, stacklevel=stacklevel)
