@@ -120,8 +120,8 @@ def said(seen: WatchedStates) -> list[Said]:
 
 
 def of_states(system: System, states: Sequence[State], turns: Callable[[int], Real] | None = None) -> WatchedStates:
-    """States of a system that are no samples of a run; turns: see `WatchedStates`, by the system's own functions of time if
-    left out."""
+    """States of a system that are no samples of a run; turns: see `WatchedStates`, by the functions of time of the
+    system if left out."""
     t, q, u = (np.array([getattr(state, key) for state in states]) for key in ("t", "q", "u"))
     loads = _loads(system, states) if len(system.constants.section) and not system.scene.controllers else None
     return WatchedStates(system, t, q, u, turns or (lambda n: system.turns(float(t[n]), q[n], u[n])), loads=loads)
