@@ -25,6 +25,7 @@ from flexmb.scene.sections import inertia_on_axis, restated, stiffness_on_axis, 
 from flexmb.scene.sections import matrix as section_matrix
 from flexmb.scene.shapes import beam_section
 from flexmb.scene.tree import coordinates, with_coordinates
+from flexmb.system.watches import WAIVERS
 
 STRUCTS = {struct.__struct_config__.tag: struct for struct in get_args(s.Hinge)}
 # A new kind is none of these, so that the random scenes of a seed stay what they are; it is drawn by `LATER_KINDS`.
@@ -89,7 +90,7 @@ def random_scene(seed: int, recipe: Recipe = FULL) -> s.Scene:
     """A checked scene of `recipe`; bodies "b0", "b1" ..., their hinges "h0" ..., markers "m0" ... at random nodes."""
     rng = np.random.default_rng(seed)
     gravity = vector(rng, 5.0) if recipe.grounded else np.zeros(3)
-    scene = SceneBuilder(f"random tree {seed}", gravity=gravity, allow=("uncut_beam", "level_range"))
+    scene = SceneBuilder(f"random tree {seed}", gravity=gravity, allow=("uncut_beam", *WAIVERS))
     kinds = list(rng.permutation(recipe.hinges))
     carriers = list(rng.permutation(recipe.carriers))
     nodes: list[list[str]] = []

@@ -30,7 +30,7 @@ def bent(count=2, points=None, force=7.0):
     builder.revolute("hub", "ground", "rod", axis=(0, 0, 1), prescribed=fm.Constant(value=0.0))
     builder.force("push", "rod", node="tip", direction=(0, 1, 0), frame="node",
                   function=fm.Constant(value=force))  # fmt: skip
-    return replace(builder.marker("tip", "rod", node="tip").scene(), allow=("wave_speed", "uncut_beam"))
+    return replace(builder.marker("tip", "rod", node="tip").scene(), allow=("wave_speed", "uncut_beam", "held_stretch"))
 
 
 RUN = {"rtol": 1e-4}

@@ -13,6 +13,7 @@ import flexmb as fm
 from flexmb.advisor.modes import with_strains
 from flexmb.scene.pieces import across, edges
 from flexmb.surrogate import cut_where_loaded, substructured
+from flexmb.system.watches import WAIVERS
 
 SECTION = fm.BeamStation(
     x_m=0.0, EA_N=1e6, EIy_Nm2=1.0, EIz_Nm2=1.0, GJ_Nm2=0.8, mass_per_length_kg_m=1.0, rotary_y_kg_m=1e-4,
@@ -25,7 +26,7 @@ UPRIGHT = (float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5)))
 
 def stem(modes: fm.Modes, **more: Any) -> fm.SceneBuilder:
     """A clamped beam of 1 m with a node inside; its builder."""
-    builder = fm.SceneBuilder("T", allow=("wave_speed", "thick_section"))
+    builder = fm.SceneBuilder("T", allow=("wave_speed", "thick_section", *WAIVERS))
     nodes = [fm.BeamNode(name="port", x_m=PORT), fm.BeamNode(name="free", x_m=0.8)]
     section = more.pop("section", SECTION)
     builder.beam("stem", length=1.0, elements=8, section=section, modes=modes, level="exact", nodes=nodes, **more)

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 import flexmb as fm
 from flexmb.scene.strains import polynomials
 from flexmb.surrogate import finite_segments, modal_points, rigidify, substructured
+from flexmb.system.watches import WAIVERS
 
 LENGTH = 2.0
 SECTION = fm.BeamStation(
@@ -67,7 +68,8 @@ def test_a_beam_and_its_pieces_bend_alike_in_space(curvature: float) -> None:
     chain = substructured(scene, "beam", 3, polynomials=5)
     fm.check_scene(chain)
     assert_allclose(at_rest(chain), at_rest(scene), atol=2e-6 * LENGTH)
-    assert np.linalg.norm(at_rest(scene)[0] - at_rest(substructured(scene, "beam", 2, polynomials=1))[0]) > 1e-3
+    few = replace(substructured(scene, "beam", 2, polynomials=1), allow=WAIVERS)
+    assert np.linalg.norm(at_rest(scene)[0] - at_rest(few)[0]) > 1e-3
 
 
 def test_damping_is_that_of_a_material() -> None:

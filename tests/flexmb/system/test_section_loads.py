@@ -153,7 +153,7 @@ def test_statics_of_a_beam_bent_by_its_length() -> None:
                            rotary_y_kg_m=1e-3, rotary_z_kg_m=1e-3, curvature_1_m=(0.0, 0.0, 0.4)) for x in (0.0, 1.0)]
     x = np.array([0.0, 0.25, 0.6])
     scene = (
-        fm.SceneBuilder("cantilever", gravity=(0.0, -9.81, 0.0), allow=("wave_speed",))
+        fm.SceneBuilder("cantilever", gravity=(0.0, -9.81, 0.0), allow=("wave_speed", "held_stretch"))
         .beam("beam", length=1.0, elements=6, section=soft, level="exact", nodes={"a": 0.25, "b": 0.6},
               modes=fm.Modes(count=12, families=("bending_y",)))
         .weld("clamp", "ground", "beam")
