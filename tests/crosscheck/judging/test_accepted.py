@@ -330,8 +330,8 @@ def test_few_agreements_of_the_library_are_uncertain_by_more_than_a_hundredth() 
     coarse = 0
     for case in shipped():
         for item in case.run.comparisons:
-            for judged, figure in case.accepted[item.name].items() if item.expect == "agree" else ():
-                assert figure.U <= 0.2, (case.name, item.name, judged)
+            for which, figure in case.accepted[item.name].items() if item.expect == "agree" else ():
+                assert figure.U <= 0.2, (case.name, item.name, which)
                 coarse += figure.U > 1e-2
     assert coarse <= COARSE
 
