@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.scene.bodies import BeamBody
+from flexmb.scene.collocation import gauss_rule
 from flexmb.scene.sections import EXTENSION, mass_per_length, stiffness_on_axis
 from flexmb.scene.strains import strains
 from flexmb.system.section_loads import SectionBalance
@@ -86,7 +87,7 @@ def _largest(system: System, u: Real, loads: Mapping[str, Real]) -> tuple[Real, 
 
 
 def _stretched(system: System, body: BeamBody, state: State) -> Unstretched:
-    places, weights = np.polynomial.legendre.leggauss(_SECTIONS)
+    places, weights = gauss_rule(_SECTIONS)
     balance = SectionBalance(system, body.name, body.length_m * (1.0 + places) / 2.0)
     try:
         found = balance.loads(balance.at(system.all_loads(state))).strain[:, 0]
