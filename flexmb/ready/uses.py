@@ -17,6 +17,7 @@ from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.jain.elimination import Elimination
 from flexmb.linear.campbell import campbell
+from flexmb.linear.controlled_motion import ControlledMotion
 from flexmb.linear.equilibrium import equilibrium
 from flexmb.linear.linearize import linearize
 from flexmb.linear.spin import steady_spin
@@ -117,6 +118,9 @@ def _linear_models() -> None:
     linearize(scenes.looped().scene())
     linearize(scenes.with_feedback(scenes.pendulum()))
     linearize(scenes.with_feedback(scenes.looped()))
+    for builder in (scenes.pendulum, scenes.looped):
+        controlled = scenes.with_feedback(builder())
+        ControlledMotion(controlled).evaluation_derivatives(compile(controlled).initial_state)
     steady_spin(scenes.spinner().scene(), "pivot", 1.0)
     campbell(scenes.spinner().scene(), "pivot", [0.0, 1.0])
 
