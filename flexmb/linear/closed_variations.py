@@ -26,14 +26,15 @@ import numpy as np
 from scipy.linalg import qr, solve_triangular
 
 from flexmb.closure.assembly import consistent
-from flexmb.closure.closures import ClosureError
+from flexmb.closure.closures import ClosureError, Closures
 from flexmb.closure.constant_loads import Changes, ConstantLoads
 from flexmb.closure.factor import DEPENDENT
-from flexmb.closure.tangent import closure_tangent_workspace
+from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace
 from flexmb.entry.variation import coordinate_motion
 from flexmb.linear.variations import Equations, RestForces, Variations
 from flexmb.system.closed import ClosedSystem
 from flexmb.tables.arrays import Constants
+from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, pack
 from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real
@@ -78,11 +79,21 @@ class ClosedEquations(Equations):
                 'closures join them: for a linear model use level "linear" or a better one'
             )
         c = self.constants
-        self._closures = system.closures.on_tree(c, lambda: workspace(c, system.nq, system.nu))
+        self._shared = system.closures.on_tree(c, lambda: workspace(c, system.nq, system.nu))
         self.rank = system.rank
         """Number of independent rows of the closures."""
-        self._rows_w = closure_tangent_workspace(self._closures.constants[1])
-        self._constant_loads = ConstantLoads(self._closures, self._w)
+
+    @per_thread
+    def _closures(self) -> Closures:
+        return self._shared.for_thread()
+
+    @per_thread
+    def _rows_w(self) -> ClosureTangentWorkspace:
+        return closure_tangent_workspace(self._closures.constants[1])
+
+    @per_thread
+    def _constant_loads(self) -> ConstantLoads:
+        return ConstantLoads(self._closures, self._w)
 
     @property
     def freedom(self) -> int:

@@ -21,12 +21,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flexmb.entry import articulated
-from flexmb.entry.derivatives import derivative_workspace, inverse_dynamics_derivatives, jacobian
-from flexmb.entry.tangent import tangent_workspace, time_derivative
+from flexmb.entry.derivatives import DerivativeWorkspace, derivative_workspace, inverse_dynamics_derivatives, jacobian
+from flexmb.entry.tangent import TangentWorkspace, tangent_workspace, time_derivative
 from flexmb.scene.functions import Constant, Function, Ramp
 from flexmb.system.tree_system import System
-from flexmb.tables.arrays import Constants
+from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.functions import pack as pack_functions
+from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, pack
 from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real, Record
@@ -75,7 +76,10 @@ class RestForces(NamedTuple):
 
 
 class Equations:
-    """A system with its functions of time, which can be held or replaced (`held`, `spinning`); one per thread."""
+    """A system with its functions of time, which can be held or replaced (`held`, `spinning`).
+
+    Threads may share it, as they may share a `SteadySpin`, which holds one: each has workspaces of its own.
+    """
 
     def __init__(self, system: System, constants: Constants | None = None) -> None:
         self.system = system
@@ -83,17 +87,28 @@ class Equations:
         self.free: Index = np.flatnonzero(self.constants.speed["prescribed"] < 0)
         wheels = self.constants.wheel["u_index"]
         self._indifferent: Index = wheels[self.constants.speed["stiffness"][wheels] == 0.0]
-        if _alike(self.constants, system.constants):
-            self._w, self._derivatives, self._real_w = system.own_tangent, system.own_derivatives, system.own_workspace
-        else:  # workspaces have a row for each function, and tables of which coordinates are driven
-            self._w = tangent_workspace(self.constants, system.nq, system.nu)
-            self._derivatives = derivative_workspace(self.constants, system.nq, system.nu)
-            self._real_w = workspace(self.constants, system.nq, system.nu)
+        # Workspaces have a row for each function, and tables of which coordinates are driven.
+        self._as_system = _alike(self.constants, system.constants)
 
     @property
     def freedom(self) -> int:
         """Number of independent speeds."""
         return len(self.free)
+
+    @per_thread
+    def _w(self) -> TangentWorkspace:
+        system = self.system
+        return system.own_tangent if self._as_system else tangent_workspace(self.constants, system.nq, system.nu)
+
+    @per_thread
+    def _derivatives(self) -> DerivativeWorkspace:
+        system = self.system
+        return system.own_derivatives if self._as_system else derivative_workspace(self.constants, system.nq, system.nu)
+
+    @per_thread
+    def _real_w(self) -> Workspace:
+        system = self.system
+        return system.own_workspace if self._as_system else workspace(self.constants, system.nq, system.nu)
 
     @property
     def tangent_tables(self) -> tuple[Any, ...]:

@@ -24,8 +24,6 @@ from typing import Any
 import numpy as np
 
 THREADS = 8
-LONG = {"advise", "fit", "gradient", "uncertainty", "sensitivities", "compile_batch", "simulate_stages"}
-"""What takes long, and shares a scene only: asked by two threads, unless there is time."""
 WHOLE = "whole"
 
 
@@ -144,6 +142,8 @@ def same(one: Any, other: Any) -> bool:
 
 def wrong(scene: str, span: float, thorough: bool) -> tuple[int, dict[str, int]]:
     """How many questions were asked, and how many answers were wrong, by question; each is asked for so long (s)."""
+    from tests.flexmb.system.public_calls import LONG  # they share a scene only, and two threads ask them
+
     alone, shared = asked(scene), asked(scene)
     threads = {name: range(2 if name in LONG and not thorough else THREADS) for name in shared.calls}
     right = {name: [alone.ask(name, i) for i in who] for name, who in threads.items()}

@@ -13,9 +13,10 @@ from tests.flexmb.system.batch_calls import judge
 from tests.flexmb.system.public_calls import faults
 
 
-def test_every_public_call_refuses_what_is_wrong_and_casts_what_is_right():
+@pytest.mark.parametrize("words", [(), pytest.param(["--thorough"], marks=pytest.mark.slow)], ids=["some", "all"])
+def test_every_public_call_refuses_what_is_wrong_and_casts_what_is_right(words):
     """All variants of all arguments of all public calls; a crash names its place by faulthandler."""
-    program = [sys.executable, "-m", "tests.flexmb.system.public_calls"]
+    program = [sys.executable, "-m", "tests.flexmb.system.public_calls", *words]
     done = subprocess.run(program, cwd=Path(__file__).parents[3], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-4000:]
     *found, summary = done.stdout.splitlines()
@@ -43,6 +44,19 @@ def test_a_class_that_a_call_gives_is_found(monkeypatch):
     novel = type("Novel", (), {"__module__": "flexmb.system.novel", "ask": lambda self, x: x})
     monkeypatch.setattr(walk, "met", lambda: ({"answers": [novel()]},))
     assert walk.reached() == {novel} and "Novel.ask" in walk.unlisted()
+
+
+def test_nothing_that_threads_may_share_holds_arrays_that_kernels_write():
+    """Else two threads write them at once, and a test of threads sees it now and then."""
+    assert "Closed" in walk.holders() <= set(walk.GUARDED)
+
+
+def test_a_result_that_holds_arrays_that_kernels_write_is_seen(monkeypatch):
+    """Negative control."""
+    novel = type("Novel", (), {"__module__": "flexmb.system.novel"})()
+    novel.__dict__["_w"] = W.tree.workspace()
+    monkeypatch.setattr(walk, "met", lambda: ({"answers": [novel]},))
+    assert walk.holders() == {"Novel"}
 
 
 @pytest.mark.parametrize(

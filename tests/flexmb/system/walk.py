@@ -13,6 +13,7 @@ from typing import Any
 
 import flexmb as fm
 from flexmb.scene import schema
+from flexmb.tables.per_thread import Own
 from tests.flexmb.system import public_calls
 
 # What is not called here, and why. Whatever else is public must be among the calls.
@@ -57,6 +58,16 @@ INNER = {  # classes of the mechanics and of runs, which users meet only behind 
     "Restart",  # its files: tests/flexmb/run/test_damaged_restarts.py
 }  # fmt: skip
 DEEP = 4  # attributes in a row
+GUARDED = {  # who holds arrays that kernels write, and why no two threads write them at once
+    "Closures": "each thread asks a copy: for_thread",
+    "Closed": "held by those above and below",
+    "ChainJacobian": "held by those above and below",
+    "DerivativeCall": "held by those above and below",
+    "Integration": "one run takes it, and the next one makes another",
+    "Linear": "held by an Integration",
+    "_Careful": "behind a gate, which lets one thread pass",
+    "LaneTables": "one run of a batch takes it",
+}  # fmt: skip
 
 
 @cache
@@ -108,6 +119,26 @@ def public() -> set[str]:
     found = set(fm.__all__) - set(schema.__all__)
     for each in (kind for kind in reached() if kind.__name__ not in INNER):
         found |= {f"{each.__name__}.{name}" for name in _methods(each)}
+    return found
+
+
+def holders() -> set[str]:
+    """Classes of what public calls lead to, by any attribute, that hold a workspace which is not of one thread only."""
+    found, seen = set[str](), set[int]()
+    left: list[tuple[Any, str]] = [(root, "") for root in met()]
+    while left:
+        thing, holder = left.pop()
+        if id(thing) in seen or isinstance(thing, Own):
+            continue
+        seen.add(id(thing))
+        kind = type(thing)
+        if isinstance(thing, list | tuple | dict):
+            holder = kind.__name__ if hasattr(kind, "_fields") else holder
+            left += [(each, holder) for each in (thing.values() if isinstance(thing, dict) else thing)]
+        elif kind.__name__.endswith("Workspace"):
+            found.add(holder)
+        elif kind.__module__.startswith("flexmb"):
+            left += [(each, kind.__name__) for each in getattr(thing, "__dict__", {}).values()]
     return found
 
 
