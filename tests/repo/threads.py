@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable
 
-from tests.flexmb.system.public_calls import calls
-from tests.flexmb.system.shared_calls import LONG, THREADS
+from tests.flexmb.system.public_calls import LONG, calls
+from tests.flexmb.system.shared_calls import THREADS
 from tests.flexmb.system.system_calls import REFUSED
 from tests.flexmb.system.walk import UNTRIED
 from tests.repo.project import ROOT
