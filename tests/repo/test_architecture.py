@@ -44,7 +44,7 @@ def test_a_wrong_list_of_rooms_is_noticed(wrong: str, fault: str) -> None:
     assert any(each.startswith(fault) for each in a.faults_of_rooms(wrong, "crosscheck", ORDER))
 
 
-@pytest.mark.parametrize("page", ["docs/architecture.md", "CONTRIBUTING.md", "README.md"])
+@pytest.mark.parametrize("page", ["docs/architecture.md", "docs/reading.md", "CONTRIBUTING.md", "README.md"])
 def test_every_file_and_name_exists(page: str) -> None:
     assert not a.faults_of_names((ROOT / page).read_text(encoding="utf-8"))
 
