@@ -1,4 +1,4 @@
-"""The first picture of README.md and of the site: speed against accuracy of all codes in the canonical cases.
+"""The picture of the tour: speed against accuracy of all codes in the canonical cases.
 
     python -m tests.repo.front records.jsonl   # keep the figures of a session, and draw them
     python -m tests.repo.front                 # draw those that are kept
@@ -26,7 +26,7 @@ from tests.repo.project import ROOT
 
 KEPT = ROOT / "docs" / "pictures" / "speed.json"
 PICTURE = ROOT / "docs" / "pictures" / "speed.svg"
-PLACES = {"README.md": "docs/pictures/speed.svg", "docs/index.md": "pictures/speed.svg"}  # where it is shown
+PLACES = {"docs/tour.md": "pictures/speed.svg"}  # where it is shown
 EXPONENTS = range(-1, -13, -1)
 COLOURS = {
     "native": "#0072b2",
