@@ -31,7 +31,7 @@ How some cases move. The pictures repeat without end; the reports of `crosscheck
 for every case that is run. This page is generated: `python -m tests.repo.motions`.
 """
 FRAMES, SECONDS = 60, 8.0  # of a picture, which shows the whole of its time span
-WIDTH, HEIGHT, MARGIN = 560, 340, 24  # pixels
+WIDTH, HEIGHT, MARGIN = 560, 340, 24  # pixels at most; the margin
 RIM = 24  # points of a wheel's rim
 FINER = 6  # points of a bent line for each of its pieces
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#c28800", "#b8609a", "#5d6877", "#3aa0d8")
@@ -100,13 +100,14 @@ def picture(trajectory: Trajectory, drawing: Drawing, motion: Motion) -> str:
     everything = np.concatenate([stroke.reshape(-1, 2) for _, strokes, _ in flat for stroke in strokes])
     low, size = everything.min(axis=0), np.ptp(everything, axis=0)
     factor = min((WIDTH - 2 * MARGIN) / max(size[0], 1e-9), (HEIGHT - 2 * MARGIN) / max(size[1], 1e-9))
-    corner = 0.5 * (np.array([WIDTH, HEIGHT]) - factor * size)
+    width, height = (round(float(factor * extent + 2 * MARGIN)) for extent in size)  # no more than what moves needs
+    corner = 0.5 * (np.array([width, height]) - factor * size)
     paths = [
         _path(colour, [corner + factor * (stroke - low) for stroke in strokes], kind) for colour, strokes, kind in flat
     ]
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}">'
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}">'
     style = "<style>path{fill:none;stroke-linecap:round;stroke-linejoin:round}</style>"
-    ground = f'<rect width="{WIDTH}" height="{HEIGHT}" rx="8" fill="#fff"/>'
+    ground = f'<rect width="{width}" height="{height}" rx="8" fill="#fff"/>'
     return "\n".join([head, f"<title>{motion.text}</title>", style, ground, *paths, "</svg>", ""])
 
 
@@ -183,7 +184,7 @@ def _path(colour: str, strokes: list[Real], kind: str) -> str:
 
 
 def _line(points: Real) -> str:
-    return "M" + "L".join(f"{x:.0f} {y:.0f}" for x, y in points)
+    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
 
 
 def page() -> str:

@@ -36,8 +36,10 @@ def test_a_picture_moves_and_is_small(motion: motions.Motion) -> None:
     text = file.read_text(encoding="utf-8")
     drawn = frames(text)
     assert all(len(path) == motions.FRAMES for path in drawn) and any(len(set(path)) > 10 for path in drawn)
-    inside = np.array(re.findall(r"(-?\d+) (-?\d+)(?=[ML;\"])", text), dtype=float)
-    assert inside.min() >= 0.0 and (inside <= [motions.WIDTH, motions.HEIGHT]).all()
+    inside = np.array(re.findall(r"(-?\d+\.\d) (-?\d+\.\d)(?=[ML;\"])", text), dtype=float)
+    frame = np.array(re.findall(r'viewBox="0 0 (\d+) (\d+)"', text)[0], dtype=float)
+    assert (inside >= 0.0).all() and (inside <= frame).all()
+    assert (np.ptp(inside, axis=0) > frame - 2 * motions.MARGIN - 2).all(), "the frame is larger than what moves in it"
 
 
 def test_what_is_drawn_is_where_the_motion_is() -> None:
@@ -53,12 +55,12 @@ def test_what_is_drawn_is_where_the_motion_is() -> None:
     trajectory = fm.simulate(scene, t_end=1.0, samples=motions.FRAMES, rtol=1e-9, atol=1e-11)
     line = Line(body="rod", kind="arm", points=(CarriedPoint("end", (-1.0, 0.0, 0.0)), CarriedPoint("end", (0.0,) * 3)))
     (arm,) = frames(motions.picture(trajectory, Drawing(lines=(line,), trails=()), seen))
-    tips = [tuple(map(int, re.findall(r"\d+", frame)[-2:])) for frame in arm]
-    feet = [tuple(map(int, re.findall(r"\d+", frame)[:2])) for frame in arm]
+    tips = [tuple(map(float, re.findall(r"[\d.]+", frame)[-2:])) for frame in arm]
+    feet = [tuple(map(float, re.findall(r"[\d.]+", frame)[:2])) for frame in arm]
     (first, last), foot = (tips[0], tips[-1]), feet[0]
     assert len(set(feet)) == 1
     assert first[1] == foot[1] and first[0] > foot[0] + 100
-    assert last[0] == foot[0] and foot[1] - last[1] == first[0] - foot[0]
+    assert last[0] == foot[0] and foot[1] - last[1] == pytest.approx(first[0] - foot[0], abs=0.2)  # of 0.1 pixel
 
 
 def test_the_first_picture_is_what_the_generator_draws_of_its_figures() -> None:
