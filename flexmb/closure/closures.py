@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -96,16 +97,22 @@ class Closures:
         tree: Callable[[], Workspace],
         slowest: float,
         check: Callable[[int, int], None],
+        like: Closures | None = None,
     ) -> None:
         """`tree` makes workspaces of the tree; `slowest`: lowest modal frequency (rad/s), infinite without modes.
 
-        `check` raises unless a status is OK; its second argument is the body or closure at fault.
+        `check` raises unless a status is OK; its second argument is the body or closure at fault. `like`: closures with
+        other numbers, in tables of the same structure, whose workspaces and count of rows serve these too.
         """
         self.scene, self._tree, self._slowest, self._check = closures, tree, slowest, check
         self._layout = layout
         self.constants = constants, own
-        self._counted = [_Counted(np.full(len(own.group), -1), np.zeros(len(own.row)))]
-        self._chain = self._evaluated = self.chain("articulated")
+        if like is None:
+            self._counted = [_Counted(np.full(len(own.group), -1), np.zeros(len(own.row)))]
+            self._chain = self._evaluated = self.chain("articulated")
+        else:
+            self._counted = like._counted
+            self._chain = self._evaluated = self.chain_in(like._chain)
         self._composite: Closed | None = None
         self.is_singular = False
         """Whether the last motion failed at a singular position, where fewer rows are independent than elsewhere."""
@@ -114,13 +121,15 @@ class Closures:
         """DynamicsError unless a status is OK; `fault`: the body or closure at fault."""
         self._check(status, fault)
 
-    def on_tree(self, constants: Constants, tree: Callable[[], Workspace]) -> Closures:
-        """The same closures and tree with other functions of time, and with workspaces of their own."""
-        return Closures(self.scene, constants, self.constants[1], self._layout, tree, self._slowest, self._check)
+    def on_tree(
+        self, constants: Constants, tree: Callable[[], Workspace], like: Closures | None = None
+    ) -> Closures:
+        """The same closures and tree with other functions of time, and with workspaces of their own, or of `like`."""
+        return Closures(self.scene, constants, self.constants[1], self._layout, tree, self._slowest, self._check, like)
 
-    def for_thread(self) -> Closures:
-        """The same closures with workspaces of their own; the count of independent rows is shared."""
-        found = self.on_tree(self.constants[0], self._tree)
+    def for_thread(self, like: Closures | None = None) -> Closures:
+        """The same closures with workspaces of their own, or of `like`; the count of independent rows is shared."""
+        found = self.on_tree(self.constants[0], self._tree, like)
         found._counted = self._counted
         return found
 
@@ -144,6 +153,11 @@ class Closures:
         (own.rank[:], own.size[:]), own.gain[:] = self._counted[0], (2.0 * rate, rate * rate)
         own.notices[0] = GAPS if rate > 0.0 else UNRECORDED
         return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)
+
+    def chain_in(self, other: Closed) -> Closed:
+        """The chain in the workspaces of another one, of closures with other numbers, that is used no more."""
+        c, cc = self.constants
+        return replace(other, c=c, cc=cc)
 
     def _route(self, algorithm: str) -> Recursion | Response | Matrices:
         c = self.constants[0]

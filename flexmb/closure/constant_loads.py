@@ -49,8 +49,12 @@ class AtConstantLoads(NamedTuple):
 class ConstantLoads:
     """`changes(t, y, load)` of the closures of one scene; `w`: tables for dual numbers."""
 
-    def __init__(self, closures: Closures, w: TangentWorkspace) -> None:
+    def __init__(self, closures: Closures, w: TangentWorkspace, like: ConstantLoads | None = None) -> None:
+        """like: those of closures with other numbers, in tables of the same structure, whose workspaces serve too."""
         self._check, self._w = closures.check, w
+        if like is not None:
+            self._chain, self._x, self._rows = closures.chain_in(like._chain), like._x, like._rows
+            return
         self._chain: Closed = closures.chain("articulated")
         c, cc = closures.constants
         self._x: ChainJacobian = chain_jacobian(self._chain, len(self._chain.w.q), len(c.speed))

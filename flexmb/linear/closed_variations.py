@@ -31,7 +31,7 @@ from flexmb.closure.constant_loads import Changes, ConstantLoads
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace
 from flexmb.entry.variation import coordinate_motion
-from flexmb.linear.variations import Equations, RestForces, Variations
+from flexmb.linear.variations import Equations, RestForces, Variations, same_structure
 from flexmb.system.closed import ClosedSystem
 from flexmb.tables.arrays import Constants
 from flexmb.tables.per_thread import per_thread
@@ -71,29 +71,36 @@ class _Freedom(NamedTuple):
 class ClosedEquations(Equations):
     """The equations of a closed chain."""
 
-    def __init__(self, system: ClosedSystem, constants: Constants | None = None) -> None:
-        super().__init__(system, constants)
+    _root: ClosedEquations
+
+    def __init__(
+        self, system: ClosedSystem, constants: Constants | None = None, like: ClosedEquations | None = None
+    ) -> None:
+        super().__init__(system, constants, like)
         if system.closures.at_rest:
             raise NotImplementedError(
                 f'scene "{system.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
                 'closures join them: for a linear model use level "linear" or a better one'
             )
-        c = self.constants
-        self._shared = system.closures.on_tree(c, lambda: workspace(c, system.nq, system.nu))
-        self.rank = system.rank
+        c, root = self.constants, self._root
+        if not same_structure(system.closures.constants[1], root.system.closures.constants[1]):
+            self._root = root = self
+        before = None if root is self else root._closures
+        self._shared = system.closures.on_tree(c, lambda: workspace(c, system.nq, system.nu), before)
+        self.rank: int = system.rank if root is self else root.rank
         """Number of independent rows of the closures."""
 
     @per_thread
     def _closures(self) -> Closures:
-        return self._shared.for_thread()
+        return self._shared.for_thread(None if self._root is self else self._root._closures)
 
     @per_thread
     def _rows_w(self) -> ClosureTangentWorkspace:
-        return closure_tangent_workspace(self._closures.constants[1])
+        return closure_tangent_workspace(self._closures.constants[1]) if self._root is self else self._root._rows_w
 
     @per_thread
     def _constant_loads(self) -> ConstantLoads:
-        return ConstantLoads(self._closures, self._w)
+        return ConstantLoads(self._closures, self._w, None if self._root is self else self._root._constant_loads)
 
     @property
     def freedom(self) -> int:

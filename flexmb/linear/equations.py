@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 from flexmb.building.numbering import speeds_at_least
 from flexmb.linear.variations import Equations
 from flexmb.scene.check import check_scene
@@ -26,13 +28,16 @@ def built(given: System | Scene) -> System:
     return compile(given) if isinstance(given, Scene) else given
 
 
-def equations_of(system: System) -> Equations:
-    """The equations of a tree or a closed chain; NotImplementedError for closures on bodies of level "ruthless"."""
+def equations_of(system: System, like: Equations | None = None) -> Equations:
+    """The equations of a tree or a closed chain; NotImplementedError for closures on bodies of level "ruthless".
+
+    like: equations of the same scene with other numbers, which are not used meanwhile; their workspaces are reused.
+    """
     if not isinstance(system, ClosedSystem):
-        return Equations(system)
+        return Equations(system, None, like)
     from flexmb.linear.closed_variations import ClosedEquations  # imported only for scenes with closures
 
-    return ClosedEquations(system)
+    return ClosedEquations(system, None, cast(ClosedEquations | None, like))
 
 
 def entering(system: System | Scene, state: State | None) -> tuple[Equations, State]:

@@ -6,8 +6,9 @@ by Newton's method in the plane across that tangent (Riks 1979; Crisfield 1991, 
     K xi - dr/dp dp = r,    tangent . (xi, dp) = 0
 
 with the loads r and the tangent stiffness K of `flexmb.linear.newton`. dr/dp is a difference of two scenes: it aims
-steps, while what is found is exact. Lengths are measured in the metric of kinetic energy, and p by the range of the
-values.
+steps, while what is found is exact. Lengths are measured in the metric of kinetic energy, in units of what the whole
+range of values would displace if the structure stayed as flexible as it is at the first, and p by that range: both
+count alike then, and a limit point is no sharp corner of the path, however small the displacements are.
 """
 
 from __future__ import annotations
@@ -33,14 +34,16 @@ from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
-FIRST, LONGEST, SHORTEST = 0.02, 0.2, 1e-7  # steps, parts of a displacement of all free coordinates by 1 and the range
+FIRST, SHORTEST = 0.02, 1e-7  # steps, in these units and ranges
+LONGEST = 0.5  # the same, parts of the range, and of a displacement of all free coordinates by 1
+LEAST_UNIT = 1e-6  # of displacements, parts of a displacement of all free coordinates by 1, which is the largest
 CORRECTIONS = 12  # Newton steps; after more the step is halved
 EASY = 4  # after fewer the next one is longer
-CONVERGED = 1e-11  # last correction, in the same measure
+CONVERGED = 1e-11  # the next correction, parts of a displacement of all free coordinates by 1
 STRAIGHT = 0.9  # least cosine between the tangents at both ends of a step
 MOST = 2000  # steps
 FARTHEST = 10.0  # ranges beyond the values, where the path is given up
-DIFFERENCE = 2.0**-18  # of p, parts of its range
+NEAR, FAR = 2.0**-18, 2.0**-6  # differences of p, parts of its range
 LOCATED = 1e-6  # where in a step something happens, part of the step
 
 
@@ -104,6 +107,15 @@ def equilibrium_path(scene: Scene, number: str, values: Sequence[float] | Real) 
     return EquilibriumPath(number, passed, states, found)
 
 
+class _Corrected(NamedTuple):
+    """What Newton's method found: p, the derivatives and forces there, and the number of corrections."""
+
+    p: float
+    at: Variations
+    forces: RestForces
+    taken: int
+
+
 class _Point(NamedTuple):
     """An equilibrium at p: its derivatives, dr/dp (f,), the tangent (n+1,) of the path over all free speeds and p, of
     length 1, and omega^2."""
@@ -126,32 +138,48 @@ class _Point(NamedTuple):
 
 
 class _Family:
-    """The scenes with all values of one number; the system at the first one; range of the values."""
+    """The scenes with all values of one number; the system at the first one; range of the values.
+
+    unit: of displacements; see the top of this module.
+    """
 
     def __init__(self, scene: Scene, number: str, asked: Real) -> None:
         Number(scene, number)  # PathError unless it is one real number
         first: Scene = with_values(scene, {number: float(asked[0])})
         self.number, self.system = Number(first, number), built(first)
-        self.name, self.range = scene.name, float(np.ptp(asked))
-        self._made = dict[float, Equations]()
+        self.name, self.range, self._middle = scene.name, float(np.ptp(asked)), float(np.mean(asked[[0, -1]]))
+        self.unit = 1.0
+        self._here = self._beside = self._made(self.number.value, None)
 
-    def start(self) -> tuple[Equations, Variations]:
-        """The equations at the first value, and its equilibrium."""
-        equations = self.equations(self.number.value)
-        return equations, equations.variations(found_equilibrium(self.system, None)[0])
+    def start(self, onwards: float) -> _Point:
+        """The equilibrium at the first value, with the tangent of the path that leaves it in the direction `onwards`;
+        determines the unit of displacements."""
+        p, equations = self._here
+        at = equations.variations(found_equilibrium(self.system, None)[0])
+        ahead = np.zeros(len(at.by_chosen) // 2 + 1)
+        ahead[-1] = onwards * self.range
+        found = _Corrected(p, at, equations.forces(at), 0)
+        tangent = self.point(found, ahead).tangent
+        displaced = self.length(at, np.r_[tangent[:-1], 0.0]) * self.range / abs(float(tangent[-1]))
+        self.unit = float(np.clip(displaced, LEAST_UNIT, 1.0))
+        return self.point(found, ahead)
+
+    def _made(self, p: float, like: Equations | None) -> tuple[float, Equations]:
+        """At rest, with functions of time at their values at t = 0."""
+        return p, equations_of(self.system.with_numbers(self.number.scene_at(p)), like).held(0.0)
 
     def equations(self, p: float) -> Equations:
-        """At rest, with functions of time at their values at t = 0."""
-        if p not in self._made:
-            system = self.system.with_numbers(self.number.scene_at(p))
-            self._made = dict([*self._made.items()][-1:])  # a point and one beside it
-            self._made[p] = equations_of(system).held(0.0)
-        return self._made[p]
+        """Those at a value."""
+        if p != self._here[0]:
+            self._here = self._made(p, self._here[1])
+        return self._here[1]
 
     def by_number(self, p: float, at: Variations) -> Real:
         """dr/dp (f,) at a state."""
-        here, h = self.equations(p).loads(at.state, at), DIFFERENCE * self.range
-        return (self.equations(p + h).loads(at.state, at) - here) / h
+        if not NEAR * self.range <= abs(self._beside[0] - p) <= FAR * self.range:
+            self._beside = self._made(p + np.copysign(0.5 * FAR * self.range, self._middle - p), self._here[1])
+        other, beside = self._beside
+        return (beside.loads(at.state, at) - self.equations(p).loads(at.state, at)) / (other - p)
 
     def bordered(self, at: Variations, forces: RestForces, by_number: Real, row: Real) -> Callable[[Real, float], Real]:
         """Solver of K xi - dr/dp dp = load, row . (xi, dp) = rest, for (xi, dp) over all free speeds (n+1,)."""
@@ -172,33 +200,39 @@ class _Family:
         """Of (xi, dp) (n+1,), the row by which lengths are measured: x . weighed(x) is the square of one."""
         independent = x[:-1][at.chosen]
         back = np.zeros(len(x) - 1)
-        back[at.chosen] = at.mass @ independent / np.trace(at.mass)
+        back[at.chosen] = at.mass @ independent / np.trace(at.mass) / self.unit**2
         return np.r_[back, x[-1] / self.range / self.range]
 
     def length(self, at: Variations, x: Real) -> float:
         return float(np.sqrt(self.weighed(at, x) @ x))
 
-    def point(self, p: float, at: Variations, before: Real) -> _Point:
+    def longest(self, point: _Point) -> float:
+        """The longest step from a point."""
+        xi = np.r_[point.tangent[:-1], 0.0]
+        return LONGEST / max(self.unit * self.length(point.at, xi), abs(float(point.tangent[-1])) / self.range)
+
+    def point(self, found: _Corrected, before: Real) -> _Point:
         """An equilibrium with its tangent, which goes on as the one before it (n+1,)."""
-        forces = self.equations(p).forces(at)
+        p, at, forces, _ = found
         by_number = self.by_number(p, at)
         solve = self.bordered(at, forces, by_number, before)
         tangent = solve(np.zeros(len(forces.load)), 1.0)
         return _Point(p, at, by_number, tangent / self.length(at, tangent), squares(at, forces))
 
-    def corrected(self, p: float, state: State, by_number: Real, row: Real) -> tuple[float, Variations, int] | None:
-        """The equilibrium near a state at p, across `row` (n+1,), and the number of corrections; None if not found."""
+    def corrected(self, p: float, state: State, by_number: Real, row: Real, farthest: float) -> _Corrected | None:
+        """The equilibrium near a state at p, across `row` (n+1,), no correction longer than `farthest`; None if not
+        found."""
         for taken in range(CORRECTIONS):
             equations = self.equations(p)
             at = equations.variations(state)
             forces = equations.forces(at)
             step = self.bordered(at, forces, by_number, row)(forces.load, 0.0)
-            if not np.isfinite(step).all() or self.length(at, step) > 2.0 * LONGEST:
+            length = self.length(at, step)
+            if not np.isfinite(step).all() or length > farthest:
                 return None
+            if self.unit * length <= CONVERGED:
+                return _Corrected(p, at, forces, taken)
             p, state = p + float(step[-1]), equations.moved(at, step[:-1][at.chosen])
-            if self.length(at, step) <= CONVERGED:
-                equations = self.equations(p)
-                return p, equations.variations(equations.on_functions(state)), taken
         return None
 
     def stepped(self, point: _Point, h: float) -> tuple[_Point, int] | None:
@@ -206,22 +240,22 @@ class _Family:
         try:
             equations, ahead = self.equations(point.p), h * point.tangent
             state = equations.moved(point.at, ahead[:-1][point.at.chosen])
-            found = self.corrected(point.p + float(ahead[-1]), state, point.by_number, point.tangent)
+            found = self.corrected(point.p + float(ahead[-1]), state, point.by_number, point.tangent, h)
             if found is None:
                 return None
-            there = self.point(found[0], found[1], point.tangent)
+            there = self.point(found, point.tangent)
         except (DynamicsError, np.linalg.LinAlgError):
             return None
         turned = float(self.weighed(there.at, there.tangent) @ point.tangent)
-        return (there, found[2]) if turned >= STRAIGHT or h <= 16.0 * SHORTEST else None
+        return (there, found.taken) if turned >= STRAIGHT or h <= 16.0 * SHORTEST else None
 
     def exactly(self, point: _Point, value: float) -> _Point | None:
         """The equilibrium at a value near that of a point."""
         try:
             across = np.zeros(len(point.tangent))
             across[-1] = self.range
-            found = self.corrected(value, point.at.state, point.by_number, across)
-            return None if found is None else self.point(value, found[1], point.tangent)
+            found = self.corrected(value, point.at.state, point.by_number, across, LONGEST / self.unit)
+            return None if found is None else self.point(found, point.tangent)
         except (DynamicsError, np.linalg.LinAlgError):
             return None
 
@@ -231,12 +265,8 @@ Kind = Literal["limit", "bifurcation"]
 
 def _followed(family: _Family, asked: Real) -> Iterator[tuple[Kind | None, _Point]]:
     """The points of the path, and what those are that are critical."""
-    onwards = float(np.sign(asked[1] - asked[0]))
-    _, at = family.start()
-    ahead = np.zeros(len(at.by_chosen) // 2 + 1)
-    ahead[-1] = onwards * family.range
     try:
-        here, h = family.point(float(asked[0]), at, ahead), FIRST
+        here, h = family.start(float(np.sign(asked[1] - asked[0]))), FIRST
     except (DynamicsError, np.linalg.LinAlgError):
         raise EquilibriumError(
             f'scene "{family.name}": no path of equilibria leaves {asked[0]:g}, because something there may move '
@@ -256,7 +286,7 @@ def _followed(family: _Family, asked: Real) -> Iterator[tuple[Kind | None, _Poin
                 return
         yield None, there[0]
         here = there[0]
-        h = min(LONGEST, 1.5 * h) if there[1] <= EASY else h
+        h = min(family.longest(here), 1.5 * h if there[1] <= EASY else h)
         if np.min(np.abs(here.p - asked)) > FARTHEST * family.range:
             raise EquilibriumError(_lost(family, here, "the path turned away for good"))
     raise EquilibriumError(_lost(family, here, f"{MOST} steps were too few"))

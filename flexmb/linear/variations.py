@@ -15,7 +15,7 @@ speeds and w, v those of a free or spherical hinge,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -81,14 +81,16 @@ class Equations:
     Threads may share it, as they may share a `SteadySpin`, which holds one: each has workspaces of its own.
     """
 
-    def __init__(self, system: System, constants: Constants | None = None) -> None:
+    def __init__(self, system: System, constants: Constants | None = None, like: Equations | None = None) -> None:
+        """like: equations with other numbers, whose workspaces serve these too where the tables have one structure."""
         self.system = system
         self.constants = system.constants if constants is None else constants
         self.free: Index = np.flatnonzero(self.constants.speed["prescribed"] < 0)
         wheels = self.constants.wheel["u_index"]
         self._indifferent: Index = wheels[self.constants.speed["stiffness"][wheels] == 0.0]
         # Workspaces have a row for each function, and tables of which coordinates are driven.
-        self._as_system = _alike(self.constants, system.constants)
+        self._as_system = same_structure(self.constants, system.constants)
+        self._root = like._root if like is not None and same_structure(self.constants, like.constants) else self
 
     @property
     def freedom(self) -> int:
@@ -97,16 +99,22 @@ class Equations:
 
     @per_thread
     def _w(self) -> TangentWorkspace:
+        if self._root is not self:
+            return self._root._w
         system = self.system
         return system.own_tangent if self._as_system else tangent_workspace(self.constants, system.nq, system.nu)
 
     @per_thread
     def _derivatives(self) -> DerivativeWorkspace:
+        if self._root is not self:
+            return self._root._derivatives
         system = self.system
         return system.own_derivatives if self._as_system else derivative_workspace(self.constants, system.nq, system.nu)
 
     @per_thread
     def _real_w(self) -> Workspace:
+        if self._root is not self:
+            return self._root._real_w
         system = self.system
         return system.own_workspace if self._as_system else workspace(self.constants, system.nq, system.nu)
 
@@ -135,12 +143,12 @@ class Equations:
         """The same with other functions of time, as many."""
         rows, table = pack_functions(functions)
         speed = self.constants.speed if speeds is None else speeds
-        return type(self)(self.system, replace(self.constants, function=rows, table=table, speed=speed))
+        return type(self)(self.system, replace(self.constants, function=rows, table=table, speed=speed), self)
 
     def constant_functions(self, t: float) -> list[Constant]:
         """All functions of time, held at their values at time t (s)."""
         w = self._real_w
-        articulated.accelerations(t, pack(self.system.initial_state), self.constants, w)  # fills in the functions
+        articulated.accelerations(t, pack(self.system.scene_state(t)), self.constants, w)  # fills in the functions
         return [Constant(value=float(value)) for value in w.function[:, 0]]
 
     def rates(self, state: State) -> Real:
@@ -227,9 +235,19 @@ class Equations:
         return out[np.ix_(self.free, self.free)]
 
 
-def _alike(a: Constants, b: Constants) -> bool:
-    """Whether the same workspaces serve: as many functions, and the same coordinates are driven."""
-    return len(a.function) == len(b.function) and np.array_equal(a.speed["prescribed"], b.speed["prescribed"])
+def same_structure(a: Any, b: Any) -> bool:
+    """Whether one workspace serves two bundles of tables: shapes and integers agree, of functions of time only how many
+    there are."""
+    for each in fields(a):
+        one, other = getattr(a, each.name), getattr(b, each.name)
+        if one is other or each.name == "table":
+            continue
+        if one.shape != other.shape:
+            return False
+        for name in () if each.name == "function" else one.dtype.names or ():
+            if one[name].dtype == np.int64 and not np.array_equal(one[name], other[name]):
+                return False
+    return True
 
 
 def _cross(v: Real) -> Real:

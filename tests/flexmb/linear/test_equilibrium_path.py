@@ -8,7 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, root
+from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import flexmb as fm
 from flexmb.scene import schema as s
@@ -47,6 +49,17 @@ def test_a_torque_winds_a_strip_into_a_circle(turns):
     assert tip(system, fm.equilibrium(system)) == pytest.approx(circle, abs=1e-9)
 
 
+def test_five_turns_by_path():
+    """As by one equilibrium, and a path of few steps."""
+    values = 2.0 * np.pi * np.array([0.0, 2.5, 4.5, 5.0])
+    path = fm.equilibrium_path(strip(20, torque=0.0), "loads.load.function.value", values)
+    assert not path.critical and {each.stability for each in path.states} == {"stable"} and len(path.states) < 30
+    for value in values[1:]:
+        circle = np.array([np.sin(value), 1.0 - np.cos(value), 0.0]) / value
+        system = fm.compile(strip(20, torque=value))
+        assert tip(system, path.at(value)[0]) == pytest.approx(circle, abs=1e-12)
+
+
 def test_what_its_points_do_not_follow_is_refused():
     """A turn from one of the 23 points to the next; what is within is at rest under its torque."""
     one = fm.equilibrium(strip(20, torque=2.0 * np.pi))
@@ -58,17 +71,36 @@ def test_what_its_points_do_not_follow_is_refused():
         system.accelerations(system.state(30.0 * one.q, one.u))
 
 
+def elastica(force: float) -> np.ndarray:
+    """The tip under a force across the unloaded strip, by elliptic integrals; the tangent there has sine 2 m - 1."""
+
+    def excess(log: float) -> float:
+        m = 1.0 - np.exp(log)
+        return float(ellipk(m) - ellipkinc(np.arcsin(1.0 / np.sqrt(2.0 * m)), m) - np.sqrt(force))
+
+    m = 1.0 - np.exp(brentq(excess, np.log(1e-16), np.log(0.49999)))
+    along = ellipe(m) - ellipeinc(np.arcsin(1.0 / np.sqrt(2.0 * m)), m)
+    return np.array([np.sqrt(2.0 * (2.0 * m - 1.0) / force), 1.0 - 2.0 * along / np.sqrt(force), 0.0])
+
+
 def test_elastica_by_any_polynomials_and_by_path():
     """P L^2 / EI = 300 from straight: the branch that a slowly growing load leads to."""
     far = [fm.equilibrium(fm.compile(strip(p, force=300.0))) for p in (6, 12, 20)]
     places = [tip(fm.compile(strip(p, force=300.0)), each) for p, each in zip((6, 12, 20), far, strict=True)]
     assert {each.stability for each in far} == {"stable"}
-    assert np.max(np.abs(np.array(places) - [np.sqrt(2.0 / 300.0), 0.96618, 0.0])) < 2e-3  # x: EI theta'^2 / 2 = P
+    assert np.max(np.abs(np.array(places) - elastica(300.0))) < 2e-3
     path = fm.equilibrium_path(strip(12, force=0.0), "loads.load.function.value", [0.0, 10.0, 300.0])
     assert not path.critical and {each.stability for each in path.states} == {"stable"}
     system = fm.compile(strip(12, force=300.0))
-    assert tip(system, path.at(10.0)[0]) == pytest.approx([1.0 - 0.5549956, 0.81060902, 0.0], abs=1e-6)
+    assert tip(system, path.at(10.0)[0]) == pytest.approx(elastica(10.0), abs=1e-11)
     assert tip(system, path.at(300.0)[0]) == pytest.approx(places[1], abs=1e-9)
+
+
+def test_elastica_to_300_is_the_closed_form():
+    path = fm.equilibrium_path(strip(20, force=0.0), "loads.load.function.value", [0.0, 1.0, 30.0, 300.0])
+    system = fm.compile(strip(20, force=300.0))
+    for value in (1.0, 30.0, 300.0):
+        assert tip(system, path.at(value)[0]) == pytest.approx(elastica(value), abs=1e-9)
 
 
 def load(z: float) -> float:
@@ -95,6 +127,15 @@ def test_a_truss_snaps_through():
     assert np.array_equal(stable, ~between | (np.abs(np.abs(heights) - LIMIT) < 1e-4) & stable)
     assert [each.stability for each in path.at(0.5 * top)] == ["stable", "unstable", "stable"]
     assert path.values[-1] == 1.2 * top and heights[-1] < -HIGH
+
+
+def test_a_limit_point_of_small_displacements_is_no_sharp_corner():
+    """Steps follow the structure's own displacements, not the size of its coordinates' units."""
+    flat = 0.01
+    path = fm.equilibrium_path(guided(flat, flat), "loads.push.function.value", [0.0, 3.0 * STIFF * flat**3])
+    z = np.sqrt(np.hypot(1.0, flat) ** (2.0 / 3.0) - 1.0)
+    assert [abs(each.state.q[0]) for each in path.critical] == pytest.approx([z, z], rel=1e-4)
+    assert len(path.states) < 40
 
 
 def test_a_truss_gives_way_sideways_before():
@@ -129,3 +170,74 @@ def test_what_cannot_be_followed_is_refused():
         fm.equilibrium_path(fm.compile(scene), number, [0.0, 1.0])
     with pytest.raises(ValueError, match="not one of the values"):
         fm.equilibrium_path(scene, number, [0.0, 1.0]).at(0.5)
+
+
+ARC, STRETCHED = 0.4, 400.0  # the angle of half an arch of length 1 and bending stiffness 1; EA
+SPAN, RISE = np.sin(ARC) / ARC, (1.0 - np.cos(ARC)) / ARC
+
+
+def arch() -> fm.Scene:
+    """Half of a hinged circular arch, its crown on a guide, under half of the load that pushes the crown down (N)."""
+    section = s.BeamStation(
+        x_m=0.0, EA_N=STRETCHED, EIy_Nm2=1.0, EIz_Nm2=1.0, GJ_Nm2=1.0, mass_per_length_kg_m=1.0, rotary_y_kg_m=1e-3,
+        rotary_z_kg_m=1e-3, curvature_1_m=(0.0, 0.0, -ARC),
+    )  # fmt: skip
+    modes = s.Modes(count=1, polynomials={"bending_y": 8, "axial": 6})
+    made = fm.SceneBuilder("arch", allow=("wave_speed",)).rigid_body("crown", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    made.beam("rib", length=1.0, elements=4, section=section, modes=modes, level="exact")
+    made.prismatic("guide", "ground", "crown", axis=(0, 1, 0), position=RISE).weld("joint", "crown", "rib")
+    made.closure("support", "revolute", "ground", "rib", position_a=(SPAN, 0.0, 0.0), node_b="tip")
+    return made.force("push", "crown", direction=(0, -1, 0), function=fm.Constant(value=0.0)).scene()
+
+
+class Shooting:
+    """The same half by shooting from the support, where (H, V) push: x' = (1 + N/EA) cos a, a' = -arc + M/EI."""
+
+    def __init__(self) -> None:
+        self._guess = np.array([ARC, 0.0, 0.0])
+
+    def push(self, height: float) -> float:
+        """The load V on the half whose crown is at a height, next to the one that was asked for before."""
+        found = root(self._missed, self._guess, (height,), tol=1e-13)
+        assert np.max(np.abs(self._missed(found.x, height))) < 1e-9, found.message
+        self._guess = found.x
+        return float(found.x[2])
+
+    @staticmethod
+    def _missed(start: np.ndarray, height: float) -> np.ndarray:
+        angle, H, V = start
+
+        def slope(_: float, at: np.ndarray) -> list[float]:
+            x, y, a = at
+            g = 1.0 - (H * np.cos(a) + V * np.sin(a)) / STRETCHED
+            return [g * np.cos(a), g * np.sin(a), x * V - y * H - ARC]
+
+        x, y, a = solve_ivp(slope, (0.0, 1.0), [0.0, 0.0, angle], rtol=1e-11, atol=1e-13).y[:, -1]
+        return np.array([x - SPAN, y - height, a])
+
+    def limit(self, near: float) -> float:
+        """The stationary load at a height near the one that was asked for before."""
+        beside = 1e-3 * np.arange(-2, 3)
+        fitted = np.polyfit(beside, [self.push(near + each) for each in beside], 4)
+        return float(np.polyval(fitted, next(r.real for r in np.roots(np.polyder(fitted)) if abs(r) < 2e-3)))
+
+
+def test_an_arch_snaps_through():
+    """All of its equilibria, and both limit points, against shooting over the height of the crown; values beside them
+    name both branches' stability."""
+    path = fm.equilibrium_path(arch(), "loads.push.function.value", [0.0, 0.62, 1.5])
+    found, by_hand, limits = np.array([each.q[0] for each in path.states]), Shooting(), []
+    assert found[0] == pytest.approx(RISE) and found[-1] < -RISE and np.all(np.diff(found) < 0.0)
+    critical = [float(each.state.q[0]) for each in path.critical]
+    for height, value in zip(found, path.values, strict=True):
+        assert value == pytest.approx(by_hand.push(height), abs=1e-7)
+        if height in critical:
+            limits.append(by_hand.limit(height))
+    assert [each.kind for each in path.critical] == ["limit", "limit"]
+    assert [each.value for each in path.critical] == pytest.approx(limits, abs=1e-7)
+    upper, lower = critical
+    beside = np.min(np.abs(found[:, None] - critical), axis=1) > 1e-4
+    stable = np.array([each.stability == "stable" for each in path.states])
+    assert np.array_equal(stable[beside], ((found > upper) | (found < lower))[beside])
+    assert [each.stability for each in path.at(0.62)] == ["stable", "unstable", "stable"]
+    assert len(path.states) < 60
