@@ -22,10 +22,12 @@ from flexmb.closure.tables import Closed
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
+from flexmb.kept import kept
 from flexmb.parameters import kernels
 from flexmb.parameters.numbers import Number, numbers
 from flexmb.parameters.plant import Plant
-from flexmb.parameters.spectral import NotSmooth, derivative
+from flexmb.parameters.spectral import Derivative, NotSmooth, derivative
+from flexmb.parameters.steady import First, Steady, steady
 from flexmb.parameters.tables import ParameterBlock, Tables, blocks, diagonal, moments, numbers_of, parts, structure
 from flexmb.parameters.together import derivatives_together
 from flexmb.scene.problems import SceneWarning
@@ -34,7 +36,7 @@ from flexmb.tables import arguments
 from flexmb.tables.per_thread import Own, per_thread
 from flexmb.tables.state import DynamicsError, State, finite_result
 from flexmb.tables.status import OK
-from flexmb.typing import Index, Real
+from flexmb.typing import Real
 
 
 class ParameterError(ValueError):
@@ -52,8 +54,11 @@ class Parameters:
     All methods raise `NotDifferentiableError` (a DynamicsError) at states at which a law has a corner.
     """
 
-    def __init__(self, plant: Plant, chosen: Sequence[Number], *, starts: bool = True) -> None:
-        """starts: whether the initial state of the scene is that of the motion, and is differentiated.
+    def __init__(
+        self, plant: Plant, chosen: Sequence[Number], *, starts: bool = True, like: Parameters | None = None
+    ) -> None:
+        """starts: whether the initial state of the scene is that of the motion, and is differentiated. like: the same
+        numbers of a scene that differs in their values only, whose steady derivatives are kept.
 
         ParameterError where there is no derivative by a number.
         """
@@ -67,19 +72,47 @@ class Parameters:
         self.plant = plant.with_numbers(plant.scene)
         """The same system, with equal functions of time kept apart: numbers of one may change without the other's."""
         found = _Differentiation(self.plant, starts)
-        rates = found.by_all(chosen)
+        held = None if like is None else found.kept(like, chosen)
+        rates = found.by_all(chosen, {} if held is None else held.rates)
+        self._held, self._found, self._rates = held, found, rates
         self.errors = np.array([each.error for each in rates])
         self.reached = np.array([each.name in found.reached or bool(np.any(rate.values))
                                  for each, rate in zip(chosen, rates, strict=True)])  # fmt: skip
-        of_tables = np.array([each.values[: found.size] for each in rates]).reshape(-1, found.size).T
-        self.blocks: tuple[ParameterBlock, ...] = blocks(found.tables, found.diagonal, self.names, of_tables)
-        self.initial_state: Real = of_tables[-len(found.tables.start) :].copy()
+        self._of_tables: Real = np.array([each.values[: found.size] for each in rates]).reshape(-1, found.size).T
+        self.initial_state: Real = self._of_tables[-len(found.tables.start) :].copy()
         for each in (self.errors, self.initial_state, self.reached):
             each.flags.writeable = False
         self.own = Own()
 
     def __repr__(self) -> str:
         return f"Parameters({list(self.names)!r})"
+
+    @kept
+    def blocks(self) -> tuple[ParameterBlock, ...]:
+        """The tables in dual numbers."""
+        return blocks(self._found.tables, self._found.diagonal, self.names, self._of_tables)
+
+    def arranged(self, places: Sequence[int], scales: Real) -> tuple[ParameterBlock, ...]:
+        """The tables in dual numbers along other directions (D,), to each of which belongs a change by its scale of the
+        parameter that has this place, or of none."""
+        rates = np.zeros((len(self._of_tables), len(scales)))
+        rates[:, list(places)] = self._of_tables * scales[list(places)]
+        names = np.full(len(scales), "", object)
+        names[list(places)] = self.names
+        return blocks(self._found.tables, self._found.diagonal, names.tolist(), rates)
+
+    @property
+    def differentiation(self) -> _Differentiation:
+        """The tables as functions of the numbers."""
+        return self._found
+
+    @property
+    def steady(self) -> Steady:
+        """Which derivatives of the tables hold at other values of these numbers too."""
+        if self._held is None:
+            values = dict(zip(self.names, self.values.tolist(), strict=True))
+            self._held = self._found.steady(values, self._rates)
+        return self._held
 
     def accelerations(self, state: State) -> Real:
         """d udot/dp (nu,P) of the free motion at a fixed state; for closed chains with closures that stay closed.
@@ -245,8 +278,10 @@ class _Differentiation:
 
     def __init__(self, plant: Plant, starts: bool) -> None:
         self._plant, self._starts = plant, starts
-        self._firsts: dict[tuple[str, float], tuple[Index, Real]] = {}
-        """By name and first other value of a number, the entries of the tables that differ, and their values."""
+        self._firsts: dict[str, First] = {}
+        """By name of a number, what its first other value made of the tables."""
+        self._number: Number | None = None
+        """Any of the numbers, for scenes with other values of all."""
         self.tables = _tables(plant, starts)
         self.diagonal = diagonal(self.tables)
         self._structure, self._parts = structure(self.tables), parts(self.tables, plant.nq)
@@ -261,9 +296,9 @@ class _Differentiation:
     @property
     def reached(self) -> set[str]:
         """Names of the numbers with which tables were seen to differ."""
-        return {name for (name, _), (places, _) in self._firsts.items() if len(places)}
+        return {name for name, first in self._firsts.items() if len(first.places)}
 
-    def by(self, number: Number) -> Any:
+    def by(self, number: Number) -> Derivative:
         """Derivatives of `numbers_of` the tables and of what follows them; ParameterError where there are none."""
 
         def at(value: float) -> Real:
@@ -277,13 +312,35 @@ class _Differentiation:
                 "value at which nothing appears, vanishes or changes its order, or another parameter"
             ) from None
 
-    def by_all(self, chosen: Sequence[Number]) -> list[Any]:
-        """The same for many numbers."""
+    def by_all(self, chosen: Sequence[Number], known: Mapping[str, Derivative]) -> list[Derivative]:
+        """The same for many numbers, some of which are known by name."""
+        asked = [each for each in chosen if each.name not in known]
+        self._number = chosen[0] if chosen else None
 
         def tables(values: Mapping[str, float]) -> Real:
             return self._with(chosen[0], values) if values else self._middle
 
-        return derivatives_together(tables, chosen, self._parts, self.by)
+        found = iter(derivatives_together(tables, asked, self._parts, self.by))
+        return [known[each.name] if each.name in known else next(found) for each in chosen]
+
+    def kept(self, like: Parameters, chosen: Sequence[Number]) -> Steady | None:
+        """What is steady in tables of the same numbers at other values, None where they are not as predicted."""
+        before = like.differentiation
+        if like.names != tuple(each.name for each in chosen) or before._structure != self._structure:
+            return None
+        if not like.steady.predicts(self._middle, {each.name: each.value for each in chosen}):
+            return None
+        self.diagonal = np.minimum(self.diagonal, before.diagonal)
+        return like.steady
+
+    def steady(self, values: Mapping[str, float], rates: Sequence[Derivative]) -> Steady:
+        """Which of these derivatives by numbers with these values are steady."""
+
+        def tables(others: Mapping[str, float]) -> Real:
+            assert self._number is not None  # of which there are values
+            return self._at(self._number.scene_with(others))
+
+        return steady(tables, self._middle, values, self._firsts, rates)
 
     def _with(self, number: Number, values: Mapping[str, float]) -> Real:
         """The tables with other values of a number and of others that belong to the same scene.
@@ -291,16 +348,17 @@ class _Differentiation:
         The entries that change with the first other value of a number are kept: tables with such values of numbers that
         change no entry in common follow from them.
         """
-        known = [self._firsts.get(each) for each in values.items()]
-        if all(each is not None for each in known):
+        known = [self._firsts.get(name) for name in values]
+        if all(first is not None and first.value == value for first, value in zip(known, values.values(), strict=True)):
             found = self._middle.copy()
-            for places, entries in (each for each in known if each is not None):
-                found[places] = entries
+            for first in known:
+                assert first is not None  # none is
+                found[first.places] = first.entries
             return found
         found = self._at(number.scene_with(values))
-        if len(values) == 1 and not any(name in values for name, _ in self._firsts):
-            places = np.flatnonzero(found != self._middle)
-            self._firsts[next(iter(values.items()))] = places, found[places]
+        if len(values) == 1 and known[0] is None:
+            (name, value), places = next(iter(values.items())), np.flatnonzero(found != self._middle)
+            self._firsts[name] = First(value, places, found[places])
         return found
 
     def _at(self, scene: Scene) -> Real:

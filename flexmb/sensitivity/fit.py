@@ -28,7 +28,7 @@ from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import SceneError, SceneWarning, closest
 from flexmb.scene.schema import Scene
 from flexmb.sensitivity.channels import refuse_unknown_outputs
-from flexmb.sensitivity.gate import admitted_to, prepared
+from flexmb.sensitivity.gate import Admitted, admitted_to, again, prepared
 from flexmb.sensitivity.measurements import Measurements, measurements
 from flexmb.sensitivity.rows import aligned
 from flexmb.sensitivity.sensitivities import of_run
@@ -132,6 +132,7 @@ class _Problem:
         self.settings = Settings("dop853", **settings).checked(float(self.times[-1]))
         self.runs = 0
         self._last: tuple[bytes, _Run] | None = None
+        self._admitted: Admitted | None = None
 
     def run(self, x: Real) -> _Run:
         """The run with these scaled parameters; what is doubtful in trial values is not said."""
@@ -153,8 +154,9 @@ class _Problem:
         run = self.run(x)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)
-            gated = admitted_to(run.system, self.names)
-            found = of_run(gated, self.settings, run.trajectory, run.course, self.data.channels)
+            last = self._admitted
+            self._admitted = admitted_to(run.system, self.names) if last is None else again(last, run.system)
+            found = of_run(self._admitted, self.settings, run.trajectory, run.course, self.data.channels)
         return found.derivatives[-len(self.data.t) :] * self.scales
 
     def seen(self, trajectory: Trajectory) -> Real:

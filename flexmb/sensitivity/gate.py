@@ -67,6 +67,14 @@ def admitted_to(system: System, names: Sequence[str]) -> Admitted:
     return Admitted(system, found, tables)
 
 
+def again(before: Admitted, system: System) -> Admitted:
+    """The same numbers of a prepared system that differs in their values only: what admits them does not depend on
+    these, and steady derivatives are kept."""
+    found = numbers(system.scene, [each.name for each in before.numbers])
+    acting = [each for each in found if each.name in before.tables.names]
+    return Admitted(system, found, Parameters(system, acting, like=before.tables))
+
+
 def _reaches_change(scene: Scene, number: Number) -> bool:
     """Whether a scene depends on a number after a change of a value, by what it is changed to."""
     for change in all_changes(scene):

@@ -19,14 +19,17 @@ _SCHEDULE = "period_s", "offset_s", "delay_s"
 def refuse_moving_instants(scene: Scene, numbers: Sequence[Number]) -> None:
     """ParameterError for numbers that move the instants of sampled controllers or the ends of pulses."""
     changes = [(), *((each,) for each in all_changes(scene))]
+    own = [(_schedule(now), _pulses(now)) for now in (changed(scene, each) for each in changes)]
+    if not any(schedule or pulses for schedule, pulses in own):
+        return
     for number in numbers:
-        pairs = [(changed(scene, each), changed(number.nearby, each)) for each in changes]
-        if any(_schedule(other) != _schedule(now) for now, other in pairs):
+        others = [changed(number.nearby, each) for each in changes]
+        if any(_schedule(other) != schedule for other, (schedule, _) in zip(others, own, strict=True)):
             raise ParameterError(
                 f'parameter "{number.name}" moves the instants at which a sampled controller acts: derivatives by it '
                 "are not available; compare runs with other values"
             )
-        if any(_pulses(other) != _pulses(now) for now, other in pairs):
+        if any(_pulses(other) != pulses for other, (_, pulses) in zip(others, own, strict=True)):
             raise ParameterError(
                 f'parameter "{number.name}" moves the start or the end of a pulse, at which a load jumps: derivatives '
                 'by it are not available; use a function of kind "smooth_step", or events on time with their levels as '

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flexmb.jit.bundle import broaden
-from flexmb.jit.lanes import LANES
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.parameters.numbers import Number
 from flexmb.parameters.parameters import Parameters
@@ -79,21 +78,15 @@ class Systems:
 
     def _arranged(self, parameters: Parameters, chosen: Sequence[int]) -> KnownTables:
         """The tables of a system by those of the directions that are chosen."""
-        plant, count = parameters.plant, range(-(-len(self._scales) // LANES))
+        plant = parameters.plant
         assert isinstance(plant, System)  # it is the same one with its functions of time kept apart
-        sources = [(each.constants, each.closures) for each in parameters.blocks]
-        tree = [_arranged(plant.constants, [each[0] for each in sources], chosen, self._scales, b) for b in count]
-        closed: list[DualClosureConstants | None] = [None for _ in count]
-        if plant.closures is not None:
-            own = plant.closures.constants[1]
-            of_closures = [_arranged(own, [each[1] for each in sources], chosen, self._scales, b) for b in count]
-            closed = [DualClosureConstants(**each) for each in of_closures]
-        found = [DualTables(DualConstants(**each), other) for each, other in zip(tree, closed, strict=True)]
-        _alike(found)
-        return KnownTables(plant, found)
+        found = parameters.arranged(chosen, self._scales)
+        return KnownTables(plant, [DualTables(each.constants, each.closures) for each in found])
 
     def _blocks(self, known: KnownTables, held: Mapping[str, Real]) -> Blocks:
         """The blocks with derivatives of what is held, which those that are taken over do not have."""
+        if not held:
+            return Blocks(known.system, known.duals, len(self._scales))
         found = []
         for b, each in enumerate(known.duals):
             functions = each.constants.function.copy()
@@ -110,30 +103,6 @@ def _alike(duals: Sequence[DualTables]) -> None:
     closures = [each.closures for each in duals if each.closures is not None]
     if closures:
         broaden(closures)
-
-
-def _arranged(table: Any, sources: Sequence[Any], chosen: Sequence[int], scales: Real, b: int) -> dict[str, Any]:
-    """The arrays of block b in duals: its lanes are those of the directions, found in `sources` in the order in which
-    they were chosen, times their scales."""
-    first = sources[0] if sources else table
-    found = {}
-    for each in fields(table):
-        own = getattr(table, each.name)
-        wide = as_duals(own)
-        for part, name in _floats(wide, own):
-            for place, k in enumerate(chosen):
-                if k // LANES == b:
-                    source = getattr(sources[place // LANES], each.name)
-                    lanes = source if name is None else source[name]
-                    part[..., 1 + k % LANES] = scales[k] * lanes[..., 1 + place % LANES]
-        if sources and each.name == "moves":
-            for source in sources:
-                wide[..., 0] = np.maximum(wide[..., 0], source.moves[..., 0])
-        if sources and each.name == "body":
-            for name in _DIAGONAL:
-                wide[name] = first.body[name]
-        found[each.name] = wide
-    return found
 
 
 def _floats(wide: Any, own: Any) -> list[tuple[Any, str | None]]:
