@@ -133,8 +133,11 @@ def settle_at(t, y, s):
 
 @kernel
 def shift(a, b, second, s):
-    """Factorise E for a (s) and b (s^2), as the first or the second matrix; returns a status code."""
-    return _factorise(a, b, s, s.second) if second else _factorise(a, b, s, s.first)
+    """Factorise E for a (s) and b (s^2), as the first or the second matrix; returns a status code.
+
+    The matrix is chosen before the call: calls in two branches would have the whole factorisation in the kernel twice.
+    """
+    return _factorise(a, b, s, s.second if second else s.first)
 
 
 @helper
@@ -169,10 +172,7 @@ def along(u, q, s):
 @kernel
 def restore(q, u, second, s):
     """Replace u (nu,) by E^-1 (K q + D u), for changes q (nq,) of coordinates and u of speeds, complex."""
-    if second:
-        _restore(q, u, s, s.second)
-    else:
-        _restore(q, u, s, s.first)
+    _restore(q, u, s, s.second if second else s.first)
 
 
 @helper

@@ -29,7 +29,7 @@ from flexmb.integrate.control import (
 from flexmb.integrate.dense_output import store_samples
 from flexmb.integrate.leap import leap_over, may_leap
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
-from flexmb.integrate.watch import keep_sides, pause
+from flexmb.integrate.watch import keep_sides, pause, watches
 from flexmb.jit.kernel import handed_in, helper
 from flexmb.tables.status import OK, STEP_TOO_SMALL
 
@@ -90,8 +90,7 @@ def adaptive(method, problem, arrays, clock, out, run, memory, watch):
             if not kept and (status != OK or (is_last and t_new == end)):
                 keep(memory, t, y, known, counts)
                 keep_more(memory, s)
-                if watch is not None:
-                    keep_sides(watch)
+                keep_sides(watch)
                 kept = True
             if status != OK:
                 return status, t
@@ -100,7 +99,7 @@ def adaptive(method, problem, arrays, clock, out, run, memory, watch):
             trouble = reason(status)
             if may_leap(status):
                 limit = farthest if is_last and farthest > end else last
-                passed, t_at, length = leap_over(problem, watch, t, limit, ends, samples, run)
+                passed, t_at, length = leap_over(problem.leap, problem.constants, watch, t, limit, ends, samples, run)
                 if passed != OK:
                     return passed, t_at
                 if length > 0.0:
@@ -108,7 +107,7 @@ def adaptive(method, problem, arrays, clock, out, run, memory, watch):
                     after_leap(length, t == end, known, exponent)
                     continue
             if status == OK and verdict[0] < 1.0:
-                if watch is not None:
+                if watches(watch):
                     status, t_at = pause(problem, watch, step, ends, state_at, s, samples, run)
                     if status != OK:
                         return status, t_at

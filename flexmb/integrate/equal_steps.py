@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from flexmb.integrate.control import ACCEPTED, SAMPLES, Interval, copy, permitted, stretch
 from flexmb.integrate.leap import may_leap
 from flexmb.integrate.memory import DONE, STRETCH, begin, keep_place
-from flexmb.integrate.watch import pause
+from flexmb.integrate.watch import pause, watches
 from flexmb.jit.kernel import helper
 from flexmb.tables.status import OK
 
@@ -74,7 +74,7 @@ def equal_steps(method, problem, arrays, clock, out, run, memory, watch):
                         break
                 if status != OK:
                     return status, t
-                if watch is not None:
+                if watches(watch):
                     status, t_at = pause(problem, watch, step, ends, state_at, looking, samples, run)
                     if status != OK:
                         return status, t_at

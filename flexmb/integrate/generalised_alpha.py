@@ -265,23 +265,22 @@ def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
     An iterate beyond the range of a flexible body does not mean that the motion leaves it, unless nothing converges.
     Returns (status, step size of the factors, 0 if they are to be renewed).
     """
-    status, iterations = NOT_CONVERGED, 0
-    if h_factored > 0.0 and abs(h - h_factored) > _SAME * h:
-        h_factored = h if factorise(problem, s, h, accuracy, counts) else 0.0
-    if h_factored > 0.0:
-        status, iterations = newton(problem, min(step.end, step.last), y, h, s, accuracy, counts)
-    if status != NOT_CONVERGED and status != OUT_OF_RANGE:
-        return status, h_factored if iterations < _WORN else 0.0
-    for _ in range(2):  # without the Jacobian where it may be missed, then with it
-        status = _linearise(problem, step.start, y, s, accuracy, counts)
-        if status != OK:
-            return status, 0.0
-        status = NOT_CONVERGED
-        if factorise(problem, s, h, accuracy, counts):
-            status, _ = newton(problem, min(step.end, step.last), y, h, s, accuracy, counts)
-        if (status != NOT_CONVERGED and status != OUT_OF_RANGE) or not give_up(s.stiff):
+    for trial in range(3):  # with the old factors, without the Jacobian where it may be missed, then with it
+        if trial > 0:
+            status = _linearise(problem, step.start, y, s, accuracy, counts)
+            if status != OK:
+                return status, 0.0
+        if trial > 0 or (h_factored > 0.0 and abs(h - h_factored) > _SAME * h):
+            h_factored = h if factorise(problem, s, h, accuracy, counts) else 0.0
+        status, iterations = NOT_CONVERGED, 0
+        if h_factored > 0.0:
+            status, iterations = newton(problem, min(step.end, step.last), y, h, s, accuracy, counts)
+        if status != NOT_CONVERGED and status != OUT_OF_RANGE:
+            sound = iterations < _WORN if trial == 0 else status == OK
+            return status, h_factored if sound else 0.0
+        if trial > 0 and not give_up(s.stiff):
             break
-    return status, h if status == OK else 0.0
+    return status, 0.0
 
 
 @helper

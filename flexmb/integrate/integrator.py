@@ -21,9 +21,8 @@ class Integrator:
     integrates a `Problem`, or a `StiffProblem` if it `linearises`, from clock.times[0], or from the time at which
     `memory` resumes a run, to clock.times[-1]. y (n,): the state at the start, on return the last good one. out (T,n):
     y at every time of the clock. counts (COUNTS,): as named in `control`; entries that a method does not use stay 0.
-    memory: a `Memory`, from which, on return, the run can be resumed unless it failed. watch: None, or a `Watch`; the
-    run pauses when it reaches the first of its levels and returns `CROSSED`. With None, the compiled method contains no
-    search for levels.
+    memory: a `Memory`, from which, on return, the run can be resumed unless it failed. watch: a `Watch`, or that of
+    `nothing_watched`; the run pauses when it reaches the first of its levels and returns `CROSSED`.
     """
 
     name: Method

@@ -6,13 +6,21 @@ The methods then approach it by smaller steps until the problem itself can leap 
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, Interval, copy
 from flexmb.integrate.dense_output import store_samples
-from flexmb.integrate.watch import CROSSED, pause
-from flexmb.jit.kernel import handed_on, helper
+from flexmb.integrate.watch import CROSSED, pause, watches
+from flexmb.jit.kernel import handed_on, helper, kernel
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR, OK
 
 EVALUATED = 8  # approximate number of evaluations of the equations of motion in a leap
+
+
+class Crossing(NamedTuple):
+    """What of a problem the search for levels within a leap needs."""
+
+    constants: Any
 
 
 @helper
@@ -39,9 +47,11 @@ def in_leap(problem, step, ends, s, t, result, run):
     return OK
 
 
-@helper
-def leap_over(problem, watch, t, farthest, ends, samples, run):
+@kernel
+def leap_over(leap, constants, watch, t, farthest, ends, samples, run):
     """Leap from the last good state, ends.y at t (s), over a singular position, not beyond `farthest` (s).
+
+    A kernel of its own, which all integrators share; `leap` and `constants` are those of the problem.
 
     Stores the samples in between and puts the state after the leap, and its slope, into ends.y and ends.dy. Returns
     (OK, time reached, length of the leap), with length 0 if no leap is possible yet; (CROSSED, time, .) if the leap
@@ -50,10 +60,11 @@ def leap_over(problem, watch, t, farthest, ends, samples, run):
     """
     _, counts = run
     counts[EVALUATIONS] += EVALUATED
-    length = problem.leap(farthest, ends.y, ends.dy, ends.y_new, ends.dy_new, problem.constants)
+    problem = Crossing(constants)
+    length = leap(farthest, ends.y, ends.dy, ends.y_new, ends.dy_new, constants)
     if length > 0.0:
         step = Interval(t, t + length, farthest)
-        if watch is not None:
+        if watches(watch):
             copy(ends.y, watch.before)
             status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
             if status == CROSSED:

@@ -147,7 +147,7 @@ def taylor(Z, tau, powers, P, E):
     multiply(Z, P[0], E)
 
 
-@helper
+@sweep
 def prepare(flow, A, h):
     """Compute everything that depends on Z = h A only; returns whether Z is finite and LEVELS suffice for its norm."""
     n = A.shape[0]
@@ -224,7 +224,7 @@ def advance(E, x, X, m, t, result):
         factor *= t / (l - m + 1)
 
 
-@helper
+@sweep
 def at_quarters(flow, X, x):
     """x (4,n): the solution from zero at 1/4, 1/2, 3/4 and 1."""
     for i in range(x.shape[1]):

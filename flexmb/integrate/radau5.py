@@ -27,7 +27,7 @@ from flexmb.integrate.radau5_tableau import REAL, E
 from flexmb.integrate.settling import settle
 from flexmb.integrate.stiff_place import begin_without_jacobian, give_up, keep_place, recall_place, suffices
 from flexmb.integrate.watch import Ends
-from flexmb.jit.kernel import handed_in, handed_on, helper, kernel
+from flexmb.jit.kernel import handed_in, handed_on, helper, kernel, sweep
 from flexmb.tables.status import NOT_CONVERGED, OK
 
 _GROW = 8.0  # strongest growth of a step
@@ -52,7 +52,7 @@ def estimate(problem, y, slope, h, s, accuracy):
     return scaled_norm(s.error, s.trial, accuracy)
 
 
-@helper
+@sweep
 def filtered(problem, y, h, s, accuracy):
     """Scaled norm of (1 - h J / REAL)^-1 times the last estimate.
 
@@ -93,6 +93,23 @@ def transient(problem, y, h, s, error, accuracy):
     return small and filtered(problem, y, h, s, accuracy) < _FILTERED * error
 
 
+@sweep
+def confirmed(problem, step, y, s, tried, error, accuracy, counts):
+    """(Status code, error) of a step that this error would reject: see `try_step`. Few steps come here, so that its
+    solutions of equations are not part of the loop over steps."""
+    h = step.end - step.start
+    for i in range(y.shape[0]):
+        s.trial[i] = y[i] + s.error[i]
+    status = derivative(problem, step.start, s.trial, s.f_new, counts)
+    if status == OK:
+        error = estimate(problem, y, s.f_new, h, s, accuracy)
+    if status == OK and error >= 1.0:
+        error = filtered(problem, y, h, s, accuracy)
+    if status == OK and error >= max(1.0, tried) and transient(problem, y, h, s, error, accuracy):
+        error = _DIED_OUT
+    return status, error
+
+
 @helper
 def try_step(problem, step, ends, s, tried, accuracy, counts):
     """A step from a guess in Z: ends.y_new, projected, and its slope; a status code, and the verdict of `attempt`.
@@ -109,15 +126,7 @@ def try_step(problem, step, ends, s, tried, accuracy, counts):
         s.y_new[i] = y[i] + s.Z[2, i]
     error = estimate(problem, y, s.f, h, s, accuracy)
     if error >= 1.0 and tried > 0.0:
-        for i in range(y.shape[0]):
-            s.trial[i] = y[i] + s.error[i]
-        status = derivative(problem, step.start, s.trial, s.f_new, counts)
-        if status == OK:
-            error = estimate(problem, y, s.f_new, h, s, accuracy)
-        if status == OK and error >= 1.0:
-            error = filtered(problem, y, h, s, accuracy)
-        if status == OK and error >= max(1.0, tried) and transient(problem, y, h, s, error, accuracy):
-            error = _DIED_OUT
+        status, error = confirmed(problem, step, y, s, tried, error, accuracy, counts)
     if status == OK and error < 1.0:
         settle(problem, step.end, REAL / h, s.y_new, s, accuracy)
         status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)

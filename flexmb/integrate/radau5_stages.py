@@ -15,7 +15,7 @@ from flexmb.integrate.control import FACTORISATIONS, derivative, linearisation, 
 from flexmb.integrate.newton_matrix import NewtonMatrix
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, P
 from flexmb.integrate.stiff_place import StiffPlace, answer, settle_at, shift, stiff_place, suffices
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
 ITERATIONS = 7  # of Newton's method, at most
@@ -53,7 +53,7 @@ def renew(problem, t, y, s, counts):
     return linearisation(problem, t, y, s.J, counts)
 
 
-@helper
+@sweep
 def factorise(problem, s, h, counts):
     """Factors of REAL/h - J and COMPLEX/h - J, or of the stiff parts; returns whether both are regular."""
     counts[FACTORISATIONS] += 1

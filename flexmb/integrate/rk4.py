@@ -20,7 +20,7 @@ from flexmb.integrate.control import (
 from flexmb.integrate.equal_steps import FixedMethod, equal_steps
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.leap import leap_over, may_leap
-from flexmb.integrate.watch import Ends, pause
+from flexmb.integrate.watch import Ends, pause, watches
 from flexmb.jit.kernel import handed_in, handed_on, helper, kernel, written_out
 from flexmb.tables.status import NONFINITE, OK
 
@@ -93,7 +93,7 @@ def detour(problem, watch, trouble, step, ends, k, samples, run):
         if status != OK:
             return status, t
         if failed:
-            status, t_at, length = leap_over(problem, watch, t, last, ends, samples, run)
+            status, t_at, length = leap_over(problem.leap, problem.constants, watch, t, last, ends, samples, run)
             if status != OK:
                 return status, t_at
             if length > 0.0:
@@ -113,7 +113,7 @@ def detour(problem, watch, trouble, step, ends, k, samples, run):
             trouble, h = status, RETREAT * h
             counts[REJECTED] += 1
             continue
-        if watch is not None:
+        if watches(watch):
             status, t_at = pause(problem, watch, Interval(t, t_new, last), ends, inside, k, samples, run)
             if status != OK:
                 return status, t_at

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,7 +91,7 @@ class Ends(NamedTuple):
 
 
 class Within(NamedTuple):
-    """A step from `start` to `end` (s) to look into, by its `state_at`, which is handed `s`.
+    """A step from `start` to `end` (s) to look into, by its `state_at`, which is handed `problem` and `s`.
 
     trial (n,): the state where it was looked into last; run: accuracy and counts.
     """
@@ -103,6 +104,12 @@ class Within(NamedTuple):
     s: Any
     trial: np.ndarray
     run: tuple[Accuracy, np.ndarray]
+
+
+@helper
+def watches(watch):
+    """Whether there is anything to watch."""
+    return watch.entry.shape[0] > 0
 
 
 @helper
@@ -143,11 +150,11 @@ def keep_sides(watch):
 
 
 @helper
-def _look(problem, watch, t, y):
+def _look(constants, watch, t, y):
     """watch.value of all at t and y (n,); a status code."""
     status = OK
     if watch.signal.shape[0] > 0:
-        status = status_at(watch.look[0], (t, y, watch.signal, problem.constants))
+        status = status_at(watch.look[0], (t, y, watch.signal, constants))
     for i in range(watch.entry.shape[0]):
         entry = watch.entry[i]
         watch.value[i] = (y[entry] if entry >= 0 else watch.signal[-1 - entry]) - watch.level[i]
@@ -155,32 +162,35 @@ def _look(problem, watch, t, y):
 
 
 @helper
-def _rates(problem, watch, t, y, dy, ahead, trial):
+def _rates(constants, watch, t, y, dy, ahead, trial):
     """watch.rate at t and y (n,), whose slope is dy; of signals by a difference over `ahead` (s). A status code."""
     status = OK
     if watch.signal.shape[0] > 0:
         for j in range(y.shape[0]):
             trial[j] = y[j] + ahead * dy[j]
-        status = _look(problem, watch, t + ahead, trial)
+        status = _look(constants, watch, t + ahead, trial)
         copy(watch.value, watch.rate)
         if status == OK:
-            status = _look(problem, watch, t, y)
+            status = _look(constants, watch, t, y)
         for i in range(watch.entry.shape[0]):
             watch.rate[i] = (watch.rate[i] - watch.value[i]) / ahead
     else:
-        status = _look(problem, watch, t, y)
+        status = _look(constants, watch, t, y)
     for i in range(watch.entry.shape[0]):
         if watch.entry[i] >= 0:
             watch.rate[i] = dy[watch.entry[i]]
     return status
 
 
-@sweep
-def meets(problem, watch, step, ends):
-    """Whether a step may reach a level: (status, whether). If it does not, sides are updated to those at its end."""
+@kernel
+def meets(constants, watch, step, ends):
+    """Whether a step may reach a level: (status, whether). If it does not, sides are updated to those at its end.
+
+    `constants` are those of the problem. A kernel of its own, which all integrators share.
+    """
     h, count, trial = step.end - step.start, watch.entry.shape[0], np.empty(ends.y.shape[0])
     before, begun = np.empty(count), np.empty(count)
-    status = _rates(problem, watch, step.start, ends.y, ends.dy, _NEAR * h, trial)
+    status = _rates(constants, watch, step.start, ends.y, ends.dy, _NEAR * h, trial)
     copy(watch.rate, before)
     copy(watch.value, begun)
     for i in range(count):
@@ -188,7 +198,7 @@ def meets(problem, watch, step, ends):
             side = _first_side(watch.value[i], before[i] * h, watch.still[i])
             watch.side[i] = 0 if watch.came[i] != 0 else side
     if status == OK:
-        status = _rates(problem, watch, min(step.end, step.last), ends.y_new, ends.dy_new, -_NEAR * h, trial)
+        status = _rates(constants, watch, min(step.end, step.last), ends.y_new, ends.dy_new, -_NEAR * h, trial)
     if status != OK:
         return status, False
     some = False
@@ -278,7 +288,7 @@ def pause(problem, watch, step, ends, state_at, s, samples, run):
     If it reaches none: OK, and its end if it was searched, else its start. samples: times of samples, and samples; run:
     accuracy and counts.
     """
-    status, some = meets(problem, watch, step, ends)
+    status, some = meets(problem.constants, watch, step, ends)
     if status != OK or not some:
         return status, step.start
     within = Within(problem, watch, step, ends, state_at, s, np.empty(ends.y.shape[0]), run)
@@ -297,7 +307,7 @@ def _value_at(within, i, t):
     else:
         status = state_at(problem, step, ends, s, t, trial, run)
     if status == OK:
-        status = _look(problem, watch, min(t, step.last), trial)
+        status = _look(problem.constants, watch, min(t, step.last), trial)
     return status, watch.value[i]
 
 
@@ -404,6 +414,15 @@ def watch(
         np.full(2, math.nan), np.zeros(size), np.zeros(1, np.int64), np.zeros(count, np.int64),
         np.zeros(count, np.int64), _address(_no_signals, AnyBundle._numba_type_),
     )  # fmt: skip
+
+
+@cache
+def nothing_watched() -> Watch:
+    """Of a run that watches nothing, of any size: its arrays are empty, and nobody reads what is written to the rest.
+
+    So integrators are compiled once, for runs with events and without.
+    """
+    return watch([], [], [], [], [], [], 0)
 
 
 def _address(look: Any, constants: Any) -> Index:

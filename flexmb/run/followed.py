@@ -18,6 +18,7 @@ import numpy as np
 from flexmb.control.schedule import slack
 from flexmb.integrate.control import COUNTS, STOP
 from flexmb.integrate.settings import Settings
+from flexmb.integrate.watch import nothing_watched
 from flexmb.jit.direct import undispatched
 from flexmb.run.envelope import PartialEnvelope
 from flexmb.run.interruption import interruptible
@@ -95,7 +96,8 @@ class FollowedRun:
             accuracy = self._settings.accuracy(system.nq, system.nu)
             y, clock, accuracy = solve.begin(begin._replace(y=begin.y.copy()), clock, accuracy, counts)
             posed, record = solve.recorded(room)
-            given = y, clock, accuracy, np.empty((len(times), len(y))), counts, method.memory(len(y)), None
+            out = np.empty((len(times), len(y)))
+            given = y, clock, accuracy, out, counts, method.memory(len(y)), nothing_watched()
             run = undispatched(method.run, posed, *given)
             (status, t), interrupted = interruptible(
                 lambda *given, run=run, posed=posed: run(posed, *given), given, counts[STOP : STOP + 1]

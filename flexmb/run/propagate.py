@@ -17,7 +17,7 @@ from flexmb.integrate.memory import Memory, memory
 from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, problem, stiff_problem
 from flexmb.integrate.recorded import RecordedSteps, recorded
 from flexmb.integrate.settings import Settings
-from flexmb.integrate.watch import CROSSED, Watch
+from flexmb.integrate.watch import CROSSED, Watch, nothing_watched
 from flexmb.jit.direct import undispatched
 from flexmb.motion import coordinates
 from flexmb.run.interruption import interruptible
@@ -95,7 +95,7 @@ class Integration:
         if self._batched and self.feedback is None:
             moving = route.rhs, constants, self._workspace
             self.batch = batch(system, moving, algorithm.observing, system.nq + system.nu + 1)
-        self._enter: dict[bool, Any] = {}  # compiled integrators, by whether levels are watched
+        self._enter: Any = None  # the compiled integrator
         self._at_first = [(array, array.copy()) for array in route.remembered(constants)]
 
     @property
@@ -107,7 +107,7 @@ class Integration:
     def __call__(self, *given: Any) -> tuple[int, float]:
         """Integrate: (y, clock, accuracy, out, counts, memory, watch) of `Integrator`, all arrays in C order."""
         self.compile(*given)
-        return self._enter[given[-1] is not None](self._problem, *given)
+        return self._enter(self._problem, *given)  # type: ignore[no-any-return]
 
     def forget(self) -> None:
         """Restore the initial state: closed chains store the branch that they are on."""
@@ -116,9 +116,8 @@ class Integration:
 
     def compile(self, *given: Any) -> None:
         """Compile for a call with these arguments, unless that has been done."""
-        watched = given[-1] is not None
-        if watched not in self._enter:
-            self._enter[watched] = undispatched(self._integrator.run, self._problem, *given)
+        if self._enter is None:
+            self._enter = undispatched(self._integrator.run, self._problem, *given)
 
     def begin(self, begin: Beginning, clock: Clock, accuracy: Accuracy, counts: Index) -> tuple[Real, Clock, Accuracy]:
         """State, clock and accuracy of a run; for a scene with controllers, those of the closed loop."""
@@ -216,7 +215,7 @@ def integrate(
     if watch is not None and np.any(watch.entry < 0):
         assert solve.feedback is not None  # events watch signals
         watch = solve.feedback.watching(watch)
-    given = y, clock, accuracy, out, counts, memory, watch
+    given = y, clock, accuracy, out, counts, memory, nothing_watched() if watch is None else watch
     start = perf_counter()
     solve.compile(*given)
     begun = perf_counter()

@@ -9,6 +9,7 @@ import numpy as np
 from flexmb.integrate.control import ACCEPTED, COUNTS, REJECTED, SAMPLES, STOP
 from flexmb.integrate.problem import Accuracy, Clock, problem
 from flexmb.integrate.settings import Settings
+from flexmb.integrate.watch import nothing_watched
 from flexmb.jit.direct import undispatched
 from flexmb.jit.lanes import LANES
 from flexmb.run.driver import Leg
@@ -111,7 +112,7 @@ class Variation:
         accuracy: Accuracy = plain._replace(controlled=(self._width - 1) * (1 + P), max_steps=most)
         posed = problem(flow.rhs, flow.project, self.flow, self.flow)
         method, counts, out = settings.integrator, np.zeros(COUNTS, np.int64), np.empty((len(times), len(z)))
-        given = z, clock._replace(times=times), accuracy, out, counts, method.memory(len(z)), None
+        given = z, clock._replace(times=times), accuracy, out, counts, method.memory(len(z)), nothing_watched()
         run = undispatched(method.run, posed, *given)
         (status, t), interrupted = interruptible(lambda *given: run(posed, *given), given, counts[STOP : STOP + 1])
         if interrupted:

@@ -13,6 +13,7 @@ import numpy as np
 from flexmb.integrate.control import COUNTS
 from flexmb.integrate.memory import memory
 from flexmb.integrate.problem import Accuracy, Clock, Linear, stiff_problem
+from flexmb.integrate.watch import nothing_watched
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import kernel
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
@@ -164,7 +165,8 @@ def solve(integrator, problem, y, times, rtol, atol, controlled, *, ends=None, m
     ends = np.array([times[-1]] if ends is None else ends, float)
     out, counts = np.full((len(times), len(y)), np.nan), np.zeros(COUNTS, np.int64)
     accuracy = Accuracy(rtol, atol, controlled, max_steps, **more)
-    status, t = integrator(equations, y, Clock(times, ends), accuracy, out, counts, memory(len(y), len(y) + 3), None)
+    given = equations, y, Clock(times, ends), accuracy, out, counts, memory(len(y), len(y) + 3), nothing_watched()
+    status, t = integrator(*given)
     evaluations, accepted, rejected, samples, _, jacobians, factorisations = map(int, counts)
     return Result(
         status, t, y, out[:samples], evaluations, accepted, rejected, jacobians, factorisations, int(workspace.fault[0])
