@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.conformance.clause import Chapter, NotOffered, allowance, ladder, offered, require, within
-from crosscheck.conformance.tree_derivatives import KnownDerivatives, derivatives
+from crosscheck.conformance.tree_answers import KnownDerivatives, derivatives
 from crosscheck.conformance.tree_scenes import AXES, bending, branched, chain, driven, loaded, placed, sprung
 from crosscheck.engines.contract import Engine, LinearPart, Run, Trajectory
 from crosscheck.engines.linear.coordinates import coordinate_names

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.conformance.clause import Chapter, acceleration, equal, finest_two, given, hold_at_samples, snapshot
-from crosscheck.conformance.tree_mechanics import Answer, TreeMechanics
+from crosscheck.conformance.tree_answers import Answer, initial, moving
 from crosscheck.conformance.tree_scenes import (
     AXES,
     bending,
@@ -27,7 +27,6 @@ from crosscheck.conformance.tree_scenes import (
     working,
 )
 from crosscheck.engines.contract import Engine, Snapshot, Trajectory
-from crosscheck.engines.conventions import quaternion_of
 from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -153,7 +152,7 @@ def a_wheel_rides_on_an_inner_body(engine: Engine) -> None:
         equal("the momentum", found.momentum, right.momentum)
     _accelerations(found, right)
     load = given("the load of a wheel", found.wheel_loads.get("wheel"))
-    _equal("the load of the wheel", load, right.wheel_loads["wheel"])
+    _equal("the load of the wheel", load, right.loads["wheel"])
     _loads(found, right)
 
 
@@ -184,7 +183,7 @@ def a_tree_swings(engine: Engine) -> None:
         where = f"of marker {name}"
         place = np.array([each.markers[name].position for each in _swing()])
         hold_at_samples(f"the position (m) {where}", (each.position for each in paths), place, TIMES)
-        turned = np.array([quaternion_of(each.markers[name].rotation) for each in _swing()])
+        turned = np.array([each.markers[name].quaternion for each in _swing()])
         sided = [each.quaternion * np.sign(np.sum(each.quaternion * turned, axis=1))[:, None] for each in paths]
         hold_at_samples(f"the quaternion {where}", sided, turned, TIMES)
         velocity = np.array([each.markers[name].velocity for each in _swing()])
@@ -257,13 +256,13 @@ def a_tree_with_a_flexible_body_swings(engine: Engine) -> None:
 
 
 def _both(engine: Engine, scene: Scene) -> tuple[Snapshot, Answer]:
-    return snapshot(engine, scene), TreeMechanics(scene).initial()
+    return snapshot(engine, scene), initial(scene)
 
 
 def _places(found: Snapshot, right: Answer) -> None:
     for name, marker in found.markers.items():
         _equal(f"the position of marker {name}", marker.position, right.markers[name].position)
-        turned = quaternion_of(right.markers[name].rotation)
+        turned = right.markers[name].quaternion
         side = 1.0 if float(np.dot(marker.quaternion, turned)) >= 0.0 else -1.0
         equal(f"the quaternion of marker {name}", side * np.asarray(marker.quaternion), turned)
 
@@ -307,19 +306,19 @@ def _sliding() -> Scene:
 
 @cache
 def _swing() -> list[Answer]:
-    return TreeMechanics(branched().scene()).at(TIMES)
+    return moving(branched().scene(), TIMES)
 
 
 @cache
 def _sprung() -> list[Answer]:
-    return TreeMechanics(sprung().scene()).at(TIMES)
+    return moving(sprung().scene(), TIMES)
 
 
 @cache
 def _working() -> list[Answer]:
-    return TreeMechanics(working()).at(TIMES)
+    return moving(working(), TIMES)
 
 
 @cache
 def _vibrating() -> list[Answer]:
-    return TreeMechanics(bending().scene()).at(TIMES)
+    return moving(bending().scene(), TIMES)

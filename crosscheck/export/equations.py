@@ -6,19 +6,16 @@ for flexible bodies their modes and inertia points, and nothing of the dynamics 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from crosscheck.export.model import modal_file, model_data
+from crosscheck.export.model import model_data
 from crosscheck.export.rebuild import RebuiltCase
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.find import load_case
 from crosscheck.running.plan import variant_scene
-from flexmb.output.whole import write_whole
 from flexmb.typing import Real
 
 
@@ -31,14 +28,7 @@ def rebuilt(file: str, rtol: float) -> Callable[[Real], dict[str, Real]]:
         if case.run.reference is None:
             raise CaseError(f"{folder / 'run.toml'}: it has no table [reference]")
         variant = case.run.variant(case.run.reference.variant)
-        data, modal = model_data(variant_scene(case.scene(variant), variant))
-        with TemporaryDirectory() as place:
-            texts = {"model.json": data} | {modal_file(body): each for body, each in modal.items()}
-            for name, content in texts.items():
-                target = Path(place) / name
-                target.parent.mkdir(exist_ok=True)
-                write_whole(target, json.dumps(content))
-            model = RebuiltCase(place)
+        model = RebuiltCase(*model_data(variant_scene(case.scene(variant), variant)))
         channels = model.channels(times, model.integrate(times, rtol))
         return {name: np.asarray(values) for name, values in channels.items()}
 

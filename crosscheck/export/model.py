@@ -37,13 +37,20 @@ def model_data(scene: Scene) -> tuple[Data, dict[str, Data]]:
     CaseError for a body that a SID file describes, and for one of level "linear" or "ruthless", whose truncated mass
     matrix these numbers do not say.
     """
-    modal = {
-        body.name: modal_data(flexible_model(body), body.level)
-        for body in scene.bodies
-        if isinstance(body, BeamBody | ModalBody) and _deforms(body)
-    }
+    modal = {body.name: modal_data(flexible_model(body), body.level) for body in flexible_bodies(scene)}
+    return tree_data(scene), modal
+
+
+def flexible_bodies(scene: Scene) -> list[BeamBody | ModalBody]:
+    """The bodies with modes. CaseError as for `model_data`."""
+    return [body for body in scene.bodies if isinstance(body, BeamBody | ModalBody) and _deforms(body)]
+
+
+def tree_data(scene: Scene) -> Data:
+    """The content of `model.json`. CaseError as for `model_data`."""
+    flexible = {body.name for body in flexible_bodies(scene)}
     branches = ordered(scene)
-    bodies = [_body(branch.body, modal) for branch in branches]
+    bodies = [_body(branch.body, flexible) for branch in branches]
     joints = [_hinge(branch.hinge) for branch in branches]
     for wheel in scene.wheels:
         bodies.append(_wheel_body(wheel))
@@ -65,7 +72,7 @@ def model_data(scene: Scene) -> tuple[Data, dict[str, Data]]:
         "loads": _plain(scene.loads),
         "markers": _plain(scene.markers),
     }
-    return data | {part: _plain(getattr(scene, part)) for part in AS_IN_THE_SCENE}, modal
+    return data | {part: _plain(getattr(scene, part)) for part in AS_IN_THE_SCENE}
 
 
 def _deforms(body: BeamBody | ModalBody) -> bool:
@@ -79,19 +86,14 @@ def _deforms(body: BeamBody | ModalBody) -> bool:
         case "linear" | "ruthless":
             what = f'body "{body.name}" is of level "{body.level}"'
             raise CaseError(f'{what}, whose truncated mass matrix an export cannot say: take level "full"')
-        case "exact":
-            raise CaseError(
-                f'body "{body.name}" is of level "exact", whose motion is no sum of mode shapes: take pieces of level '
-                '"stiffened"'
-            )
         case _:
             assert_never(body.level)
 
 
-def _body(body: Body, modal: dict[str, Data]) -> Data:
+def _body(body: Body, flexible: set[str]) -> Data:
     if isinstance(body, SidBody):
         raise CaseError(f'body "{body.name}" is described by a SID file: convert it by `flexmb import`')
-    if body.name in modal:
+    if body.name in flexible:
         return {"name": body.name, "kind": "modal", "file": modal_file(body.name)}
     if isinstance(body, BeamBody) and body.level == "exact":
         return {"name": body.name, "kind": "beam"}

@@ -13,4 +13,5 @@ so they share nothing with a recursion. All vectors are in World axes unless sai
 """
 
 from .case import RebuiltCase as RebuiltCase
+from .case import read_case as read_case
 from .comparison import compare as compare

@@ -11,31 +11,28 @@ from .functions import breaks_of, function_of
 from .rotations import cross, matrix_of, quaternion_of, quaternion_rate, rotation_vector, skew, turn, turned_by
 
 
-class RebuiltCase:
-    """The equations of motion of one exported case. The state y is [q, u]; a quaternion has four of q, three of u."""
+def read_case(folder):
+    """The equations of motion of the exported case in a folder."""
+    folder = Path(folder)
+    data = json.loads((folder / "model.json").read_text(encoding="utf-8"))
+    files = {body["name"]: body["file"] for body in data["bodies"] if body["kind"] == "modal"}
+    modal = {name: json.loads((folder / file).read_text(encoding="utf-8")) for name, file in files.items()}
+    return RebuiltCase(data, modal)
 
-    def __init__(self, folder):
-        self.folder = Path(folder)
-        data = json.loads((self.folder / "model.json").read_text(encoding="utf-8"))
+
+class RebuiltCase:
+    """The equations of motion of one exported case. The state y is [q, u]; a quaternion has four of q, three of u.
+
+    `data` is the content of `model.json`, `modal` that of `modal/<body>.json` by the name of each flexible body.
+    """
+
+    def __init__(self, data, modal):
         for part in ("beams", "closures", "connectors", "controllers", "events"):
             if data[part]:
-                raise SystemExit(f"{self.folder}: it has {part}, which this program does not rebuild")
+                raise SystemExit(f"{data['name']}: it has {part}, which this program does not rebuild")
         self.data, self.gravity = data, np.array(data["gravity_m_s2"])
         self.bodies = {body["name"]: body for body in data["bodies"]}
-        self.modal = {}
-        for name, body in self.bodies.items():
-            if body["kind"] == "modal":
-                modal = json.loads((self.folder / body["file"]).read_text(encoding="utf-8"))
-                modal["points"] = {key: np.array(values) for key, values in modal["points"].items()}
-                for node in modal["nodes"].values():
-                    node.update({key: np.array(values) for key, values in node.items()})
-                p = modal["points"]
-                modal["turning"] = bool(np.any(p["inertia_kg_m2"]) or np.any(p["mass_centre_offset_m"]))
-                modal["integrals"] = {key: np.array(values) for key, values in modal["integrals"].items()}
-                first_order = "second_translation" not in p
-                modal["summed"] = bool(modal["integrals"]) and first_order and not modal["turning"]
-                modal["stiffness"], modal["damping"] = np.array(modal["stiffness"]), np.array(modal["damping"])
-                self.modal[name] = modal
+        self.modal = {name: _flexible(body) for name, body in modal.items()}
         self.joints = self._ordered(data["joints"])
         self._number()
         self.loads = [(load, function_of(load["function"])) for load in data["loads"]]
@@ -52,7 +49,7 @@ class RebuiltCase:
 
     def _number(self):
         """Places of coordinates in q and of speeds in u, and the state at the start."""
-        q, u, self.slots, self.eta = [], [], {}, {}
+        q, u, self.slots, self.eta, self.efforts, self.prescribed = [], [], {}, {}, {}, {}
         for joint in self.joints:
             for n, freedom in enumerate(joint["freedoms"]):
                 self.slots[joint["name"], n] = len(q), len(u)
@@ -63,7 +60,9 @@ class RebuiltCase:
                     q += freedom["position_m"] + freedom["quaternion"]
                     u += freedom["angular_velocity_rad_s"] + freedom["velocity_m_s"]
                 else:
-                    freedom["f"], freedom["p"] = function_of(freedom["effort"]), function_of(freedom["prescribed"])
+                    self.efforts[len(u)] = function_of(freedom["effort"])
+                    if freedom["prescribed"] is not None:
+                        self.prescribed[len(u)] = function_of(freedom["prescribed"])
                     q.append(freedom["value"])
                     u.append(freedom["rate"])
             name = joint["child"]
@@ -84,9 +83,9 @@ class RebuiltCase:
     def driven(self, t, y):
         """The state with prescribed coordinates put in, and their accelerations by place in u."""
         y, given = y.copy(), {}
-        for freedom, i, j in self._scalars():
-            if freedom["prescribed"] is not None:
-                y[i], y[self.nq + j], given[j] = freedom["p"](t)
+        for _, i, j in self._scalars():
+            if j in self.prescribed:
+                y[i], y[self.nq + j], given[j] = self.prescribed[j](t)
         return y, given
 
     def node(self, frames, body, node, y):
@@ -228,7 +227,7 @@ class RebuiltCase:
             vector = function(t)[0] * (direction if load["frame"] == "world" else at.R @ direction)
             f += (at.V if load["type"] == "force" else at.W).T @ vector
         for freedom, i, j in self._scalars():
-            f[j] += freedom["f"](t)[0] - freedom["stiffness"] * (y[i] - freedom["rest"]) - freedom["damping"] * u[j]
+            f[j] += self.efforts[j](t)[0] - freedom["stiffness"] * (y[i] - freedom["rest"]) - freedom["damping"] * u[j]
         for joint in self.joints:
             for n, freedom in enumerate(joint["freedoms"]):
                 if freedom["motion"] == "ball":
@@ -261,6 +260,13 @@ class RebuiltCase:
 
     def accelerations(self, t, y):
         """udot (N,)."""
+        return self.solved(t, y)[1]
+
+    def solved(self, t, y):
+        """The state with prescribed coordinates put in, udot (N,), and the load M udot - f (N,) that is left.
+
+        The load is zero but for prescribed coordinates, where it is what drives them.
+        """
         y, given = self.driven(t, y)
         M, f = self.equations(t, y)
         free = [j for j in range(self.nu) if j not in given]
@@ -268,16 +274,15 @@ class RebuiltCase:
         for j, value in given.items():
             found[j] = value
         if free:
-            f = f - M @ found
+            known = f - M @ found
             try:
-                found[free] = np.linalg.solve(M[np.ix_(free, free)], f[free])
+                found[free] = np.linalg.solve(M[np.ix_(free, free)], known[free])
             except np.linalg.LinAlgError:  # a trial step went far beyond what the modes mean: it will be a shorter one
                 found[:] = np.nan
-        return found
+        return y, found, M @ found - f
 
-    def rates(self, t, y):
-        """dy/dt."""
-        y, _ = self.driven(t, y)
+    def coordinate_rates(self, y):
+        """dq/dt."""
         u, rate = y[self.nq :], np.zeros(self.nq)
         for joint in self.joints:
             for n, freedom in enumerate(joint["freedoms"]):
@@ -291,7 +296,12 @@ class RebuiltCase:
                     rate[i] = u[j]
         for qs, us in self.eta.values():
             rate[qs] = u[us]
-        return np.concatenate([rate, self.accelerations(t, y)])
+        return rate
+
+    def rates(self, t, y):
+        """dy/dt."""
+        y, udot, _ = self.solved(t, y)
+        return np.concatenate([self.coordinate_rates(y), udot])
 
     def integrate(self, times, rtol=1e-13, method="DOP853"):
         """States (T, .) at the times, the first of which is 0."""
@@ -349,3 +359,16 @@ class RebuiltCase:
         found |= {f"energy.{kind}": value for kind, value in energies.items()}
         found["energy.total"] = sum(energies.values())
         return found | {"momentum.linear": linear, "momentum.angular": angular}
+
+
+def _flexible(body):
+    """A flexible body with arrays, and how its inertia is summed."""
+    points = {key: np.array(values) for key, values in body["points"].items()}
+    integrals = {key: np.array(values) for key, values in body["integrals"].items()}
+    turning = bool(np.any(points["inertia_kg_m2"]) or np.any(points["mass_centre_offset_m"]))
+    return {
+        "modes": body["modes"], "points": points, "integrals": integrals, "turning": turning,
+        "nodes": {name: {key: np.array(part) for key, part in node.items()} for name, node in body["nodes"].items()},
+        "summed": bool(integrals) and "second_translation" not in points and not turning,
+        "stiffness": np.array(body["stiffness"]), "damping": np.array(body["damping"]),
+    }  # fmt: skip

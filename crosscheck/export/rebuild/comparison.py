@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .case import RebuiltCase
+from .case import read_case
 
 
 def distance(channel, a, b):
@@ -31,7 +31,7 @@ def reference(folder):
 
 def compare(folder, rtol=1e-13, method="DOP853", until=np.inf):
     """For each channel that is rebuilt: the largest distance to the reference up to a time, and its uncertainty."""
-    case = RebuiltCase(folder)
+    case = read_case(folder)
     times, stored, known = reference(folder)
     here = times <= until
     times, stored = times[here], {name: values[here] for name, values in stored.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import runpy
 from pathlib import Path
 from xml.etree import ElementTree
@@ -30,7 +29,7 @@ TREES = (
 CLOSE = 1e-9  # relative: MuJoCo's principal axes and the long chain's condition take up to seven digits of sixteen
 
 
-def bare(scene: Scene, place: Path, springs: bool) -> RebuiltCase:
+def bare(scene: Scene, springs: bool) -> RebuiltCase:
     """The tree as `rebuild` has it, without what the format leaves out."""
     data, _ = model_data(scene)
     data |= {"loads": [], "connectors": [], "controllers": [], "events": []}
@@ -39,8 +38,7 @@ def bare(scene: Scene, place: Path, springs: bool) -> RebuiltCase:
         if not springs:
             dropped |= {key: 0.0 for key in freedom if key.startswith(("stiffness", "damping"))}
         freedom |= {key: value for key, value in dropped.items() if key in freedom}
-    (place / "model.json").write_text(json.dumps(data), encoding="utf-8")
-    return RebuiltCase(place)
+    return RebuiltCase(data, {})
 
 
 def state(case: RebuiltCase) -> Real:
@@ -121,38 +119,38 @@ def off(ours: Real, theirs: Real) -> float:
 
 
 @pytest.mark.parametrize("name", TREES)
-def test_urdf_is_the_same_tree(tmp_path: Path, name: str) -> None:
+def test_urdf_is_the_same_tree(name: str) -> None:
     scene = scene_of(name)
     written = urdf(scene, "tree")
     if written.refused:
         assert "ball" in written.refused and name.startswith("tops/"), written.refused
         return
-    case = bare(scene, tmp_path, springs=False)
+    case = bare(scene, springs=False)
     y = state(case)
     theirs = by_pinocchio(written.text, case, y, np.array(scene.gravity_m_s2))
     assert off(case.accelerations(0.0, y), theirs) < CLOSE
 
 
 @pytest.mark.parametrize("name", TREES)
-def test_mjcf_is_the_same_tree(tmp_path: Path, name: str) -> None:
+def test_mjcf_is_the_same_tree(name: str) -> None:
     scene = scene_of(name)
     written = mjcf(scene, "tree")
     if written.refused:
         assert "no inertia" in written.refused, written.refused
         return
-    case = bare(scene, tmp_path, springs=True)
+    case = bare(scene, springs=True)
     y = state(case)
     assert off(case.accelerations(0.0, y), by_mujoco(written.text, case, y)) < CLOSE
 
 
-def test_mjcf_starts_where_the_case_starts(tmp_path: Path) -> None:
+def test_mjcf_starts_where_the_case_starts() -> None:
     mujoco = pytest.importorskip("mujoco")
     scene = scene_of("wheel_gyrostat/torque_driven")
     model = mujoco.MjModel.from_xml_string(mjcf(scene, "tree").text)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
-    case = bare(scene, tmp_path, springs=True)
+    case = bare(scene, springs=True)
     seen = case.observed(0.0, case.start)
     for marker in scene.markers:
         assert np.allclose(data.site(marker.name).xpos, seen[f"marker:{marker.name}.position"], atol=1e-14)
@@ -163,7 +161,7 @@ def test_the_exudyn_script_moves_as_the_tree(tmp_path: Path, name: str) -> None:
     """A hundredth of a second from a random state: exudyn's own fixed steps leave 1e-10."""
     pytest.importorskip("exudyn")
     scene = scene_of(name)
-    case = bare(scene, tmp_path, springs=True)
+    case = bare(scene, springs=True)
     y = state(case)
     order = [case.slots[joint["name"], n] for joint, n, _ in each_freedom(case)]
     (tmp_path / "script.py").write_text(exudyn_script(scene, "tree").text, encoding="utf-8")
@@ -176,9 +174,9 @@ def test_the_exudyn_script_moves_as_the_tree(tmp_path: Path, name: str) -> None:
     assert off(np.array([end[i] for i, _ in order]), np.array(q)) < 1e-8
 
 
-def test_a_wrong_axis_or_mass_in_a_file_is_noticed(tmp_path: Path) -> None:
+def test_a_wrong_axis_or_mass_in_a_file_is_noticed() -> None:
     scene = scene_of("manipulators/six_axis_arm")
-    case = bare(scene, tmp_path, springs=False)
+    case = bare(scene, springs=False)
     y = state(case)
     ours = case.accelerations(0.0, y)
     changes = (("axis", "xyz", "0.6 0 0.8"), ("mass", "value", "1.001"), ("origin", "rpy", "0.01 0.02 0"))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.export.rebuild import RebuiltCase, compare
+from crosscheck.export.rebuild import compare, read_case
 from tests.crosscheck.export.exported import Data, change, export_cases
 
 DOUBLE, TOP, MASS = "pendulums/double", "tops/lagrange", "sliders/oscillator"
@@ -90,7 +90,7 @@ def test_one_per_cent_more_mass_is_beyond_them(tmp_path: Path, case: str, file: 
 
 def test_integrals_and_points_are_the_same_body(release: Path) -> None:
     """The equations by the modal integrals are those by the sum over all points, at a state that is bent and moves."""
-    by_integrals, by_points = RebuiltCase(release / FLEXIBLE), RebuiltCase(release / FLEXIBLE)
+    by_integrals, by_points = read_case(release / FLEXIBLE), read_case(release / FLEXIBLE)
     for body in by_points.modal.values():
         assert body["summed"]
         body["summed"] = False
@@ -106,4 +106,4 @@ def test_integrals_and_points_are_the_same_body(release: Path) -> None:
 def test_what_the_program_does_not_hold_it_names(tmp_path: Path, case: str, part: str) -> None:
     folder = export_cases(tmp_path / "all", case) / case
     with pytest.raises(SystemExit, match=part):
-        RebuiltCase(folder)
+        read_case(folder)
