@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from crosscheck.cli import common
-from crosscheck.terminal.text import marked, words
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.text import Verbosity, marked, words
 
 if TYPE_CHECKING:
     from crosscheck.judging.outcome import SessionOutcome
@@ -76,7 +75,7 @@ def hold_against(baseline: Baseline, outcome: SessionOutcome, out: Path) -> Agai
 
 def print_held(held: AgainstBaseline, shown: Verbosity) -> None:
     """What changed since the baseline; or that there was none, and what this session excuses in later ones."""
-    from crosscheck.terminal.differences import print_differences
+    from crosscheck.terminal.verdicts import print_differences
 
     file = held.baseline.file
     if held.differences is not None:

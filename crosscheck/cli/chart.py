@@ -39,7 +39,7 @@ def chart(
     """
     shown = common.verbosity(quiet, False)
     chosen = common.asked(cases, engine or (), variant or (), time_limit)
-    from crosscheck.terminal.live import LiveProgress
+    from crosscheck.terminal.progress import LiveProgress
     from crosscheck.timing.chart import chart as chart_case
     from crosscheck.timing.page import INDEX, write_case, write_index  # it loads matplotlib
 

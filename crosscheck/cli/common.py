@@ -15,8 +15,7 @@ import typer
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.own_files import OURS, source_folder
 from crosscheck.running.scheduler import TIME_LIMIT_S
-from crosscheck.terminal.text import words
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.text import Verbosity, words
 from flexmb.output.terminal import Terminal
 from flexmb.output.writing import in_words
 from flexmb.scene.problems import SceneWarning, closest
@@ -47,7 +46,7 @@ errors = Terminal(stderr=True)
 
 def _show_versions(asked: bool) -> None:
     if asked:
-        from crosscheck.terminal.versions import versions_text  # it asks the engines
+        from crosscheck.terminal.listings import versions_text  # it asks the engines
 
         typer.echo(versions_text())
         raise typer.Exit

@@ -34,7 +34,7 @@ def compare(
     """
     from crosscheck.sealed.compare import compare_results
     from crosscheck.sealed.seal import ResultsError, read_finished
-    from crosscheck.terminal.differences import print_differences
+    from crosscheck.terminal.verdicts import print_differences
 
     shown = verbosity(quiet, verbose)
     try:

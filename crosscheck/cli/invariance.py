@@ -9,8 +9,7 @@ import typer
 
 from crosscheck.cli import common
 from crosscheck.running.scheduler import Limits
-from crosscheck.terminal.text import words
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.text import Verbosity, words
 
 
 @common.app.command()
@@ -39,9 +38,9 @@ def invariance(
     **Examples**: `crosscheck invariance torque_driven` · `crosscheck invariance four_bar -e pinocchio`
     """
     chosen = common.asked(cases, (engine,), time_limit=time_limit)
-    from crosscheck.biting.invariance_runs import VERDICTS, run_invariances
-    from crosscheck.terminal.invariances import print_invariances
-    from crosscheck.terminal.live import LiveProgress
+    from crosscheck.mutation.invariance_runs import VERDICTS, run_invariances
+    from crosscheck.terminal.mutation import print_invariances
+    from crosscheck.terminal.progress import LiveProgress
 
     with common.sole_writer(out):
         with LiveProgress(common.console, Verbosity.NORMAL) as live:

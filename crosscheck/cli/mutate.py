@@ -9,8 +9,7 @@ import typer
 
 from crosscheck.cli import common
 from crosscheck.running.scheduler import Limits
-from crosscheck.terminal.text import words
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.text import Verbosity, words
 
 
 @common.app.command()
@@ -48,16 +47,16 @@ def mutate(
     `crosscheck mutate ./my_case --all-targets --verbose`
     """
     chosen = common.asked(cases, (engine,), time_limit=time_limit)
-    from crosscheck.biting.campaign import SCORES, run_campaign
-    from crosscheck.terminal.bites import print_bites
-    from crosscheck.terminal.live import LiveProgress
+    from crosscheck.mutation.campaign import SCORES, run_campaign
+    from crosscheck.terminal.mutation import print_mutation_scores
+    from crosscheck.terminal.progress import LiveProgress
 
     with common.sole_writer(out):
         with LiveProgress(common.console, Verbosity.NORMAL) as live:
             limits = Limits(jobs, time_limit)
-            bites = run_campaign(
+            scores = run_campaign(
                 chosen, out, engine=engine, all_targets=all_targets, fresh=fresh, limits=limits, listener=live.hear
             )
-        code = print_bites(common.console, bites, verbose)
+        code = print_mutation_scores(common.console, scores, verbose)
     common.console.print(words(f"Scores: {out / SCORES}"), soft_wrap=True)
     raise typer.Exit(code)

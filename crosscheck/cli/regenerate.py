@@ -42,7 +42,7 @@ def regenerate(
     """
     chosen = common.asked(cases, time_limit=time_limit)
     from crosscheck.references.regenerate import regenerate as make_again
-    from crosscheck.terminal.live import LiveProgress
+    from crosscheck.terminal.progress import LiveProgress
 
     good = True
     with common.in_one_line():

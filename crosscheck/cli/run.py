@@ -12,8 +12,7 @@ import typer
 from crosscheck.cli import common
 from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.schedulers import LOCAL, scheduler_at
-from crosscheck.terminal.text import words
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.text import Verbosity, words
 
 if TYPE_CHECKING:
     from crosscheck.cli.baseline import AgainstBaseline
@@ -147,7 +146,7 @@ def _run(
     """Run the cases; until they are judged the outputs say that the session is unfinished."""
     from crosscheck.report import mark_unfinished
     from crosscheck.running.sweep import sweep
-    from crosscheck.terminal.live import LiveProgress
+    from crosscheck.terminal.progress import LiveProgress
 
     mark_unfinished(records, records.parent)
     with LiveProgress(common.console, shown) as live:

@@ -101,7 +101,7 @@ def _write_template(csv: Path, case: Case, variant: str | None) -> None:
 
 def _show(outcome: CsvOutcome) -> int:
     """Print the channels and the verdicts; the exit code."""
-    from crosscheck.terminal.csv_channels import channels_table
+    from crosscheck.terminal.listings import channels_table
     from crosscheck.terminal.verdicts import print_outcome
 
     console.print(channels_table(outcome))

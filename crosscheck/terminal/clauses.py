@@ -10,10 +10,8 @@ from rich.console import Console
 from rich.progress import TimeRemainingColumn
 
 from crosscheck.conformance.trial import ClauseOutcome, ClauseStatus, Listener, to_offer, verdict_on
-from crosscheck.terminal.bars import bars
-from crosscheck.terminal.heartbeat import EVERY_S
-from crosscheck.terminal.text import marked, words
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.progress import EVERY_S, bars
+from crosscheck.terminal.text import Verbosity, marked, words
 
 MARKS: dict[ClauseStatus, tuple[str, str]] = {
     "holds": ("✓", "green"), "broken": ("✕", "red"), "not offered": ("⊘", "yellow"), "missing": ("–", "yellow"),

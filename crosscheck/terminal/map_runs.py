@@ -14,7 +14,7 @@ from crosscheck.stability.map import StabilityMap
 from crosscheck.stability.picture import draw
 from crosscheck.stability.run import Finished, run_map
 from crosscheck.stability.verdict_file import VERDICTS, take_away_verdicts, write_verdicts
-from crosscheck.terminal.bars import bars
+from crosscheck.terminal.progress import bars
 from crosscheck.terminal.text import marked, words
 from flexmb.output.whole import take_away
 from flexmb.output.writing import folder

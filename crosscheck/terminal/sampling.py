@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import TimeRemainingColumn
 
 from crosscheck.sampling.statistics import Distribution, Estimated, SweepSummary
-from crosscheck.terminal.bars import bars
+from crosscheck.terminal.progress import bars
 from crosscheck.terminal.text import marked, words
 from flexmb.output.listing import Listing, figures, names
 

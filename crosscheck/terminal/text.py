@@ -1,10 +1,20 @@
-"""Text that is shown literally on the terminal."""
+"""Text that is shown literally on the terminal, and how much of it."""
 
 from __future__ import annotations
+
+from enum import Enum
 
 from rich.text import Text
 
 from flexmb.output.printable import printable
+
+
+class Verbosity(Enum):
+    """QUIET: the last line, and errors; NORMAL: some ten lines; VERBOSE: every comparison and every run."""
+
+    QUIET = 0
+    NORMAL = 1
+    VERBOSE = 2
 
 
 def words(text: str, style: str = "") -> Text:

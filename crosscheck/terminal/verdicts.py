@@ -1,4 +1,4 @@
-"""The outcome of a session on the terminal."""
+"""The outcome of a session, and the differences of two, on the terminal."""
 
 from __future__ import annotations
 
@@ -14,11 +14,16 @@ from crosscheck.judging.finer import BEYOND
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.unjudged import grouped
 from crosscheck.judging.verdict import STATUSES, Verdict
-from crosscheck.terminal.text import marked, words
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.sealed.compare import Differences, Direction, ResultChange
+from crosscheck.terminal.text import Verbosity, marked, words
 from flexmb.output.listing import Listing, figures, names
 
 LINES = 7  # of problems, without --verbose
+DIRECTIONS: dict[Direction, tuple[str, str]] = {
+    "worse": ("✕", "red"), "gone": ("–", "red"), "better": ("✓", "green"), "new": ("+", "cyan"),
+}  # fmt: skip
+CHANGES = 8  # of two sessions, without --verbose
+FEW_LINES = 3  # of times and of notes
 
 
 def print_outcome(console: Console, outcome: SessionOutcome, verbosity: Verbosity = Verbosity.NORMAL) -> int:
@@ -192,3 +197,29 @@ def _groups(verdicts: Iterable[Verdict]) -> dict[tuple[str, ...], list[Verdict]]
     for verdict in verdicts:
         groups.setdefault((verdict.case, verdict.comparison, verdict.pair, verdict.status), []).append(verdict)
     return groups
+
+
+def print_differences(console: Console, differences: Differences, verbosity: Verbosity) -> None:
+    """The changes, the gravest first; notes and times after them; the headline last."""
+    if verbosity is not Verbosity.QUIET:
+        everything = verbosity is Verbosity.VERBOSE
+        changes = [marked(*DIRECTIONS[change.direction], _told(change)) for change in differences.changes]
+        times = [
+            words(f"time: {each.case}, {each.what}: {each.before_s:.3g} s -> {each.now_s:.3g} s")
+            for each in differences.times
+        ]
+        notes = [words(f"note: {note}", "dim") for note in differences.notes]
+        kinds = (changes, CHANGES, "changes"), (times, FEW_LINES, "times"), (notes, FEW_LINES, "notes")
+        for lines, limit, what in kinds:
+            shown = lines if everything else lines[:limit]
+            for line in shown:
+                console.print(line, soft_wrap=True)
+            if len(shown) < len(lines):
+                console.print(words(f"... and {len(lines) - len(shown)} {what} more: --verbose shows all", "dim"))
+    colour = "red" if differences.regressed else "green"
+    console.print(words(differences.headline, f"bold {colour}"), soft_wrap=True)
+
+
+def _told(change: ResultChange) -> str:
+    where = ", ".join(part for part in (change.case, change.comparison, change.what) if part)
+    return f"{change.direction}: {where}: {change.how}"

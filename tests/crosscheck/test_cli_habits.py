@@ -81,7 +81,7 @@ def test_lists_are_json_too(runner: CliRunner, monkeypatch: pytest.MonkeyPatch) 
 
 def test_versions_of_both_commands(runner: CliRunner, monkeypatch: pytest.MonkeyPatch) -> None:
     states = [EngineState("native", "0.1.0", ""), EngineState("pinocchio", None, "pip install it")]
-    monkeypatch.setattr("crosscheck.terminal.versions.describe_engines", lambda: states)
+    monkeypatch.setattr("crosscheck.running.installed.describe_engines", lambda: states)
     said = runner.invoke(cli.app, ["--version"]).stdout.splitlines()
     assert said[0].startswith("crosscheck ") and said[1].startswith("Python 3.")
     assert said[2:] == ["native: 0.1.0", "pinocchio: not installed"]

@@ -124,11 +124,11 @@ def test_a_session_says_unfinished_before_it_touches_the_records(green: Path, mo
     ("place", "words", "gone"),
     [
         (
-            "crosscheck.biting.campaign.run_planned", ["mutate", str(CASE), "-e", "native", "-o", "OUT"],
+            "crosscheck.mutation.campaign.run_planned", ["mutate", str(CASE), "-e", "native", "-o", "OUT"],
             ["mutation.json"],
         ),
         (
-            "crosscheck.biting.invariance_runs.run_planned", ["invariance", str(CASE), "-e", "native", "-o", "OUT"],
+            "crosscheck.mutation.invariance_runs.run_planned", ["invariance", str(CASE), "-e", "native", "-o", "OUT"],
             ["invariance.json"],
         ),
         (

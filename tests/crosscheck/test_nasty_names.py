@@ -35,7 +35,7 @@ from crosscheck.running.installed import EngineState
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Event
 from crosscheck.terminal.listings import cases_table, engines_table
-from crosscheck.terminal.live import LiveProgress
+from crosscheck.terminal.progress import LiveProgress
 from crosscheck.terminal.verdicts import print_outcome
 from flexmb.output.csv_cells import as_text, from_text
 from flexmb.output.printable import chart_text, printable

@@ -94,7 +94,7 @@ def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("work has begun")
 
     for place in ("running.sweep.sweep", "running.sweep.run_planned", "timing.bench.bench", "timing.chart.chart",
-                  "biting.campaign.run_campaign", "biting.invariance_runs.run_invariances",
+                  "mutation.campaign.run_campaign", "mutation.invariance_runs.run_invariances",
                   "conformance.trial.try_engine", "terminal.map_runs.run_and_draw"):  # fmt: skip
         monkeypatch.setattr(f"crosscheck.{place}", begun)
 

@@ -17,8 +17,8 @@ from crosscheck.library.reference import digest, load_reference
 from crosscheck.sampling.run import run_sweep
 from crosscheck.sealed.compare import compare_results
 from crosscheck.sealed.seal import ResultsError, read_results, sealed_text
-from crosscheck.terminal.differences import print_differences
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.text import Verbosity
+from crosscheck.terminal.verdicts import print_differences
 from tests.crosscheck.sealed.test_compare import made
 from tests.crosscheck.sessions import CASE, PROVIDER
 from tests.fuzz import mutate

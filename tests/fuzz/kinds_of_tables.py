@@ -12,11 +12,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from crosscheck.biting.campaign import SCORES
 from crosscheck.library.case import CaseError
 from crosscheck.library.expect_file import NAME, read_expect_file
 from crosscheck.library.find import load_case
 from crosscheck.library.with_claims import with_claims
+from crosscheck.mutation.campaign import SCORES
 from crosscheck.report.mutations import read_scores
 from crosscheck.sealed.compare import compare_results
 from crosscheck.sealed.seal import ResultsError, read_finished, sealed_text

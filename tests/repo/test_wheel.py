@@ -21,7 +21,7 @@ FROM_WHEEL = """
 import pathlib, sys
 wheel = pathlib.Path(sys.argv[1])
 sys.path.insert(0, str(wheel))
-import crosscheck.cli, crosscheck.report, crosscheck.running.sweep, crosscheck.biting.campaign, flexmb.run.simulate
+import crosscheck.cli, crosscheck.report, crosscheck.running.sweep, crosscheck.mutation.campaign, flexmb.run.simulate
 from crosscheck.library.find import shipped_cases, shipped_folder
 assert pathlib.Path(flexmb.__file__).is_relative_to(wheel), flexmb.__file__
 assert shipped_folder().is_relative_to(wheel), shipped_folder()

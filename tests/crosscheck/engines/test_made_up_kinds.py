@@ -6,13 +6,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from crosscheck.biting.invariances.counterpart import NotApplicable
-from crosscheck.biting.invariances.mirrored import MIRRORED
-from crosscheck.biting.invariances.units import _without_unit
 from crosscheck.engines.connections import KNOWN, _along, exerts
 from crosscheck.engines.links import freedoms, obstacle
 from crosscheck.library.mutations.mirror import _hinge as is_own_image
 from crosscheck.library.mutations.turning import _own as axis_of
+from crosscheck.mutation.invariances.counterpart import NotApplicable
+from crosscheck.mutation.invariances.mirrored import MIRRORED
+from crosscheck.mutation.invariances.units import _without_unit
 from flexmb.dense.connectors import grip
 from flexmb.dense.hinge_frames import hinge_frame
 from flexmb.dense.jets import Jet, MovingFrame, constant

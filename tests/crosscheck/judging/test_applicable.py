@@ -14,7 +14,7 @@ from crosscheck.library.accepted import Figure, key
 from crosscheck.records.kinds import RunRecord
 from crosscheck.report.ci import write_summary
 from crosscheck.report.junit import write_junit
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.text import Verbosity
 from crosscheck.terminal.verdicts import print_outcome
 from tests.crosscheck.made_records import ONE_PAIR, TIP, ended, judged, ladder, way
 

@@ -14,7 +14,7 @@ from rich.console import Console
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.report.ci import write_summary
 from crosscheck.report.junit import write_junit
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.text import Verbosity
 from crosscheck.terminal.verdicts import print_outcome
 from flexmb.typing import Real
 from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, judged, ladder, way

@@ -10,11 +10,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from crosscheck.biting.campaign import MutationFile
-from crosscheck.biting.mutants import PassedOver
-from crosscheck.biting.score import Mutant, Outcome, ShownIn, bite
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.verdict import Status
+from crosscheck.mutation.campaign import MutationFile
+from crosscheck.mutation.mutants import PassedOver
+from crosscheck.mutation.score import Mutant, Outcome, ShownIn, mutation_score
 from crosscheck.report import write_all
 from crosscheck.report.html import source
 from crosscheck.report.mutations import FILE, read_scores
@@ -144,7 +144,8 @@ def test_mutation_scores_are_shown(tmp_path: Path) -> None:
     sign = mutant("gravity_sign", "noticed", **{"marker:tip.position": "differ", "load": "agree"})
     mass = mutant("mass", "missed")
     idle = PassedOver(mutation="wheel", target="", reason="there is no wheel")
-    scored = [bite("pendulum/single", "rigid", "fine", [sign, mass], [idle]), bite("none", "rigid", "fine", [], [])]
+    single = mutation_score("pendulum/single", "rigid", "fine", [sign, mass], [idle])
+    scored = [single, mutation_score("none", "rigid", "fine", [], [])]
     (tmp_path / FILE).write_bytes(msgspec.json.encode(MutationFile(cases=tuple(scored))))
     write_all(tmp_path / "records.jsonl", tmp_path)
     text, page = index.read_text(encoding="utf-8"), (index.parent / "pendulum" / "single.html").read_text("utf-8")

@@ -11,10 +11,9 @@ from rich.console import Console
 
 from crosscheck.running.job import MAIN, Job
 from crosscheck.running.scheduler import Event
-from crosscheck.terminal import heartbeat
-from crosscheck.terminal.heartbeat import Heartbeat
-from crosscheck.terminal.live import LiveProgress
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal import progress
+from crosscheck.terminal.progress import Heartbeat, LiveProgress
+from crosscheck.terminal.text import Verbosity
 
 
 def jobs(count: int) -> list[Job]:
@@ -52,7 +51,7 @@ def test_a_line_says_what_runs_how_much_is_done_and_how_long_yet() -> None:
 
 
 def shown(monkeypatch: pytest.MonkeyPatch, verbosity: Verbosity, terminal: bool) -> str:
-    monkeypatch.setattr(heartbeat.Heartbeat.__init__, "__defaults__", (0.01, time.monotonic))
+    monkeypatch.setattr(progress.Heartbeat.__init__, "__defaults__", (0.01, time.monotonic))
     screen = io.StringIO()
     with LiveProgress(Console(file=screen, width=200, force_terminal=terminal), verbosity) as live:
         live.hear(jobs(2), Event(0, "started"))

@@ -13,7 +13,7 @@ from rich.console import Console
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.job import MAIN, Job
 from crosscheck.running.scheduler import Event
-from crosscheck.terminal.live import LiveProgress
+from crosscheck.terminal.progress import LiveProgress
 
 
 def lasting_line(message: str) -> str:

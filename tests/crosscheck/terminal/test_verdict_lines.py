@@ -10,7 +10,7 @@ from rich.console import Console
 
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.verdict import Verdict
-from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.text import Verbosity
 from crosscheck.terminal.verdicts import print_outcome
 
 GOOD = Verdict(

@@ -1,0 +1,200 @@
+"""A mutation campaign: the mutants of cases are run by the usual workers, judged as negative controls, and scored.
+
+The true run uses the engine's whole ladder of efforts, which gives its uncertainty; every mutant runs at the finest
+effort and has the uncertainty of the true run. Faults of an answer are planted in the true run and need no other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from crosscheck.engines.signals import signals_of
+from crosscheck.judging.case_verdicts import judge
+from crosscheck.judging.results import CaseResults, Result, collect
+from crosscheck.judging.uncertainty import roundoff_floor
+from crosscheck.judging.verdict import Signal, Verdict, compare
+from crosscheck.library.find import Case
+from crosscheck.library.patterns import most_specific
+from crosscheck.mutation.answers import FAULTS, AnswerFault, run_of
+from crosscheck.mutation.by_reference import ByReference, by_reference
+from crosscheck.mutation.mutants import CaseMutants, PassedOver, mutants_of
+from crosscheck.mutation.score import Mutant, MutationScore, ShownIn, mutation_score, outcome
+from crosscheck.mutation.subject import JudgedVariant, subject
+from crosscheck.records.archive import read
+from crosscheck.records.kinds import CaseRecord
+from crosscheck.records.session import last_session
+from crosscheck.running.execute import PROVIDER
+from crosscheck.running.job import MAIN, Job
+from crosscheck.running.plan import plan, variant_scene
+from crosscheck.running.scheduler import BY_DEFAULT, Limits
+from crosscheck.running.sweep import Listener, run_planned
+from flexmb.output.whole import take_away, write_whole
+from flexmb.run.channels import distance, family, magnitude
+from flexmb.scene.schema import Scene
+from flexmb.typing import Real
+
+RECORDS = "mutants.jsonl"
+SCORES = "mutation.json"
+MUTANT_LIMIT_S = 120.0
+PATIENCE = 20.0  # times the true run's time, after which a mutant counts as having another motion
+
+
+class MutationFile(msgspec.Struct, frozen=True, kw_only=True):
+    """mutation.json: the scores of the cases, sorted by name. docs/mutations.md explains every key."""
+
+    format: int = 1
+    cases: tuple[MutationScore, ...] = ()
+
+
+def run_campaign(
+    cases: Sequence[Case],
+    out: Path,
+    *,
+    engine: str = "native",
+    all_targets: bool = False,
+    fresh: bool = False,
+    provider: str = PROVIDER,
+    limits: Limits = BY_DEFAULT,
+    listener: Listener = lambda jobs, event: None,
+) -> tuple[MutationScore, ...]:
+    """Run all mutants of the cases in one engine and score them; `mutation.json` in `out` has the result.
+
+    Results in `mutants.jsonl` in `out` of the same scenes and sources are not run again unless `fresh`.
+    CaseError where a case judges nothing that the engine runs.
+    """
+    subjects = [subject(case, engine) for case in cases]
+    faulty = [mutants_of(each, all_targets) for each in subjects]
+    plans = [_plan(each.case, provider, limits) for each in faulty]
+    take_away(out / SCORES)  # so that a killed campaign leaves none of an earlier one
+    run_planned(plans, (engine,), out / RECORDS, fresh=fresh, limits=limits, listener=listener)
+    found = {each.case.case: each for each in collect(last_session(read(out / RECORDS))).cases}
+    scores = tuple(scored(one, mutants, found[one.case.name]) for one, mutants in zip(subjects, faulty, strict=True))
+    ordered = tuple(sorted(scores, key=lambda each: each.case))
+    text = msgspec.json.format(msgspec.json.encode(MutationFile(cases=ordered)), indent=1)
+    write_whole(out / SCORES, text + b"\n")
+    return scores
+
+
+def _plan(case: Case, provider: str, limits: Limits) -> tuple[CaseRecord, list[Job]]:
+    """The jobs: the true run with the case's time limit, mutants with `MUTANT_LIMIT_S`, unless `limits` says
+    otherwise."""
+    record, jobs = plan(case, (), provider, limits.time_s)
+    if limits.time_s is not None:
+        return record, jobs
+    return record, [
+        job if job.role == MAIN else replace(job, time_limit_s=min(job.time_limit_s, MUTANT_LIMIT_S)) for job in jobs
+    ]
+
+
+def scored(what: JudgedVariant, mutants: CaseMutants, results: CaseResults) -> MutationScore:
+    verdicts: dict[str, list[Verdict]] = {name: [] for name in mutants.mutants}
+    for verdict in judge(results):
+        verdicts[verdict.comparison].append(verdict)
+    true = results.get(what.variant.name, what.engine)
+    patient = true.status == "finished" and PATIENCE * true.finest.wall_s <= MUTANT_LIMIT_S
+    found = by_reference(what, true)
+    stored, no_reference = (None, found) if isinstance(found, str) else (found, "")
+    of_scene = []
+    for name, control in mutants.mutants.items():
+        faulty = results.get(what.variant.name, what.engine, f"control:{name}")
+        reference = stored.of_scene(faulty) if stored is not None else {}
+        channels = {
+            each.channel: ShownIn(status=each.status, E=each.E, U=each.U, goal=each.goal) for each in verdicts[name]
+        }
+        worst = max(verdicts[name], key=lambda each: each.E or 0.0, default=None)
+        reason = "no verdict" if worst is None else worst.reason
+        of_scene.append(_mutant("scene", control.mutation, control.target, reason, channels, reference, patient))
+    of_answer, not_asked = _answers(what, true, stored)
+    return mutation_score(
+        what.case.name,
+        what.variant.name,
+        what.engine,
+        [*of_scene, *of_answer],
+        [*mutants.passed_over, *not_asked],
+        no_reference,
+    )
+
+
+def _mutant(
+    of: Literal["scene", "answer"], mutation: str, target: str, reason: str, channels: dict[str, ShownIn],
+    reference: dict[str, ShownIn], patient: bool = False,
+) -> Mutant:  # fmt: skip
+    """What became of a fault, by the verdicts on the channels and those by the stored reference."""
+    what, beyond = outcome(channels, patient)
+    return Mutant(
+        mutation=mutation,
+        target=target,
+        of=of,
+        outcome=what,
+        beyond_goal=beyond,
+        reason=reason,
+        channels=channels,
+        by_reference=outcome(reference, patient)[0] if reference else None,
+        reference=reference,
+    )
+
+
+def _answers(what: JudgedVariant, true: Result, stored: ByReference | None) -> tuple[list[Mutant], list[PassedOver]]:
+    """Faults planted in the true run; those that change nothing, or nothing that the case judges, are passed over."""
+    found: list[Mutant] = []
+    passed: list[PassedOver] = []
+    if true.status != "finished":
+        return found, [PassedOver(mutation="answers", target="", reason=f"no true run: {true.message}")]
+    scene = variant_scene(what.case.scene(what.variant), what.variant)
+    rounding = _rounding(true)
+    for fault in FAULTS:
+        wrong = _falsified(true, scene, fault, rounding)
+        changed, channels = list(wrong), _judged(what, true, wrong)
+        if not changed:
+            passed.append(PassedOver(mutation=fault.name, target="", reason="it changes nothing in this run"))
+        elif not channels:
+            reason = f"the case sets no goal for what it changes: {', '.join(changed)}"
+            passed.append(PassedOver(mutation=fault.name, target="", reason=reason))
+        else:
+            reference = stored.of_answer(wrong) if stored is not None else {}
+            worst = max(channels, key=lambda name: channels[name].E or 0.0)
+            reason = f"{fault.what}: {worst}"
+            found.append(_mutant("answer", fault.name, "", reason, channels, reference))
+    return found, passed
+
+
+def _rounding(true: Result) -> dict[str, float]:
+    """The rounding (SI) of each family of channels, by which body and World components of an axis may differ."""
+    sizes: dict[str, float] = {}
+    for name in true.channels:
+        values = true.values(name)
+        sizes[family(name)] = max(sizes.get(family(name), 0.0), magnitude(name, values))
+    sums = max(true.finest.evaluations, len(true.times))
+    return {group: roundoff_floor(size, sums) for group, size in sizes.items()}
+
+
+def _falsified(true: Result, scene: Scene, fault: AnswerFault, rounding: dict[str, float]) -> dict[str, Real]:
+    """The channels (T, k) with the fault, those that it changes by more than their rounding."""
+    right = {name: true.values(name) for name in true.channels}
+    wrong = signals_of(fault.falsify(run_of(true.times, right), scene))
+    return {
+        name: values
+        for name, values in wrong.items()
+        if np.max(distance(name, values, right[name])) > rounding[family(name)]
+    }
+
+
+def _judged(what: JudgedVariant, true: Result, wrong: dict[str, Real]) -> dict[str, ShownIn]:
+    """The findings on the falsified channels that the case judges, compared with the true ones."""
+    channels: dict[str, ShownIn] = {}
+    for name, values in wrong.items():
+        pattern = most_specific(what.goals, name)
+        if pattern is None:
+            continue
+        signal = true.signal(name, across=False)
+        false = Signal(values, signal.uncertainty, signal.sizes)
+        scale = most_specific(what.scales, name)
+        finding = compare(name, false, signal, what.goals[pattern], None if scale is None else what.scales[scale])
+        channels[name] = ShownIn(status=finding.status, E=finding.E, U=finding.U, goal=what.goals[pattern])
+    return channels

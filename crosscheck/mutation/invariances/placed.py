@@ -1,0 +1,107 @@
+"""Rotation and translation of the World, with everything on the ground, gravity and loads in World axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from crosscheck.mutation.invariances.counterpart import (
+    Channels,
+    Counterpart,
+    Invariance,
+    by_kind,
+    product,
+    quaternion,
+    total_mass,
+    vector,
+    with_energy,
+    without_feedback,
+)
+from crosscheck.mutation.invariances.linearised import relation
+from flexmb.scene.bodies import IDENTITY, Quaternion, Vector
+from flexmb.scene.connectors import Connector
+from flexmb.scene.hinges import Closure
+from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.schema import Load, Scene
+from flexmb.scene.tree import GROUND
+from flexmb.typing import Real
+
+TURN = np.array([0.5, -0.1, 0.7, 0.5])  # of length 1, about no axis of any scene
+STEP_M = np.array([0.75, -1.25, 0.5])
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+Placed = Callable[[Vector, Quaternion], tuple[Vector, Quaternion]]
+
+
+def _turned(scene: Scene) -> Counterpart:
+    without_feedback(scene)
+    R = rotation_matrix(TURN)
+
+    def placed(position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:
+        return vector(R @ np.asarray(position)), quaternion(product(TURN, np.array([orientation]))[0])
+
+    def turned(load: Load) -> Load:
+        if load.frame == "node":
+            return load
+        return msgspec.structs.replace(load, direction=vector(R @ np.asarray(load.direction)))
+
+    other = msgspec.structs.replace(
+        on_ground(scene, placed),
+        gravity_m_s2=vector(R @ np.asarray(scene.gravity_m_s2)),
+        loads=tuple(map(turned, scene.loads)),
+    )
+
+    def back(times: Real, channels: Channels) -> Channels:
+        return by_kind(channels, lambda rows: rows @ R, lambda rows: rows @ R, lambda q: product(TURN * CONJUGATE, q))
+
+    return Counterpart(other, back, linear=relation(scene, other))
+
+
+def _moved(scene: Scene) -> Counterpart:
+    without_feedback(scene)
+    gravity = np.asarray(scene.gravity_m_s2)
+    potential = total_mass(scene) * float(gravity @ STEP_M) if np.any(gravity) else 0.0
+
+    def placed(position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:
+        return vector(np.asarray(position) + STEP_M), orientation
+
+    def back(times: Real, channels: Channels) -> Channels:
+        found = with_energy(channels, {"gravity": np.full(len(times), potential)})
+        if "momentum.linear" in found:
+            found["momentum.angular"] = found["momentum.angular"] - np.cross(STEP_M, found["momentum.linear"])
+        return {name: rows - STEP_M if name.endswith(".position") else rows for name, rows in found.items()}
+
+    other = on_ground(scene, placed)
+    return Counterpart(other, back, linear=relation(scene, other))
+
+
+def on_ground(scene: Scene, placed: Placed) -> Scene:
+    """The scene with the ends of hinges, closures and connectors on the ground moved."""
+    hinges = []
+    for hinge in scene.hinges:
+        if hinge.parent == GROUND:
+            position, orientation = placed(hinge.parent_position_m, hinge.parent_quaternion)
+            hinge = msgspec.structs.replace(hinge, parent_position_m=position, parent_quaternion=orientation)
+        hinges.append(hinge)
+
+    def two_ended(item: Closure | Connector) -> Any:
+        for side in "ab":
+            if getattr(item, f"body_{side}", "") == GROUND:
+                frame = f"position_{side}_m", f"quaternion_{side}"
+                at = placed(getattr(item, frame[0]), getattr(item, frame[1], IDENTITY))
+                known = {key: value for key, value in zip(frame, at, strict=True) if hasattr(item, key)}
+                item = msgspec.structs.replace(item, **known)
+        return item
+
+    return msgspec.structs.replace(
+        scene,
+        hinges=tuple(hinges),
+        closures=tuple(map(two_ended, scene.closures)),
+        connectors=tuple(map(two_ended, scene.connectors)),
+    )
+
+
+TURNED = Invariance("turned", "the World turned, gravity and loads with it", _turned)
+MOVED = Invariance("moved", "the World moved", _moved)
