@@ -18,6 +18,6 @@ class Kind:
     file: str
     seeds: tuple[bytes, ...]
     mutations: tuple[mutate.Mutation, ...]
-    refusals: tuple[type[Exception], ...]
+    refusals: tuple[type[BaseException], ...]
     accept: Accept
     place: str = ""

@@ -43,6 +43,7 @@ from tests.crosscheck.sessions import CASE, PROVIDER
 from tests.flexmb.scene.bad_scenes import satellite
 from tests.fuzz import mutate
 from tests.fuzz.kind import Kind
+from tests.fuzz.kinds_of_exports import of_exports
 from tests.fuzz.kinds_of_imports import of_imports
 from tests.fuzz.kinds_of_sessions import of_sessions
 from tests.fuzz.kinds_of_tables import of_tables
@@ -86,6 +87,7 @@ def kinds(folder: Path) -> dict[str, Kind]:
         "map verdicts": Kind("maps.json", (_verdicts(),), jsonl, (ValueError,), _maps),
         **of_sessions(folder),
         **of_imports(folder),
+        **of_exports(folder),
         **of_tables(_scene),
     }
 

@@ -97,7 +97,7 @@ def _try(kind: Kind, folder: Path, seed: int, name: str, number: int, keep: Path
     return {"done": done, "outcome": outcome, "detail": detail, "growth_mb": growth >> 20}
 
 
-def _refusal(kind: Kind, path: Path, error: Exception) -> tuple[str, str]:
+def _refusal(kind: Kind, path: Path, error: BaseException) -> tuple[str, str]:
     """A documented error says which file it is about; any other kind of ValueError came through from below."""
     if not isinstance(error, OSError) and type(error) not in kind.refusals:
         return "traceback", f"{type(error).__name__}: {error}\n{traceback.format_exc()[-1500:]}"

@@ -4,5 +4,9 @@ import sys
 
 from .comparison import compare
 
-for channel, (off, uncertainty) in compare(sys.argv[1]).items():
+try:
+    found = compare(sys.argv[1])
+except ArithmeticError as error:
+    sys.exit(f"{sys.argv[1]}: {error}")
+for channel, (off, uncertainty) in found.items():
     print(f"{channel:40s} {off:9.1e} {'within' if off <= uncertainty else 'BEYOND'} {uncertainty:9.1e}")

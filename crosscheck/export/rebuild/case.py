@@ -1,29 +1,39 @@
 """The equations of motion of a case, and what is observed."""
 
-import json
+from os.path import isfile
 from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from .forms import MODAL, MODEL, read_json
 from .frame import JacobianFrame, field
 from .functions import breaks_of, function_of
 from .rotations import cross, matrix_of, quaternion_of, quaternion_rate, rotation_vector, skew, turn, turned_by
 
 
 def read_case(folder):
-    """The equations of motion of the exported case in a folder."""
+    """The equations of motion of the exported case in a folder; SystemExit names a file that is none, and why."""
     folder = Path(folder)
-    data = json.loads((folder / "model.json").read_text(encoding="utf-8"))
-    files = {body["name"]: body["file"] for body in data["bodies"] if body["kind"] == "modal"}
-    modal = {name: json.loads((folder / file).read_text(encoding="utf-8")) for name, file in files.items()}
-    return RebuiltCase(data, modal)
+    file, modal = folder / "model.json", {}
+    data = read_json(file, MODEL)
+    for body in data["bodies"]:
+        if body["kind"] == "modal":
+            place = folder / body["file"]
+            if not isfile(place):
+                raise SystemExit(f'{file}: the file of body "{body["name"]}" is not there: {place}')
+            modal[body["name"]] = read_json(place, MODAL)
+    try:
+        return RebuiltCase(data, modal)
+    except (ValueError, ArithmeticError) as error:
+        raise SystemExit(f"{file}: {error}") from None
 
 
 class RebuiltCase:
     """The equations of motion of one exported case. The state y is [q, u]; a quaternion has four of q, three of u.
 
     `data` is the content of `model.json`, `modal` that of `modal/<body>.json` by the name of each flexible body.
+    ValueError where they do not fit each other.
     """
 
     def __init__(self, data, modal):
@@ -33,15 +43,40 @@ class RebuiltCase:
         self.data, self.gravity = data, np.array(data["gravity_m_s2"])
         self.bodies = {body["name"]: body for body in data["bodies"]}
         self.modal = {name: _flexible(body) for name, body in modal.items()}
+        self._check()
         self.joints = self._ordered(data["joints"])
         self._number()
         self.loads = [(load, function_of(load["function"])) for load in data["loads"]]
+        if not np.all(np.isfinite(self.rates(0.0, self.start))):
+            raise ValueError("its accelerations at the start are not finite")
+
+    def _check(self):
+        """ValueError unless each body has one joint, and all else is at nodes and bodies that there are."""
+        bodies, joints = [body["name"] for body in self.data["bodies"]], self.data["joints"]
+        children = [joint["child"] for joint in joints]
+        if sorted(children) != sorted(bodies) or len({*bodies, "ground"}) <= len(bodies):
+            raise ValueError("each body has one name and one joint")
+        if len({joint["name"] for joint in joints}) < len(joints):
+            raise ValueError("two joints have one name")
+        nodes = {name: {"origin", *body.get("nodes", ())} for name, body in self.bodies.items()}
+        nodes |= {name: set(modal["nodes"]) for name, modal in self.modal.items()} | {"ground": {"origin"}}
+        places = [(joint[end], joint[f"{end}_node"]) for joint in joints for end in ("parent", "child")]
+        places += [(each["body"], each["node"]) for part in ("loads", "markers") for each in self.data[part]]
+        for body, node in places:
+            if node not in nodes.get(body, ()):
+                raise ValueError(f'there is no node "{node}" of a body "{body}"')
+        for body, state in self.data["modal_states"].items():
+            m = self.modal[body]["modes"] if body in self.modal else None
+            if len(state["coordinates"]) != m or len(state["rates"]) not in (0, m):
+                raise ValueError(f'modal_states: body "{body}" has not so many modes')
 
     def _ordered(self, joints):
         """Joints, parents before children."""
         known, waiting, found = {"ground"}, list(joints), []
         while waiting:
             ready = [joint for joint in waiting if joint["parent"] in known]
+            if not ready:
+                raise ValueError(f'no way leads from the ground to joint "{waiting[0]["name"]}"')
             found += ready
             known |= {joint["child"] for joint in ready}
             waiting = [joint for joint in waiting if joint not in ready]
@@ -367,7 +402,7 @@ def _flexible(body):
     integrals = {key: np.array(values) for key, values in body["integrals"].items()}
     turning = bool(np.any(points["inertia_kg_m2"]) or np.any(points["mass_centre_offset_m"]))
     return {
-        "modes": body["modes"], "points": points, "integrals": integrals, "turning": turning,
+        "modes": len(body["stiffness"]), "points": points, "integrals": integrals, "turning": turning,
         "nodes": {name: {key: np.array(part) for key, part in node.items()} for name, node in body["nodes"].items()},
         "summed": bool(integrals) and "second_translation" not in points and not turning,
         "stiffness": np.array(body["stiffness"]), "damping": np.array(body["damping"]),

@@ -1,11 +1,11 @@
 """The reference of a case with its error bars, and the distance of the rebuilt motion from it."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
 
 from .case import read_case
+from .forms import read_table
 
 
 def distance(channel, a, b):
@@ -18,15 +18,26 @@ def distance(channel, a, b):
 
 def reference(folder):
     """Times, channels (T, k) by name, and the uncertainty of each, from the two tables of a case."""
-    with open(Path(folder) / "reference.csv", encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))
-    values, places = np.array(rows[1:], float), {}
-    with open(Path(folder) / "uncertainty.csv", encoding="utf-8", newline="") as file:
-        known = {row["channel"]: float(row["uncertainty"]) for row in csv.DictReader(file)}
-    for column, name in enumerate(rows[0][1:], start=1):
-        name = name.rpartition(" [")[0]
-        places.setdefault(name if name in known else name.rpartition(".")[0], []).append(column)
-    return values[:, 0], {name: values[:, columns] for name, columns in places.items()}, known
+    file, other = Path(folder) / "reference.csv", Path(folder) / "uncertainty.csv"
+    bars = read_table(other, ("channel", "unit", "how"))
+    if list(bars) != ["channel", "unit", "uncertainty", "range", "how"] or np.any(bars["uncertainty"] < 0.0):
+        raise SystemExit(f"{other}: it has other columns than a table of error bars, or negative ones")
+    units = dict(zip(bars["channel"], bars["unit"], strict=True))
+    (time, times), *columns = read_table(file).items()
+    if time != "t [s]" or times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
+        raise SystemExit(f"{file}: its first column is no time that begins at zero and grows")
+    found = {channel: {} for channel in units}
+    for column, values in columns:
+        name, _, symbol = column.removesuffix("]").rpartition(" [")
+        channel = name if name in units else name.rpartition(".")[0]
+        if channel not in units or symbol != ("1" if channel.endswith(".orientation") else units[channel]):
+            raise SystemExit(f'{file}: "{column}" is not the channel and unit of a row of {other.name}')
+        found[channel][name.removeprefix(channel)] = values
+    for channel, parts in found.items():
+        if not parts or list(parts) != sorted(parts, key=lambda part: "wxyz".find(part[1:])):
+            raise SystemExit(f'{file}: "{channel}" has no columns, or not in the order w, x, y, z')
+    stored = {channel: np.column_stack(list(parts.values())) for channel, parts in found.items()}
+    return times, stored, dict(zip(bars["channel"], bars["uncertainty"], strict=True))
 
 
 def compare(folder, rtol=1e-13, method="DOP853", until=np.inf):
@@ -36,5 +47,8 @@ def compare(folder, rtol=1e-13, method="DOP853", until=np.inf):
     here = times <= until
     times, stored = times[here], {name: values[here] for name, values in stored.items()}
     ours = case.channels(times, case.integrate(times, rtol, method))
+    for name in stored.keys() & ours.keys():
+        if stored[name].shape != ours[name].shape:
+            raise SystemExit(f"{Path(folder) / 'reference.csv'}: \"{name}\" has {stored[name].shape[1]} columns")
     off = {name: distance(name, ours[name], stored[name]) for name in stored if name in ours}
     return {name: (float(np.max(values)), known[name]) for name, values in off.items()}
