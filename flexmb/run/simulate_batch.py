@@ -85,22 +85,23 @@ def simulate_batch(
 
 
 def _watched(runs: BatchTrajectory) -> Iterator[str]:
-    """What watches of accuracy say of the finished copies: of each body and each watch once, and of how many copies."""
+    """What watches of accuracy say of the finished copies: of each body and each watch once, of the worst copy."""
     batch, done = runs.batch, np.flatnonzero(runs.status == OK)
     if not len(done) or all(link.is_rigid for link in batch.systems[0].links):
         return
     together = [done] if batch.shares_constants else [done[i : i + 1] for i in range(len(done))]
-    found: dict[tuple[str, str], list[Said]] = {}
+    found: dict[tuple[str, str], list[tuple[Said, int]]] = {}
     for copies in together:
         system = batch.system(int(copies[0]))
         t = np.tile(runs.t, len(copies))
         q, u = (each[copies].reshape(len(t), -1) for each in (runs.q, runs.u))
         turns = partial(_turns, system, t, q, u)
         for each in said(WatchedStates(system, t, q, u, turns)):
-            found.setdefault((each.waiver, each.finding.body), []).append(each)
+            found.setdefault((each.waiver, each.finding.body), []).append((each, int(copies[0])))
     for alike in found.values():
-        more = f" (and {len(alike) - 1} more copies like it)" if len(alike) > 1 else ""
-        yield f'scene "{batch.systems[0].scene.name}": {alike[0]}{more}'
+        worst, copy = max(alike, key=lambda each: each[0].finding.size)
+        more = f" (copy {copy}, the worst of {len(alike)} copies like it)" if len(alike) > 1 else ""
+        yield f'scene "{batch.systems[0].scene.name}": {worst}{more}'
 
 
 def _turns(system: FreeMotion, t: Real, q: Real, u: Real, n: int) -> Real:

@@ -49,6 +49,10 @@ class Unfollowed(NamedTuple):
     enough: int | None
 
     @property
+    def size(self) -> float:
+        return self.rotation
+
+    @property
     def what(self) -> str:
         return (
             f'beam "{self.body}" bends more than its points can follow: at t = {self.t:g} s, {self.points} of them '

@@ -40,6 +40,10 @@ class Unresolved(NamedTuple):
     enough: int | None
 
     @property
+    def size(self) -> float:
+        return self.position
+
+    @property
     def what(self) -> str:
         return (
             f'beam "{self.body}" bends more finely than its polynomials can describe: at t = {self.t:g} s the last of '

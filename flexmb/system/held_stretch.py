@@ -14,6 +14,7 @@ import numpy as np
 
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.collocation import gauss_rule
+from flexmb.scene.schema import Scene
 from flexmb.scene.sections import EXTENSION, mass_per_length, stiffness_on_axis
 from flexmb.scene.strains import strains
 from flexmb.system.section_loads import SectionBalance
@@ -37,6 +38,10 @@ class Unstretched(NamedTuple):
     strain: float
 
     @property
+    def size(self) -> float:
+        return abs(self.strain)
+
+    @property
     def remedy(self) -> str:
         return 'give it "axial" among the families of its modes, or polynomials'
 
@@ -50,17 +55,19 @@ class Unstretched(NamedTuple):
         )
 
 
+def unstretchable(scene: Scene) -> list[BeamBody]:
+    """The beams of level exact whose stretch is held."""
+    beams = [body for body in scene.bodies if isinstance(body, BeamBody) and body.level == "exact"]
+    return [body for body in beams if "axial" not in strains(body)]
+
+
 def unstretched(system: System, t: Real, q: Real, u: Real, loads: Mapping[str, Real]) -> Iterator[Unstretched]:
     """The beams that loads in some of the states at t (T,) s would stretch by more than ALLOWED, at the worst of them.
 
     loads: (T,6) of hinges and closures, by name. Nothing of scenes with controllers, whose loads do not follow from a
     state.
     """
-    held = [
-        body
-        for body in system.scene.bodies
-        if isinstance(body, BeamBody) and body.level == "exact" and "axial" not in strains(body)
-    ]
+    held = unstretchable(system.scene)
     if system.scene.controllers or not held or not len(t):
         return
     force, turn = _largest(system, u, loads)

@@ -38,17 +38,17 @@ class TooFast(NamedTuple):
     remedy: str
 
     @property
-    def share(self) -> float:
+    def size(self) -> float:
         """(w / omega_1)^2."""
         return (self.rate / self.first) ** 2
 
     @property
     def what(self) -> str:
-        beyond = f'; level "{self.level}" is unstable there' if self.share >= 1.0 and self.level != "ruthless" else ""
+        beyond = f'; level "{self.level}" is unstable there' if self.size >= 1.0 and self.level != "ruthless" else ""
         return (
             f'body "{self.body}" turns at {self.rate:.3g} rad/s at t = {self.t:g} s, {self.rate / self.first:.2g} of '
             f'its first frequency of {self.first:.3g} rad/s, and level "{self.level}" leaves out that this pulls it '
-            f"straight, an effect of (spin / first frequency)^2 = {self.share:.2g}{beyond}"
+            f"straight, an effect of (spin / first frequency)^2 = {self.size:.2g}{beyond}"
         )
 
 

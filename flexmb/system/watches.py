@@ -44,6 +44,11 @@ class AccuracyFinding(Protocol):
     def body(self) -> str: ...
 
     @property
+    def size(self) -> float:
+        """How bad it is, beside other findings of one watch."""
+        ...
+
+    @property
     def what(self) -> str: ...
 
     @property

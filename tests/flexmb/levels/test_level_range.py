@@ -79,14 +79,15 @@ def test_linear_models_of_closed_loops_warn():
         assert len(caught) == 1
 
 
-def test_batches_warn_once():
+def test_batches_warn_once_and_of_the_worst():
     scenes = [arm(share * FIRST) for share in (0.1, 0.6, 0.7, 0.2)]
     system = fm.compile(scenes[0])
     states = np.array([fm.compile(scene).initial_state.u for scene in scenes])
     for copies, given in ((scenes, {}), (system, {"u": states})):
-        with pytest.warns(fm.SceneWarning, match='"arm": .*first frequency') as caught:
+        with pytest.warns(fm.SceneWarning, match='"arm": .*, 0.7 of its first frequency') as caught:
             fm.simulate_batch(copies, 0.02, samples=3, **given)
         assert len(caught) == 1
+        assert "u" in given or "(copy 2, the worst of 2 copies like it)" in str(caught[0].message)
     fm.simulate_batch([arm(0.6 * FIRST, "stiffened")] * 2, 0.02, samples=3)
     fm.simulate_batch([replace(arm(0.6 * FIRST), allow=("level_range",))] * 2, 0.02, samples=3)
 
