@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from textwrap import fill
 from typing import Any
@@ -25,6 +25,7 @@ from flexmb.scene.bodies import BeamBody, Level, ModalBody
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
+from flexmb.system.held_stretch import unstretchable
 from flexmb.tables import arguments
 
 BUDGET = 4e10
@@ -184,7 +185,7 @@ class Prepared:
     """A question and the predictions that are made before any candidate runs.
 
     `known`: the indicators of each body, empty if the rigid scene does not run; `cost` and `hidden` as for
-    `Confirmation`; `ladders`: the steps of each body; `notes`: why there are no indicators;
+    `Confirmation`; `ladders`: the steps of each body; `notes`: why there are no indicators, and what is held;
     `budget` as for `advise`.
     """
 
@@ -221,7 +222,7 @@ def prepare(
         known, slow = _indicators(base, scene, bench.wanted), base.run.statistics.evaluations
     return Prepared(
         bench, tolerance, known, cost(scene, t_end, slow), _hidden(scene, known),
-        _ladders(scene, known, tolerance), (base,) if isinstance(base, str) else (), budget,
+        _ladders(scene, known, tolerance), (*((base,) if isinstance(base, str) else ()), *_held(scene)), budget,
     )  # fmt: skip
 
 
@@ -245,6 +246,16 @@ def _hidden(scene: Scene, known: dict[str, Indicators]) -> float:
         for body in flexible_bodies(scene)
         if body.name in known and (body.name in bent or not isinstance(body, BeamBody))
     )
+
+
+def _held(scene: Scene) -> Iterator[str]:
+    """What no reference has, because the modes of the scene say so."""
+    beams = ", ".join(f'"{body.name}"' for body in unstretchable(scene))
+    if beams:
+        yield (
+            f'errors are those of beams that do not stretch, as the modes of {beams} hold it: give them "axial" where '
+            "a length matters, as near the fold of a mechanism"
+        )
 
 
 def _finest(body: BeamBody | ModalBody) -> Level:

@@ -114,7 +114,8 @@ def test_an_initial_bend_in_strains_is_kept_by_more_polynomials() -> None:
     with pytest.raises(ValueError, match="starts bent"):
         built(scene, (("arm", BodyModel("modes", 3, "full")),))
     assert [name for name, _ in references(scene)] == ["modes", "still more modes"]
-    assert prepare(scene, 1e-3, None, 0.5).hidden == 0.0
+    asked = prepare(scene, 1e-3, None, 0.5)
+    assert asked.hidden == 0.0 and '"arm" hold' in asked.notes[0]
 
 
 def test_a_stiffened_beam_that_starts_bent_is_compared_at_its_own_points() -> None:
