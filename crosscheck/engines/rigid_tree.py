@@ -1,17 +1,18 @@
-"""What the adapters of peers for rigid trees have in common: slots of freedoms, loads at nodes, connectors, drives."""
+"""What the adapters of peers for rigid trees have in common: coordinates, forces, loads, connectors, drives."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar, assert_never
+from typing import Generic, NamedTuple, TypeVar, assert_never
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.engines.connections import Along, Exerted, Moving, along_hinges, connections
-from crosscheck.engines.conventions import Frame
+from crosscheck.engines.conventions import Frame, rotation_vector
 from crosscheck.engines.functions_of_time import Profile, profile
-from crosscheck.engines.links import Attachment, Freedom, Link, Scalar
+from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, attachment
 from flexmb.scene.schema import Load, Scene
 from flexmb.scene.tree import coupled
 from flexmb.typing import Real
@@ -32,6 +33,20 @@ class Slot:
 
 
 AnySlot = TypeVar("AnySlot", bound=Slot)
+Places = slice | NDArray[np.intp]
+
+
+def places(numbers: ArrayLike) -> Places:
+    """Indices of entries of an array; consecutive ones as a slice, which takes a third of the time."""
+    found = np.asarray(numbers, dtype=np.intp)
+    if len(found) == 0:
+        return slice(0, 0)
+    return slice(int(found[0]), int(found[-1]) + 1) if np.all(np.diff(found) == 1) else found
+
+
+def as_it_is(quaternion: Real) -> Real:
+    """A quaternion of a peer that counts them as the scene does, scalar first."""
+    return quaternion
 
 
 def scalars(slots: Sequence[AnySlot]) -> list[AnySlot]:
@@ -49,6 +64,156 @@ def scalar_start(freedom: Scalar) -> tuple[float, float]:
     if freedom.prescribed is None:
         return freedom.value, freedom.rate
     return profile(freedom.prescribed)(0.0)[:2]
+
+
+def scene_start(
+    slots: Sequence[Slot], sizes: tuple[int, int], flight: Callable[[Floating], ArrayLike],
+    quaternion: Callable[[Real], Real] = as_it_is,
+) -> tuple[Real, Real]:  # fmt: skip
+    """q and v, of these sizes, at t = 0; free flight has position and quaternion in q.
+
+    `flight` gives its speeds (6,), `quaternion` the order in which the peer has the scene's quaternions.
+    """
+    q, v = (np.zeros(size) for size in sizes)
+    for slot in slots:
+        match slot.freedom:
+            case Scalar() as freedom:
+                q[slot.q], v[slot.v] = scalar_start(freedom)
+            case Ball() as freedom:
+                q[slot.q : slot.q + 4] = quaternion(np.array(freedom.quaternion))
+                v[slot.v : slot.v + 3] = freedom.angular_velocity
+            case Floating() as freedom:
+                q[slot.q : slot.q + 7] = [*freedom.position, *quaternion(np.array(freedom.quaternion))]
+                v[slot.v : slot.v + 6] = flight(freedom)
+            case _:
+                assert_never(slot.freedom)
+    return q, v
+
+
+def quaternion_place(slot: Slot) -> slice:
+    """Where in q a ball joint or free flight has its quaternion; ValueError for a scalar, which has none."""
+    match slot.freedom:
+        case Ball():
+            return slice(slot.q, slot.q + 4)
+        case Floating():
+            return slice(slot.q + 3, slot.q + 7)
+        case Scalar():
+            raise ValueError(f'"{slot.link.joint}" has no quaternion')
+        case _:
+            assert_never(slot.freedom)
+
+
+class TreeState(NamedTuple):
+    """q (nq,) with unit quaternions, v (nv,), accelerations of the driven coordinates (d,)."""
+
+    q: Real
+    v: Real
+    driven: Real
+
+
+class Turning(NamedTuple):
+    """A ball joint or free flight: where q has its quaternion, and y the one that is integrated."""
+
+    slot: Slot
+    in_q: slice
+    in_y: slice
+
+
+class FreeCoordinates(Generic[AnySlot]):
+    """The state y = [free coordinates, free speeds, work] of a tree that SciPy steps.
+
+    Quaternions are integrated as four numbers: qdot is linear in q, so the norm is an invariant of the exact flow, and
+    everything else uses the normalised q. Driven coordinates follow their functions of time.
+    """
+
+    def __init__(self, slots: Sequence[AnySlot], nq: int, nv: int) -> None:
+        self._nq, self._nv = nq, nv
+        self.driven = [slot for slot in slots if slot.driven]
+        self._motions = [profile(slot.freedom.prescribed) for slot in self.driven if isinstance(slot.freedom, Scalar)]
+        driven_q, self._driven_v = [slot.q for slot in self.driven], [slot.v for slot in self.driven]
+        free = np.setdiff1d(np.arange(nq), driven_q)
+        self._count, self._driven_q, self._free_q = len(free), places(driven_q), places(free)
+        self.driven_v, self.free_v = places(self._driven_v), places(np.setdiff1d(np.arange(nv), self._driven_v))
+        single = scalars(slots)
+        self.scalar_q, self.scalar_v = places([slot.q for slot in single]), places([slot.v for slot in single])
+        turning = [(slot, quaternion_place(slot)) for slot in slots if not isinstance(slot.freedom, Scalar)]
+        firsts = [int(np.searchsorted(free, place.start)) for _, place in turning]
+        self.turning = [Turning(slot, place, slice(k, k + 4)) for (slot, place), k in zip(turning, firsts, strict=True)]
+        self._none = np.zeros(0)
+        self.plain = not self.driven and not turning
+
+    def packed(self, q: Real, v: Real) -> Real:
+        """y of a state, before any work was done."""
+        return np.concatenate([q[self._free_q], v[self.free_v], [0.0]])
+
+    def state(self, t: float, y: Real) -> TreeState:
+        """The state of all coordinates."""
+        if self.plain:
+            return TreeState(y[: self._count], y[self._count : -1], self._none)
+        q, v, driven = np.empty(self._nq), np.empty(self._nv), self._none
+        q[self._free_q], v[self.free_v] = y[: self._count], y[self._count : -1]
+        if self._motions:
+            motion = np.array([each(t) for each in self._motions])
+            q[self._driven_q], v[self.driven_v], driven = motion[:, 0], motion[:, 1], motion[:, 2]
+        for _, place, _ in self.turning:
+            quaternion = q[place]
+            quaternion /= np.sqrt(quaternion @ quaternion)
+        return TreeState(q, v, driven)
+
+    def rate(self, qdot: Real, vdot: Real, power: float) -> Real:
+        """dy/dt of rates (nq,) and (nv,) of all coordinates and speeds."""
+        return np.concatenate([qdot[self._free_q], vdot[self.free_v], [power]])
+
+
+class JointForces:
+    """Generalised forces (nv,) of springs, of dampers and of motors; `quaternion` makes a peer's scalar first."""
+
+    def __init__(
+        self, slots: Sequence[Slot], nv: int, quaternion: Callable[[Real], Real] = as_it_is
+    ) -> None:
+        single = scalars(slots)
+        sprung = [slot for slot in single if slot.freedom.stiffness]
+        damped = [slot for slot in single if slot.freedom.damping]
+        self._nv, self._quaternion = nv, quaternion
+        self._spring_q, self._spring_v = places([slot.q for slot in sprung]), places([slot.v for slot in sprung])
+        self._stiffness = np.array([slot.freedom.stiffness for slot in sprung])
+        self._rest = np.array([slot.freedom.rest for slot in sprung])
+        self._damper_v = places([slot.v for slot in damped])
+        self._damping = np.array([slot.freedom.damping for slot in damped])
+        self._motors = motors(slots)
+        self._balls = [
+            slot
+            for slot in slots
+            if isinstance(slot.freedom, Ball) and (slot.freedom.stiffness or slot.freedom.damping)
+        ]
+        self.loses = bool(damped or self._motors or self._balls)  # else dampers and motors give nothing
+
+    def springs(self, q: Real) -> Real:
+        tau = np.zeros(self._nv)
+        if len(self._stiffness):
+            tau[self._spring_v] = -self._stiffness * (q[self._spring_q] - self._rest)
+        for slot in self._balls:
+            tau[slot.v : slot.v + 3] = -slot.freedom.stiffness * self._turn(slot, q)
+        return tau
+
+    def dampers_and_motors(self, t: float, v: Real) -> Real:
+        tau = np.zeros(self._nv)
+        tau[self._damper_v] = -self._damping * v[self._damper_v]
+        for slot in self._balls:
+            tau[slot.v : slot.v + 3] = -slot.freedom.damping * v[slot.v : slot.v + 3]
+        for index, motor in self._motors:
+            tau[index] += motor(t).value
+        return tau
+
+    def spring_energy(self, q: Real) -> float:
+        energy = 0.5 * self._stiffness @ (q[self._spring_q] - self._rest) ** 2
+        for slot in self._balls:
+            turn = self._turn(slot, q)
+            energy += 0.5 * slot.freedom.stiffness * (turn @ turn)
+        return float(energy)
+
+    def _turn(self, slot: Slot, q: Real) -> Real:
+        return rotation_vector(self._quaternion(q[quaternion_place(slot)]))
 
 
 @dataclass(frozen=True)
@@ -96,6 +261,12 @@ def placed_couplings(scene: Scene, slots: Sequence[Slot]) -> tuple[PlacedCouplin
         own = tuple(scalars[each.hinge.name][each.place] for each in related)
         found.append(PlacedCoupling(coupling.name, own, tuple(each.factor for each in related), coupling.offset))
     return tuple(found)
+
+
+def placed_loads(scene: Scene, links: tuple[Link, ...]) -> list[tuple[int, PointLoad]]:
+    """The loads at nodes, each with the number of its link, in whose axes they are."""
+    at = [attachment(scene, links, load) for load in scene.loads]
+    return [(there.link, PointLoad(load, there.frame)) for there, load in zip(at, scene.loads, strict=True)]
 
 
 class PointLoad:
@@ -161,3 +332,18 @@ def by_joint(slots: Iterable[Slot], loads: Iterable[float]) -> dict[str, Real]:
 def of_kind(kind: str, wrenches: dict[tuple[str, str], Real]) -> dict[str, Real]:
     """The wrenches of one kind of link, "body" or "wheel", by the name of their joint."""
     return {name: wrench for (each, name), wrench in wrenches.items() if each == kind}
+
+
+class ConnectorOutputs(NamedTuple):
+    """Energy of all connectors (J), loads [torque; force] of those between nodes on B, and loads along hinges."""
+
+    energy: float
+    between: dict[str, Real]
+    along: dict[str, Real]
+
+
+def connector_outputs(exerted: dict[str, Exerted], along: dict[str, tuple[int, Along]]) -> ConnectorOutputs:
+    """What a snapshot says of connectors."""
+    stored = sum(each.energy for each in exerted.values()) + sum(each.energy for _, each in along.values())
+    between = {name: each.on_b for name, each in exerted.items()}
+    return ConnectorOutputs(stored, between, {name: np.array([each.load]) for name, (_, each) in along.items()})

@@ -1,53 +1,13 @@
-"""Everything that acts on a DART tree besides gravity: springs, dampers, motors, loads at nodes."""
+"""Loads at nodes of a DART tree."""
 
 from __future__ import annotations
 
 import dartpy
-import numpy as np
 
-from crosscheck.engines.conventions import cross, rotation_vector
+from crosscheck.engines.conventions import cross
 from crosscheck.engines.dart.tree import DartTree
-from crosscheck.engines.links import Ball, attachment
-from crosscheck.engines.rigid_tree import PointLoad, motors, scalars
-from flexmb.scene.schema import Load, Scene
-from flexmb.typing import Real
-
-
-class DartJointForces:
-    """Generalised forces (nv,) of springs, of dampers and of motors, from the scene's coordinates (nq,)."""
-
-    def __init__(self, tree: DartTree) -> None:
-        balls = [slot for slot in tree.slots if isinstance(slot.freedom, Ball)]
-        self._nv = tree.skeleton.getNumDofs()
-        self._springs = [slot for slot in scalars(tree.slots) if slot.freedom.stiffness]
-        self._dampers = [slot for slot in scalars(tree.slots) if slot.freedom.damping]
-        self._motors = motors(tree.slots)
-        self._balls = [slot for slot in balls if slot.freedom.stiffness or slot.freedom.damping]
-
-    def springs(self, q: Real) -> Real:
-        tau = np.zeros(self._nv)
-        for slot in self._springs:
-            tau[slot.v] = -slot.freedom.stiffness * (q[slot.q] - slot.freedom.rest)
-        for slot in self._balls:
-            tau[slot.v : slot.v + 3] = -slot.freedom.stiffness * rotation_vector(q[slot.q : slot.q + 4])
-        return tau
-
-    def dampers_and_motors(self, t: float, v: Real) -> Real:
-        tau = np.zeros(self._nv)
-        for slot in self._dampers:
-            tau[slot.v] = -slot.freedom.damping * v[slot.v]
-        for slot in self._balls:
-            tau[slot.v : slot.v + 3] = -slot.freedom.damping * v[slot.v : slot.v + 3]
-        for index, motor in self._motors:
-            tau[index] += motor(t).value
-        return tau
-
-    def spring_energy(self, q: Real) -> float:
-        energy = sum(0.5 * slot.freedom.stiffness * (q[slot.q] - slot.freedom.rest) ** 2 for slot in self._springs)
-        for slot in self._balls:
-            turn = rotation_vector(q[slot.q : slot.q + 4])
-            energy += 0.5 * slot.freedom.stiffness * (turn @ turn)
-        return float(energy)
+from crosscheck.engines.rigid_tree import PointLoad, placed_loads
+from flexmb.scene.schema import Scene
 
 
 class DartLoads:
@@ -55,7 +15,7 @@ class DartLoads:
 
     def __init__(self, tree: DartTree, scene: Scene) -> None:
         self._skeleton = tree.skeleton
-        self._loads = [_DartLoad(tree, scene, load) for load in scene.loads]
+        self._loads = [_DartLoad(tree.bodies[link], load) for link, load in placed_loads(scene, tree.links)]
 
     def __bool__(self) -> bool:
         return bool(self._loads)
@@ -67,10 +27,8 @@ class DartLoads:
 
 
 class _DartLoad:
-    def __init__(self, tree: DartTree, scene: Scene, load: Load) -> None:
-        at = attachment(scene, tree.links, load)
-        self._body: dartpy.dynamics.BodyNode = tree.bodies[at.link]
-        self._load = PointLoad(load, at.frame)
+    def __init__(self, body: dartpy.dynamics.BodyNode, load: PointLoad) -> None:
+        self._body, self._load = body, load
 
     def apply(self, t: float) -> float:
         R = self._body.getWorldTransform().rotation()

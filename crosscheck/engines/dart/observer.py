@@ -6,9 +6,9 @@ import numpy as np
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import cross, quaternion_of, rotate_spatial
-from crosscheck.engines.dart.dynamics import DartDynamics, DartState
+from crosscheck.engines.dart.dynamics import DartDynamics
 from crosscheck.engines.links import Attachment, attachment
-from crosscheck.engines.rigid_tree import by_joint, of_kind
+from crosscheck.engines.rigid_tree import TreeState, by_joint, of_kind
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -21,7 +21,7 @@ class DartObserver:
         self._gravity = np.array(scene.gravity_m_s2, dtype=float)
         self._markers = {marker.name: attachment(scene, dynamics.tree.links, marker) for marker in scene.markers}
 
-    def observe(self, t: float, state: DartState) -> Snapshot:
+    def observe(self, t: float, state: TreeState) -> Snapshot:
         dynamics = self._dynamics
         tree = dynamics.tree
         drive = dynamics.solve(t, state).drive

@@ -16,7 +16,7 @@ import numpy as np
 
 from crosscheck.engines.conventions import Frame
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar, by_motion
-from crosscheck.engines.rigid_tree import Slot, scalar_start
+from crosscheck.engines.rigid_tree import Slot, scene_start
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -68,20 +68,8 @@ def build_tree(scene: Scene, chain: tuple[Link, ...]) -> DartTree:
 
 def initial_state(tree: DartTree) -> tuple[Real, Real]:
     """The scene's coordinates (nq,) and speeds (nv,) at t = 0, those of free joints in outboard axes."""
-    q, v = np.zeros(tree.nq), np.zeros(tree.skeleton.getNumDofs())
-    for slot in tree.slots:
-        match slot.freedom:
-            case Scalar() as freedom:
-                q[slot.q], v[slot.v] = scalar_start(freedom)
-            case Ball() as freedom:
-                q[slot.q : slot.q + 4] = freedom.quaternion
-                v[slot.v : slot.v + 3] = freedom.angular_velocity
-            case Floating() as freedom:
-                q[slot.q : slot.q + 7] = [*freedom.position, *freedom.quaternion]
-                v[slot.v : slot.v + 6] = [*freedom.angular_velocity, *freedom.velocity]
-            case _:
-                assert_never(slot.freedom)
-    return q, v
+    sizes = tree.nq, tree.skeleton.getNumDofs()
+    return scene_start(tree.slots, sizes, lambda flight: [*flight.angular_velocity, *flight.velocity])
 
 
 def _coordinates(freedom: Freedom) -> int:

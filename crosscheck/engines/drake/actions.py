@@ -14,9 +14,9 @@ from crosscheck.engines.connections import WORLD, Along, Exerted, Moving
 from crosscheck.engines.conventions import quaternion_of, rotation_vector
 from crosscheck.engines.drake.tree import BALLAST, DrakeSlot, DrakeTree, ball_rotation
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Attachment, attachment
-from crosscheck.engines.rigid_tree import PointLoad, TreeConnectors, motors, scalars
-from flexmb.scene.schema import Load, Scene
+from crosscheck.engines.links import Attachment
+from crosscheck.engines.rigid_tree import PointLoad, TreeConnectors, motors, placed_loads, scalars
+from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 
@@ -98,7 +98,7 @@ class DrakeLoads:
     """
 
     def __init__(self, tree: DrakeTree, scene: Scene) -> None:
-        self._loads = [_DrakeLoad(tree, scene, load) for load in scene.loads]
+        self._loads = [(tree.bodies[link].index(), load) for link, load in placed_loads(scene, tree.links)]
         self._connectors, self._bodies = TreeConnectors(scene, tree.links, tree.slots), tree.bodies
 
     def __bool__(self) -> bool:
@@ -107,7 +107,7 @@ class DrakeLoads:
     def applied(
         self, t: float, poses: list[RigidTransform], speeds: list[SpatialVelocity]
     ) -> list[ExternallyAppliedSpatialForce]:
-        found = [load.applied(t, poses) for load in self._loads]
+        found = [_applied(t, poses, body, load) for body, load in self._loads]
         for at, load in self._connectors.loads(self.exerted(t, poses, speeds)):
             body = self._bodies[at.link].index()
             found.append(_wrench(body, at.frame.position, SpatialForce(load[:3], load[3:])))
@@ -127,18 +127,11 @@ class DrakeLoads:
         return self._connectors.exerted(t, frame)
 
 
-class _DrakeLoad:
-    def __init__(self, tree: DrakeTree, scene: Scene, load: Load) -> None:
-        at = attachment(scene, tree.links, load)
-        self._body = tree.bodies[at.link].index()
-        self._load = PointLoad(load, at.frame)
-
-    def applied(self, t: float, poses: list[RigidTransform]) -> ExternallyAppliedSpatialForce:
-        R = poses[int(self._body)].rotation().matrix()
-        vector = self._load.in_world(t, R)
-        nothing = np.zeros(3)
-        load = SpatialForce(nothing, vector) if self._load.is_force else SpatialForce(vector, nothing)
-        return _wrench(self._body, self._load.point, load)
+def _applied(
+    t: float, poses: list[RigidTransform], body: BodyIndex, load: PointLoad
+) -> ExternallyAppliedSpatialForce:
+    vector, nothing = load.in_world(t, poses[int(body)].rotation().matrix()), np.zeros(3)
+    return _wrench(body, load.point, SpatialForce(*((nothing, vector) if load.is_force else (vector, nothing))))
 
 
 def _wrench(body: BodyIndex, point: Real, load: SpatialForce) -> ExternallyAppliedSpatialForce:

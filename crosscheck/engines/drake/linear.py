@@ -28,8 +28,8 @@ from crosscheck.engines.linear.axes import OutboardAxes
 from crosscheck.engines.linear.coordinates import obstacle
 from crosscheck.engines.linear.matrices import LinearMatrices, exact, quaternion_transport
 from crosscheck.engines.linear.slots import slot_places
-from crosscheck.engines.links import Ball, Floating, Scalar, attachment
-from crosscheck.engines.rigid_tree import PointLoad
+from crosscheck.engines.links import Ball, Floating, Scalar
+from crosscheck.engines.rigid_tree import PointLoad, placed_loads
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -58,8 +58,7 @@ class DrakeLinear:
     def __init__(self, tree: DrakeTree, scene: Scene) -> None:
         self._tree = tree
         self._joints, self._drives = JointActions(tree, scene), Drives(tree)
-        self._placed = [(attachment(scene, tree.links, load), load) for load in scene.loads]
-        self._loads = [(tree.bodies[at.link].index(), PointLoad(load, at.frame)) for at, load in self._placed]
+        self._loads = [(tree.bodies[link].index(), load) for link, load in placed_loads(scene, tree.links)]
         self._plain = tree.plant.CreateDefaultContext()
         self._plant = tree.plant.ToAutoDiffXd()
         self._context = self._plant.CreateDefaultContext()

@@ -12,7 +12,7 @@ from crosscheck.engines.conventions import cross, quaternion_of
 from crosscheck.engines.drake.actions import DrakeLoads, Drives, JointActions
 from crosscheck.engines.drake.tree import DrakeState, DrakeTree, place
 from crosscheck.engines.links import Attachment, attachment
-from crosscheck.engines.rigid_tree import by_joint, of_kind
+from crosscheck.engines.rigid_tree import by_joint, connector_outputs, of_kind
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -40,8 +40,7 @@ class DrakeObserver:
         place(self._tree, context, state)
         drives = self._act(t, state, acceleration)
         loads = dict(zip(self._names, self._reactions(), strict=True))
-        exerted, held = self._loads.exerted(t, *self._motion()), self._joints.held(t, state.q, state.v)
-        stored = sum(each.energy for each in exerted.values()) + sum(each.energy for _, each in held.values())
+        connected = connector_outputs(self._loads.exerted(t, *self._motion()), self._joints.held(t, state.q, state.v))
         momentum = plant.CalcSpatialMomentumInWorldAboutPoint(context, np.zeros(3))
         centre = plant.CalcCenterOfMassPositionInWorld(context)
         return Snapshot(
@@ -52,12 +51,12 @@ class DrakeObserver:
             energy={
                 "kinetic": plant.CalcKineticEnergy(context),
                 "strain": 0.0,
-                "spring": self._joints.spring_energy(state.q, state.turned) + stored,
+                "spring": self._joints.spring_energy(state.q, state.turned) + connected.energy,
                 "gravity": -float(plant.CalcTotalMass(context) * (centre @ self._gravity)),
             },
             momentum=np.concatenate([momentum.rotational(), momentum.translational()]),
-            connectors={name: each.on_b for name, each in exerted.items()},
-            hinge_forces={name: np.array([each.load]) for name, (_, each) in held.items()},
+            connectors=connected.between,
+            hinge_forces=connected.along,
         )
 
     def _act(self, t: float, state: DrakeState, acceleration: Real) -> dict[str, Real]:

@@ -39,10 +39,6 @@ class MujocoConnections:
         for speed, held in self.along(t, data).values():
             data.qfrc_applied[speed] += held.load
 
-    def energy(self, t: float, data: mujoco.MjData) -> float:
-        stored = sum(each.energy for each in self.exerted(t, data).values())
-        return stored + sum(held.energy for _, held in self.along(t, data).values())
-
     def _frame(self, at: Attachment, data: mujoco.MjData) -> Moving:
         if at.link < 0:
             return WORLD.carrying(at.frame)

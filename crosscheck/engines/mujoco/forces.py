@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import assert_never
 
 import mujoco
 import numpy as np
 
-from crosscheck.engines.conventions import cross, rotation_vector
+from crosscheck.engines.conventions import cross
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Attachment, Ball, Floating, Scalar, attachment
 from crosscheck.engines.mujoco.connections import MujocoConnections
 from crosscheck.engines.mujoco.tree import ARMATURE, MujocoSlot, MujocoTree
-from crosscheck.engines.rigid_tree import PointLoad, motors
-from flexmb.scene.schema import Load, Scene
+from crosscheck.engines.rigid_tree import JointForces, PointLoad, motors, placed_loads
+from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 
@@ -28,11 +26,11 @@ class Forces:
 
     def __init__(self, tree: MujocoTree, scene: Scene) -> None:
         self.driven: list[MujocoSlot] = [slot for slot in tree.slots if slot.driven]
-        self._tree = tree
         self._motions = [(slot.q, slot.v, profile(slot.freedom.prescribed)) for slot in self.driven]
         self._motors = motors(tree.slots)
         self._pushed: tuple[float, list[tuple[int, float]]] = np.nan, []  # the last result of `_pushes`, with its time
-        self._loads = [_BodyWrench(tree, attachment(scene, tree.links, load), load) for load in scene.loads]
+        self._loads = [_BodyWrench(tree, link, load) for link, load in placed_loads(scene, tree.links)]
+        self.spring_energy = JointForces(tree.slots, tree.model.nv, _unit).spring_energy
         self.connections = MujocoConnections(tree, scene)
         self._connected = bool(self.connections)
         self.before_end = np.inf
@@ -52,21 +50,6 @@ class Forces:
         """Set the prescribed coordinates to their functions of time."""
         for q, v, motion in self._motions:
             data.qpos[q], data.qvel[v], _ = motion(t)
-
-    def spring_energy(self, q: Real) -> float:
-        energy = 0.0
-        for slot in self._tree.slots:
-            match slot.freedom:
-                case Scalar(stiffness=k, rest=rest):
-                    energy += 0.5 * k * (q[slot.q] - rest) ** 2
-                case Ball(stiffness=k):
-                    turn = rotation_vector(q[slot.q : slot.q + 4] / np.linalg.norm(q[slot.q : slot.q + 4]))
-                    energy += 0.5 * k * (turn @ turn)
-                case Floating():
-                    pass  # free flight has no spring
-                case _:
-                    assert_never(slot.freedom)
-        return float(energy)
 
     def _apply(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         t = min(data.time, self.before_end)
@@ -96,10 +79,9 @@ class Forces:
 class _BodyWrench:
     """A force or torque at a node, handed to MuJoCo as a wrench [force; torque] at the mass centre in World axes."""
 
-    def __init__(self, tree: MujocoTree, at: Attachment, load: Load) -> None:
-        self._body = int(tree.bodies[at.link])
-        self._load = PointLoad(load, at.frame)
-        self._arm = self._load.point - tree.links[at.link].inertia.com
+    def __init__(self, tree: MujocoTree, link: int, load: PointLoad) -> None:
+        self._body, self._load = int(tree.bodies[link]), load
+        self._arm = load.point - tree.links[link].inertia.com
 
     def add(self, t: float, data: mujoco.MjData) -> None:
         R = data.xmat[self._body].reshape(3, 3)
@@ -109,3 +91,7 @@ class _BodyWrench:
             data.xfrc_applied[self._body, 3:] += cross(R @ self._arm, vector)
         else:
             data.xfrc_applied[self._body, 3:] += vector
+
+
+def _unit(quaternion: Real) -> Real:
+    return quaternion / np.linalg.norm(quaternion)

@@ -11,7 +11,7 @@ from crosscheck.engines.conventions import cross, quaternion_of, shift_wrench
 from crosscheck.engines.links import Attachment, Scalar, attachment, by_motion
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.tree import MujocoClosure, MujocoTree
-from crosscheck.engines.rigid_tree import by_joint, of_kind, placed_couplings
+from crosscheck.engines.rigid_tree import by_joint, connector_outputs, of_kind, placed_couplings
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -46,6 +46,7 @@ class MujocoObserver:
         loads = dict(zip(self._names, self._loads(data), strict=True))
         kinetic, momentum = self._motion(data)
         mass, connections = model.body_mass, self._forces.connections
+        connected = connector_outputs(connections.exerted(data.time, data), connections.along(data.time, data))
         return Snapshot(
             markers={name: self._marker(at, data) for name, at in self._markers.items()},
             loads=of_kind("body", loads) | self._closed(data),
@@ -54,14 +55,12 @@ class MujocoObserver:
             energy={
                 "kinetic": kinetic,
                 "strain": 0.0,
-                "spring": self._forces.spring_energy(data.qpos) + connections.energy(data.time, data),
+                "spring": self._forces.spring_energy(data.qpos) + connected.energy,
                 "gravity": -float(mass @ data.xipos @ self._gravity),
             },
             momentum=momentum,
-            connectors={name: each.on_b for name, each in connections.exerted(data.time, data).items()},
-            hinge_forces={
-                name: np.array([held.load]) for name, (_, held) in connections.along(data.time, data).items()
-            },
+            connectors=connected.between,
+            hinge_forces=connected.along,
         )
 
     def _pole(self, bodies: int | NDArray[np.intp], data: mujoco.MjData) -> Real:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import quaternion_of, rotation_matrix
 from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, by_motion
-from crosscheck.engines.rigid_tree import Slot, scalar_start
+from crosscheck.engines.rigid_tree import Slot, scene_start
 from flexmb.typing import Real
 
 ARMATURE = 1e20
@@ -103,21 +103,12 @@ def build_tree(
 
 def initial_state(tree: MujocoTree) -> tuple[Real, Real]:
     """qpos and qvel at t = 0."""
-    q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
-    for slot in tree.slots:
-        match slot.freedom:
-            case Scalar() as freedom:
-                q[slot.q], v[slot.v] = scalar_start(freedom)
-            case Ball() as freedom:
-                q[slot.q : slot.q + 4] = freedom.quaternion
-                v[slot.v : slot.v + 3] = freedom.angular_velocity
-            case Floating() as freedom:
-                q[slot.q : slot.q + 7] = [*freedom.position, *freedom.quaternion]
-                linear = rotation_matrix(freedom.quaternion) @ freedom.velocity
-                v[slot.v : slot.v + 6] = [*linear, *freedom.angular_velocity]
-            case _:
-                assert_never(slot.freedom)
-    return q, v
+    return scene_start(tree.slots, (tree.model.nq, tree.model.nv), _inboard)
+
+
+def _inboard(flight: Floating) -> list[float]:
+    """The speeds of free flight, whose slides are in inboard axes."""
+    return [*(rotation_matrix(flight.quaternion) @ flight.velocity), *flight.angular_velocity]
 
 
 def _close(spec: mujoco.MjSpec, bodies: list[mujoco.MjsBody], closed: MujocoClosure, number: int) -> None:

@@ -22,7 +22,8 @@ from crosscheck.engines.linear.coordinates import obstacle
 from crosscheck.engines.linear.matrices import LinearMatrices, exact
 from crosscheck.engines.linear.slots import slot_places
 from crosscheck.engines.links import Ball, Floating, Scalar
-from crosscheck.engines.pinocchio.dynamics import Acting, Dynamics, PinocchioState
+from crosscheck.engines.pinocchio.dynamics import Acting, Dynamics
+from crosscheck.engines.rigid_tree import TreeState
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -42,7 +43,7 @@ class PinocchioLinear:
         self._turning, self._moving = [slot.v for slot in slots.balls], [slot.v for slot in slots.flying]
         self._free = not dynamics.driven
 
-    def at(self, t: float, state: PinocchioState) -> LinearMatrices:
+    def at(self, t: float, state: TreeState) -> LinearMatrices:
         """The derivatives at a state, in the order that all engines share."""
         acting = self._dynamics.acting(t, state)
         a = self._dynamics.solve(t, state).acceleration
@@ -51,7 +52,7 @@ class PinocchioLinear:
         transport = swapped_transport(state.v, self._turning, self._moving)[np.ix_(place, place)]
         return exact(by_q, by_v, by_force, transport, state.v, a)
 
-    def _of_all(self, state: PinocchioState, acting: Acting) -> tuple[Real, Real, Real]:
+    def _of_all(self, state: TreeState, acting: Acting) -> tuple[Real, Real, Real]:
         """By forward dynamics: derivatives by displacements, speeds and forces."""
         extra = () if acting.wrenches is None else (acting.wrenches,)
         pin.computeABADerivatives(self._model, self._data, state.q, state.v, acting.tau, *extra)
@@ -62,7 +63,7 @@ class PinocchioLinear:
         square = np.ix_(self._places, self._places)
         return by_q[square], by_v[square], inverse[square]
 
-    def _of_free(self, state: PinocchioState, acting: Acting, a: Real) -> tuple[Real, Real, Real]:
+    def _of_free(self, state: TreeState, acting: Acting, a: Real) -> tuple[Real, Real, Real]:
         """The same by inverse dynamics, of the coordinates that no function of time drives."""
         extra = () if acting.wrenches is None else (acting.wrenches,)
         by_q, by_v, _ = pin.computeRNEADerivatives(self._model, self._data, state.q, state.v, a, *extra)
@@ -74,7 +75,7 @@ class PinocchioLinear:
         pull, drag = self._pull(state, acting)[square], self._drag(state)[square]
         return inverse @ (pull - by_q[square]), inverse @ (drag - by_v[square]), inverse
 
-    def _pull(self, state: PinocchioState, acting: Acting) -> Real:
+    def _pull(self, state: TreeState, acting: Acting) -> Real:
         """d tau/d xi (nv,nv) of springs and of loads in World axes."""
         found = np.zeros((self._model.nv, self._model.nv))
         for slot in self._dynamics.tree.slots:
@@ -95,7 +96,7 @@ class PinocchioLinear:
                 found += J.T @ wrench @ J[3:]
         return found
 
-    def _drag(self, state: PinocchioState) -> Real:
+    def _drag(self, state: TreeState) -> Real:
         """d tau/d v (nv,nv) of dampers."""
         found = np.zeros(self._model.nv)
         for slot in self._dynamics.tree.slots:

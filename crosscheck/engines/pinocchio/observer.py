@@ -8,9 +8,9 @@ import pinocchio as pin
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import angular_first, cross, quaternion_of, rotate_spatial
 from crosscheck.engines.links import attachment
-from crosscheck.engines.pinocchio.dynamics import Dynamics, PinocchioState
+from crosscheck.engines.pinocchio.dynamics import Dynamics
 from crosscheck.engines.pinocchio.tree import placement
-from crosscheck.engines.rigid_tree import by_joint, of_kind
+from crosscheck.engines.rigid_tree import TreeState, by_joint, connector_outputs, of_kind
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -31,7 +31,7 @@ class PinocchioObserver:
         self._bodies = tree.model.copy()
         self._bodies.armature = np.zeros(tree.model.nv)
 
-    def observe(self, t: float, state: PinocchioState) -> Snapshot:
+    def observe(self, t: float, state: TreeState) -> Snapshot:
         dynamics = self._dynamics
         model, data, links = dynamics.tree.model, dynamics.data, dynamics.tree.links
         acceleration, drive, _ = dynamics.solve(t, state)
@@ -42,8 +42,9 @@ class PinocchioObserver:
         for link, joint in zip(links, dynamics.tree.joints, strict=True):
             local = angular_first(data.f[joint].vector)
             wrench[link.kind, link.joint] = rotate_spatial(data.oMi[joint].rotation, local)
-        exerted, held = dynamics.connections.exerted(t, data), dynamics.connections.along(t, state.q, state.v)
-        stored = sum(each.energy for each in exerted.values()) + sum(each.energy for _, each in held.values())
+        connected = connector_outputs(
+            dynamics.connections.exerted(t, data), dynamics.connections.along(t, state.q, state.v)
+        )
         pin.updateFramePlacements(model, data)
         markers = {name: self._marker(frame) for name, frame in self._frames.items()}
         pin.computeCentroidalMomentum(model, data, state.q, state.v)
@@ -56,15 +57,15 @@ class PinocchioObserver:
             energy={
                 "kinetic": self._kinetic(data, state),
                 "strain": 0.0,
-                "spring": dynamics.forces.spring_energy(state.q) + stored,
+                "spring": dynamics.forces.spring_energy(state.q) + connected.energy,
                 "gravity": pin.computePotentialEnergy(model, data, state.q),
             },
             momentum=np.concatenate([about_com + cross(com, linear), linear]),
-            connectors={name: each.on_b for name, each in exerted.items()},
-            hinge_forces={name: np.array([each.load]) for name, (_, each) in held.items()},
+            connectors=connected.between,
+            hinge_forces=connected.along,
         )
 
-    def _kinetic(self, data: pin.Data, state: PinocchioState) -> float:
+    def _kinetic(self, data: pin.Data, state: TreeState) -> float:
         """Of the bodies, and of armatures, which Pinocchio 4.1 leaves out at revolute and screw joints of any axis."""
         of_bodies = pin.computeKineticEnergy(self._bodies, data, state.q, state.v)
         return float(of_bodies + 0.5 * self._dynamics.tree.model.armature @ state.v**2)

@@ -11,18 +11,14 @@ from typing import assert_never
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.engines.conventions import Frame, scalar_last
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
-from crosscheck.engines.rigid_tree import Slot, scalar_start
+from crosscheck.engines.rigid_tree import Slot, scene_start
 from flexmb.scene.functions import Constant
 from flexmb.typing import Real
 
 _HELD = Scalar("turn", np.array([0.0, 0.0, 1.0]), *(0.0,) * 7, None, Constant(value=0.0))
-
-
-Places = slice | NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -40,14 +36,6 @@ class PinocchioTree:
     links: tuple[Link, ...]
     joints: tuple[int, ...]
     slots: tuple[PinocchioSlot, ...]
-
-
-def places(numbers: ArrayLike) -> Places:
-    """Indices of entries of an array; consecutive ones as a slice, which takes a third of the time."""
-    found = np.asarray(numbers, dtype=np.intp)
-    if len(found) == 0:
-        return slice(0, 0)
-    return slice(int(found[0]), int(found[-1]) + 1) if np.all(np.diff(found) == 1) else found
 
 
 def placement(frame: Frame) -> pin.SE3:
@@ -82,20 +70,8 @@ def build_tree(links: tuple[Link, ...], gravity: Real) -> PinocchioTree:
 
 def initial_state(tree: PinocchioTree) -> tuple[Real, Real]:
     """Coordinates (nq,) and speeds (nv,) at t = 0."""
-    q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
-    for slot in tree.slots:
-        match slot.freedom:
-            case Scalar() as freedom:
-                q[slot.q], v[slot.v] = scalar_start(freedom)
-            case Ball() as freedom:
-                q[slot.q : slot.q + 4] = scalar_last(freedom.quaternion)
-                v[slot.v : slot.v + 3] = freedom.angular_velocity
-            case Floating() as freedom:
-                q[slot.q : slot.q + 7] = [*freedom.position, *scalar_last(freedom.quaternion)]
-                v[slot.v : slot.v + 6] = [*freedom.velocity, *freedom.angular_velocity]
-            case _:
-                assert_never(slot.freedom)
-    return q, v
+    sizes = tree.model.nq, tree.model.nv
+    return scene_start(tree.slots, sizes, lambda flight: [*flight.velocity, *flight.angular_velocity], scalar_last)
 
 
 def _joint(freedom: Freedom) -> pin.JointModel:
