@@ -7,8 +7,8 @@ from typing import Any, assert_never
 
 import msgspec
 
-from flexmb.scene.columns import struct_keys
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.keys import struct_keys
 
 # The keys of every kind of function that are values, times or frequencies.
 VALUES: dict[type, tuple[str, ...]] = {

@@ -20,9 +20,8 @@ from scipy.optimize import linear_sum_assignment
 from flexmb.linear.linear_model import Complex, LinearModel, modal_assurance
 from flexmb.linear.linearize import linearize
 from flexmb.modal.flexible import flexible_model
-from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody, StrainPolynomials
+from flexmb.scene.bodies import MOST_POLYNOMIALS, BeamBody, BeamNode, Body, RigidBody, StrainPolynomials
 from flexmb.scene.check.beams import available_modes, mode_count
-from flexmb.scene.check.exact_beams import MOST_POLYNOMIALS
 from flexmb.scene.pieces import piece_count
 from flexmb.scene.schema import ModalState, Scene
 from flexmb.scene.strains import polynomials

@@ -3,27 +3,55 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Literal, TypeVar
+from typing import Annotated, ClassVar, Literal, TypeVar
 
 import msgspec
 from msgspec import structs
 
 from flexmb.scene.convert import NamedKeys
+from flexmb.scene.quantities import (
+    PURE,
+    UNIT_LENGTH,
+    Damping,
+    Lump,
+    NotNegative,
+    Number,
+    Positive,
+    unit,
+    whole,
+    within,
+)
 from flexmb.scene.rounding import ROUNDING
 
-Vector = tuple[float, float, float]
+Vector = tuple[Number, Number, Number]
+Axis = Annotated[Vector, UNIT_LENGTH]
+Quaternion = Annotated[tuple[Number, Number, Number, Number], UNIT_LENGTH]
 Matrix3 = tuple[Vector, Vector, Vector]
-Row6 = tuple[float, float, float, float, float, float]
+Row6 = tuple[Number, Number, Number, Number, Number, Number]
 Matrix6 = tuple[Row6, Row6, Row6, Row6, Row6, Row6]
-Quaternion = tuple[float, float, float, float]
-Level = Literal["rigid", "ruthless", "linear", "full", "stiffened", "exact"]
-Square = tuple[tuple[float, ...], ...]
+Matrix = tuple[tuple[Number, ...], ...]
 VectorSquare = tuple[tuple[Vector, ...], ...]
+Level = Literal["rigid", "ruthless", "linear", "full", "stiffened", "exact"]
 Family = Literal["axial", "torsion", "bending_y", "bending_z"]
 
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ZERO: Vector = (0.0, 0.0, 0.0)
 FAMILIES: tuple[Family, ...] = ("axial", "torsion", "bending_y", "bending_z")
+
+
+MOST_PIECES, MOST_POLYNOMIALS, MOST_POINTS = 1000, 40, 200
+"""Beyond these a number is taken for a slip. The fastest frequency grows with the fourth power of the polynomials: with
+40 of them it would be some hundred thousand times the first (docs/exact.md has it for 4, 6 and 8)."""
+
+FINER = f"give 0 to {MOST_POLYNOMIALS}, and more pieces where these are not enough"
+Polynomials = Annotated[int, whole(0, MOST_POLYNOMIALS, noun="polynomials", remedy=FINER)]
+Rotary = Annotated[float, within(0.0, noun="rotary inertia")]
+Ratio = Annotated[float, within(0.0, waiver="negative_damping"), PURE]
+# Modal coordinates of raw bodies are numbers without unit.
+Shapes = Annotated[tuple[Vector, ...], unit("m")]
+Turns = Annotated[tuple[Vector, ...], unit("rad")]
+SecondShapes = Annotated[VectorSquare, unit("m")]
+SecondTurns = Annotated[VectorSquare, unit("rad")]
 
 
 class SceneStruct(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, metaclass=NamedKeys):
@@ -45,7 +73,7 @@ class RigidBody(SceneStruct, frozen=True, kw_only=True, tag="rigid", tag_field="
     """A rigid body: mass, centre of mass in the body frame, inertia about the centre of mass in body axes."""
 
     name: str
-    mass_kg: float
+    mass_kg: NotNegative
     com_m: Vector = ZERO
     inertia_kg_m2: Matrix3
     nodes: tuple[Node, ...] = ()
@@ -73,27 +101,27 @@ class BeamStation(SceneStruct, frozen=True, kw_only=True):
     "exact"; the beam leaves the body's origin along +x.
     """
 
-    x_m: float
-    EA_N: float | None = None
-    EIy_Nm2: float | None = None
-    EIz_Nm2: float | None = None
-    GJ_Nm2: float | None = None
-    mass_per_length_kg_m: float | None = None
-    rotary_y_kg_m: float = 0.0
-    rotary_z_kg_m: float = 0.0
-    GAy_N: float | None = None
-    GAz_N: float | None = None
+    x_m: Number
+    EA_N: Positive | None = None
+    EIy_Nm2: Positive | None = None
+    EIz_Nm2: Positive | None = None
+    GJ_Nm2: Positive | None = None
+    mass_per_length_kg_m: Positive | None = None
+    rotary_y_kg_m: Rotary = 0.0
+    rotary_z_kg_m: Rotary = 0.0
+    GAy_N: Positive | None = None
+    GAz_N: Positive | None = None
     curvature_1_m: Vector = ZERO
-    stiffness: Matrix6 | None = None
-    inertia: Matrix6 | None = None
-    reference_point_m: tuple[float, float] = (0.0, 0.0)
+    stiffness: Annotated[Matrix6, unit("N, N m, N m²")] | None = None
+    inertia: Annotated[Matrix6, unit("kg/m, kg, kg m")] | None = None
+    reference_point_m: tuple[Number, Number] = (0.0, 0.0)
 
 
 class TipMass(SceneStruct, frozen=True, kw_only=True):
     """A rigid lump fixed to the beam section at `x_m`; it is part of the body and of its modes."""
 
-    x_m: float
-    mass_kg: float
+    x_m: Number
+    mass_kg: Lump
     com_m: Vector = ZERO
     inertia_kg_m2: Matrix3 = (ZERO, ZERO, ZERO)
 
@@ -102,7 +130,7 @@ class BeamNode(SceneStruct, frozen=True, kw_only=True):
     """A named node at station `x_m`. "root" (x = 0) and "tip" (x = length) exist without being listed."""
 
     name: str
-    x_m: float
+    x_m: Number
     quaternion: Quaternion = IDENTITY
 
 
@@ -113,12 +141,12 @@ class StrainPolynomials(SceneStruct, frozen=True, kw_only=True):
     `bending_y` is curvature about the section's z, `bending_z` about y, `axial` the stretch.
     """
 
-    axial: int = 0
-    shear_y: int = 0
-    shear_z: int = 0
-    torsion: int = 0
-    bending_z: int = 0
-    bending_y: int = 0
+    axial: Polynomials = 0
+    shear_y: Polynomials = 0
+    shear_z: Polynomials = 0
+    torsion: Polynomials = 0
+    bending_z: Polynomials = 0
+    bending_y: Polynomials = 0
 
 
 class Modes(SceneStruct, frozen=True, kw_only=True):
@@ -141,16 +169,16 @@ class Modes(SceneStruct, frozen=True, kw_only=True):
     is that of the strain plus `viscosity_s` times the strain rate.
     """
 
-    count: int
+    count: Annotated[int, whole(0, noun="modes")]
     boundary: Literal["clamped-free", "free-free"] = "clamped-free"
     families: tuple[Family, ...] | None = None
     static: bool = False
     polynomials: StrainPolynomials | None = None
-    pieces: int = 1
+    pieces: Annotated[int, whole(1, MOST_PIECES)] = 1
     cuts: tuple[str, ...] = ()
-    points: int | None = None
-    viscosity_s: float = 0.0
-    damping_ratio: float | tuple[float, ...] = 0.0
+    points: Annotated[int, whole(1, MOST_POINTS)] | None = None
+    viscosity_s: Damping = 0.0
+    damping_ratio: Ratio | tuple[Ratio, ...] = 0.0
 
 
 class BeamBody(SceneStruct, frozen=True, kw_only=True, tag="beam", tag_field="kind"):
@@ -162,8 +190,8 @@ class BeamBody(SceneStruct, frozen=True, kw_only=True, tag="beam", tag_field="ki
     """
 
     name: str
-    length_m: float
-    elements: int
+    length_m: Positive
+    elements: Annotated[int, whole(1, remedy="use one element at least")]
     stations: tuple[BeamStation, ...]
     modes: Modes
     level: Level = "full"
@@ -207,14 +235,14 @@ class InertiaPoint(SceneStruct, frozen=True, kw_only=True):
     level "stiffened"; only their symmetric part has an effect.
     """
 
-    mass_kg: float
+    mass_kg: NotNegative
     position_m: Vector
-    translation_modes: tuple[Vector, ...]
-    rotation_modes: tuple[Vector, ...] = ()
+    translation_modes: Shapes
+    rotation_modes: Turns = ()
     inertia_kg_m2: Matrix3 = (ZERO, ZERO, ZERO)
     com_offset_m: Vector = ZERO
-    second_translation: VectorSquare = ()
-    second_rotation: VectorSquare = ()
+    second_translation: SecondShapes = ()
+    second_rotation: SecondTurns = ()
 
 
 class ModalNode(SceneStruct, frozen=True, kw_only=True):
@@ -227,12 +255,12 @@ class ModalNode(SceneStruct, frozen=True, kw_only=True):
 
     name: str
     position_m: Vector
-    translation_modes: tuple[Vector, ...]
-    rotation_modes: tuple[Vector, ...]
+    translation_modes: Shapes
+    rotation_modes: Turns
     quaternion: Quaternion = IDENTITY
-    second_translation: VectorSquare = ()
-    second_rotation: VectorSquare = ()
-    force_stiffness: tuple[Square, ...] = ()
+    second_translation: SecondShapes = ()
+    second_rotation: SecondTurns = ()
+    force_stiffness: Annotated[tuple[Matrix, ...], unit("m")] = ()
 
 
 class ModalBody(SceneStruct, frozen=True, kw_only=True, tag="modal", tag_field="kind"):
@@ -253,10 +281,10 @@ class ModalBody(SceneStruct, frozen=True, kw_only=True, tag="modal", tag_field="
     name: str
     points: tuple[InertiaPoint, ...] = ()
     file: str | None = None
-    stiffness: tuple[tuple[float, ...], ...] = ()
-    damping: tuple[tuple[float, ...], ...] = ()
-    gravity_stiffness: tuple[Square, ...] = ()
-    gradient_stiffness: tuple[tuple[Square, ...], ...] = ()
+    stiffness: Annotated[Matrix, unit("N m")] = ()
+    damping: Annotated[Matrix, unit("N m s")] = ()
+    gravity_stiffness: Annotated[tuple[Matrix, ...], unit("kg m")] = ()
+    gradient_stiffness: Annotated[tuple[tuple[Matrix, ...], ...], unit("kg m²")] = ()
     boundary: Literal["clamped-free", "free-free"] = "clamped-free"
     level: Level = "full"
     nodes: tuple[ModalNode, ...] = ()

@@ -5,16 +5,15 @@ Checks of scenes with 10^5 bodies use these, because a loop over single values w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cache
+from collections.abc import Sequence
 from itertools import chain
 from operator import attrgetter
 from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
-from msgspec import inspect
 
+from flexmb.scene.keys import struct_keys
 from flexmb.typing import Real
 
 
@@ -61,30 +60,3 @@ def _inside(group: Alike, key: str) -> tuple[list[int], list[Any]]:
         if isinstance(each, msgspec.Struct)
     ]
     return [owner for owner, _ in pairs], [each for _, each in pairs]
-
-
-@cache
-def struct_keys(kind: type[msgspec.Struct]) -> tuple[str, ...]:
-    """Keys whose values can contain structs."""
-    return _keys(kind, lambda node: isinstance(node, inspect.StructType))
-
-
-@cache
-def number_keys(kind: type[msgspec.Struct]) -> tuple[str, ...]:
-    """Keys whose values can contain real numbers other than those of inner structs."""
-    return _keys(kind, lambda node: isinstance(node, inspect.FloatType))
-
-
-def _keys(kind: type[msgspec.Struct], wanted: Callable[[inspect.Type], bool]) -> tuple[str, ...]:
-    described = inspect.type_info(kind)
-    assert isinstance(described, inspect.StructType)
-    return tuple(field.name for field in described.fields if _holds(field.type, wanted))
-
-
-def _holds(node: inspect.Type, wanted: Callable[[inspect.Type], bool]) -> bool:
-    match node:
-        case inspect.UnionType(types=inner) | inspect.TupleType(item_types=inner):
-            return any(_holds(each, wanted) for each in inner)
-        case inspect.VarTupleType(item_type=each):
-            return _holds(each, wanted)
-    return wanted(node)

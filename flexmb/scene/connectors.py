@@ -8,10 +8,11 @@ A law is `preload` + `stiffness` x + `stiffening[0]` x² + `stiffening[1]` x³ .
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, SceneStruct, Vector
+from flexmb.scene.bodies import IDENTITY, ZERO, Matrix6, Quaternion, SceneStruct, Vector
 from flexmb.scene.functions import Function
+from flexmb.scene.quantities import NotNegative, Number, unit, within
 from flexmb.scene.units import split_unit
 
 __all__ = [
@@ -19,8 +20,10 @@ __all__ = [
 ]  # fmt: skip
 """What the schema exports."""
 
-Six = tuple[float, float, float, float, float, float]
-Matrix6 = tuple[Six, Six, Six, Six, Six, Six]
+Stiffening = tuple[Annotated[Number, unit("of the load, per power of x")], ...]
+Stribeck = Annotated[float, within(0.0, excluded=0.0, noun="Stribeck speed")]
+SLOW = "give a positive speed, well below those that matter"
+Smoothing = Annotated[float, within(0.0, excluded=0.0, noun="smoothing speed", remedy=SLOW)]
 NONE6: Matrix6 = ((0.0,) * 6,) * 6
 
 
@@ -40,13 +43,13 @@ class SpringDamper(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag
     node_b: str = "origin"
     position_a_m: Vector = ZERO
     position_b_m: Vector = ZERO
-    free_length_m: float = 0.0
-    preload_N: float = 0.0
-    stiffness_N_m: float = 0.0
-    stiffening: tuple[float, ...] = ()
-    table_m: tuple[float, ...] = ()
-    loads_N: tuple[float, ...] = ()
-    damping_Ns_m: float = 0.0
+    free_length_m: NotNegative = 0.0
+    preload_N: Number = 0.0
+    stiffness_N_m: Number = 0.0
+    stiffening: Stiffening = ()
+    table_m: tuple[Number, ...] = ()
+    loads_N: tuple[Number, ...] = ()
+    damping_Ns_m: NotNegative = 0.0
     acts: Literal["both", "tension", "compression"] = "both"
     force_N: Function | None = None
 
@@ -71,8 +74,8 @@ class Bushing(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="bus
     quaternion_a: Quaternion = IDENTITY
     position_b_m: Vector = ZERO
     quaternion_b: Quaternion = IDENTITY
-    stiffness: Matrix6
-    damping: Matrix6 = NONE6
+    stiffness: Annotated[Matrix6, unit("N m/rad, N/rad, N/m")]
+    damping: Annotated[Matrix6, unit("N m s/rad, N s/rad, N s/m")] = NONE6
 
 
 class AngularSpring(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="angular_spring"):
@@ -88,17 +91,17 @@ class AngularSpring(SceneStruct, frozen=True, kw_only=True, tag_field="kind", ta
     name: str
     hinge: str
     coordinate: str = ""
-    rest_rad: float = 0.0
-    preload_Nm: float = 0.0
-    stiffness_Nm_rad: float = 0.0
-    stiffening: tuple[float, ...] = ()
-    table_rad: tuple[float, ...] = ()
-    loads_Nm: tuple[float, ...] = ()
-    damping_Nms_rad: float = 0.0
-    lower_rad: float | None = None
-    upper_rad: float | None = None
-    stop_stiffness_Nm_rad: float = 0.0
-    stop_dissipation_s_rad: float = 0.0
+    rest_rad: Number = 0.0
+    preload_Nm: Number = 0.0
+    stiffness_Nm_rad: Number = 0.0
+    stiffening: Stiffening = ()
+    table_rad: tuple[Number, ...] = ()
+    loads_Nm: tuple[Number, ...] = ()
+    damping_Nms_rad: NotNegative = 0.0
+    lower_rad: Number | None = None
+    upper_rad: Number | None = None
+    stop_stiffness_Nm_rad: NotNegative = 0.0
+    stop_dissipation_s_rad: NotNegative = 0.0
     torque_Nm: Function | None = None
 
     ANGULAR: ClassVar[bool] = True
@@ -111,17 +114,17 @@ class LinearSpring(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag
     name: str
     hinge: str
     coordinate: str = ""
-    rest_m: float = 0.0
-    preload_N: float = 0.0
-    stiffness_N_m: float = 0.0
-    stiffening: tuple[float, ...] = ()
-    table_m: tuple[float, ...] = ()
-    loads_N: tuple[float, ...] = ()
-    damping_Ns_m: float = 0.0
-    lower_m: float | None = None
-    upper_m: float | None = None
-    stop_stiffness_N_m: float = 0.0
-    stop_dissipation_s_m: float = 0.0
+    rest_m: Number = 0.0
+    preload_N: Number = 0.0
+    stiffness_N_m: Number = 0.0
+    stiffening: Stiffening = ()
+    table_m: tuple[Number, ...] = ()
+    loads_N: tuple[Number, ...] = ()
+    damping_Ns_m: NotNegative = 0.0
+    lower_m: Number | None = None
+    upper_m: Number | None = None
+    stop_stiffness_N_m: NotNegative = 0.0
+    stop_dissipation_s_m: NotNegative = 0.0
     force_N: Function | None = None
 
     ANGULAR: ClassVar[bool] = False
@@ -139,10 +142,10 @@ class AngularFriction(SceneStruct, frozen=True, kw_only=True, tag_field="kind", 
     name: str
     hinge: str
     coordinate: str = ""
-    sliding_Nm: float
-    static_Nm: float | None = None
-    stribeck_rad_s: float | None = None
-    smoothing_rad_s: float
+    sliding_Nm: NotNegative
+    static_Nm: NotNegative | None = None
+    stribeck_rad_s: Stribeck | None = None
+    smoothing_rad_s: Smoothing
 
     ANGULAR: ClassVar[bool] = True
 
@@ -153,10 +156,10 @@ class LinearFriction(SceneStruct, frozen=True, kw_only=True, tag_field="kind", t
     name: str
     hinge: str
     coordinate: str = ""
-    sliding_N: float
-    static_N: float | None = None
-    stribeck_m_s: float | None = None
-    smoothing_m_s: float
+    sliding_N: NotNegative
+    static_N: NotNegative | None = None
+    stribeck_m_s: Stribeck | None = None
+    smoothing_m_s: Smoothing
 
     ANGULAR: ClassVar[bool] = False
 

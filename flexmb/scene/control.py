@@ -12,12 +12,18 @@ instant.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from flexmb.scene.bodies import SceneStruct
+from flexmb.scene.bodies import Matrix, SceneStruct
 from flexmb.scene.functions import Function
+from flexmb.scene.quantities import Number, Positive, Time, unit, whole, within
 
-Matrix = tuple[tuple[float, ...], ...]
+Period = Annotated[float, within(0.0, excluded=0.0, remedy="give a positive one, or leave it out")]
+Mixed = unit("of what it leads to, per one of what it multiplies")
+Entries = Annotated[Matrix, Mixed]
+OfLaw = tuple[Annotated[Number, unit("of the law")], ...]
+Gain = Annotated[Number, Mixed]
+OfSignal = Annotated[Number, unit("of the signal")]
 
 
 class CoordinateSensor(SceneStruct, frozen=True, kw_only=True, tag="coordinate", tag_field="kind"):
@@ -96,9 +102,9 @@ Sensor = CoordinateSensor | MarkerSensor | DistanceSensor | LoadSensor | DriveSe
 class _Controller(SceneStruct, frozen=True, kw_only=True, tag_field="kind"):
     name: str
     inputs: tuple[str, ...]
-    period_s: float | None = None
-    offset_s: float = 0.0
-    delay_s: float = 0.0
+    period_s: Period | None = None
+    offset_s: Time = 0.0
+    delay_s: Time = 0.0
 
 
 class StateSpace(_Controller, frozen=True, kw_only=True, tag="state_space"):
@@ -109,11 +115,11 @@ class StateSpace(_Controller, frozen=True, kw_only=True, tag="state_space"):
     zero by default.
     """
 
-    A: Matrix = ()
-    B: Matrix = ()
-    C: Matrix = ()
-    D: Matrix = ()
-    initial: tuple[float, ...] = ()
+    A: Entries = ()
+    B: Entries = ()
+    C: Entries = ()
+    D: Entries = ()
+    initial: OfLaw = ()
 
 
 class Pid(_Controller, frozen=True, kw_only=True, tag="pid"):
@@ -125,21 +131,21 @@ class Pid(_Controller, frozen=True, kw_only=True, tag="pid"):
     `tracking_s`, by default kp / ki, prevents wind-up of the integral.
     """
 
-    kp: float = 0.0
-    ki: float = 0.0
-    kd: float = 0.0
-    setpoint: float = 0.0
-    filter_s: float = 0.0
-    lower: float | None = None
-    upper: float | None = None
-    tracking_s: float | None = None
+    kp: Gain = 0.0
+    ki: Gain = 0.0
+    kd: Gain = 0.0
+    setpoint: OfSignal = 0.0
+    filter_s: Time = 0.0
+    lower: OfSignal | None = None
+    upper: OfSignal | None = None
+    tracking_s: Positive | None = None
 
 
 class Saturation(_Controller, frozen=True, kw_only=True, tag="saturation"):
     """Each input, limited to the range `lower` to `upper`."""
 
-    lower: float
-    upper: float
+    lower: OfSignal
+    upper: OfSignal
 
 
 class GainTable(_Controller, frozen=True, kw_only=True, tag="gain_table"):
@@ -148,8 +154,8 @@ class GainTable(_Controller, frozen=True, kw_only=True, tag="gain_table"):
     g is linear between `values` at `points` and constant beyond. If x is the only input, the output is g(x) itself.
     """
 
-    points: tuple[float, ...]
-    values: tuple[float, ...]
+    points: tuple[OfSignal, ...]
+    values: tuple[Gain, ...]
 
 
 class UserLaw(_Controller, frozen=True, kw_only=True, tag="user"):
@@ -160,9 +166,9 @@ class UserLaw(_Controller, frozen=True, kw_only=True, tag="user"):
     """
 
     function: str
-    outputs: int = 1
-    initial: tuple[float, ...] = ()
-    parameters: tuple[float, ...] = ()
+    outputs: Annotated[int, whole(1, remedy="give one or more")] = 1
+    initial: OfLaw = ()
+    parameters: OfLaw = ()
 
 
 Controller = StateSpace | Pid | Saturation | GainTable | UserLaw

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import inspect
 
+from flexmb.scene.keys import bare
 from flexmb.scene.problems import Defect, Place, SceneError, closest
 from flexmb.scene.units import split_unit
 
@@ -115,13 +116,14 @@ def _explain(message: str, data: Any, kind: Any, place: Place) -> Defect:
 
 def _below(node: inspect.Type, step: str | int, value: Any) -> inspect.Type:
     """The type one step below `node`; in a union, the alternative that the `kind` of `value` selects."""
-    below: inspect.Type = node
+    below = node = bare(node)
     if isinstance(node, inspect.StructType):
         below = next((field.type for field in node.fields if field.encode_name == step), node)
     elif isinstance(node, inspect.VarTupleType):
         below = node.item_type
     elif isinstance(node, inspect.TupleType) and isinstance(step, int):
         below = node.item_types[min(step, len(node.item_types) - 1)]
+    below = bare(below)
     if isinstance(below, inspect.UnionType):
         structs = [each for each in below.types if isinstance(each, inspect.StructType)]
         tag = value.get("kind") if isinstance(value, dict) else None

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from flexmb.scene.bodies import SceneStruct
+from flexmb.scene.quantities import Number, unit, within
+
+Ratio = Annotated[float, within(excluded=0.0, remedy="leave this coordinate out"), unit("of q, per one of this")]
 
 __all__ = ["CoupledCoordinate", "Coupling"]
 """What the schema exports."""
@@ -18,7 +23,7 @@ class CoupledCoordinate(SceneStruct, frozen=True, kw_only=True):
 
     hinge: str
     coordinate: str = ""
-    ratio: float
+    ratio: Ratio
 
 
 class Coupling(SceneStruct, frozen=True, kw_only=True):
@@ -38,4 +43,4 @@ class Coupling(SceneStruct, frozen=True, kw_only=True):
     hinge: str
     coordinate: str = ""
     terms: tuple[CoupledCoordinate, ...]
-    offset: float = 0.0
+    offset: Annotated[Number, unit("of the coordinate")] = 0.0

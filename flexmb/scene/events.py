@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from flexmb.scene.bodies import SceneStruct
 from flexmb.scene.functions import Function
+from flexmb.scene.quantities import PURE, Number, unit, within
+
+Restitution = Annotated[float, within(0.0, 1.0, remedy="from 0 (no rebound) to 1 (no loss)"), PURE]
 
 
 class Latch(SceneStruct, frozen=True, kw_only=True, tag="latch", tag_field="kind"):
@@ -32,7 +35,7 @@ class Impact(SceneStruct, frozen=True, kw_only=True, tag="impact", tag_field="ki
     """
 
     coordinate: str
-    restitution: float = 1.0
+    restitution: Restitution = 1.0
     rests: bool = False
 
 
@@ -43,7 +46,7 @@ class Change(SceneStruct, frozen=True, kw_only=True, tag="change", tag_field="ki
     """
 
     path: str
-    value: float | Function
+    value: Annotated[Number, unit("of the path")] | Function
 
 
 class EndRun(SceneStruct, frozen=True, kw_only=True, tag="end", tag_field="kind"):
@@ -64,6 +67,6 @@ class SceneEvent(SceneStruct, frozen=True, kw_only=True):
 
     name: str
     watch: str
-    level: float
+    level: Annotated[Number, unit("of what is watched")]
     crossing: Literal["rising", "falling", "either"] = "either"
     actions: tuple[Action, ...]

@@ -7,10 +7,13 @@ of mirrors and units on a hinge follow from its freedoms.
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from flexmb.scene.bodies import Quaternion, SceneStruct, Vector
 from flexmb.scene.functions import Function
+from flexmb.scene.quantities import Damping, Number, Stiffness, within
+
+Armature = Annotated[float, within(0.0, remedy="give at least zero: it is the inertia of a rotor")]
 
 
 class MotionKeys(NamedTuple):
@@ -83,13 +86,13 @@ class AngularCoordinate(_ScalarCoordinate, frozen=True, kw_only=True):
     SPRING: ClassVar[tuple[str, str, str]] = ("stiffness_Nm_rad", "damping_Nms_rad", "rest_rad")
     ARMATURE: ClassVar[str] = "armature_kg_m2"
 
-    angle_rad: float = 0.0
-    rate_rad_s: float = 0.0
+    angle_rad: Number = 0.0
+    rate_rad_s: Number = 0.0
     given: bool = False
-    stiffness_Nm_rad: float = 0.0
-    damping_Nms_rad: float = 0.0
-    rest_rad: float = 0.0
-    armature_kg_m2: float = 0.0
+    stiffness_Nm_rad: Stiffness = 0.0
+    damping_Nms_rad: Damping = 0.0
+    rest_rad: Number = 0.0
+    armature_kg_m2: Armature = 0.0
     torque_Nm: Function | None = None
     prescribed_rad: Function | None = None
 
@@ -106,13 +109,13 @@ class LinearCoordinate(_ScalarCoordinate, frozen=True, kw_only=True):
     SPRING: ClassVar[tuple[str, str, str]] = ("stiffness_N_m", "damping_Ns_m", "rest_m")
     ARMATURE: ClassVar[str] = "armature_kg"
 
-    position_m: float = 0.0
-    rate_m_s: float = 0.0
+    position_m: Number = 0.0
+    rate_m_s: Number = 0.0
     given: bool = False
-    stiffness_N_m: float = 0.0
-    damping_Ns_m: float = 0.0
-    rest_m: float = 0.0
-    armature_kg: float = 0.0
+    stiffness_N_m: Stiffness = 0.0
+    damping_Ns_m: Damping = 0.0
+    rest_m: Number = 0.0
+    armature_kg: Armature = 0.0
     force_N: Function | None = None
     prescribed_m: Function | None = None
 

@@ -7,9 +7,15 @@ the function is given (rad, m, N, Nm). A scene file stores a function as a table
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import msgspec
 
 from flexmb.scene.convert import NamedKeys
+from flexmb.scene.quantities import Number, Positive, unit
+
+OfKey = Annotated[Number, unit("of the key")]
+PerSecond = Annotated[Number, unit("of the key, per s")]
 
 
 class _Function(
@@ -21,24 +27,24 @@ class _Function(
 class Constant(_Function, frozen=True, tag="constant", kw_only=True):
     """f(t) = value."""
 
-    value: float
+    value: OfKey
 
 
 class Ramp(_Function, frozen=True, tag="ramp", kw_only=True):
     """f(t) = value + rate * (t - start_s): constant rate, no acceleration."""
 
-    value: float = 0.0
-    rate: float
-    start_s: float = 0.0
+    value: OfKey = 0.0
+    rate: PerSecond
+    start_s: Number = 0.0
 
 
 class Sine(_Function, frozen=True, tag="sine", kw_only=True):
     """f(t) = offset + amplitude * sin(angular_frequency * t + phase)."""
 
-    amplitude: float
-    angular_frequency_rad_s: float
-    phase_rad: float = 0.0
-    offset: float = 0.0
+    amplitude: OfKey
+    angular_frequency_rad_s: Number
+    phase_rad: Number = 0.0
+    offset: OfKey = 0.0
 
 
 class SmoothStep(_Function, frozen=True, tag="smooth_step", kw_only=True):
@@ -47,10 +53,10 @@ class SmoothStep(_Function, frozen=True, tag="smooth_step", kw_only=True):
     s(x) = 35 x^4 - 84 x^5 + 70 x^6 - 20 x^7: rate, acceleration and jerk vanish at both ends.
     """
 
-    start_value: float
-    end_value: float
-    start_s: float
-    duration_s: float
+    start_value: OfKey
+    end_value: OfKey
+    start_s: Number
+    duration_s: Positive
 
 
 class SpinUp(_Function, frozen=True, tag="spin_up", kw_only=True):
@@ -59,16 +65,16 @@ class SpinUp(_Function, frozen=True, tag="spin_up", kw_only=True):
     For t <= T: (rate/T) [t^2/2 + (T/2 pi)^2 (cos(2 pi t/T) - 1)], then rate*T/2 + rate*(t - T).
     """
 
-    rate: float
-    duration_s: float
+    rate: PerSecond
+    duration_s: Positive
 
 
 class Pulse(_Function, frozen=True, tag="pulse", kw_only=True):
     """`value` for start_s <= t < start_s + duration_s, else 0 (a load only: it is not differentiable)."""
 
-    value: float
-    start_s: float
-    duration_s: float
+    value: OfKey
+    start_s: Number
+    duration_s: Positive
 
 
 class Table(_Function, frozen=True, tag="table", kw_only=True):
@@ -77,8 +83,8 @@ class Table(_Function, frozen=True, tag="table", kw_only=True):
     A run must lie within this interval, which is checked before it starts.
     """
 
-    times_s: tuple[float, ...]
-    values: tuple[float, ...]
+    times_s: tuple[Number, ...]
+    values: tuple[OfKey, ...]
 
 
 class ControlSignal(_Function, frozen=True, tag="signal", kw_only=True):
@@ -89,7 +95,7 @@ class ControlSignal(_Function, frozen=True, tag="signal", kw_only=True):
     """
 
     source: str
-    gain: float = 1.0
+    gain: Annotated[Number, unit("of the key, per one of the signal")] = 1.0
 
 
 Function = Constant | Ramp | Sine | SmoothStep | SpinUp | Pulse | Table | ControlSignal

@@ -12,8 +12,9 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, SceneStruct, Vector
+from flexmb.scene.bodies import IDENTITY, ZERO, Axis, Quaternion, SceneStruct, Vector
 from flexmb.scene.freedoms import AngularCoordinate, Ball, Floating, Freedom, LinearCoordinate, ScalarFreedom
+from flexmb.scene.quantities import Damping, Number, Stiffness
 
 __all__ = [
     "AngularCoordinate", "Closure", "Cylindrical", "Free", "Gimbal", "Hinge", "LinearCoordinate", "Planar", "Prismatic",
@@ -55,7 +56,7 @@ class Weld(_Hinge, frozen=True, kw_only=True, tag="weld"):
 class Revolute(_Hinge, frozen=True, kw_only=True, tag="revolute"):
     """One rotation about `axis` (inboard hinge axes)."""
 
-    axis: Vector = Z_AXIS
+    axis: Axis = Z_AXIS
     rotation: AngularCoordinate = AngularCoordinate()
 
     @property
@@ -70,8 +71,8 @@ class Screw(_Hinge, frozen=True, kw_only=True, tag="screw"):
     damper and motor act on the angle: its torque does the work of the force along the axis too.
     """
 
-    axis: Vector = Z_AXIS
-    pitch_m_rad: float
+    axis: Axis = Z_AXIS
+    pitch_m_rad: Number
     rotation: AngularCoordinate = AngularCoordinate()
 
     @property
@@ -82,7 +83,7 @@ class Screw(_Hinge, frozen=True, kw_only=True, tag="screw"):
 class Prismatic(_Hinge, frozen=True, kw_only=True, tag="prismatic"):
     """One translation along `axis`."""
 
-    axis: Vector = Z_AXIS
+    axis: Axis = Z_AXIS
     translation: LinearCoordinate = LinearCoordinate()
 
     @property
@@ -93,7 +94,7 @@ class Prismatic(_Hinge, frozen=True, kw_only=True, tag="prismatic"):
 class Cylindrical(_Hinge, frozen=True, kw_only=True, tag="cylindrical"):
     """Rotation about and translation along `axis`. Speeds: [rotation, translation]."""
 
-    axis: Vector = Z_AXIS
+    axis: Axis = Z_AXIS
     rotation: AngularCoordinate = AngularCoordinate()
     translation: LinearCoordinate = LinearCoordinate()
 
@@ -140,8 +141,8 @@ class Spherical(_Hinge, frozen=True, kw_only=True, tag="spherical"):
     quaternion: Quaternion = IDENTITY
     angular_velocity_rad_s: Vector = ZERO
     given: bool = False
-    stiffness_Nm_rad: float = 0.0
-    damping_Nms_rad: float = 0.0
+    stiffness_Nm_rad: Stiffness = 0.0
+    damping_Nms_rad: Damping = 0.0
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
@@ -213,4 +214,4 @@ class Closure(SceneStruct, frozen=True, kw_only=True):
     quaternion_a: Quaternion = IDENTITY
     position_b_m: Vector = ZERO
     quaternion_b: Quaternion = IDENTITY
-    axis: Vector = Z_AXIS
+    axis: Axis = Z_AXIS

@@ -6,8 +6,8 @@ from typing import Any
 
 import msgspec
 
-from flexmb.scene.columns import struct_keys
 from flexmb.scene.functions import Constant, ControlSignal
+from flexmb.scene.keys import struct_keys
 from flexmb.scene.schema import Change, Scene, SceneEvent
 from flexmb.scene.tree import watchable
 from flexmb.scene.values import PathError, with_values

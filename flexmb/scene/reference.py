@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
 from inspect import cleandoc
 from pathlib import Path
 
@@ -17,8 +16,8 @@ from msgspec import inspect
 
 from flexmb.output.whole import write_whole
 from flexmb.scene.files import inline
+from flexmb.scene.keys import Key, kinds, number_keys
 from flexmb.scene.schema import Scene
-from flexmb.scene.units import split_unit
 
 SCALARS: dict[type[inspect.Type], str] = {
     inspect.StrType: "string", inspect.FloatType: "number", inspect.IntType: "integer", inspect.BoolType: "boolean",
@@ -30,7 +29,8 @@ INTRODUCTION = """\
 Generated from the schema by `python -m flexmb.scene.reference`; do not edit. A scene is a TOML file; the same structs
 are built in Python with `SceneBuilder`, whose argument names are these keys without their unit.
 
-SI throughout; the unit of a key is its suffix. Quaternions are scalar-first, unit, and map outboard components to
+SI throughout; the unit of a key is its suffix, and 1 that of pure numbers. All numbers are finite; those with a range
+are inside, or the scene is refused. Quaternions are scalar-first, unit, and map outboard components to
 inboard ones. References are by name. A key without default is required.
 """
 
@@ -47,12 +47,15 @@ def json_schema() -> str:
 def reference() -> str:
     """The reference in Markdown: every struct of a scene, in the order of its first appearance."""
     sections = [INTRODUCTION]
-    for struct in _structs(inspect.type_info(Scene), set()):
+    for struct in map(inspect.type_info, kinds(Scene)):
+        assert isinstance(struct, inspect.StructType)
         kind = f' (`{struct.tag_field} = "{struct.tag}"`)' if struct.tag is not None else ""
         sections.append(f"## {struct.cls.__name__}{kind}\n\n{cleandoc(struct.cls.__doc__ or '')}\n")
         if struct.fields:
-            rows = [f"| `{f.encode_name}` | {_type(f.type)} | {_unit(f)} | {_default(f)} |" for f in struct.fields]
-            sections.append("\n".join(["| key | type | unit | default |", "|---|---|---|---|", *rows, ""]))
+            keys = number_keys(struct.cls)
+            said = [(f, _said(keys.get(f.name))) for f in struct.fields]
+            rows = [f"| `{f.name}` | {_type(f.type)} | {numbers} | {_default(f)} |" for f, numbers in said]
+            sections.append("\n".join(["| key | type | unit | range | default |", "|---|---|---|---|---|", *rows, ""]))
     return "\n".join(sections)
 
 
@@ -62,22 +65,10 @@ def write(folder: Path) -> None:
     write_whole(folder / "scene-reference.md", reference())
 
 
-def _structs(node: inspect.Type, seen: set[type]) -> Iterator[inspect.StructType]:
-    match node:
-        case inspect.StructType(cls=cls) if cls not in seen:
-            seen.add(cls)
-            yield node
-            for field in node.fields:
-                yield from _structs(field.type, seen)
-        case inspect.VarTupleType(item_type=item):
-            yield from _structs(item, seen)
-        case inspect.UnionType(types=types):
-            for each in types:
-                yield from _structs(each, seen)
-
-
 def _type(node: inspect.Type) -> str:
     match node:
+        case inspect.Metadata(type=inner):
+            return _type(inner)
         case inspect.StructType(cls=cls):
             return f"[{cls.__name__}](#{_anchor(node)})"
         case inspect.VarTupleType(item_type=item):
@@ -97,8 +88,12 @@ def _anchor(struct: inspect.StructType) -> str:
     return name if struct.tag is None else f"{name}-{struct.tag_field}--{struct.tag}"
 
 
-def _unit(field: inspect.Field) -> str:
-    return split_unit(field.encode_name)[1]
+def _said(key: Key | None) -> str:
+    """Unit and range of a key with numbers; nothing of others."""
+    if key is None:
+        return " | "
+    span = "unit length" if key.unit_length else str(key.range)
+    return f"{key.unit} | {span}" + (f', else doubtful ("{key.range.waiver}")' if key.range.waiver else "")
 
 
 def _default(field: inspect.Field) -> str:

@@ -13,11 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.scene.bodies import BeamBody, Vector
+from flexmb.scene.bodies import MOST_POINTS, BeamBody, Vector
 from flexmb.scene.pieces import edges
-
-MOST_FOLLOWED = 200
-"""Points, or polynomials, beyond which nobody counts."""
 
 
 class RestTurn(NamedTuple):
@@ -30,9 +27,9 @@ class RestTurn(NamedTuple):
 
 
 def follow(turn: float, left_out: float) -> int:
-    """How many polynomials follow a turn (rad) to a part `left_out` of what turns; MOST_FOLLOWED at most."""
-    if not turn <= MOST_FOLLOWED:  # also what is no number
-        return MOST_FOLLOWED
+    """How many polynomials follow a turn (rad) to a part `left_out` of what turns; MOST_POINTS at most."""
+    if not turn <= MOST_POINTS:  # also what is no number
+        return MOST_POINTS
     reach = (3.0 / (2.0 * sqrt(2.0)) * log(1.0 / left_out)) ** (2.0 / 3.0)
     return ceil(turn / 2.0 + reach * (turn / 2.0) ** (1.0 / 3.0))
 

@@ -7,13 +7,14 @@ indices; keys carry units. Frames, signs and orders: docs/notation.md.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
 
 from flexmb.scene import connectors, couplings, hinges
 from flexmb.scene.bodies import (
     ZERO,
+    Axis,
     BeamBody,
     BeamNode,
     BeamStation,
@@ -58,7 +59,10 @@ from flexmb.scene.freedoms import AngularCoordinate, Freedom, LinearCoordinate, 
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import *  # noqa: F403
 from flexmb.scene.hinges import Closure, Hinge
+from flexmb.scene.quantities import PURE, Damping, Lump, NotNegative, Number, Positive, unit, within
 from flexmb.scene.values import with_values
+
+Spinning = Annotated[float, within(0.0, excluded=0.0, remedy="give a positive one: a wheel stores spin")]
 
 
 class Wheel(SceneStruct, frozen=True, kw_only=True):
@@ -73,13 +77,13 @@ class Wheel(SceneStruct, frozen=True, kw_only=True):
     body: str
     node: str = "origin"
     offset_m: Vector = ZERO
-    axis: Vector
-    mass_kg: float
-    axial_inertia_kg_m2: float
-    transverse_inertia_kg_m2: float
-    angle_rad: float = 0.0
-    speed_rad_s: float = 0.0
-    friction_Nms_rad: float = 0.0
+    axis: Axis
+    mass_kg: NotNegative
+    axial_inertia_kg_m2: Spinning
+    transverse_inertia_kg_m2: Positive
+    angle_rad: Number = 0.0
+    speed_rad_s: Number = 0.0
+    friction_Nms_rad: Damping = 0.0
     torque_Nm: Function | None = None
     prescribed_rad: Function | None = None
 
@@ -102,8 +106,8 @@ class PointMass(SceneStruct, frozen=True, kw_only=True):
     body: str
     node: str = "origin"
     offset_m: Vector = ZERO
-    mass_kg: float
-    directions: tuple[Vector, ...] = ()
+    mass_kg: Lump
+    directions: tuple[Axis, ...] = ()
     coordinates: tuple[LinearCoordinate, ...] = ()
 
     @property
@@ -124,7 +128,7 @@ class Load(SceneStruct, frozen=True, kw_only=True):
     body: str
     node: str = "origin"
     type: Literal["force", "torque"]
-    direction: Vector
+    direction: Axis
     frame: Literal["world", "node"] = "world"
     function: Function
 
@@ -142,8 +146,8 @@ class ModalState(SceneStruct, frozen=True, kw_only=True):
     """Initial modal coordinates and rates of one flexible body (zero where not listed)."""
 
     body: str
-    coordinates: tuple[float, ...]
-    rates: tuple[float, ...] = ()
+    coordinates: tuple[Annotated[Number, PURE], ...]
+    rates: tuple[Annotated[Number, unit("1/s")], ...] = ()
 
 
 Waiver = Literal[

@@ -13,9 +13,9 @@ from typing import Literal, assert_never
 
 import numpy as np
 
-from flexmb.scene.bodies import FAMILIES, BeamBody, BeamStation, Family, StrainPolynomials
+from flexmb.scene.bodies import FAMILIES, MOST_POINTS, BeamBody, BeamStation, Family, StrainPolynomials
 from flexmb.scene.pieces import piece_count
-from flexmb.scene.rest_turn import MOST_FOLLOWED, RestTurn, follow, turns_of_pieces
+from flexmb.scene.rest_turn import RestTurn, follow, turns_of_pieces
 from flexmb.scene.sections import (
     ABOUT_Y,
     ABOUT_Z,
@@ -118,7 +118,7 @@ def points_at_rest(part: RestTurn, left_out: float) -> int:
     needed = follow(part.turn, left_out)
     if part.share > WHOLE_PIECE or needed <= LEAST_OF_PART:
         return needed
-    return min(MOST_FOLLOWED, ceil((needed - 1) / part.share))
+    return min(MOST_POINTS, ceil((needed - 1) / part.share))
 
 
 def points_of_part(points: int, share: float) -> int:

@@ -10,12 +10,12 @@ from msgspec.structs import replace
 
 from flexmb.scene import control as c
 from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, SidBody, Vector
-from flexmb.scene.columns import struct_keys
 from flexmb.scene.connectors import AlongHinge, AngularFriction
 from flexmb.scene.couplings import CoupledCoordinate, Coupling
 from flexmb.scene.events import Impact
 from flexmb.scene.freedoms import AngularCoordinate, Coordinate, LinearCoordinate
 from flexmb.scene.hinges import Hinge
+from flexmb.scene.keys import struct_keys
 from flexmb.scene.quaternions import quaternion_of, rotation_matrix
 from flexmb.scene.rest_curve import is_curved, rest_sections
 from flexmb.scene.schema import PointMass, Scene, Wheel

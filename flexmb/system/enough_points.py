@@ -16,9 +16,9 @@ import numpy as np
 
 from flexmb.modal.exact import field_of_points
 from flexmb.modal.strain_field import WHOLE, StrainField
-from flexmb.scene.bodies import BeamBody
+from flexmb.scene.bodies import MOST_POINTS, BeamBody
 from flexmb.scene.pieces import piece_count
-from flexmb.scene.rest_turn import MOST_FOLLOWED, follow, turns_of_pieces
+from flexmb.scene.rest_turn import follow, turns_of_pieces
 from flexmb.scene.strains import points_of_piece
 from flexmb.system.moved_sections import moved_sections
 from flexmb.system.scene_arrays import SceneArrays
@@ -109,7 +109,7 @@ def _error(body: BeamBody, eta: Real, t: float, turn: float) -> Unfollowed | Non
     while enough - few > 1:
         middle = (few + enough) // 2
         few, enough = (few, middle) if is_enough(left(middle)) else (middle, enough)
-    return Unfollowed(body.name, t, points, position, rotation, enough if enough < min(finest, MOST_FOLLOWED) else None)
+    return Unfollowed(body.name, t, points, position, rotation, enough if enough < min(finest, MOST_POINTS) else None)
 
 
 def _seen(body: BeamBody, points: int, eta: Real) -> tuple[Real, Real]:

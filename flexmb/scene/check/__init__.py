@@ -19,7 +19,7 @@ from flexmb.scene.check.names import references, unique_names
 from flexmb.scene.check.outboard import moved_inertia
 from flexmb.scene.check.profiles import functions
 from flexmb.scene.check.topology import tree
-from flexmb.scene.check.walk import finite_numbers, unit_quaternions, unit_vectors
+from flexmb.scene.check.walk import numbers
 from flexmb.scene.convert import refuse_wrong_types
 from flexmb.scene.garbage import collector_paused
 from flexmb.scene.loaded import called
@@ -27,7 +27,6 @@ from flexmb.scene.problems import Defect, Doubt, SceneError, SceneWarning, in_sh
 from flexmb.scene.schema import Scene
 
 _LARGEST_BITS = 1000  # of integers that are finite as floats
-EVERYWHERE = (finite_numbers, unit_vectors, unit_quaternions)
 STRUCTURE = (unique_names, references, tree)
 PHYSICS = (
     rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, couplings, wheels, point_masses, connectors,
@@ -60,7 +59,7 @@ def check_and_warn(scene: Scene, t_end: float | None = None, t_start: float = 0.
 def _problems(scene: Scene, t_end: float | None, t_start: float) -> list[Defect]:
     refuse_wrong_types(scene)  # a struct built by hand may hold values of any type
     problems = [*_run_time(t_end, t_start)]
-    problems += [problem for check in EVERYWHERE + STRUCTURE + PHYSICS for problem in check(scene)]
+    problems += [problem for check in (numbers, *STRUCTURE, *PHYSICS) for problem in check(scene)]
     problems += functions(scene, t_end, t_start)
     if all(isinstance(each, Doubt) for each in problems):  # it needs valid numbers and names, and a tree
         problems += [*moved_inertia(scene), *jumps(scene)]

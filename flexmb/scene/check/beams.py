@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.check import inertia
 from flexmb.scene.check.exact_beams import damping, exact_beam, without_strains
+from flexmb.scene.check.numbers import in_range
 from flexmb.scene.check.sections import stations
 from flexmb.scene.check.walk import sound
 from flexmb.scene.problems import Defect, Doubt, Place
@@ -21,7 +22,6 @@ def beams(scene: Scene) -> Iterator[Defect]:
     """Problems of every beam body."""
     of_beams = [i for i, body in enumerate(scene.bodies) if isinstance(body, BeamBody)]
     for place, body in sound(scene, "bodies", of_beams):
-        yield from _mesh(place, body)
         yield from _size(place.key("elements"), body)
         yield from _stations(place, body)
         yield from _along(place, body)
@@ -37,13 +37,6 @@ def mode_count(body: BeamBody) -> int:
     if body.level == "exact":
         return strain_count(body)
     return body.modes.count + (_attachments(body) if body.modes.static else 0)
-
-
-def _mesh(place: Place, body: BeamBody) -> Iterator[Defect]:
-    if body.length_m <= 0.0:
-        yield Defect(str(place.key("length_m")), f"the length is {body.length_m:g} m", "give a positive length")
-    if body.elements < 1:
-        yield Defect(str(place.key("elements")), f"{counted(body.elements)} elements", "use one element at least")
 
 
 def _size(place: Place, body: BeamBody) -> Iterator[Defect]:
@@ -78,8 +71,7 @@ def _along(place: Place, body: BeamBody) -> Iterator[Defect]:
                 what = f"x_m = {item.x_m:g} m is not on the beam"
                 yield Defect(str(place.key(key, i, "x_m")), what, f"choose 0 <= x_m <= {body.length_m:g}")
     for i, lump in enumerate(body.tip_masses):
-        yield from inertia.mass(place.key("tip_masses", i, "mass_kg"), lump.mass_kg, zero=False)
-        dust = ROUNDING * lump.mass_kg * body.length_m**2
+        dust = ROUNDING * abs(lump.mass_kg) * body.length_m**2
         yield from inertia.tensor(place.key("tip_masses", i, "inertia_kg_m2"), lump.inertia_kg_m2, dust)
 
 
@@ -87,10 +79,12 @@ def _modes(place: Place, body: BeamBody) -> Iterator[Defect]:
     modes = body.modes
     if not (own := families(body)) or len(set(own)) < len(own):
         yield Defect(str(place.key("families")), f"the families are {own}", "list each wanted family once")
-    if modes.count < 0 or mode_count(body) < 1:
+    if not (in_range(body) and in_range(modes)):
+        return
+    if mode_count(body) < 1:
         remedy = 'give one at least, or "static" ones, or make the level "rigid"'
         yield Defect(str(place.key("count")), f"{counted(modes.count)} modes", remedy)
-    elif body.elements >= 1 and mode_count(body) > (available := available_modes(body)):
+    elif mode_count(body) > (available := available_modes(body)):
         what = f"{counted(mode_count(body))} modes, but {body.elements} elements give {available} of these families"
         yield Defect(str(place.key("count")), what, "use more elements, more families, or fewer modes")
     yield from damping(place, modes, mode_count(body))

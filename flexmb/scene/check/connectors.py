@@ -10,6 +10,7 @@ from typing import assert_never
 import numpy as np
 
 from flexmb.scene import schema as s
+from flexmb.scene.check.numbers import in_range
 from flexmb.scene.check.walk import sound
 from flexmb.scene.connectors import AlongHinge, HingeFriction, HingeSpring, by_stem
 from flexmb.scene.problems import Defect, Doubt, Place
@@ -18,14 +19,12 @@ from flexmb.scene.tree import GROUND, coordinate_of
 HIGHEST = 4  # coefficients of `stiffening`: a law is a polynomial of degree five at most
 SYMMETRIC = 1e-9  # tolerance of matrices printed to ten digits, relative to the largest element
 LOST = 0.01  # fraction of static friction that may be lost by smoothing without a doubt
-NOT_NEGATIVE = ("free_length", "damping", "stop_stiffness", "stop_dissipation", "sliding", "static")
 
 
 def connectors(scene: s.Scene) -> Iterator[Defect]:
     """Every connector by itself, and that it acts on something that moves."""
     for place, item in sound(scene, "connectors"):
         connector: s.Connector = item
-        yield from _signs(place, connector)
         match connector:
             case s.SpringDamper():
                 yield from _law(place, connector)
@@ -47,13 +46,6 @@ def connectors(scene: s.Scene) -> Iterator[Defect]:
                 coordinate_of(scene, connector)
             except ValueError as error:
                 yield Defect(str(place.key("hinge")), str(error), "name a hinge, and its coordinate as the hinge does")
-
-
-def _signs(place: Place, connector: s.Connector) -> Iterator[Defect]:
-    for key, (stem, value) in zip(connector.__struct_fields__, by_stem(connector).items(), strict=True):
-        if stem in NOT_NEGATIVE and isinstance(value, float) and value < 0.0:
-            noun = stem.replace("_", " ")
-            yield Defect(str(place.key(key)), f"negative {noun}: {value:g}", f"give a {noun} of at least zero")
 
 
 def _law(place: Place, connector: s.SpringDamper | HingeSpring) -> Iterator[Defect]:
@@ -116,18 +108,13 @@ def _stops(place: Place, connector: HingeSpring) -> Iterator[Defect]:
 
 def _friction(place: Place, connector: HingeFriction) -> Iterator[Defect]:
     law = by_stem(connector)
-    if law["smoothing"] <= 0.0:
-        what = f"the smoothing speed is {law['smoothing']:g}"
-        yield Defect(str(place), what, "give a positive speed, well below those that matter")
     if (law["static"] is None) != (law["stribeck"] is None):
         yield Defect(str(place), "static friction and the Stribeck speed belong together", "give both, or neither")
     elif law["static"] is not None:
         if law["static"] < law["sliding"]:
             what = f"static friction {law['static']:g} is below sliding friction {law['sliding']:g}"
             yield Defect(str(place), what, "give at least as much")
-        if law["stribeck"] <= 0.0:
-            yield Defect(str(place), f"the Stribeck speed is {law['stribeck']:g}", "give a positive one")
-        elif law["static"] > law["sliding"] >= 0.0 and law["smoothing"] > 0.0:
+        elif law["static"] > law["sliding"] and in_range(connector):
             yield from _peak(place, law)
 
 

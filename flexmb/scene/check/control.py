@@ -179,14 +179,8 @@ def _reference(place: Place, reference: str, widths: dict[str, int | None], late
 
 
 def _instants(place: Place, controller: s.Controller) -> Iterator[Defect]:
-    period = controller.period_s
-    if period is not None and not period > 0.0:
-        yield Defect(str(place.key("period_s")), f"the period is {period:g} s", "give a positive one, or leave it out")
     for key in ("offset_s", "delay_s"):
-        value = getattr(controller, key)
-        if value < 0.0:
-            yield Defect(str(place.key(key)), f"{key} is {value:g} s", "give a time that is not negative")
-        elif value and period is None:
+        if getattr(controller, key) and controller.period_s is None:
             remedy = "give its period_s too: a continuous controller has no instants, and no delay"
             yield Defect(str(place.key(key)), f'controller "{controller.name}" is continuous', remedy)
 
@@ -206,14 +200,12 @@ def _sizes(place: Place, controller: s.Controller, inputs: int | None) -> Iterat
                 yield Defect(str(place.key("values")), what, "give one value for each point, and one point at least")
             if any(b <= a for a, b in zip(points, points[1:], strict=False)):
                 yield Defect(str(place.key("points")), "the points do not increase", "sort them, each once")
-        case s.UserLaw(function=function, outputs=outputs):
+        case s.UserLaw(function=function):
             if not ADDRESS.fullmatch(function):
                 remedy = 'write "package.module:function"'
                 yield Defect(str(place.key("function")), f'"{function}" is no name of a function', remedy)
             elif forbidden := refusal(function):
                 yield Defect(str(place.key("function")), *forbidden)
-            if outputs < 1:
-                yield Defect(str(place.key("outputs")), f"it has {outputs} outputs", "give one or more")
         case _:
             assert_never(controller)
     if inputs == 0 and not isinstance(controller, s.UserLaw | s.StateSpace):
@@ -247,12 +239,8 @@ def _pid(place: Place, pid: s.Pid, inputs: int | None) -> Iterator[Defect]:
     if pid.kd and not pid.filter_s and pid.period_s is None:
         remedy = "give filter_s, a small part of the fastest period of interest; or feed a rate to a state_space"
         yield Defect(str(place.key("filter_s")), "a continuous derivative needs a filter", remedy)
-    if pid.filter_s < 0.0:
-        yield Defect(str(place.key("filter_s")), f"it is {pid.filter_s:g} s", "give a time that is not negative")
     if pid.lower is not None and pid.upper is not None and not pid.lower <= pid.upper:
         yield Defect(str(place.key("lower")), f"it is above upper, {pid.upper:g}", "exchange the two")
-    if pid.tracking_s is not None and not pid.tracking_s > 0.0:
-        yield Defect(str(place.key("tracking_s")), f"it is {pid.tracking_s:g} s", "give a positive time")
 
 
 def _at_once(

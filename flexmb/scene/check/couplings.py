@@ -1,4 +1,4 @@
-"""Couplings: that they relate coordinates that exist, each once, by ratios other than zero, and leave one free."""
+"""Couplings: that they relate coordinates that exist, each once, and leave one free."""
 
 from __future__ import annotations
 
@@ -20,9 +20,6 @@ def couplings(scene: Scene) -> Iterator[Defect]:
             remedy = "name the coordinates that lead this one; a coordinate that is constant is prescribed, or a weld"
             yield Defect(str(place.key("terms")), "no coordinate leads this one", remedy)
             continue
-        for i, term in enumerate(coupling.terms):
-            if term.ratio == 0.0:
-                yield Defect(str(place.key("terms", i, "ratio")), "the ratio is zero", "leave this coordinate out")
         try:
             related = coupled(scene, coupling)
         except ValueError as error:

@@ -70,9 +70,6 @@ def _actions(scene: Scene, place: Place, event: SceneEvent, paths: dict[str, str
         if isinstance(action, Latch | Release | Impact) and action.coordinate not in paths:
             what = f'there is no scalar coordinate "{action.coordinate}"'
             yield Defect(str(spot.key("coordinate")), what, closest(action.coordinate, paths))
-        if isinstance(action, Impact) and not 0.0 <= action.restitution <= 1.0:
-            what = f"the restitution is {action.restitution:g}"
-            yield Defect(str(spot.key("restitution")), what, "from 0 (no rebound) to 1 (no loss)")
         if isinstance(action, Change):
             yield from _change(scene, spot, action)
 

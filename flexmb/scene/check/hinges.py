@@ -8,41 +8,35 @@ from typing import Any
 
 import numpy as np
 
-from flexmb.scene.bodies import SceneStruct
 from flexmb.scene.check import inertia
+from flexmb.scene.check.numbers import UNIT_LENGTH
 from flexmb.scene.check.profiles import MOTIONS, initial_motion
-from flexmb.scene.check.walk import UNIT_LENGTH, sound
-from flexmb.scene.columns import alike, column
+from flexmb.scene.check.walk import sound
+from flexmb.scene.columns import alike
 from flexmb.scene.events import Release
 from flexmb.scene.freedoms import Coordinate
 from flexmb.scene.hinges import WITH_AXIS, Z_AXIS, Gimbal
-from flexmb.scene.problems import Defect, Doubt, Place
+from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene, Wheel
 from flexmb.scene.tree import coordinates
 
-ARMATURES = ("armature_kg_m2", "armature_kg")
-USUALLY_POSITIVE = ("stiffness_Nm_rad", "stiffness_N_m", "damping_Nms_rad", "damping_Ns_m", "friction_Nms_rad")
-
 
 def hinges(scene: Scene) -> Iterator[Defect]:
-    """Springs and dampers of the usual sign, motors that can act, gimbal sequences that exist."""
+    """Motors that can act, motions that start where they are, gimbal sequences that exist."""
     for place, hinge in sound(scene, "hinges", _to_examine(scene)):
-        yield from _springs(place, hinge)
         yield from _coordinates(place, hinge, _let_go(scene))
         if isinstance(hinge, Gimbal):
             yield from _gimbal(place, hinge)
 
 
 def _to_examine(scene: Scene) -> set[int]:
-    """Numbers of the gimbals, and of hinges with a negative spring, damper or armature or a prescribed motion."""
+    """Numbers of the gimbals, and of hinges with a prescribed motion."""
     found: set[int] = set()
     for kind, owners, structs in alike(scene.hinges):
         if kind is Gimbal:
             found.update(owners)
         for key in kind.__struct_fields__:
-            if key in (*USUALLY_POSITIVE, *ARMATURES):
-                found.update(owners[i] for i in np.flatnonzero(column(structs, key) < 0.0).tolist())
-            elif key in MOTIONS and any(profiles := list(map(attrgetter(key), structs))):
+            if key in MOTIONS and any(profiles := list(map(attrgetter(key), structs))):
                 found.update(owner for owner, profile in zip(owners, profiles, strict=True) if profile is not None)
     return found
 
@@ -60,18 +54,15 @@ def closures(scene: Scene) -> Iterator[Defect]:
 
 
 def wheels(scene: Scene) -> Iterator[Defect]:
-    """A wheel has a possible inertia and either a motor or a prescribed spin."""
+    """A wheel has a possible inertia, and either a motor or a prescribed spin."""
     for place, wheel in sound(scene, "wheels"):
-        yield from inertia.mass(place.key("mass_kg"), wheel.mass_kg)
         yield from _wheel_inertia(place, wheel)
-        yield from _springs(place, wheel)
         yield from _drive(place, wheel, f"{wheel.name}.angle" in _let_go(scene))
 
 
 def point_masses(scene: Scene) -> Iterator[Defect]:
     """A point mass has mass, at most three orthogonal directions, and a coordinate for each if any."""
     for place, item in sound(scene, "point_masses"):
-        yield from inertia.mass(place.key("mass_kg"), item.mass_kg, zero=False)
         count = len(item.directions)
         if count > 3:
             yield Defect(str(place.key("directions")), f"{count} directions in space", "give three at most")
@@ -89,15 +80,6 @@ def point_masses(scene: Scene) -> Iterator[Defect]:
         yield from _coordinates(place, item, _let_go(scene))
 
 
-def _springs(place: Place, item: SceneStruct) -> Iterator[Doubt]:
-    for key in USUALLY_POSITIVE:
-        value = getattr(item, key, 0.0)
-        if value < 0.0:
-            noun = key.split("_")[0]
-            waiver = "negative_stiffness" if noun == "stiffness" else "negative_damping"
-            yield Doubt(str(place.key(key)), f"negative {noun}: {value:g}", f"give a {noun} of at least zero", waiver)
-
-
 def _let_go(scene: Scene) -> set[str]:
     """Coordinates that an event releases: their motors move them from then on."""
     actions = [action for event in scene.events for action in event.actions]
@@ -107,15 +89,7 @@ def _let_go(scene: Scene) -> set[str]:
 def _coordinates(place: Place, item: Any, released: set[str]) -> Iterator[Defect]:
     for name, coordinate in coordinates(item):
         spot = Place(f"{place.path}.{name}", place.names)
-        yield from _springs(spot, coordinate)
-        yield from _armature(spot, coordinate)
         yield from _drive(spot, coordinate, f"{item.name}.{name}" in released)
-
-
-def _armature(place: Place, coordinate: Coordinate) -> Iterator[Defect]:
-    if coordinate.armature < 0.0:
-        what = f"the armature is {coordinate.armature:g}"
-        yield Defect(str(place.key(coordinate.ARMATURE)), what, "give at least zero: it is the inertia of a rotor")
 
 
 def _drive(place: Place, item: Coordinate | Wheel, released: bool) -> Iterator[Defect]:
@@ -146,10 +120,7 @@ def _gimbal(place: Place, hinge: Gimbal) -> Iterator[Defect]:
 
 def _wheel_inertia(place: Place, wheel: Wheel) -> Iterator[Defect]:
     axial, transverse = wheel.axial_inertia_kg_m2, wheel.transverse_inertia_kg_m2
-    if axial <= 0.0:
-        what = f"the axial inertia is {axial:g} kg m²"
-        yield Defect(str(place.key("axial_inertia_kg_m2")), what, "give a positive one: a wheel stores spin")
-    elif axial > 2.0 * transverse * (1.0 + inertia.PRINTED):
+    if axial > 2.0 * transverse * (1.0 + inertia.PRINTED):
         what = f"the axial inertia {axial:g} exceeds twice the transverse inertia {transverse:g} kg m²"
         remedy = f"no wheel has this: the transverse inertia is {axial / 2.0:g} kg m² at least (a flat disc)"
         yield Defect(str(place.key("transverse_inertia_kg_m2")), what, remedy)

@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 
 from flexmb.scene.bodies import RigidBody
 from flexmb.scene.check.reach import reach
-from flexmb.scene.check.walk import LARGEST, sound
+from flexmb.scene.check.walk import sound
 from flexmb.scene.columns import column
 from flexmb.scene.problems import Defect, Place
+from flexmb.scene.quantities import LARGEST
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 
@@ -20,13 +21,12 @@ PRINTED = 1e-9
 
 
 def rigid_bodies(scene: Scene) -> Iterator[Defect]:
-    """Every rigid body has a nonnegative mass, and an inertia tensor that a distribution of this mass can have."""
+    """Every rigid body has an inertia tensor that a distribution of its mass can have."""
     rigid = {i: body for i, body in enumerate(scene.bodies) if isinstance(body, RigidBody)}
     doubtful = _doubtful(list(rigid.values()))
     size = reach(scene) if any(doubtful) else 0.0
     whole = sum(body.mass_kg for body in rigid.values() if body.mass_kg > 0.0)
     for place, body in sound(scene, "bodies", [i for i, doubt in zip(rigid, doubtful, strict=True) if doubt]):
-        yield from mass(place.key("mass_kg"), body.mass_kg)
         dust = ROUNDING * size**2 * (body.mass_kg if body.mass_kg > 0.0 else whole)
         yield from tensor(place.key("inertia_kg_m2"), body.inertia_kg_m2, dust)
         if body.mass_kg == 0.0 and np.max(np.abs(body.inertia_kg_m2)) > dust:
@@ -37,21 +37,13 @@ def rigid_bodies(scene: Scene) -> Iterator[Defect]:
 def _doubtful(bodies: Sequence[RigidBody]) -> list[bool]:
     """Whether the mass or the tensor of each body may be wrong, with half of the tolerance of `tensor`."""
     m, J = column(bodies, "mass_kg"), column(bodies, "inertia_kg_m2", 3, 3)
-    J[~np.all(np.abs(J) <= LARGEST, axis=(1, 2))] = 0.0  # reported by `finite_numbers`
+    J[~np.all(np.abs(J) <= LARGEST, axis=(1, 2))] = 0.0  # reported by `numbers`
     slack = 0.5 * PRINTED * np.max(np.abs(J), axis=(1, 2), initial=0.0)
     skew = np.max(np.abs(J - np.swapaxes(J, 1, 2)), axis=(1, 2), initial=0.0) > slack
     low, middle, high = np.linalg.eigvalsh(J).T
     impossible = (low < -slack) | (low + middle < high - slack)
     doubtful: list[bool] = ((m <= 0.0) | skew | impossible).tolist()
     return doubtful
-
-
-def mass(place: Place, value: float, *, zero: bool = True) -> Iterator[Defect]:
-    """A mass is not negative, and positive where `zero` is not allowed."""
-    if value < 0.0:
-        yield Defect(str(place), f"the mass is negative: {value:g} kg", "give a mass of at least zero")
-    elif value == 0.0 and not zero:
-        yield Defect(str(place), "the mass is zero", "give a positive mass, or leave the item out")
 
 
 def tensor(place: Place, value: ArrayLike, dust: float) -> Iterator[Defect]:

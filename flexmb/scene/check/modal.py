@@ -12,9 +12,10 @@ from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody
 from flexmb.scene.check import inertia
 from flexmb.scene.check.beams import mode_count
 from flexmb.scene.check.second_order import second_order
-from flexmb.scene.check.walk import LARGEST, entries, sound
+from flexmb.scene.check.walk import entries, sound
 from flexmb.scene.modal_data import ModalArrays, modal_arrays
 from flexmb.scene.problems import Defect, Doubt, Place
+from flexmb.scene.quantities import LARGEST
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import MOST_BYTES, modes_memory
@@ -103,7 +104,8 @@ def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defe
     size = float(np.max(np.linalg.norm(arrays.position, axis=1)))
     for j, (mass, tensor) in enumerate(zip(arrays.mass, arrays.inertia, strict=True)):
         point = spot.key(j) if body.file is None else spot.named(f"point {j}")
-        yield from inertia.mass(point, mass)
+        if body.file is not None and mass < 0.0:  # of points in the scene, `numbers` sees it
+            yield Defect(str(point), f"negative mass: {mass:g} kg", "give a mass of at least zero")
         if np.any(tensor):
             yield from inertia.tensor(point, tensor, ROUNDING * abs(mass) * size**2)
     if not np.any(arrays.mass > 0.0):

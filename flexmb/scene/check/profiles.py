@@ -1,4 +1,4 @@
-"""Functions of time: well-formed, defined over the run, smooth where they prescribe a motion that starts there."""
+"""Functions of time: tables in order, defined over the run, smooth where they prescribe a motion that starts there."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from math import cos, sin
 from typing import assert_never, get_args
 
 from flexmb.scene.bodies import SceneStruct
-from flexmb.scene.check.walk import holding, non_finite, suspicious, values
+from flexmb.scene.check.walk import finite, holding, suspicious
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.problems import Defect, Place
@@ -24,9 +24,9 @@ SMOOTH = "use smooth_step, spin_up, sine, ramp, constant, or a table"
 def functions(scene: Scene, t_end: float | None, t_start: float = 0.0) -> Iterator[Defect]:
     """Problems of every function in the scene; tables must cover t_start (s), and with `t_end` (s) reach that far."""
     for place, key, value in suspicious(scene, holding(*get_args(Function))):
-        if isinstance(value, Function) and not any(non_finite(v) for _, _, v in values(place, value)):
-            yield from _well_formed(place, value)
+        if isinstance(value, Function) and finite(value):
             if isinstance(value, Table):
+                yield from _table(place, value)
                 yield from _covers(place, value, t_end, t_start)
             if isinstance(value, Pulse) and key in MOTIONS:
                 yield Defect(str(place), "a pulse jumps: no body can follow it", SMOOTH)
@@ -77,14 +77,6 @@ def initial_motion(place: Place, item: SceneStruct, keys: tuple[str, str], funct
         if abs(given) > ROUNDING * size and abs(given - profile) > PRINTED * size:  # what is zero is not given
             what = f"starts at {given:g}, but its prescribed motion at {profile:g}"
             yield Defect(str(place.key(key)), what, f"leave {key} out: the profile says where the motion starts")
-
-
-def _well_formed(place: Place, function: Function) -> Iterator[Defect]:
-    duration = getattr(function, "duration_s", 1.0)
-    if duration <= 0.0:
-        yield Defect(str(place.key("duration_s")), f"the duration is {duration:g} s", "give a positive duration")
-    if isinstance(function, Table):
-        yield from _table(place, function)
 
 
 def _table(place: Place, table: Table) -> Iterator[Defect]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from flexmb.scene.bodies import BeamBody, BeamStation, Matrix6
 from flexmb.scene.check.inertia import PRINTED
+from flexmb.scene.check.numbers import in_range
 from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.sections import (
     INERTIA_KEYS,
@@ -44,9 +45,9 @@ def stations(place: Place, body: BeamBody) -> Iterator[Defect]:
         spot = place.key("stations", i)
         found = [*_complete(spot, station, body.theory == "timoshenko")]
         if not found:
-            found = [*_positive(spot, station, body)]
+            found = [*_matrices(spot, station, body)]
         yield from found
-        if not found:
+        if not found and in_range(station):
             yield from _plausible(spot, station, body.length_m)
             sound += 1
             if body.level != "exact" and body.length_m > 0.0 and not is_plain(station):
@@ -73,13 +74,7 @@ def _complete(spot: Place, station: BeamStation, sheared: bool) -> Iterator[Defe
             yield Defect(str(spot), f"a Timoshenko beam needs {key}", f"add {key}, or use euler-bernoulli")
 
 
-def _positive(spot: Place, station: BeamStation, body: BeamBody) -> Iterator[Defect]:
-    for key in (*STIFFNESS_KEYS, "mass_per_length_kg_m", *SHEAR_KEYS):
-        if (value := getattr(station, key)) is not None and value <= 0.0:
-            yield Defect(str(spot.key(key)), f"{key} is {value:g}", "give a positive value")
-    for key in ("rotary_y_kg_m", "rotary_z_kg_m"):
-        if (value := getattr(station, key)) < 0.0:
-            yield Defect(str(spot.key(key)), f"{key} is {value:g}", "give a rotary inertia of at least zero")
+def _matrices(spot: Place, station: BeamStation, body: BeamBody) -> Iterator[Defect]:
     if station.stiffness is not None:
         yield from _stiffness(spot.key("stiffness"), station.stiffness)
     if station.inertia is not None:

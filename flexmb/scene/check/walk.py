@@ -1,27 +1,21 @@
-"""Every value of a scene with its place; checks that apply everywhere: finite numbers, unit axes and quaternions."""
+"""Every value of a scene with its place, and every number checked where it is."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
-from itertools import chain
-from math import hypot
-from operator import attrgetter
 from typing import Any
 
 import msgspec
-import numpy as np
 
-from flexmb.scene.columns import Alike, alike, number_keys
+from flexmb.scene.check.numbers import first_outside, outside, wrong_numbers
+from flexmb.scene.columns import alike
 from flexmb.scene.convert import ROOT, label
+from flexmb.scene.keys import number_keys, struct_keys
 from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene
 
-# Data printed to ten digits are unit vectors to 1e-10; vectors with a larger error than this were not normalised.
-UNIT_LENGTH = 1e-9
-# Larger than any quantity of mechanics in SI units; products of five such numbers are still finite.
-LARGEST = 1e60
-AXES = ("axis", "direction", "directions")
+Suspects = Callable[[Sequence[Any]], Iterable[int]]
+"""Returns the numbers of the items, of one collection, that are to be looked at."""
 
 
 def entries(scene: Scene, collection: str, chosen: Iterable[int] | None = None) -> Iterator[tuple[Place, Any]]:
@@ -38,122 +32,64 @@ def sound(scene: Scene, collection: str, chosen: Iterable[int] | None = None) ->
 
 
 def not_finite(items: Sequence[Any]) -> set[int]:
-    """Numbers of the items with a number that `non_finite` reports."""
-    return {
-        owner
-        for group in alike(items)
-        for key in number_keys(group.kind)
-        if not _all_finite(values := list(map(attrgetter(key), group.structs)))
-        for owner, value in zip(group.owners, values, strict=True)
-        if non_finite(value)
-    }
+    """Numbers of the items with a NaN, an infinity, or a number beyond LARGEST."""
+    return {i for i in outside(items) if not finite(items[i])}
 
 
-def _all_finite(values: list[Any]) -> bool:
-    """Whether numbers, or nested tuples of numbers of equal shape, are finite; False for anything else."""
-    try:
-        while values and isinstance(values[0], tuple):
-            values = list(chain.from_iterable(values))
-        return bool(np.all(np.abs(np.array(values, float)) <= LARGEST))
-    except (TypeError, ValueError, OverflowError):
-        return False
+def finite(struct: msgspec.Struct) -> bool:
+    """Whether all real numbers of a struct, and of the structs inside it, are finite."""
+    for _, each in structs(ROOT, struct):
+        real = [key for key in number_keys(type(each)).values() if not key.whole]
+        if any(first_outside(getattr(each, key.name)) for key in real):
+            return False
+    return True
 
 
-def suspicious(scene: Scene, suspects: Callable[[Sequence[Any]], Iterable[int]]) -> Iterator[tuple[Place, str, Any]]:
+def numbers(scene: Scene) -> Iterator[Defect]:
+    """Every number is finite, in the range of its key, and of unit length with those beside it if the key says so."""
+    for place, struct in _suspects(scene, outside):
+        yield from wrong_numbers(place, struct)
+
+
+def suspicious(scene: Scene, suspects: Suspects) -> Iterator[tuple[Place, str, Any]]:
     """Place, key and value of every field of the scene itself, and of the items of its collections whose numbers
     `suspects` returns."""
-    for key in scene.__struct_fields__:
-        value, spot = getattr(scene, key), ROOT.key(key)
-        if isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
-            for place, item in _named_items(spot, key, value, suspects(value)):
-                yield from values(place, item)
-        else:
-            yield spot, key, value
+    for place, struct in _suspects(scene, suspects):
+        yield from _fields(place, struct)
+
+
+def _suspects(scene: Scene, suspects: Suspects) -> Iterator[tuple[Place, msgspec.Struct]]:
+    yield ROOT, scene
+    for key in struct_keys(Scene):
+        for place, item in entries(scene, key, suspects(getattr(scene, key))):
+            yield from structs(place, item)
+
+
+def structs(place: Place, struct: msgspec.Struct) -> Iterator[tuple[Place, msgspec.Struct]]:
+    """A struct with its place, and all structs inside it with theirs."""
+    yield place, struct
+    for key in struct_keys(type(struct)):
+        value, spot = getattr(struct, key), place.key(key)
+        if isinstance(value, msgspec.Struct):
+            yield from structs(spot, value)
+        elif isinstance(value, tuple):
+            for inner, item in _named_items(spot, key, value):
+                yield from structs(inner, item)
 
 
 def values(place: Place, struct: msgspec.Struct) -> Iterator[tuple[Place, str, Any]]:
     """Place, key and value of every field of a struct, those of the structs inside it included."""
-    for key in struct.__struct_fields__:
-        value, spot = getattr(struct, key), place.key(key)
-        yield spot, key, value
-        if isinstance(value, msgspec.Struct):
-            yield from values(spot, value)
-        elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
-            for inner, item in _named_items(spot, key, value):
-                yield from values(inner, item)
+    for spot, each in structs(place, struct):
+        yield from _fields(spot, each)
 
 
-def non_finite(value: Any) -> tuple[tuple[int, ...], float] | None:
-    """Index and value of the first NaN, infinity, or size beyond LARGEST in a number or nested tuple of numbers."""
-    if isinstance(value, float) and not abs(value) <= LARGEST:
-        return (), value
-    if isinstance(value, tuple):
-        for i, item in enumerate(value):
-            if found := non_finite(item):
-                return (i, *found[0]), found[1]
-    return None
+def _fields(place: Place, struct: msgspec.Struct) -> Iterator[tuple[Place, str, Any]]:
+    return ((place.key(key), key, getattr(struct, key)) for key in struct.__struct_fields__)
 
 
-def finite_numbers(scene: Scene) -> Iterator[Defect]:
-    """No number is NaN, infinite, or so large that its powers overflow."""
-    for place, _, value in suspicious(scene, not_finite):
-        if found := non_finite(value):
-            remedy = f"give a finite number, of at most {LARGEST:g}"
-            yield Defect(str(place.key(*found[0])), f"the number is {found[1]}", remedy)
-
-
-def unit_vectors(scene: Scene) -> Iterator[Defect]:
-    """Axes and directions have unit length."""
-    for place, key, value in suspicious(scene, partial(_off_unit, wanted=AXES.__contains__)):
-        if key in AXES and not non_finite(value):
-            several = key == "directions"
-            for i, vector in enumerate(value if several else (value,)):
-                spot = place.key(i) if several else place
-                length = hypot(*vector)
-                if length == 0.0:
-                    yield Defect(str(spot), "the axis has no direction: it is zero", "give a unit vector")
-                elif abs(length - 1.0) > UNIT_LENGTH:
-                    yield Defect(str(spot), f"not a unit vector: its length is {length:.9g}", _unit(vector, length))
-
-
-def unit_quaternions(scene: Scene) -> Iterator[Defect]:
-    """Quaternions have unit length."""
-    for place, key, value in suspicious(scene, partial(_off_unit, wanted=_is_quaternion)):
-        if _is_quaternion(key) and not non_finite(value):
-            norm = hypot(*value)
-            if norm == 0.0:
-                yield Defect(str(place), "the quaternion is zero", "for no rotation write (1, 0, 0, 0), scalar first")
-            elif abs(norm - 1.0) > UNIT_LENGTH:
-                yield Defect(str(place), f"not a unit quaternion: its norm is {norm:.9g}", _unit(value, norm))
-
-
-def _is_quaternion(key: str) -> bool:
-    return "quaternion" in key
-
-
-def holding(*kinds: type) -> Callable[[Sequence[Any]], set[int]]:
+def holding(*kinds: type) -> Suspects:
     """For `suspicious`: finds the items that contain structs of these kinds."""
     return lambda items: {owner for group in alike(items) if group.kind in kinds for owner in group.owners}
-
-
-def _off_unit(items: Sequence[Any], wanted: Callable[[str], bool]) -> set[int]:
-    """Items with a vector under a wanted key that may not have unit length."""
-    return {
-        owner
-        for group in alike(items)
-        for key in filter(wanted, group.kind.__struct_fields__)
-        for owner in _not_unit(group, key)
-    }
-
-
-def _not_unit(group: Alike, key: str) -> list[int]:
-    values = list(map(attrgetter(key), group.structs))
-    try:
-        length = np.linalg.norm(np.array(values, float), axis=-1)
-    except (TypeError, ValueError, OverflowError):  # tuples of several
-        return [owner for owner, value in zip(group.owners, values, strict=True) if value]
-    unit = np.abs(length - 1.0) <= 0.5 * UNIT_LENGTH  # half of it, because `hypot` rounds differently
-    return [group.owners[i] for i in np.flatnonzero(~unit.reshape(len(values), -1).all(axis=1)).tolist()]
 
 
 def _named_items(
@@ -163,7 +99,3 @@ def _named_items(
         item = items[i]
         name = label(key, item)
         yield (spot.key(i).named(name) if name else spot.key(i)), item
-
-
-def _unit(vector: tuple[float, ...], length: float) -> str:
-    return f"write ({', '.join(repr(component / length) for component in vector)})"

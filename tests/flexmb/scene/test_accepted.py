@@ -169,9 +169,9 @@ def test_all_problems_are_reported_together():
         check_scene(msgspec.structs.replace(scene, bodies=bodies, hinges=hinges), t_end=-1.0)
     assert [problem.where for problem in error.value.problems] == [
         "t_end",
+        '$.bodies[0].mass_kg (body "hub")',
         '$.hinges[4].axis (hinge "rail")',
         '$.hinges[4].parent (hinge "rail")',
-        '$.bodies[0].mass_kg (body "hub")',
     ]
     assert 'scene "satellite" has 4 problems' in str(error.value)
 

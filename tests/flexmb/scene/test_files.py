@@ -47,6 +47,8 @@ def values_of(node: inspect.Type) -> st.SearchStrategy:
             return st.sampled_from(values)
         case inspect.UnionType(types=types):
             return st.one_of(*map(values_of, types))
+        case inspect.Metadata(type=inner):
+            return values_of(inner)
     return SCALARS[type(node)]
 
 

@@ -11,8 +11,9 @@ from msgspec.structs import replace
 from flexmb.modal.exact import exact_model
 from flexmb.modal.strain_field import strain_field
 from flexmb.scene import schema as s
+from flexmb.scene.bodies import MOST_POINTS
 from flexmb.scene.check import check_scene
-from flexmb.scene.rest_turn import MOST_FOLLOWED, follow, turns_of_pieces
+from flexmb.scene.rest_turn import follow, turns_of_pieces
 from flexmb.scene.strains import REST_LEFT_OUT, points_of_piece
 from tests.flexmb.levels.strain_beams import PLANE, SPACE, beam, body_of, stations
 
@@ -72,7 +73,7 @@ def test_points_of_a_part_between_stations_and_of_pieces():
     parts = turns_of_pieces(body_of(coil(6, 4, pieces=3)))
     assert [(part.piece, round(part.share, 9)) for part in parts] == [(0, 1.0), (1, 1.0), (2, 1.0)]
     assert sum(part.turn for part in parts) == pytest.approx(12.0 * pi)
-    assert follow(np.nan, 0.1) == follow(1e300, 0.1) == MOST_FOLLOWED and follow(0.0, 0.1) == 0
+    assert follow(np.nan, 0.1) == follow(1e300, 0.1) == MOST_POINTS and follow(0.0, 0.1) == 0
 
 
 @pytest.mark.parametrize("turns", [1, pytest.param(2, marks=pytest.mark.slow)])

@@ -15,11 +15,11 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from msgspec import inspect
 
 import flexmb as fm
 from flexmb.parameters.numbers import Number
 from flexmb.parameters.parameters import ParameterError
+from flexmb.scene.keys import kinds, number_keys
 from flexmb.scene.schema import Scene
 from flexmb.scene.values import PathError
 from flexmb.sensitivity.gate import admitted
@@ -44,33 +44,6 @@ NOT_IN_SCENES = {
 }  # fmt: skip
 PLACES = 2
 """Numbers under one key of one kind of struct that are walked in a scene: the first ones that are not zero."""
-
-
-def fields(node: inspect.Type, seen: set[type]) -> Iterator[str]:
-    """Struct.field of every real number of the schema."""
-    match node:
-        case inspect.StructType(cls=cls) if cls not in seen:
-            seen.add(cls)
-            for field in node.fields:
-                if any(isinstance(each, inspect.FloatType) for each in flat(field.type)):
-                    yield f"{cls.__name__}.{field.name}"
-                for each in flat(field.type):
-                    yield from fields(each, seen)
-
-
-def flat(node: inspect.Type) -> Iterator[inspect.Type]:
-    """The types of which a type is made up."""
-    match node:
-        case inspect.UnionType(types=types):
-            for each in types:
-                yield from flat(each)
-        case inspect.VarTupleType(item_type=item):
-            yield from flat(item)
-        case inspect.TupleType(item_types=items):
-            for each in items:
-                yield from flat(each)
-        case _:
-            yield node
 
 
 def places(node: Any, path: tuple[str, ...] = (), of: str = "") -> Iterator[tuple[str, str]]:
@@ -153,7 +126,9 @@ def catalogue() -> dict[str, Scene]:
 
 
 def test_scenes_have_every_number_of_the_schema():
-    known = set(fields(inspect.type_info(Scene), set()))
+    known = {
+        f"{kind.__name__}.{key.name}" for kind in kinds(Scene) for key in number_keys(kind).values() if not key.whole
+    }
     found = {of for scene in catalogue().values() for _, of in places(scene)}
     assert len(known) > 100 and not known - found - set(NOT_IN_SCENES), sorted(known - found - set(NOT_IN_SCENES))
     assert not set(NOT_IN_SCENES) - known
