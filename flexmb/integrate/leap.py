@@ -17,7 +17,7 @@ from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR,
 EVALUATED = 8  # approximate number of evaluations of the equations of motion in a leap
 
 
-class Crossing(NamedTuple):
+class LeapProblem(NamedTuple):
     """What of a problem the search for levels within a leap needs."""
 
     constants: Any
@@ -60,7 +60,7 @@ def leap_over(leap, constants, watch, t, farthest, ends, samples, run):
     """
     _, counts = run
     counts[EVALUATIONS] += EVALUATED
-    problem = Crossing(constants)
+    problem = LeapProblem(constants)
     length = leap(farthest, ends.y, ends.dy, ends.y_new, ends.dy_new, constants)
     if length > 0.0:
         step = Interval(t, t + length, farthest)
