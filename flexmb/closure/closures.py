@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -92,27 +91,23 @@ class Closures:
     def __init__(
         self,
         closures: Sequence[Closure | Coupling],
-        constants: Constants,
-        own: ClosureConstants,
+        constants: tuple[Constants, ClosureConstants],
         layout: Layout,
         tree: Callable[[], Workspace],
         slowest: float,
         check: Callable[[int, int], None],
+        like: Closures | None = None,
     ) -> None:
         """`tree` makes workspaces of the tree; `slowest`: lowest modal frequency (rad/s), infinite without modes.
 
-        `check` raises unless a status is OK; its second argument is the body or closure at fault.
+        `check` raises unless a status is OK; its second argument is the body or closure at fault. `like`: closures with
+        other numbers, in tables of the same structure, whose workspaces and count of rows serve these too.
         """
         self.scene, self._tree, self._slowest, self._check = closures, tree, slowest, check
         self._layout = layout
-        self.constants = constants, own
-        self._start(None)
-
-    def _start(self, like: Closures | None) -> None:
-        """Without results. `like`: closures with other numbers, in tables of the same structure, whose workspaces and
-        count of rows serve these too."""
-        own = self.constants[1]
+        self.constants = constants
         if like is None:
+            own = constants[1]
             self._counted = [_Counted(np.full(len(own.group), -1), np.zeros(len(own.row)))]
             self._chain = self._evaluated = self.chain("articulated")
         else:
@@ -126,14 +121,10 @@ class Closures:
         """DynamicsError unless a status is OK; `fault`: the body or closure at fault."""
         self._check(status, fault)
 
-    def on_tree(
-        self, constants: Constants, tree: Callable[[], Workspace], like: Closures | None = None
-    ) -> Closures:
+    def on_tree(self, constants: Constants, tree: Callable[[], Workspace], like: Closures | None = None) -> Closures:
         """The same closures and tree with other functions of time, and with workspaces of their own, or of `like`."""
-        found = copy(self)
-        found.constants, found._tree = (constants, self.constants[1]), tree
-        found._start(like)
-        return found
+        both = constants, self.constants[1]
+        return Closures(self.scene, both, self._layout, tree, self._slowest, self._check, like)
 
     def for_thread(self, like: Closures | None = None) -> Closures:
         """The same closures with workspaces of their own, or of `like`; the count of independent rows is shared."""

@@ -62,7 +62,7 @@ class ClosedSystem(ChainDerivatives, System):
         super().__init__(scene, like=like)
         own = closure_constants(scene, self.constants, self.closure_ports, self.links, like)
         slowest = slowest_mode(self.links)
-        tree = scene.constraints, self.constants, own, self.layout, self.workspace, slowest
+        tree = scene.constraints, (self.constants, own), self.layout, self.workspace, slowest
         self._closures = self.own.closures = Closures(*tree, self.check_status)  # for this thread
         self._start: State | None = None
 
