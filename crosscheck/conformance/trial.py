@@ -21,7 +21,7 @@ from crosscheck.conformance.clause import Clause, ClauseBroken, NotOffered
 from crosscheck.conformance.limit import CLAUSE_LIMIT_S
 from crosscheck.engines.answers import BrokenContract, checked_precision, clean, describe
 from crosscheck.engines.contract import Engine, EngineMissing, Precision
-from crosscheck.running.execute import PROVIDER, NoSuchEngine, find_engine
+from crosscheck.engines.registry import PROVIDER, NoSuchEngine, find_engine
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Work
 from crosscheck.running.worker import SPAWN, Method

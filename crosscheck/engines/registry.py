@@ -6,11 +6,15 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from typing import TYPE_CHECKING
 
-from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Support
 from flexmb.scene.problems import closest
-from flexmb.scene.schema import Scene
 
+if TYPE_CHECKING:  # names are looked up before anything that runs engines is imported
+    from crosscheck.engines.contract import Effort, Engine, Model, Support
+    from flexmb.scene.schema import Scene
+
+PROVIDER = "crosscheck.engines.registry:engines"
 GROUP = "crosscheck.engines"
 
 BUILT_IN = {
@@ -34,7 +38,7 @@ OWN_CODE = tuple(name for name, place in BUILT_IN.items() if place.startswith("c
 SERVED_WITH = dict.fromkeys(OWN_CODE, "native") | {"exudyn-beam": "exudyn"}
 
 
-class Engines(Mapping[str, Engine]):
+class Engines(Mapping[str, "Engine"]):
     """Engines by name, each loaded on first use."""
 
     def __init__(self, loaders: dict[str, Callable[[], Engine]]) -> None:
@@ -51,6 +55,10 @@ class Engines(Mapping[str, Engine]):
 
     def __contains__(self, name: object) -> bool:
         return name in self._loaders
+
+
+class NoSuchEngine(LookupError):
+    """The provider has no engine of this name; the message names the nearest."""
 
 
 class BrokenPlugIn(RuntimeError):
@@ -103,11 +111,22 @@ def home(name: str) -> str:
 
 
 def engine(name: str) -> Engine:
-    """One engine; KeyError names the nearest name that is known."""
-    known = engines()
-    if name not in known:
-        raise KeyError(f'no engine "{name}": {closest(name, known)}')
-    return known[name]
+    """One engine; NoSuchEngine if it is not known."""
+    return find_engine(PROVIDER, name)
+
+
+def find_engine(provider: str, name: str) -> Engine:
+    """The engine called `name` of a provider "module:function"; no other engine is loaded. Raises NoSuchEngine."""
+    return known_engine(provider, name)[name]
+
+
+def known_engine(provider: str, name: str) -> Mapping[str, Engine]:
+    """The engines of a provider, none of them loaded; NoSuchEngine unless one is called `name`."""
+    module, _, function = provider.partition(":")
+    engines: Mapping[str, Engine] = getattr(import_module(module), function)()
+    if name not in engines:
+        raise NoSuchEngine(f'there is no engine "{name}": {closest(name, engines)}')
+    return engines
 
 
 def _built_in(path: str) -> Engine:
@@ -127,6 +146,8 @@ def _plug_ins() -> dict[str, list[EntryPoint]]:
 
 def _plugged(name: str, points: list[EntryPoint]) -> Engine:
     """The engine of a plug-in, or a `Broken` one with the reason."""
+    from crosscheck.engines.contract import Engine, EngineMissing
+
     what = f'plug-in "{name}" ({", ".join(point.value for point in points)})'
     if len(points) > 1:
         return Broken(name, BrokenPlugIn(f"{what}: several distributions offer this name; uninstall all but one"))

@@ -14,6 +14,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
+from crosscheck.engines.registry import PROVIDER
 from crosscheck.engines.signals import signals_of
 from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.results import CaseResults, Result, collect
@@ -29,7 +30,6 @@ from crosscheck.mutation.subject import JudgedVariant, subject
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord
 from crosscheck.records.session import last_session
-from crosscheck.running.execute import PROVIDER
 from crosscheck.running.job import MAIN, Job
 from crosscheck.running.plan import plan, variant_scene
 from crosscheck.running.scheduler import BY_DEFAULT, Limits

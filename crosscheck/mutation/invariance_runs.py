@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 
 from crosscheck.engines.checked import NO_START
+from crosscheck.engines.registry import PROVIDER
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
 from crosscheck.judging.verdict import Finding, Signal, Status, compare
@@ -26,7 +27,6 @@ from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord, RunRecord
 from crosscheck.records.packing import pack, unpack
 from crosscheck.records.session import last_session
-from crosscheck.running.execute import PROVIDER
 from crosscheck.running.job import MAIN, Job
 from crosscheck.running.plan import plan, scene_identity
 from crosscheck.running.scheduler import BY_DEFAULT, Limits

@@ -12,12 +12,12 @@ import msgspec
 from filelock import FileLock
 
 from crosscheck.conformance.trial import ClauseOutcome, try_engine
+from crosscheck.engines.registry import PROVIDER
 from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.library.find import Case
 from crosscheck.records.archive import read
 from crosscheck.records.session import last_session
-from crosscheck.running.execute import PROVIDER
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import run_planned

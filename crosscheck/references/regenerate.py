@@ -8,6 +8,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
+from crosscheck.engines.registry import PROVIDER
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import Case
 from crosscheck.library.recipe import ReferenceRecipe
@@ -26,7 +27,6 @@ from crosscheck.references.anchors import meet
 from crosscheck.references.change import beyond_uncertainty, largest_share
 from crosscheck.references.files import knowledge_text, write_both
 from crosscheck.references.routes import RouteSignals, run_routes
-from crosscheck.running.execute import PROVIDER
 from crosscheck.running.plan import sample_times
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import BY_DEFAULT, Limits, Scheduler

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable, Mapping
-from importlib import import_module
+from collections.abc import Callable
 
 import msgspec
 import numpy as np
@@ -13,21 +12,16 @@ import numpy as np
 from crosscheck.engines.answers import clean, describe
 from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import Engine, EngineMissing
+from crosscheck.engines.registry import NoSuchEngine, find_engine
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.made_by import made_by
 from crosscheck.records.packing import pack
 from crosscheck.running.job import Done, Job
 from crosscheck.running.ladder import extended
 from crosscheck.running.rung import Solved, solve_rung
-from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 
-PROVIDER = "crosscheck.engines.registry:engines"
 FULLY_STORED = 4  # the finest efforts, which the uncertainty needs in every channel
-
-
-class NoSuchEngine(LookupError):
-    """The provider has no engine of this name; the message names the nearest."""
 
 
 def execute(job: Job, emit: Callable[[RunRecord | Confirmed | str], None]) -> None:
@@ -54,20 +48,6 @@ def solve_job(job: Job, emit: Callable[[Solved | Confirmed | str], None]) -> Non
         raise
     except BaseException as error:  # a fault in one adapter, including sys.exit, must not end the session
         emit(Solved(msgspec.structs.replace(job.blank, status="failed", message=describe(error))))
-
-
-def find_engine(provider: str, name: str) -> Engine:
-    """The engine called `name` of a provider "module:function"; no other engine is loaded. Raises NoSuchEngine."""
-    return known_engine(provider, name)[name]
-
-
-def known_engine(provider: str, name: str) -> Mapping[str, Engine]:
-    """The engines of a provider, none of them loaded; NoSuchEngine unless one is called `name`."""
-    module, _, function = provider.partition(":")
-    engines: Mapping[str, Engine] = getattr(import_module(module), function)()
-    if name not in engines:
-        raise NoSuchEngine(f'there is no engine "{name}": {closest(name, engines)}')
-    return engines
 
 
 def _solve_efforts(found: Engine, job: Job, scene: Scene, emit: Callable[[Solved | Confirmed | str], None]) -> None:

@@ -7,11 +7,16 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from crosscheck.engines.answers import checked_version, clean, describe
-from crosscheck.engines.contract import EngineMissing
-from crosscheck.engines.registry import BUILT_IN, BrokenPlugIn, plug_ins
+from crosscheck.engines.registry import (
+    BUILT_IN,
+    PROVIDER,
+    BrokenPlugIn,
+    NoSuchEngine,
+    find_engine,
+    known_engine,
+    plug_ins,
+)
 from crosscheck.library.case_error import CaseError
-from crosscheck.running.execute import PROVIDER, NoSuchEngine, find_engine, known_engine
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Scheduler, Work
 
@@ -78,6 +83,9 @@ def _describe(names: Sequence[str], provider: str, scheduler: Scheduler) -> list
 
 
 def _state(provider: str, name: str) -> EngineState:
+    from crosscheck.engines.answers import checked_version, clean, describe  # after the names, which need it not
+    from crosscheck.engines.contract import EngineMissing
+
     summary = ""
     try:
         found = find_engine(provider, name)
@@ -92,4 +100,6 @@ def _state(provider: str, name: str) -> EngineState:
 
 
 def _useless(name: str, why: str) -> EngineState:
+    from crosscheck.engines.answers import clean
+
     return EngineState(name, None, clean(why), absence=USELESS)

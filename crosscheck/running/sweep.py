@@ -10,13 +10,13 @@ from pathlib import Path
 import msgspec
 
 from crosscheck.engines.answers import clean
-from crosscheck.engines.registry import SERVED_WITH
+from crosscheck.engines.registry import PROVIDER, SERVED_WITH
 from crosscheck.library.find import Case
 from crosscheck.records.archive import Archive, read
 from crosscheck.records.contracts import contracts
 from crosscheck.records.kinds import CaseRecord, Confirmed, Record, RunRecord
 from crosscheck.records.machine import environment
-from crosscheck.running.execute import PROVIDER, execute
+from crosscheck.running.execute import execute
 from crosscheck.running.expected import expected_seconds
 from crosscheck.running.job import Done, Job
 from crosscheck.running.plan import plan

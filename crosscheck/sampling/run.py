@@ -13,14 +13,13 @@ import numpy as np
 
 from crosscheck.engines.answers import clean
 from crosscheck.engines.contract import Effort
-from crosscheck.engines.registry import SERVED_WITH, home
+from crosscheck.engines.registry import PROVIDER, SERVED_WITH, home
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import resolve
 from crosscheck.records.archive import Archive, decoded_lines
 from crosscheck.records.kinds import Confirmed
 from crosscheck.records.machine import environment
 from crosscheck.records.made_by import made_by
-from crosscheck.running.execute import PROVIDER
 from crosscheck.running.job import MAIN, Done, Job
 from crosscheck.running.plan import sample_times, scene_identity
 from crosscheck.running.pool import run_jobs

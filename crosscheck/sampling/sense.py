@@ -11,9 +11,9 @@ import numpy as np
 from crosscheck.engines.answers import clean
 from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import EngineMissing
+from crosscheck.engines.registry import NoSuchEngine, find_engine
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import part_of
-from crosscheck.running.execute import NoSuchEngine, find_engine
 from crosscheck.sampling.file import SampleEffort, SweepFile, SweptQuantity
 from crosscheck.sampling.quantities import LETTERS, place_of
 from crosscheck.sampling.scenes import require_numbers

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
 
+from crosscheck.engines.registry import PROVIDER
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import Case
-from crosscheck.running.execute import PROVIDER
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import Listener
 from crosscheck.timing.facts import EngineFacts, facts_of

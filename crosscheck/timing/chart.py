@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
+from crosscheck.engines.registry import PROVIDER
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import Case
-from crosscheck.running.execute import PROVIDER
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import Listener
 from crosscheck.timing.facts import EngineFacts, facts_of

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from crosscheck.engines.answers import clean
-from crosscheck.running.execute import NoSuchEngine, find_engine
+from crosscheck.engines.registry import NoSuchEngine, find_engine
 
 UNSAID = "it does not say with which settings it runs"
 

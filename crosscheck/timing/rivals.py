@@ -16,6 +16,7 @@ import msgspec
 import numpy as np
 
 from crosscheck.engines.contract import Effort
+from crosscheck.engines.registry import PROVIDER
 from crosscheck.judging.against_reference import ReferenceSignals, hold, of_record, shared_times
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.verdict import Finding
@@ -24,7 +25,6 @@ from crosscheck.library.find import Case
 from crosscheck.records.archive import read
 from crosscheck.records.held import Asked, RecordedReference
 from crosscheck.records.kinds import RunRecord
-from crosscheck.running.execute import PROVIDER
 from crosscheck.running.held import held_reference
 from crosscheck.running.job import Job
 from crosscheck.running.plan import plan

@@ -19,7 +19,7 @@ from typing import Any
 
 from crosscheck.engines.answers import BrokenContract, checked_model, checked_run, describe
 from crosscheck.engines.contract import Effort, Model, Run
-from crosscheck.running.execute import find_engine
+from crosscheck.engines.registry import find_engine
 from crosscheck.running.job import Job
 from crosscheck.running.worker import TICK_S, Worker
 from flexmb.run.channels import channels_of

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
+from crosscheck.engines.registry import PROVIDER
 from crosscheck.judging.against_reference import CLOCK, shared_times
 from crosscheck.judging.sizes import size_of
 from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
-from crosscheck.running.execute import PROVIDER
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Scheduler
 from crosscheck.verify.columns import FEWEST, Columns, TimesError, VerifyError, read_columns

@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from crosscheck.engines.registry import PROVIDER
 from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.library.channels import LINEAR_KINDS, is_judged, part_of
@@ -21,7 +22,6 @@ from crosscheck.library.find import load_case, shipped_folder
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord, RunRecord
 from crosscheck.records.packing import Packed, pack, unpack
-from crosscheck.running.execute import PROVIDER
 from crosscheck.running.plan import plan
 from flexmb.typing import Real
 from tests.crosscheck.sessions import run_here

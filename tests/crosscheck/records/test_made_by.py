@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engines.contract import Effort
-from crosscheck.engines.registry import engine, home
+from crosscheck.engines.registry import PROVIDER, engine, home
 from crosscheck.judging.results import collect
 from crosscheck.library.find import load_case, shipped_folder
 from crosscheck.records import made_by as keys
@@ -24,7 +24,7 @@ from crosscheck.records.kinds import Confirmed, Environment, RunRecord
 from crosscheck.records.made_by import RECORDING, made_by
 from crosscheck.records.session import last_session, standing
 from crosscheck.records.sources import sources
-from crosscheck.running.execute import PROVIDER, execute
+from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan, scene_identity
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep

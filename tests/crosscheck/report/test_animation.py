@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.drawing.film import film
 from crosscheck.engines.native import NativeEngine
+from crosscheck.engines.registry import PROVIDER
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.library.find import Case, load_case, resolve
 from crosscheck.records.archive import read
@@ -18,7 +19,7 @@ from crosscheck.records.kinds import RunRecord
 from crosscheck.records.packing import pack
 from crosscheck.report.animation import animations, wheel_angle
 from crosscheck.report.store import Store
-from crosscheck.running.execute import PROVIDER, execute
+from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan, variant_scene
 from flexmb.interchange.sid import sid_of, write_sid
 from flexmb.scene.bodies import BeamStation, Modes, SidBody

@@ -14,13 +14,14 @@ import pytest
 
 from crosscheck.engines.answers import LONGEST_TEXT, BrokenContract, describe
 from crosscheck.engines.contract import Effort, EngineMissing, Run, Support, Trajectory
+from crosscheck.engines.registry import find_engine
 from crosscheck.judging.uncertainty import RUNGS
 from crosscheck.library.find import load_case
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.packing import unpack
 from crosscheck.running import execute as module
 from crosscheck.running import rung as of_rungs
-from crosscheck.running.execute import execute, find_engine
+from crosscheck.running.execute import execute
 from crosscheck.running.job import Done, Job
 from flexmb.run.channels import channels_of
 from flexmb.scene.schema import Scene

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from crosscheck.engines.registry import PROVIDER
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import load_case
 from crosscheck.library.reference import current_reference
 from crosscheck.references.other_times import reference_at
-from crosscheck.running.execute import PROVIDER
 from crosscheck.verify.against_case import CsvOutcome, verify_csv
 from crosscheck.verify.columns import VerifyError
 from flexmb.typing import Real
