@@ -6,44 +6,25 @@ length and map outboard components to inboard ones. Arrays are accepted in place
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, Self, Unpack
 
 import msgspec
 from numpy.typing import ArrayLike
 
-from flexmb.scene import options as o
 from flexmb.scene import schema as s
-from flexmb.scene.bodies import IDENTITY, ZERO
+from flexmb.scene.bodies import ZERO
 from flexmb.scene.check import check_scene
 from flexmb.scene.collecting import make
-from flexmb.scene.connecting import ConnectorMaker
 from flexmb.scene.convert import plain, to_struct
-from flexmb.scene.feeding_back import FeedbackMaker
 from flexmb.scene.garbage import collector_paused
-from flexmb.scene.hinges import Z_AXIS
+from flexmb.scene.methods import AT_REST, SchemaMethods, angular, linear
+from flexmb.scene.options import BeamOptions, Placement, Sampling
 
-AT_REST = s.AngularCoordinate()
-IN_PLACE = s.LinearCoordinate()
-
-
-def angular(**angle: Unpack[o.Angle]) -> s.AngularCoordinate:
-    """One angle of a hinge with several coordinates, for example ``universal(..., first=angular(rate=2.0))``."""
-    return make(s.AngularCoordinate, **angle)
+__all__ = ["SceneBuilder", "angular", "linear"]
 
 
-def linear(**displacement: Unpack[o.Displacement]) -> s.LinearCoordinate:
-    """One displacement of a hinge with several coordinates, or of a point mass."""
-    return make(s.LinearCoordinate, **displacement)
-
-
-def _divided(options: Mapping[str, Any], kind: type) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The options that a typed dictionary declares, and all others."""
-    own = {key: value for key, value in options.items() if key in kind.__annotations__}
-    return own, {key: value for key, value in options.items() if key not in own}
-
-
-class SceneBuilder(ConnectorMaker, FeedbackMaker):
+class SceneBuilder(SchemaMethods):
     """Collects the parts of a scene; every method returns the builder, and `scene()` returns the checked Scene.
 
     >>> pendulum = (
@@ -66,7 +47,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         check_scene(scene, t_end)
         return scene
 
-    # Bodies
+    # Methods that say something in another way than the schema does; all others are generated from it
 
     def rigid_body(
         self, name: str, *, mass: float, inertia: ArrayLike, com: ArrayLike = ZERO,
@@ -87,7 +68,7 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
     def beam(
         self, name: str, *, length: float, elements: int, section: s.BeamStation | Sequence[s.BeamStation],
         modes: int | s.Modes, level: s.Level = "full", nodes: Mapping[str, float] | Sequence[s.BeamNode] = (),
-        **model: Unpack[o.BeamOptions],
+        **model: Unpack[BeamOptions],
     ) -> Self:  # fmt: skip
         """A beam along +x of `length` (m), root at the body origin.
 
@@ -108,163 +89,15 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
             nodes=nodes, **model,
         )  # fmt: skip
 
-    def modal_body(
-        self, name: str, *, points: Sequence[s.InertiaPoint] = (), file: str | None = None,
-        boundary: Literal["clamped-free", "free-free"] = "clamped-free", level: s.Level = "full",
-        nodes: Sequence[s.ModalNode] = (), **matrices: Unpack[o.ModalMatrices],
-    ) -> Self:  # fmt: skip
-        """A flexible body of raw points and modes: `points` (see `inertia_points`) or an `.npz` `file`.
-
-        `stiffness`, `damping`: modal matrices (m,m), if they are not in the file. `gravity_stiffness` (3,m,m) and
-        `gradient_stiffness` (3,3,m,m): geometric stiffness under unit loads (see ModalBody).
-        """
-        return self._append(
-            s.ModalBody, name=name, points=points, file=file, boundary=boundary, level=level, nodes=nodes, **matrices
-        )
-
-    def sid_body(self, name: str, *, file: str, level: s.Level = "full") -> Self:
-        """A flexible body from a Standard Input Data file."""
-        return self._append(s.SidBody, name=name, file=file, level=level)
-
-    # Hinges
-
-    def weld(self, name: str, parent: str, child: str, **placement: Unpack[o.Placement]) -> Self:
-        """No freedom between `parent` ("ground" for the inertial frame) and `child`."""
-        return self._append(s.Weld, name=name, parent=parent, child=child, **placement)
-
-    def revolute(
-        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, **options: Unpack[o.TurningHinge]
-    ) -> Self:
-        """One rotation about the unit vector `axis` (inboard hinge axes).
-
-        Initial `angle` (rad) and `rate` (rad/s), spring `stiffness` (N m/rad) about `rest` (rad), `damping`
-        (N m s/rad), `armature` (kg m²), motor `torque` (N m) or `prescribed` angle (rad) as functions of time; nodes
-        and offsets as for every hinge (`flexmb.scene.options.Placement`).
-        """
-        return self._turning(s.Revolute, options, name=name, parent=parent, child=child, axis=axis)
-
-    def prismatic(
-        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, **options: Unpack[o.SlidingHinge]
-    ) -> Self:
-        """One translation along the unit vector `axis` (inboard hinge axes).
-
-        Initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m), `damping` (N s/m),
-        `armature` (kg), motor `force` (N) or `prescribed` displacement (m) as functions of time; nodes and offsets as
-        for every hinge (`flexmb.scene.options.Placement`).
-        """
-        o.refuse_others("a Prismatic", options, o.SlidingHinge)
-        displacement, placement = _divided(options, o.Displacement)
-        translation = make(s.LinearCoordinate, **displacement)
-        return self._append(
-            s.Prismatic, name=name, parent=parent, child=child, axis=axis, translation=translation, **placement
-        )
-
-    def screw(
-        self, name: str, parent: str, child: str, *, pitch: float, axis: ArrayLike = Z_AXIS,
-        **options: Unpack[o.TurningHinge],
-    ) -> Self:  # fmt: skip
-        """One rotation about the unit vector `axis`, with `pitch` (m/rad) times as much translation along it.
-
-        A screw that advances by h (m) a turn has the pitch h / (2 pi), a left-handed one a negative pitch. The angle is
-        as of a `revolute`.
-        """
-        return self._turning(s.Screw, options, name=name, parent=parent, child=child, axis=axis, pitch=pitch)
-
-    def _turning(self, kind: type[s.Revolute | s.Screw], options: Mapping[str, Any], **hinge: Any) -> Self:
-        """A hinge with one angle, whose arguments are among the `options`."""
-        o.refuse_others(f"a {kind.__name__}", options, o.TurningHinge)
-        angle, placement = _divided(options, o.Angle)
-        return self._append(kind, **hinge, rotation=make(s.AngularCoordinate, **angle), **placement)
-
-    def cylindrical(
-        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, rotation: s.AngularCoordinate = AT_REST,
-        translation: s.LinearCoordinate = IN_PLACE, **placement: Unpack[o.Placement],
-    ) -> Self:  # fmt: skip
-        """Rotation about and translation along the unit vector `axis`; see `angular` and `linear`."""
-        return self._append(
-            s.Cylindrical, name=name, parent=parent, child=child, axis=axis, rotation=rotation, translation=translation,
-            **placement,
-        )  # fmt: skip
-
-    def universal(
-        self, name: str, parent: str, child: str, *, first: s.AngularCoordinate = AT_REST,
-        second: s.AngularCoordinate = AT_REST, **placement: Unpack[o.Placement],
-    ) -> Self:  # fmt: skip
-        """Rotation about x of the inboard frame, then about the carried y; see `angular`."""
-        return self._append(
-            s.Universal, name=name, parent=parent, child=child, first=first, second=second, **placement
-        )
-
     def gimbal(
         self, name: str, parent: str, child: str, *, sequence: str = "xyz",
-        rotations: Sequence[s.AngularCoordinate] | None = None, **placement: Unpack[o.Placement],
+        rotations: Sequence[s.AngularCoordinate] | None = None, **placement: Unpack[Placement],
     ) -> Self:  # fmt: skip
         """Two or three successive rotations about carried axes, for example "zxz"; one `angular` each."""
         rotations = (AT_REST,) * len(sequence) if rotations is None else rotations
         return self._append(
             s.Gimbal, name=name, parent=parent, child=child, sequence=sequence, rotations=rotations, **placement
         )
-
-    def spherical(
-        self, name: str, parent: str, child: str, *, quaternion: ArrayLike = IDENTITY,
-        angular_velocity: ArrayLike = ZERO, stiffness: float = 0.0, damping: float = 0.0,
-        **placement: Unpack[o.GivenHinge],
-    ) -> Self:  # fmt: skip
-        """Three rotations: initial `quaternion` and relative `angular_velocity` (rad/s, outboard axes), `given` if
-        closures must keep both, spring `stiffness` (N m/rad) and `damping` (N m s/rad)."""
-        return self._append(
-            s.Spherical, name=name, parent=parent, child=child, quaternion=quaternion,
-            angular_velocity=angular_velocity, stiffness=stiffness, damping=damping, **placement,
-        )  # fmt: skip
-
-    def planar(
-        self, name: str, parent: str, child: str, *, x: s.LinearCoordinate = IN_PLACE,
-        y: s.LinearCoordinate = IN_PLACE, rotation: s.AngularCoordinate = AT_REST, **placement: Unpack[o.Placement],
-    ) -> Self:  # fmt: skip
-        """Translation in the x-y plane of the inboard frame, then rotation about z; see `linear` and `angular`."""
-        return self._append(
-            s.Planar, name=name, parent=parent, child=child, x=x, y=y, rotation=rotation, **placement
-        )
-
-    def free(
-        self, name: str, parent: str, child: str, *, position: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY,
-        angular_velocity: ArrayLike = ZERO, velocity: ArrayLike = ZERO, **placement: Unpack[o.GivenHinge],
-    ) -> Self:  # fmt: skip
-        """Six freedoms: initial `position` (m, inboard axes), `quaternion`, and relative `angular_velocity` (rad/s) and
-        `velocity` (m/s) of the outboard origin, both in outboard axes; `given` if closures must keep all of them."""
-        return self._append(
-            s.Free, name=name, parent=parent, child=child, position=position, quaternion=quaternion,
-            angular_velocity=angular_velocity, velocity=velocity, **placement,
-        )  # fmt: skip
-
-    # Loads, further inertia, outputs, events and closures
-
-    def wheel(
-        self, name: str, body: str, *, axis: ArrayLike, mass: float, axial_inertia: float, transverse_inertia: float,
-        node: str = "origin", **motion: Unpack[o.WheelMotion],
-    ) -> Self:  # fmt: skip
-        """A symmetric wheel at a node plus `offset` (m), spinning about the unit vector `axis` (node axes).
-
-        `mass` (kg), `axial_inertia` and `transverse_inertia` (kg m²), initial `angle` (rad) and `speed` (rad/s),
-        `friction` (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad). The body's mass excludes the wheel.
-        """
-        return self._append(
-            s.Wheel, name=name, body=body, node=node, axis=axis, mass=mass, axial_inertia=axial_inertia,
-            transverse_inertia=transverse_inertia, **motion,
-        )  # fmt: skip
-
-    def point_mass(
-        self, name: str, body: str, *, mass: float, node: str = "origin", offset: ArrayLike = ZERO,
-        directions: Sequence[ArrayLike] = (), coordinates: Sequence[s.LinearCoordinate] = (),
-    ) -> Self:  # fmt: skip
-        """A point mass (kg) at a node plus `offset` (m), free along orthonormal `directions` (node axes).
-
-        `coordinates`: one `linear` for each direction; by default at rest and without springs.
-        """
-        return self._append(
-            s.PointMass, name=name, body=body, node=node, offset=offset, mass=mass, directions=directions,
-            coordinates=coordinates,
-        )  # fmt: skip
 
     def force(
         self, name: str, body: str, *, direction: ArrayLike, function: s.Function, node: str = "origin",
@@ -284,10 +117,6 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
             s.Load, name=name, body=body, node=node, type="torque", direction=direction, frame=frame, function=function
         )
 
-    def marker(self, name: str, body: str, *, node: str = "origin", offset: ArrayLike = ZERO) -> Self:
-        """A frame whose motion is an output: a node plus `offset` (m, node axes)."""
-        return self._append(s.Marker, name=name, body=body, node=node, offset=offset)
-
     def event(
         self, name: str, watch: str, level: float, *actions: s.Action,
         crossing: Literal["rising", "falling", "either"] = "either",
@@ -298,24 +127,6 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         "wheel.speed", or one number of a sensor or controller, "height[2]".
         """
         return self._append(s.SceneEvent, name=name, watch=watch, level=level, crossing=crossing, actions=actions)
-
-    def modal_state(self, body: str, *, coordinates: ArrayLike, rates: ArrayLike = ()) -> Self:
-        """Initial modal coordinates and rates (1/s) of a flexible body."""
-        return self._append(s.ModalState, body=body, coordinates=coordinates, rates=rates)
-
-    def closure(
-        self, name: str,
-        type: Literal["weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar"],
-        body_a: str, body_b: str, *, axis: ArrayLike = Z_AXIS, **frames: Unpack[o.ClosureFrames],
-    ) -> Self:  # fmt: skip
-        """A loop closure between nodes of two bodies of the tree, or of a body and "ground".
-
-        `axis`: unit vector with the same components in frames A and B. `frames`: `node_a`, and `position_a` (m) and
-        `quaternion_a`, the fixed offset in node axes, of frame A; likewise of frame B.
-        """
-        return self._append(
-            s.Closure, name=name, type=type, body_a=body_a, body_b=body_b, axis=axis, **frames
-        )
 
     def coupling(
         self, name: str, hinge: str, ratios: Mapping[str, float] | Mapping[str | tuple[str, str], float], *,
@@ -329,3 +140,27 @@ class SceneBuilder(ConnectorMaker, FeedbackMaker):
         named = [((key, "") if isinstance(key, str) else key, ratio) for key, ratio in ratios.items()]
         terms = [{"hinge": at, "coordinate": which, "ratio": ratio} for (at, which), ratio in named]
         return self._append(s.Coupling, name=name, hinge=hinge, coordinate=coordinate, terms=terms, offset=offset)
+
+    def user_law(
+        self, name: str, inputs: str | Sequence[str], function: str | Callable[..., Any], *, outputs: int = 1,
+        initial: ArrayLike = (), parameters: ArrayLike = (), **sampling: Unpack[Sampling],
+    ) -> Self:  # fmt: skip
+        """A user's function, defined at the top level of a module, or its name "module:function".
+
+        Number of `outputs`; `initial` state; `parameters`; `period`, `offset`, `delay` (s) if it is sampled.
+        """
+        address = function if isinstance(function, str) else _address(function)
+        law = {"outputs": outputs, "initial": initial, "parameters": parameters}
+        return self._made(s.UserLaw, {"name": name, "inputs": inputs, "function": address, **law, **sampling})
+
+
+def _address(function: Callable[..., Any]) -> str:
+    """The name "module:function" of a function; ValueError for one that is not at the top level of a module."""
+    plain = getattr(function, "py_func", function)
+    name = getattr(plain, "__qualname__", repr(plain))
+    if "<" in name:
+        raise ValueError(
+            f"{name} is defined inside another function, where a scene file cannot refer to it: define it by def at "
+            "the top level of a module"
+        )
+    return f"{plain.__module__}:{name}"

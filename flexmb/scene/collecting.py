@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import wraps
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, wraps
 from inspect import Parameter, isfunction, signature
-from typing import Any, Self, get_args, get_type_hints
+from typing import Any, ParamSpec, Self, TypeVar, get_args, get_type_hints
 
 import msgspec
 from numpy.typing import ArrayLike
@@ -16,17 +16,36 @@ from flexmb.scene.convert import ROOT, label, plain, to_struct
 from flexmb.scene.problems import closest
 from flexmb.scene.units import split_unit
 
+P = ParamSpec("P")
+R = TypeVar("R")
+ALONE: dict[type[msgspec.Struct], tuple[str, type[msgspec.Struct]]] = {
+    s.Revolute: ("rotation", s.AngularCoordinate), s.Screw: ("rotation", s.AngularCoordinate),
+    s.Prismatic: ("translation", s.LinearCoordinate),
+}  # fmt: skip
+"""Hinges with one coordinate, whose keys stand for those of the coordinate."""
+
+
+@cache
+def stems(kind: type[msgspec.Struct]) -> dict[str, str]:
+    """The keys of a struct by their names without unit."""
+    return {split_unit(key)[0]: key for key in kind.__struct_fields__}
+
 
 def make(kind: type[msgspec.Struct], place: Any = ROOT, **values: Any) -> Any:
-    """A schema struct from values named without units.
+    """A schema struct from values named without units; None is what is not given.
 
     TypeError for an unknown name; SceneError, which names the place, for a value of a wrong type.
     """
-    keys = {split_unit(key)[0]: key for key in kind.__struct_fields__}
+    keys = stems(kind)
+    if kind in ALONE:
+        within, coordinate = ALONE[kind]
+        inner = {name: values.pop(name) for name in stems(coordinate) if name in values}
+        values[within] = make(coordinate, **inner)
     for name in values:
         if name not in keys:
             raise TypeError(f'a {kind.__name__} has no "{name}": {closest(name, keys)}')
-    return to_struct(plain({keys[name]: value for name, value in values.items()}), kind, place=place)
+    given = {keys[name]: value for name, value in values.items() if value is not None}
+    return to_struct(plain(given), kind, place=place)
 
 
 def _collections() -> dict[type, str]:
@@ -43,17 +62,21 @@ def _collections() -> dict[type, str]:
 COLLECTIONS = _collections()
 
 
-def _with_known_keywords(method: Callable[..., Any]) -> Callable[..., Any]:
-    """The method itself where it takes keywords of any name, which `make` examines."""
+def known_keywords(method: Callable[P, R]) -> Callable[P, R]:
+    """The function, which refuses a keyword that it does not have by the nearest one that it has.
+
+    One that takes keywords of any name, which `make` examines, is itself.
+    """
     known = signature(method).parameters
     if any(each.kind is Parameter.VAR_KEYWORD for each in known.values()):
         return method
 
     @wraps(method)
-    def examined(*given: Any, **named: Any) -> Any:
+    def examined(*given: P.args, **named: P.kwargs) -> R:
         for name in named:
             if name not in known:
-                raise TypeError(f'{method.__name__}() has no argument "{name}": {closest(name, list(known)[1:])}')
+                words = [each for each in known if each != "self"]
+                raise TypeError(f'{method.__name__}() has no argument "{name}": {closest(name, words)}')
         return method(*given, **named)
 
     return examined
@@ -66,7 +89,7 @@ class Collector:
         """Methods refuse a keyword that they do not have by the nearest one that they have."""
         for name, method in list(vars(cls).items()):
             if isfunction(method) and not name.startswith("_"):
-                setattr(cls, name, _with_known_keywords(method))
+                setattr(cls, name, known_keywords(method))
 
     def __init__(
         self, name: str, *, gravity: ArrayLike = ZERO, description: str = "", allow: Sequence[s.Waiver] = ()
@@ -85,6 +108,13 @@ class Collector:
                 raise TypeError(f"a {type(struct).__name__} is not a part of a scene by itself; these are: {names}")
             self._lists[COLLECTIONS[type(struct)]].append(struct)
         return self
+
+    def _made(self, kind: type[msgspec.Struct], given: Mapping[str, Any]) -> Self:
+        """Append a struct whose values are the arguments of a method, its local names; one input stands for a list."""
+        values = {name: value for name, value in given.items() if name != "self"}
+        if isinstance(values.get("inputs"), str):
+            values["inputs"] = (values["inputs"],)
+        return self._append(kind, **values)
 
     def _append(self, kind: type[msgspec.Struct], **values: Any) -> Self:
         key = COLLECTIONS[kind]

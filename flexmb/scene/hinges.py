@@ -46,7 +46,7 @@ class _Hinge(SceneStruct, frozen=True, kw_only=True, tag_field="kind"):
 
 
 class Weld(_Hinge, frozen=True, kw_only=True, tag="weld"):
-    """No freedom."""
+    """No freedom between `parent` ("ground" for the inertial frame) and `child`."""
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:

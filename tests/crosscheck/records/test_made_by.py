@@ -57,8 +57,7 @@ WITHOUT_PART = {
     "flexmb.scene.check": "refuses scenes, and changes none",
     "flexmb.scene.build": "makes scenes",
     "flexmb.scene.collecting": "makes scenes",
-    "flexmb.scene.connecting": "makes scenes",
-    "flexmb.scene.feeding_back": "makes scenes",
+    "flexmb.scene.methods": "makes scenes",
     "flexmb.scene.options": "makes scenes",
     "flexmb.scene.files": "reads scenes",
 }
