@@ -92,6 +92,8 @@ def _nested(group: Alike, key: Key) -> list[int]:
 def _all_inside(values: list[Any], allowed: Range) -> bool:
     """Whether numbers, or nested tuples of numbers of equal depth, are inside; False for anything else."""
     while values and isinstance(values[0], tuple):
+        if not all(isinstance(value, tuple) for value in values):
+            return False  # some have it, others nothing
         values = list(chain.from_iterable(values))
     try:
         table = np.array(values, float)

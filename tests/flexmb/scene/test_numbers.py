@@ -13,6 +13,7 @@ from msgspec import inspect
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import SceneStruct
 from flexmb.scene.check import check_scene
+from flexmb.scene.check.numbers import outside
 from flexmb.scene.check.walk import numbers
 from flexmb.scene.keys import Key, bare, fields, kinds, number_keys, parts
 from flexmb.scene.problems import Doubt, SceneError
@@ -116,6 +117,16 @@ def test_all_numbers_outside_are_refused_at_once_by_key_and_remedy(kind):
             with pytest.raises(SceneError) as refused:
                 check_scene(scene)
             assert all(str(problem) in str(refused.value) for problem in found if not isinstance(problem, Doubt))
+
+
+@pytest.mark.parametrize("kind", NUMERIC, ids=lambda kind: kind.__name__)
+def test_what_one_item_has_another_may_leave_out(kind):
+    """Items of a kind are looked at together."""
+    types = {field.name: field.type for field in fields(kind)}
+    without = example(kind)
+    for name in number_keys(kind):
+        whole = example(kind, **{name: filled(types[name])})
+        assert outside([without, whole]) <= {0, 1} and outside([whole, without]) <= {0, 1}
 
 
 def test_what_is_only_doubtful_has_a_word_that_admits_it():
