@@ -34,7 +34,7 @@ def of_exports(folder: Path) -> dict[str, Kind]:
     modes, refused, (several, whole) = "modal/upper.json", (SystemExit,), PLACES
     return {
         "exported model": Kind(f"{several}/model.json", models, data, refused, _model),
-        "exported modes": Kind(f"{whole}/{modes}", (files[modes],), data, refused, _modes),
+        "exported modes": Kind(f"{whole}/{modes}", (files[modes],), data, refused, _modes, f"{whole}/model.json"),
         "exported reference": Kind(f"{whole}/reference.csv", (files["reference.csv"],), table, refused, _values),
         "exported bars": Kind(f"{whole}/uncertainty.csv", (files["uncertainty.csv"],), table, refused, _bars),
     }
