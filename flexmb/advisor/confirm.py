@@ -2,13 +2,15 @@
 
 The references are run from coarse to fine until two successive ones agree within a quarter of the tolerance. Their
 difference is the uncertainty U of the finer one. If halving the pieces reduces the difference by a ratio r < 1/2, U is
-instead the remainder of the geometric series, r/(1 - r) times the last difference, with r at least 1/4. The change
-under ten times tighter integration is added to U. A candidate is adequate if its distance to the finest reference, plus
-U, plus the error of its integrator, is within the tolerance; by the triangle inequality this bounds its error.
+instead the remainder of the geometric series, r/(1 - r) times the last difference, with r at least 1/4. Where even
+r^2 would leave too much at the last reference, no further one is run, and there is no advice. The change under ten
+times tighter integration is added to U. A candidate is adequate if its distance to the finest reference, plus U, plus
+the error of its integrator, is within the tolerance; by the triangle inequality this bounds its error.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -224,8 +226,12 @@ class Confirmation:
         steps: list[float] = []
         last: Reference | None = None
         self.references, self.may_refine = [], False
-        for name, model in known:
-            if last is not None and last.uncertainty <= MOST * self.tolerance and self._expected(model) > dear:
+        for n, (name, model) in enumerate(known):
+            most = MOST * self.tolerance
+            if last is not None and last.uncertainty > most and hopeless(steps, len(known) - n, most):
+                history.append("these differences fall too slowly for finer models to be run")
+                break
+            if last is not None and last.uncertainty <= most and self._expected(model) > dear:
                 self.may_refine = True
                 break
             if last is not None and self._too_costly(model):
@@ -246,9 +252,8 @@ class Confirmation:
             scale = scales(self.bench.wanted, done.signals)
             apart = error(done.signals, last.signals, scale)
             history.append(f"{last.name} and {name} differ by {apart:.2g}")
-            falls = max(apart / steps[-1], SECOND_ORDER) if steps and steps[-1] > 0.0 else 1.0
+            left = _remainder(apart, steps[-1] if steps else 0.0)
             steps += [apart] if " pieces" in last.name else []
-            left = apart * falls / (1.0 - falls) if falls < 0.5 else apart
             last = Reference(name, model, done.signals, scale, left + hidden + self.drift, tuple(history))
             if last.uncertainty <= AGREED * self.tolerance:
                 return last
@@ -284,3 +289,20 @@ class Confirmation:
         if hidden > AGREED * self.tolerance:
             text += f"; the second-order deflection, which none of its models has, is estimated as {hidden:.2g}"
         return f"the finest models of this scene are not known to {self.tolerance:g} of the quantity: {text}"
+
+
+def hopeless(steps: Sequence[float], more: int, most: float) -> bool:
+    """Whether the last of so many more references would have an uncertainty above `most`, even if its order were twice
+    that of the last differences, `steps`. It takes many times the operations of all before."""
+    if len(steps) < 2 or not steps[-2] > 0.0:
+        return False
+    ratio = min(steps[-1] / steps[-2], 1.0) ** 2
+    before = steps[-1] * ratio ** (more - 1)
+    return _remainder(before * ratio, before) > most
+
+
+def _remainder(apart: float, before: float) -> float:
+    """What a reference leaves that differs so much from the one before it, and that by `before` (0: unknown) from its.
+    """
+    falls = max(apart / before, SECOND_ORDER) if before > 0.0 else 1.0
+    return apart * falls / (1.0 - falls) if falls < 0.5 else apart

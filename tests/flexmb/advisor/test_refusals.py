@@ -8,7 +8,7 @@ from msgspec.structs import replace
 import flexmb as fm
 from flexmb.advisor import advice as advice_module
 from flexmb.advisor.advice import advise
-from flexmb.advisor.confirm import NoReference
+from flexmb.advisor.confirm import NoReference, hopeless
 from flexmb.advisor.quantity import quantities
 from flexmb.advisor.remedies import remedies
 from tests.benchmarks.advice_questions import questions
@@ -80,3 +80,10 @@ def test_a_rod_that_only_stretches_is_answered() -> None:
     advice = advise(scene, 1e-2, t_end=0.3)
     assert advice.accepted, advice
     assert "curvature" not in advice.reference and "curvature" not in str(advice.bodies[0].rung)
+
+
+def test_references_that_cannot_suffice_are_not_run() -> None:
+    """If differences that halve fell to a quarter next, a third of the next one would be left."""
+    assert hopeless([0.08, 0.04], 1, 0.0033) and not hopeless([0.08, 0.04], 1, 0.0034)
+    assert not hopeless([0.08, 0.04], 3, 0.0033) and hopeless([0.08, 0.08], 3, 0.07)
+    assert not hopeless([0.08], 1, 0.0) and not hopeless([0.0, 0.04], 1, 0.0)
