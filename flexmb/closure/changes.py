@@ -58,6 +58,7 @@ class ChainChanges:
     by_speed: Real
     rate: Real  # (G,nu) changes of the rows' rates J u by displacements, if asked for
     load: Real  # (G,2nu) changes of the loads
+    opening: Real  # (G,2nu) scratch: changes of the rows' accelerations, and of the loads that undo them
 
 
 def chain_changes(cc: ClosureConstants, nu: int) -> ChainChanges:
@@ -67,7 +68,7 @@ def chain_changes(cc: ClosureConstants, nu: int) -> ChainChanges:
         end=strip_zeros((3, CHANGES, padded)), jacobian=strip_zeros((rows, padded)),
         by_displacement=strip_zeros((rows, padded)), by_speed=strip_zeros((rows, padded)),
         rate=strip_zeros((rows, padded)),
-        load=strip_zeros((rows, 2 * nu + LANES)),
+        load=strip_zeros((rows, 2 * nu + LANES)), opening=strip_zeros((rows, 2 * nu + LANES)),
     )  # fmt: skip
 
 

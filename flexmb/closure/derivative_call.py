@@ -17,7 +17,7 @@ import numpy as np
 from flexmb.closure.changes import differentiate
 from flexmb.closure.closures import Closures
 from flexmb.closure.factor import solve as solve_rows
-from flexmb.closure.forces import accelerate, choose, free_tree, refine, row_loads
+from flexmb.closure.forces import accelerate, choose, free_tree, is_delicate, refine, row_loads
 from flexmb.closure.jacobian import ChainJacobian, chain_jacobian, factors, hold_rows, put_rows
 from flexmb.closure.sizes import measure_ports
 from flexmb.closure.tables import Closed
@@ -115,23 +115,37 @@ def _respond_to_forces(s, x, count):
             row[n] = 0.0
         row[place] = -1.0
     solve(s.c, x.chain.tree.sweeps, d, nu)
+    delicate = is_delicate(s.cc, s.cw)
     for place in range(nu):
-        n = 0
-        for g in range(s.cc.group.shape[0]):
-            first = s.cc.group[g].row_start
-            for at in range(first, first + s.cw.rank[g]):
-                s.cw.scratch[at] = -x.unit[place, n]
-                n += 1
-        solve_rows(s.cc, s.cw)
-        n = 0
-        for g in range(s.cc.group.shape[0]):
-            first = s.cc.group[g].row_start
-            for at in range(first, first + s.cw.rank[g]):
-                load = s.cw.row[s.cw.chosen[at]].load
-                for i in range(nu):
-                    d.matrix[i, place] += x.unit[i, n] * load
-                n += 1
+        _stop_column(s, x, place, False)
+        if delicate:
+            _stop_column(s, x, place, True)
     _copy(s.c, d, 0, x.by_force)
+
+
+@sweep
+def _stop_column(s, x, place, again):
+    """Add to a column of M^-1 what keeps the rows; `again`: what rounding has left of their accelerations."""
+    d, J, n = x.chain.tree.tables, x.chain.changes.jacobian, 0
+    for g in range(s.cc.group.shape[0]):
+        first = s.cc.group[g].row_start
+        for at in range(first, first + s.cw.rank[g]):
+            opening = x.unit[place, n]
+            if again:
+                opening = 0.0
+                for i in range(x.unit.shape[0]):
+                    opening += J[s.cw.chosen[at], i] * d.matrix[i, place]
+            s.cw.scratch[at] = -opening
+            n += 1
+    solve_rows(s.cc, s.cw)
+    n = 0
+    for g in range(s.cc.group.shape[0]):
+        first = s.cc.group[g].row_start
+        for at in range(first, first + s.cw.rank[g]):
+            load = s.cw.solution[s.cw.chosen[at]]
+            for i in range(x.unit.shape[0]):
+                d.matrix[i, place] += x.unit[i, n] * load
+            n += 1
 
 
 @helper

@@ -148,9 +148,12 @@ def _orthonormalise(cc, cw, g, a, row):
 
 @sweep
 def solve(cc, cw):
-    """Solve Lambda^-1 f = cw.scratch (ordered as cw.chosen) for the loads f, into cw.row.load; other rows get 0."""
-    for r in range(cw.row.shape[0]):
-        cw.row[r].load = 0.0
+    """Solve Lambda^-1 f = cw.scratch (ordered as cw.chosen) for f, into cw.solution by row; other rows get 0.
+
+    f are loads, changes of loads, or what displaces: whoever lets them act as loads writes them to cw.row.load.
+    """
+    for r in range(cw.solution.shape[0]):
+        cw.solution[r] = 0.0
     R, b = cw.factor, cw.scratch
     for g in range(cc.group.shape[0]):
         first, rank = cc.group[g].row_start, cw.rank[g]
@@ -167,17 +170,17 @@ def solve(cc, cw):
                 b[first + a] -= R[entry(cc, g, a, m)] * b[first + m]
             b[first + a] /= R[entry(cc, g, a, a)]
         for place in range(first, first + rank):
-            cw.row[cw.chosen[place]].load = b[place]
+            cw.solution[cw.chosen[place]] = b[place]
 
 
 @helper
 def sum_rows(cc, cw, x):
-    """x (nu,) = sum of the rows of cw.half, each times its load."""
+    """x (nu,) = sum of the rows of cw.half, each times its entry of cw.solution."""
     for j in range(x.shape[0]):
         x[j] = 0.0
     for g in range(cc.group.shape[0]):
         start = cc.group[g].column_start
         for r in range(cc.group[g].row_start, cc.group[g].row_stop):
-            load, at = cw.row[r].load, row_place(cc, g, r)
+            load, at = cw.solution[r], row_place(cc, g, r)
             for n in range(columns(cc, g)):
                 x[cc.column[start + n]] += load * cw.half[at + n]

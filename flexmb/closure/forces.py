@@ -81,26 +81,21 @@ def _locate(route, t, y, s):
 
 @helper
 def _refine(route, s):
-    """Remove the rounding residual of the row accelerations by one refinement step; requires `accelerate`.
-
-    cw.row.load is what acts, before and after: derivatives, and whoever else comes behind, read it there.
-    """
-    if not _is_delicate(s.cc, s.cw):
+    """Remove the rounding residual of the row accelerations by one refinement step; requires `accelerate`."""
+    if not is_delicate(s.cc, s.cw):
         return
-    for r in range(s.cw.row.shape[0]):
-        s.cw.unrefined[r] = s.cw.row[r].load
     evaluate_rows(s.c, s.w, s.cc, s.cw, True)
     _stop_rows(s.cc, s.cw)
     sum_rows(s.cc, s.cw, s.cw.coefficient)
     _pass_outward(route, s, s.cw.coefficient, s.cw.step)
     for r in range(s.cw.row.shape[0]):
-        s.cw.row[r].load += s.cw.unrefined[r]
+        s.cw.row[r].load += s.cw.solution[r]
     for j in range(s.cw.step.shape[0]):
         s.w.speed[j].acceleration += s.cw.step[j]
 
 
 @helper
-def _is_delicate(cc, cw):
+def is_delicate(cc, cw):
     """Whether nearly cancelling loads accelerate light bodies between closures: pivots far below port responses."""
     for g in range(cc.group.shape[0]):
         for a in range(cw.rank[g]):
@@ -168,12 +163,14 @@ def row_loads(w, cc, cw):
     if status != OK:
         return status
     _stop_rows(cc, cw)
+    for r in range(cw.row.shape[0]):
+        cw.row[r].load = cw.solution[r]
     return OK
 
 
 @helper
 def _stop_rows(cc, cw):
-    """Solve for the loads that remove the row accelerations, or make stabilised gaps decay."""
+    """Solve for the loads that remove the row accelerations, or make stabilised gaps decay, into cw.solution."""
     for g in range(cc.group.shape[0]):
         first = cc.group[g].row_start
         for place in range(first, first + cw.rank[g]):

@@ -147,6 +147,8 @@ def respond(route, s, y, v):
 def accelerate(route, s):
     """Add the effect of cw.row.load to the accelerations and drive loads."""
     cw, y = s.cw, s.cw.coefficient
+    for r in range(cw.row.shape[0]):
+        cw.solution[r] = cw.row[r].load
     sum_rows(s.cc, cw, y)
     respond(route, s, y, cw.step)
     driven = False

@@ -7,7 +7,8 @@ of the tree's accelerations and dg'' of the rows at constant loads (`flexmb.clos
 
     Lambda^-1 df = -(J X + dg''),    dudot = X + M^-1 J' df.
 
-`flexmb.closure.dual_jacobian` has the same by dual numbers, one direction after the other.
+The normal equations lose digits where bodies are light, as those of the loads themselves do (`is_delicate`): there a
+second solution removes what the first has left of the rows' accelerations.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from flexmb.closure.changes import ChainChanges, chain_changes, differentiate, tree_derivatives
 from flexmb.closure.dynamics import slope
 from flexmb.closure.factor import solve as solve_rows
+from flexmb.closure.forces import is_delicate
 from flexmb.closure.tables import Closed, Recursion
 from flexmb.entry.derivatives import DerivativeWorkspace, store_jacobian
 from flexmb.jain.derivatives.solve import solve
@@ -41,7 +43,6 @@ class ChainJacobian:
 
     tree: DerivativeWorkspace
     changes: ChainChanges
-    load: Real  # (G,) of the rows at y
     slope: Real  # (nq+nu+1,) dy/dt there
 
 
@@ -50,7 +51,7 @@ def chain_jacobian(chain: Closed, nq: int, nu: int) -> ChainJacobian:
     sweeps = chain.w if isinstance(chain.route, Recursion) else workspace(chain.c, nq, nu)
     return ChainJacobian(
         tree=DerivativeWorkspace(sweeps, tree_derivatives(chain.c, chain.cc, nq, nu)),
-        changes=chain_changes(chain.cc, nu), load=np.zeros(len(chain.cc.row)), slope=np.zeros(nq + nu + 1),
+        changes=chain_changes(chain.cc, nu), slope=np.zeros(nq + nu + 1),
     )  # fmt: skip
 
 
@@ -84,15 +85,11 @@ def jacobian(t, y, J, s, x):
         status = factors(s.route, t, y, s, x.tree.sweeps)
     if status != OK:
         return status
-    for r in range(x.load.shape[0]):
-        x.load[r] = s.cw.row[r].load
     c, w, d = s.c, x.tree.sweeps, x.tree.tables
     differentiate(c, w, d, s.cc, s.cw, x.changes, has(c, PRESCRIBED), False)
     differentiate_power(c, w, d)
     solve(c, w, d, 2 * w.u.shape[0] + put_rows(d, s.cc, s.cw, x.changes))
     hold_rows(d, s.cc, s.cw, x.changes)
-    for r in range(x.load.shape[0]):
-        s.cw.row[r].load = x.load[r]
     if has(c, PRESCRIBED):
         _supply_drives(c, w, d, s.cc, s.cw, x.changes)
     store_jacobian(c, x.tree, J)
@@ -117,6 +114,17 @@ def put_rows(d, cc, cw, x):
 def hold_rows(d, cc, cw, x):
     """Change the loads so that the rows keep their accelerations, and with them the accelerations; `solve` goes before.
     """
+    for r in range(cw.row.shape[0]):
+        for n in range(2 * d.speed.shape[0]):
+            x.load[r, n] = 0.0
+    _stop_changes(d, cc, cw, x)
+    if is_delicate(cc, cw):
+        _stop_changes(d, cc, cw, x)
+
+
+@sweep
+def _stop_changes(d, cc, cw, x):
+    """Add to the changes of the loads, and of the accelerations, what the changes of the rows' accelerations need."""
     nu = d.speed.shape[0]
     for g in range(cc.group.shape[0]):
         first = cc.group[g].row_start
@@ -127,22 +135,23 @@ def hold_rows(d, cc, cw, x):
         for g in range(cc.group.shape[0]):
             first = cc.group[g].row_start
             for at in range(first, first + cw.rank[g]):
-                cw.scratch[at] = -x.load[cw.chosen[at], n]
+                cw.scratch[at] = -x.opening[cw.chosen[at], n]
         solve_rows(cc, cw)
         for r in range(cw.row.shape[0]):
-            x.load[r, n] = cw.row[r].load
+            x.opening[r, n] = cw.solution[r]
+            x.load[r, n] += cw.solution[r]
     count = 0
     for g in range(cc.group.shape[0]):
         first = cc.group[g].row_start
         for at in range(first, first + cw.rank[g]):
-            _add_response(d, x.load[cw.chosen[at]], 2 * nu + count)
+            _add_response(d, x.opening[cw.chosen[at]], 2 * nu + count)
             count += 1
 
 
 @helper
 def _opening(d, x, r, nu):
-    """J X + dg'' of row r, by displacements and speeds, to x.load[r]."""
-    out, J = x.load[r], x.jacobian[r]
+    """J X + dg'' of row r, by displacements and speeds, to x.opening[r]."""
+    out, J = x.opening[r], x.jacobian[r]
     for n in range(nu):
         out[n] = x.by_displacement[r, n]
         out[nu + n] = x.by_speed[r, n]

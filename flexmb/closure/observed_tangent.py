@@ -19,7 +19,7 @@ from flexmb.tables.status import OK
 def closed_observed_jacobian(t, y, J, c, w, cc, cw, out):
     """J (E+nu+6C+G,n+G): derivatives of `every` (E,), `drives`, the loads of closures (C,6) on body_b about B, World
     axes, and the rows' accelerations, by y = [q, u, work] (n,) and the rows' loads in cw.row.load (G,); returns a
-    status code. Tables as of `flexmb.closure.tangent.closed_jacobian`. Values are left in `out`.
+    status code. Tables as of `flexmb.closure.tangent.evaluate`. Values are left in `out`.
     """
     n, rows, columns = y.shape[0], cc.row.shape[0], w.column.shape[0]
     w.time[0] = t

@@ -106,7 +106,7 @@ ROW_STATE = _record(
     ("value", _F),  # g: 0 where the closure is closed (m, or sine of an angle; of a coupling m or rad)
     ("rate", _F),  # J u
     ("acceleration", _F),  # J udot + Jdot u
-    ("load", _F),  # constraint load along `direction`
+    ("load", _F),  # constraint load along `direction` that acts: whoever differentiates the motion reads it
 )
 CLOSURE_STATE = _record(
     ("rotation", _F, (9,)),  # R_A_B
@@ -132,7 +132,7 @@ class ClosureWorkspace:
     chosen: Index  # (G,) by group, rows by pivot; the first `rank` of each are independent
     rank: Index  # (K,) independent rows; -1 until they are counted
     scratch: Real  # (G,) right-hand sides in the order of `chosen`
-    unrefined: Real  # (G,) loads of the rows before their refinement, to which it adds
+    solution: Real  # (G,) scratch, by row: what `solve` found
     size: Real  # (G,) response of the separate ports of a row's closure, `flexmb.closure.sizes`
     response: Response  # loads in the inward sweep, and the response to them
     coefficient: Real  # (nu,)
@@ -195,7 +195,7 @@ def workspace(c: ClosureConstants, tree: Constants, coordinates: int) -> Closure
         chosen=np.arange(rows),
         rank=np.full(len(c.group), -1),
         scratch=np.zeros(rows),
-        unrefined=np.zeros(rows),
+        solution=np.zeros(rows),
         size=np.zeros(rows),
         response=response(tree),
         coefficient=np.zeros(nu),

@@ -1,13 +1,8 @@
-"""Derivatives of a closed chain at given constraint loads, exact to round-off: eight columns in one evaluation.
-
-    w = tangent_workspace(c, nq, nu)
-    cw = closure_tangent_workspace(cc)
-    status = closed_jacobian(t, y, load, J, c, w, cc, cw)
+"""Derivatives of a closed chain at given constraint loads, exact to round-off, along eight directions at once.
 
 The row loads f are constant, while their directions turn with the bodies: the tree's accelerations under J(q)'f are
 differentiated, and the rates and accelerations of the rows. The change of the loads that keeps the row accelerations
-zero then follows by linear algebra (`flexmb.linear.closed_variations`) or by another evaluation
-(`flexmb.closure.jacobian`).
+zero then follows by linear algebra (`flexmb.linear.closed_variations`) or by another evaluation (`evaluate_held`).
 
 As in `flexmb.entry.tangent`, the kernels are compiled once more for dual numbers. They do not need the pivots of the
 closures.
@@ -18,6 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.closure.couplings import evaluate_coupling, is_coupling
+from flexmb.closure.factor import solve
+from flexmb.closure.forces import is_delicate
 from flexmb.closure.rows import evaluate_closure, load_on_b
 from flexmb.closure.tables import CLOSURE_STATE, COUPLINGS, ON_GROUND, ROW_STATE, ClosureConstants
 from flexmb.jain.balance import power
@@ -49,49 +46,16 @@ class ClosureTangentWorkspace:
 
 
 def closure_tangent_workspace(cc: ClosureConstants) -> ClosureTangentWorkspace:
-    """Make the workspace of `closed_jacobian`; one per thread."""
+    """Make the workspace of `evaluate`; one per thread."""
     return ClosureTangentWorkspace(
         closure=as_duals(np.zeros(len(cc.closure), CLOSURE_STATE)), row=as_duals(np.zeros(len(cc.row), ROW_STATE))
     )
 
 
 @kernel
-def closed_jacobian(t, y, load, J, c, w, cc, cw):
-    """J (n+2G,n+1) = d[dy/dt; rows' rates; rows' accelerations]/d[y, t], at y (n,) = [q, u, work] and loads (G,).
-
-    Rows are ordered as in `flexmb.entry.tangent.jacobian`; the values themselves are stored in w.slope and cw.row.
-    Returns a status code. Columns of prescribed coordinates and speeds vanish.
-    """
-    n, rows, columns = y.shape[0], cc.row.shape[0], w.column.shape[0]
-    w.time[0] = t
-    for i in range(n):
-        w.state[i] = y[i]
-    for r in range(rows):
-        cw.row[r].load = load[r]
-    for i in range(J.shape[0]):
-        for j in range(n + 1):
-            J[i, j] = 0.0
-    for first in range(0, columns, LANES):
-        count = min(LANES, columns - first)
-        for lane in range(count):
-            j = w.column[first + lane]
-            w.state[j] = seeded(w.state[j], lane)
-        status = evaluate(c, w, cc, cw)
-        for lane in range(count):
-            j = w.column[first + lane]
-            w.state[j] = y[j]
-            _read_column(J, j, lane, w, cw)
-        if status != OK:
-            return status
-    w.time[0] = seeded(w.time[0], 0)
-    status = evaluate(c, w, cc, cw)
-    _read_column(J, n, 0, w, cw)
-    return status
-
-
-@kernel
 def change_by_time(t, y, load, out, c, w, cc, cw):
-    """out (n+2G,): the last column of `closed_jacobian` alone; returns a status code."""
+    """out (n+2G,): changes with time of dy/dt, the rows' rates and their accelerations, at y (n,) = [q, u, work] and
+    loads (G,); returns a status code."""
     n, rows = y.shape[0], cc.row.shape[0]
     w.time[0] = t
     w.time[0] = seeded(w.time[0], 0)
@@ -106,16 +70,6 @@ def change_by_time(t, y, load, out, c, w, cc, cw):
         out[n + r] = rate(cw.row[r].rate, 0)
         out[n + rows + r] = rate(cw.row[r].acceleration, 0)
     return status
-
-
-@helper
-def _read_column(J, j, lane, w, cw):
-    n, rows = w.slope.shape[0], cw.row.shape[0]
-    for i in range(n):
-        J[i, j] = rate(w.slope[i], lane)
-    for r in range(rows):
-        J[n + r, j] = rate(cw.row[r].rate, lane)
-        J[n + rows + r, j] = rate(cw.row[r].acceleration, lane)
 
 
 @sweep
@@ -137,6 +91,43 @@ def evaluate(c, w, cc, cw):
     drive_loads(c, w)
     store_slope(c, w, power(c, w), w.slope)
     return OK
+
+
+@sweep
+def evaluate_held(s, c, w, cc, cw):
+    """As `evaluate`, under the row loads of the chain s of floats at the values of w.state, whose factors it has.
+
+    If along a direction the accelerations of the rows change by dg'' under constant loads, the loads change by df,
+
+        Lambda^-1 df = -dg'',
+
+    for rows without accelerations or, stabilised, with decaying gaps. Each direction is evaluated under the loads as
+    they are, then under those that change; where bodies are light (`is_delicate`), once more for what rounding left.
+    """
+    for r in range(cc.row.shape[0]):
+        cw.row[r].load = s.cw.row[r].load
+    status, left = evaluate(c, w, cc, cw), 2 if is_delicate(s.cc, s.cw) else 1
+    while status == OK and left > 0:
+        for lane in range(LANES):
+            _hold_rows(s, cw, lane)
+        status = evaluate(c, w, cc, cw)
+        left -= 1
+    return status
+
+
+@sweep
+def _hold_rows(s, cw, lane):
+    """Change the loads along a direction so that the accelerations of the rows, evaluated before, change no more."""
+    for g in range(s.cc.group.shape[0]):
+        first = s.cc.group[g].row_start
+        for place in range(first, first + s.cw.rank[g]):
+            r = s.cw.chosen[place]
+            damped = s.cw.gain[0] * rate(cw.row[r].rate, lane) + s.cw.gain[1] * rate(cw.row[r].value, lane)
+            s.cw.scratch[place] = -(rate(cw.row[r].acceleration, lane) + damped)
+    solve(s.cc, s.cw)
+    for r in range(s.cw.row.shape[0]):
+        load = cw.row[r].load
+        cw.row[r].load = load + s.cw.solution[r] * seeded(load - load, lane)
 
 
 @helper

@@ -109,7 +109,7 @@ def _copy(d, third, out):
 
 @kernel
 def jacobian(t, y, J, c, w):
-    """J (n,n) = d(dy/dt)/dy at y = [q, u, work] (n,), as `flexmb.entry.tangent.jacobian`; returns a status code."""
+    """J (n,n) = d(dy/dt)/dy at y = [q, u, work] (n,), row by row as `rhs` orders them; returns a status code."""
     load_state(t, y, c, w.sweeps)
     status = forward_dynamics(c, w.sweeps)
     if status == OK:

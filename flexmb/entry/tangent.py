@@ -1,7 +1,4 @@
-"""Derivatives of the equations of motion, exact to round-off: eight columns of the Jacobian in one evaluation.
-
-    w = tangent_workspace(system.constants, system.nq, system.nu)
-    status = jacobian(t, y, J, system.constants, w)
+"""Derivatives of the equations of motion along eight directions in one evaluation, exact to round-off.
 
 The kernels of the recursion are compiled once more for a workspace whose numbers are duals (`flexmb.jit.duals`), which
 carry derivatives along eight directions (forward differentiation). No differences are formed, so that nothing cancels.
@@ -21,28 +18,26 @@ from flexmb.entry.articulated import slope
 from flexmb.jit.bundle import bundle
 from flexmb.jit.duals import DUAL, rate, seeded
 from flexmb.jit.kernel import kernel
-from flexmb.jit.lanes import LANES
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.tables.arrays import Constants, Workspace
-from flexmb.tables.status import OK
 from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real
 
 
 @bundle
 class TangentWorkspace(Workspace):
-    """A workspace whose numbers are duals, and the further arrays of a Jacobian."""
+    """A workspace whose numbers are duals, and further arrays."""
 
     numbers = DUAL
 
     time: Real  # (1,) s
     state: Real  # (nq+nu+1,) y
     slope: Real  # (nq+nu+1,) dy/dt
-    column: Index  # (C,) indices in y of the nonzero columns of the Jacobian
+    column: Index  # (C,) indices in y of all but what is prescribed, or turns without springs
 
 
 def tangent_workspace(c: Constants, nq: int, nu: int) -> TangentWorkspace:
-    """The workspace of `jacobian` and `time_derivative`; one per thread."""
+    """The workspace of `time_derivative`; one per thread."""
     n = nq + nu + 1
     tables = workspace(c, nq, nu)
     return TangentWorkspace(
@@ -52,34 +47,6 @@ def tangent_workspace(c: Constants, nq: int, nu: int) -> TangentWorkspace:
         slope=as_duals(np.zeros(n)),
         column=_columns(c, nq, nu),
     )
-
-
-@kernel
-def jacobian(t, y, J, c, w):
-    """J (n,n) = d(dy/dt)/dy at y = [q, u, work] (n,), row by row as `rhs` orders them; returns a status code.
-
-    Prescribed coordinates and speeds are functions of time: their columns vanish, and so do their rows.
-    """
-    n, columns = y.shape[0], w.column.shape[0]
-    w.time[0] = t
-    for i in range(n):
-        w.state[i] = y[i]
-        for j in range(n):
-            J[i, j] = 0.0
-    for first in range(0, max(columns, 1), LANES):  # without any column once, for the status
-        count = min(LANES, columns - first)
-        for lane in range(count):
-            j = w.column[first + lane]
-            w.state[j] = seeded(w.state[j], lane)
-        status = slope(w.time[0], w.state, w.slope, c, w)
-        for lane in range(count):
-            j = w.column[first + lane]
-            w.state[j] = y[j]
-            for i in range(n):
-                J[i, j] = rate(w.slope[i], lane)
-        if status != OK:
-            return status
-    return OK
 
 
 @kernel

@@ -9,11 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.closure.couplings import relieve_drives
-from flexmb.closure.dual_jacobian import hold_rows
 from flexmb.closure.dynamics import closure_loads, linearise
 from flexmb.closure.rows import load_on_b
 from flexmb.closure.tables import COUPLINGS, ClosureConstants
-from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace, evaluate
+from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace, evaluate_held
 from flexmb.entry import articulated
 from flexmb.entry.articulated import slope
 from flexmb.entry.observation import Outputs, observe
@@ -131,20 +130,12 @@ def closed_outputs(t, y, s, c, cc, x, out, loads):
 
 @helper
 def _closed(t, y, s, c, cc, x):
-    """Evaluate the chain under the row loads at y, then under loads that keep the rows' accelerations."""
+    """Evaluate the chain under loads that keep the rows' accelerations; returns a status code."""
     status = linearise(t, y, s)
     if status == OK:
         status = closure_loads(s.w, s.cc, s.cw)
     x.w.fault[0] = s.w.fault[0]
-    for r in range(cc.row.shape[0]):
-        x.cw.row[r].load = s.cw.row[r].load
-    if status == OK:
-        status = evaluate(c, x.w, cc, x.cw)
-    if status == OK:
-        for lane in range(LANES):
-            hold_rows(s, x.cw, lane)
-        status = evaluate(c, x.w, cc, x.cw)
-    return status
+    return evaluate_held(s, c, x.w, cc, x.cw) if status == OK else status
 
 
 @helper

@@ -1,24 +1,21 @@
 """The equations of motion of a closed chain in dual numbers, for one block of directions.
 
-The loads of closures follow from the implicit function theorem, as in `flexmb.closure.dual_jacobian`: directions are
-evaluated under constant loads, then under loads that change so that the rows keep their accelerations.
+The loads of closures follow from the implicit function theorem, `flexmb.closure.tangent.evaluate_held`.
 """
 
 from __future__ import annotations
 
 from flexmb.closure.couplings import relieve_drives
-from flexmb.closure.dual_jacobian import hold_rows
 from flexmb.closure.dynamics import slope
 from flexmb.closure.projection import project_closed
 from flexmb.closure.rows import load_on_b
 from flexmb.closure.tables import COUPLINGS, Closed, ClosureConstants
-from flexmb.closure.tangent import evaluate
+from flexmb.closure.tangent import evaluate, evaluate_held
 from flexmb.entry.observation import observe
 from flexmb.jit.bundle import bundle
 from flexmb.jit.duals import DUAL
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
-from flexmb.jit.lanes import LANES
 from flexmb.motion.coordinates import put_back
 from flexmb.parameters.kernels import ChainRates
 from flexmb.spatial.spatial_vector import store6, times6
@@ -57,15 +54,7 @@ def motion(t, s):
         s.y[i] = w.state[i].real
     w.time[0] = t
     status = slope(t, s.y, s.slope, s.chain)
-    for r in range(s.cc.row.shape[0]):
-        x.cw.row[r].load = s.chain.cw.row[r].load
-    if status == OK:
-        status = evaluate(s.c, w, s.cc, x.cw)
-    if status == OK:
-        for lane in range(LANES):
-            hold_rows(s.chain, x.cw, lane)
-        status = evaluate(s.c, w, s.cc, x.cw)
-    return status
+    return evaluate_held(s.chain, s.c, w, s.cc, x.cw) if status == OK else status
 
 
 @kernel

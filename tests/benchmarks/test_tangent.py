@@ -7,8 +7,9 @@ import pytest
 
 import flexmb
 from flexmb.entry import articulated
-from flexmb.entry.tangent import jacobian, tangent_workspace
+from flexmb.entry.tangent import tangent_workspace
 from tests.benchmarks.rivals import flexible_chain, interleaved, record, rigid_chain
+from tests.flexmb.entry.dual_jacobian import jacobian
 
 SCENES = {"rigid": lambda: rigid_chain(20), "flexible": lambda: flexible_chain(10, 5, "full")}
 

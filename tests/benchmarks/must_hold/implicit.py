@@ -11,7 +11,7 @@ import numpy as np
 
 import flexmb as fm
 from crosscheck.library.find import shipped_folder
-from flexmb.closure import dual_jacobian, jacobian
+from flexmb.closure import jacobian
 from flexmb.closure.tables import Closed
 from flexmb.integrate.problem import Linear
 from flexmb.scene.files import load_scene
@@ -19,6 +19,7 @@ from flexmb.system import by_recursion
 from flexmb.system.closed import ClosedSystem
 from tests.benchmarks.must_hold.row import Call, Measured, Row, how_many_times
 from tests.benchmarks.rivals import flexible_chain
+from tests.flexmb.closure import dual_jacobian
 
 BODIES, MODES, T_END = 50, 5, 0.02
 SETTINGS = {"radau5": {"rtol": 1e-4, "atol": 1e-6}, "generalised_alpha": {"step": 2e-3}}

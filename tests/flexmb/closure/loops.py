@@ -33,6 +33,11 @@ RECIPES = (
     replace(trees.STIFFENED, **_SMALL, deformation=0.01),
 )
 
+# Of the first 80 seeds those with a body between joints of a loop whose mass decides how near to singular the loop is:
+# with the mass times 1e-8 the least pivot of the rows is 1.5e-5 to 1.4e-3 of its size. Of seed 42 the body is a leaf.
+LIGHT = {11: "b3", 29: "b2", 42: "b2", 44: "b3", 72: "b2"}
+RATIOS = (1.0, 1e-4, 1e-6, 1e-8)
+
 
 @cache
 def random_loops(seed: int) -> s.Scene:
@@ -48,6 +53,23 @@ def random_loops(seed: int) -> s.Scene:
         situation = SITUATIONS[(seed // 3 + i) % len(SITUATIONS)]
         closures.append(_closure(scene, dense, rng, f"c{i}", situation, KINDS[(seed + i) % len(KINDS)], closures))
     return msgspec.structs.replace(scene, closures=tuple(closures))
+
+
+def lighter(scene: s.Scene, names: tuple[str, ...], ratio: float) -> s.Scene:
+    """The scene with mass and inertia of rigid bodies times `ratio`."""
+
+    def light(body: s.RigidBody) -> s.RigidBody:
+        inertia = tuple(tuple(ratio * each for each in row) for row in body.inertia_kg_m2)
+        return msgspec.structs.replace(body, mass_kg=ratio * body.mass_kg, inertia_kg_m2=inertia)
+
+    assert set(names) <= {each.name for each in scene.bodies if isinstance(each, s.RigidBody)}
+    bodies = tuple(light(each) if each.name in names else each for each in scene.bodies)
+    return msgspec.structs.replace(scene, bodies=bodies)
+
+
+def light_loops(seed: int, ratio: float) -> s.Scene:
+    """`random_loops` of a seed of `LIGHT` with the mass of that body times `ratio`."""
+    return lighter(random_loops(seed), (LIGHT[seed],), ratio)
 
 
 def contradictory(seed: int) -> s.Scene:

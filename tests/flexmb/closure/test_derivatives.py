@@ -11,7 +11,7 @@ import pytest
 
 import flexmb as fm
 from tests.flexmb.closure import mechanisms as m
-from tests.flexmb.closure.test_jacobian import MOVING, Linearised
+from tests.flexmb.closure.test_jacobian import LIGHT, NAMES, SCENES, Linearised
 from tests.flexmb.entry.test_tangent import extrapolated
 from tests.flexmb.system import test_section_loads as sections
 
@@ -22,13 +22,18 @@ CLOSED = 1e-12  # to which the assembly closes closures; differences divide it b
 
 @cache
 def asked(name: str) -> tuple[Any, fm.State, Any, Any]:
-    system = fm.compile(MOVING[name]())
+    system = fm.compile(SCENES[name]())
     state = system.initial_state
     return system, state, system.acceleration_derivatives(state), system.evaluation_derivatives(state)
 
 
 def free_speeds(system: Any) -> Any:
     return system.constants.speed["prescribed"] < 0
+
+
+def rounding(system: Any, state: fm.State) -> float:
+    """The relative error of accelerations where a loop has light bodies: the state itself has no more digits."""
+    return float(10.0 ** -system.digits_left(state))
 
 
 def small_direction(system: Any, seed: int) -> tuple[Any, Any]:
@@ -67,7 +72,8 @@ def changes(d: Any, of: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", MOVING)
+# Accelerations of 1e8 leave nothing of the differences of what hardly moves.
+@pytest.mark.parametrize("name", [each for each in NAMES if "11, light 1e-08" not in str(each)])
 def test_along_what_the_closures_allow(name: str) -> None:
     """States are displaced, and put back on the closures: what they really change by is differenced, too."""
     system, state, rates, d = asked(name)
@@ -78,7 +84,8 @@ def test_along_what_the_closures_allow(name: str) -> None:
         there = system.admissible(system.state(state.q + h * (rates.motion @ xi), state.u + h * du, state.t))
         return np.concatenate([there.q, there.u, *values(system, there).values()])
 
-    expected, doubt = extrapolated(beside, STEP)
+    step = 4.0 * STEP if name in LIGHT else STEP  # the error of closing is larger there
+    expected, doubt = extrapolated(beside, step)
     nq, nu = system.nq, system.nu
     dq, dv = expected[:nq], expected[nq : nq + nu]
     along = np.linalg.lstsq(rates.motion, dq, rcond=None)[0] if nu else np.zeros(0)
@@ -93,24 +100,24 @@ def test_along_what_the_closures_allow(name: str) -> None:
         size = max(1.0, float(np.nanmax(slopes[key], initial=0.0)))
         known = ~np.isnan(values(system, state)[key])
         np.testing.assert_array_equal(np.isnan(now), ~known)
-        allowed = 30.0 * np.max(unsure[known], initial=0.0) + CLOSED * size / (STEP / 2**5)
+        allowed = 30.0 * np.max(unsure[known], initial=0.0) + (CLOSED + rounding(system, state)) * size / (step / 2**5)
         assert np.max(np.abs(now - wanted)[known], initial=0.0) <= allowed, key
         planted.append(float(np.max(np.abs(1.001 * now - wanted)[known], initial=0.0) - allowed))
         start = stop
     assert max(planted) > 0.0, "a planted error of a thousandth is noticed"
 
 
-@pytest.mark.parametrize("name", MOVING)
+@pytest.mark.parametrize("name", NAMES)
 def test_by_all_coordinates_as_the_jacobian_of_runs(name: str) -> None:
     """The other route evaluates each direction again under loads that change; it also holds beside the manifold."""
     system, state, rates, _ = asked(name)
     other = Linearised(system, state.y.copy()).J[system.nq : -1]
-    size = np.max(np.abs(other))
-    np.testing.assert_allclose(rates.by_coordinates, other[:, : system.nq], rtol=0.0, atol=1e-11 * size)
-    np.testing.assert_allclose(rates.by_speed, other[:, system.nq : -1], rtol=0.0, atol=1e-11 * size)
+    allowed = (1e-11 + 30.0 * rounding(system, state)) * np.max(np.abs(other))
+    np.testing.assert_allclose(rates.by_coordinates, other[:, : system.nq], rtol=0.0, atol=allowed)
+    np.testing.assert_allclose(rates.by_speed, other[:, system.nq : -1], rtol=0.0, atol=allowed)
 
 
-@pytest.mark.parametrize("name", MOVING)
+@pytest.mark.parametrize("name", NAMES)
 def test_forces_move_only_what_closures_allow(name: str) -> None:
     """Rows have no acceleration, the response is symmetric, and of a force that a closure exerts there is none."""
     system, state, rates, d = asked(name)
@@ -126,7 +133,7 @@ def test_forces_move_only_what_closures_allow(name: str) -> None:
     np.testing.assert_allclose(np.trace(inner @ M), free.sum() - system.rank, rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", [name for name in MOVING if name != "random loops 5"])
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "random loops 5"])
 def test_closure_loads_do_no_work(name: str) -> None:
     """Along the motion the energy changes by the power of what has no potential: closures have none. Markers move.
 

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.closure import dual_jacobian, dynamics
-from flexmb.closure.dual_jacobian import chain_tangent
+from flexmb.closure import dynamics
 from flexmb.closure.jacobian import chain_jacobian, jacobian
-from flexmb.closure.tangent import closed_jacobian
 from flexmb.scene import schema as s
-from tests.flexmb.closure import loops
+from tests.flexmb.closure import dual_jacobian, loops
 from tests.flexmb.closure import mechanisms as m
 from tests.flexmb.closure.coupled import coupled_tree
+from tests.flexmb.closure.dual_jacobian import chain_tangent
 from tests.flexmb.entry.test_tangent import extrapolated
 
 UNIT_ROUNDOFF = 2.0**-53
@@ -53,6 +52,13 @@ MOVING = {
     "coupled": lambda: coupled_tree("full"),
     "coupled and closed": lambda: coupled_tree("rigid", ("spherical",)),
 } | {f"random loops {seed}": lambda seed=seed: loops.random_loops(seed) for seed in (4, 5, 8, 13, 20)}
+LIGHT = {
+    f"random loops {seed}, light {ratio:g}": lambda seed=seed, ratio=ratio: loops.light_loops(seed, ratio)
+    for seed in loops.LIGHT for ratio in loops.RATIOS
+}  # fmt: skip
+MOVING |= {name: LIGHT[name] for name in ("random loops 11, light 1e-06", "random loops 44, light 1e-08")}
+SCENES = MOVING | LIGHT
+NAMES = [*MOVING, *(pytest.param(name, marks=pytest.mark.slow) for name in LIGHT if name not in MOVING)]
 
 
 class Linearised:
@@ -96,11 +102,11 @@ def state(system: fm.System, beside: float = 0.0) -> np.ndarray:
 
 @pytest.mark.parametrize("rate", [0.0, 20.0])
 @pytest.mark.parametrize("beside", [0.0, 1e-3])
-@pytest.mark.parametrize("name", MOVING)
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_all_columns_against_differences(name, beside, rate):
     """Also that of work, also of open loops, where rows are redundant, driven, or decay."""
-    system = fm.compile(MOVING[name]())
+    system = fm.compile(SCENES[name]())
     found = Linearised(system, state(system, beside), rate)
     assert found.worst(found.J) <= 1.0
 
@@ -108,12 +114,12 @@ def test_all_columns_against_differences(name, beside, rate):
 @pytest.mark.parametrize("algorithm", ["articulated", "composite"])
 @pytest.mark.parametrize("rate", [0.0, 20.0])
 @pytest.mark.parametrize("beside", [0.0, 1e-3])
-@pytest.mark.parametrize("name", MOVING)
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_recursion_and_dual_numbers_agree(name, beside, rate, algorithm):
     """Two routes that share the right-hand side alone: rows scaled by their largest element, which the stiffest mode
     has. A planted error of 1e-9 in the derivatives of the accelerations is noticed."""
-    system = fm.compile(MOVING[name]())
+    system = fm.compile(SCENES[name]())
     found = Linearised(system, state(system, beside), rate, algorithm)
     expected = found.by_duals(system)
     size = np.abs(expected).max()
@@ -127,17 +133,6 @@ def test_recursion_and_dual_numbers_agree(name, beside, rate, algorithm):
 @pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_what_the_differences_would_notice(name):
     """A planted error of a millionth."""
-    system = fm.compile(MOVING[name]())
+    system = fm.compile(SCENES[name]())
     found = Linearised(system, state(system))
     assert found.worst(found.J * (1.0 + 1e-6)) > 10.0
-
-
-@pytest.mark.slow
-def test_closure_loads_that_do_not_change_would_be_noticed():
-    """Slow, as nothing else calls this kernel from Python: it takes 20 s to compile."""
-    system = fm.compile(MOVING["flexible four-bar"]())
-    found = Linearised(system, state(system))
-    J = np.empty((len(found.y) + 2 * len(found.chain.cw.row), len(found.y) + 1))
-    tangent = chain_tangent(*system.closures.constants, system.nq, system.nu)
-    closed_jacobian(0.0, found.y, found.chain.cw.row["load"], J, found.chain.c, tangent.w, found.chain.cc, tangent.cw)
-    assert found.worst(J[: len(found.y), :-1]) > 1e3

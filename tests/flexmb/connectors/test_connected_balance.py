@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.entry.tangent import jacobian, tangent_workspace
+from flexmb.entry.tangent import tangent_workspace
 from tests.bounds import observed_order
 from tests.flexmb import spectral
 from tests.flexmb.connectors.connected_scenes import everything, free_flying, started
+from tests.flexmb.entry.dual_jacobian import jacobian
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*leaves out that this pulls it straight")  # fast turns are meant
 

@@ -14,10 +14,11 @@ from scipy.interpolate import PchipInterpolator
 
 import flexmb as fm
 from flexmb.entry import articulated
-from flexmb.entry.tangent import jacobian, tangent_workspace
+from flexmb.entry.tangent import tangent_workspace
 from flexmb.scene import schema as s
 from tests.bounds import UNIT_ROUNDOFF
 from tests.flexmb.connectors.connected_scenes import positive
+from tests.flexmb.entry.dual_jacobian import jacobian
 from tests.flexmb.entry.test_tangent import complex_rotation_vector
 
 H = 2.0**-100

@@ -10,12 +10,13 @@ import pytest
 import flexmb
 from flexmb.dense import DenseSystem
 from flexmb.entry import articulated
-from flexmb.entry.tangent import jacobian, tangent_workspace, time_derivative
+from flexmb.entry.tangent import tangent_workspace, time_derivative
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.tables.status import Status
 from tests import trees
 from tests.bounds import UNIT_ROUNDOFF, algebra
+from tests.flexmb.entry.dual_jacobian import jacobian
 
 H = 2.0**-100
 # The dense route finds bodies of levels linear and stiffened by a complex step, which cannot be nested: differences

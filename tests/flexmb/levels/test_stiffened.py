@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 
 import flexmb
 from flexmb.dense import DenseSystem
-from flexmb.entry.tangent import jacobian, tangent_workspace
+from flexmb.entry.tangent import tangent_workspace
 from flexmb.modal.flexible import beam_model
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
@@ -19,6 +19,7 @@ from flexmb.tables.state import pack
 from flexmb.typing import Real
 from tests import trees
 from tests.bounds import algebra, observed_order, relative
+from tests.flexmb.entry.dual_jacobian import jacobian
 
 EULER = np.pi**2 / 4.0  # tip load, EI / L^2
 GREENHILL = 7.837347438  # own weight per length, EI / L^3: first zero of J_-1/3

@@ -13,11 +13,12 @@ import pytest
 import flexmb as fm
 from flexmb.control.feedback import Feedback
 from flexmb.control.loop_run import FreshStart
-from flexmb.entry import tangent
+from flexmb.entry.tangent import tangent_workspace
 from flexmb.system import algorithms
 from tests.flexmb.closure import mechanisms
 from tests.flexmb.control.scenes import pendulum, rotor, tossed
 from tests.flexmb.control.test_closed_chains import controlled
+from tests.flexmb.entry.dual_jacobian import jacobian
 
 EXACT = 1e-11  # of the largest element: rounding of the drives' effect, and of laws of users
 DIFFERENCE = 1e-8  # of extrapolated central differences over H: H**4, and rounding over H
@@ -110,7 +111,7 @@ def test_a_spring_and_damper_do_the_same(closed):
     if not closed:
         J = np.empty((other.nq + other.nu + 1,) * 2)
         y = np.concatenate([state.q, state.u, [0.0]])
-        tangent.jacobian(state.t, y, J, other.constants, tangent.tangent_workspace(other.constants, other.nq, other.nu))
+        jacobian(state.t, y, J, other.constants, tangent_workspace(other.constants, other.nq, other.nu))
         rows = J[other.nq : -1, :-1]
         of = found.accelerations
         assert close(np.hstack([of.by_displacement, of.by_speed]), rows, EXACT)

@@ -12,10 +12,11 @@ import pytest
 import flexmb as fm
 from flexmb.dense import DenseSystem
 from flexmb.entry import articulated
-from flexmb.entry.tangent import jacobian, tangent_workspace
+from flexmb.entry.tangent import tangent_workspace
 from tests import trees
 from tests.bounds import UNIT_ROUNDOFF, algebra
 from tests.flexmb.connectors.connected_scenes import everything
+from tests.flexmb.entry.dual_jacobian import jacobian
 from tests.flexmb.entry.test_tangent import RECIPES, H, extrapolated, terms
 
 SCENES = {
