@@ -15,7 +15,7 @@ from flexmb.run.situation import with_stops
 from flexmb.scene.schema import Scene
 from flexmb.sensitivity.law_rates import reaches_event, reaches_laws
 from flexmb.sensitivity.part_scene import PartNumber, PartScene, all_changes, changed, differ_in_mechanics
-from flexmb.sensitivity.refusals import refuse_measured_loads, refuse_moving_instants
+from flexmb.sensitivity.refusals import refuse_measured_loads, refuse_moving_instants, refuse_opened_closures
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
 
@@ -41,7 +41,9 @@ def admitted(scene: Scene, names: Sequence[str]) -> Admitted:
 def prepared(scene: Scene) -> System:
     """The system whose runs are differentiated; NotImplementedError for scenes whose runs have no derivatives."""
     refuse_measured_loads(scene)
-    return with_stops(assembled(scene))
+    system = with_stops(assembled(scene))
+    refuse_opened_closures(system)
+    return system
 
 
 def admitted_to(system: System, names: Sequence[str]) -> Admitted:

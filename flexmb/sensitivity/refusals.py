@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
 
 from flexmb.parameters.numbers import Number
 from flexmb.parameters.parameters import ParameterError
@@ -12,8 +15,14 @@ from flexmb.scene.functions import Pulse
 from flexmb.scene.schema import DriveSensor, LoadSensor, Scene
 from flexmb.scene.tree import watches_signals
 from flexmb.sensitivity.part_scene import all_changes, changed
+from flexmb.system.compile import assembled
+from flexmb.system.tree_system import System
+
+if TYPE_CHECKING:
+    from flexmb.system.closed import ClosedSystem
 
 _SCHEDULE = "period_s", "offset_s", "delay_s"
+_CLOSED = 1e-9  # m and rad, to which starts are closed with room for rounding
 
 
 def refuse_moving_instants(scene: Scene, numbers: Sequence[Number]) -> None:
@@ -45,6 +54,26 @@ def refuse_measured_loads(scene: Scene) -> None:
                 f'sensor "{sensor.name}" measures a load in a scene with closures or couplings: derivatives of its '
                 "runs are not available; compare runs with other values, or leave the sensor out"
             )
+
+
+def refuse_opened_closures(system: System) -> None:
+    """NotImplementedError where a change of a value opens a closure or coupling: bodies then jump to where it is
+    closed again, and no derivatives pass through that."""
+    scene = system.scene
+    if not scene.constraints:
+        return
+    start = system.initial_state
+    before = cast("ClosedSystem", system).closure_gaps(start)
+    for change in all_changes(scene):
+        other = cast("ClosedSystem", assembled(changed(scene, [change])))
+        gaps = other.closure_gaps(other.state(start.q, start.u, start.t))
+        for name, gap in gaps.items():
+            if not np.allclose(gap, before[name], rtol=0.0, atol=_CLOSED):
+                raise NotImplementedError(
+                    f'event "{change.event}" changes a value on which closure "{name}" depends (action '
+                    f"{change.action}): bodies jump to where it is closed again, through which there are no "
+                    "derivatives; compare runs with other values, or leave the event out"
+                )
 
 
 def _schedule(scene: Scene) -> list[tuple[float | None, ...]]:

@@ -75,11 +75,16 @@ def _actions(scene: Scene, place: Place, event: SceneEvent, paths: dict[str, str
 
 
 def _change(scene: Scene, place: Place, action: Change) -> Iterator[Defect]:
+    what = f'"{action.path}" stays as it is in a run'
+    fixed = Defect(str(place.key("path")), what, "change values, not names or events")
     first, *rest = action.path.split(".")
     if first in ("name", "events") or (rest and rest[-1] == "name"):
-        yield Defect(str(place.key("path")), f'"{action.path}" stays as it is in a run', "change values, not names")
+        yield fixed
         return
     try:
-        with_values(scene, {action.path: action.value})
+        other = with_values(scene, {action.path: action.value})
     except PathError as problem:
         yield Defect(str(place), str(problem), "see Scene.with_values")
+        return
+    if other.events != scene.events:  # a path may begin with the name of an event
+        yield fixed

@@ -9,6 +9,7 @@ import flexmb as fm
 from flexmb.parameters.parameters import ParameterError
 from flexmb.ready import scenes
 from flexmb.scene.values import PathError
+from flexmb.sensitivity.gate import admitted
 
 
 def falling(**impact) -> fm.SceneBuilder:
@@ -113,3 +114,24 @@ def test_loads_that_are_measured_in_closed_chains_are_refused():
     scene = msgspec.structs.replace(scenes.looped().scene(), sensors=(fm.LoadSensor(name="felt", hinge="pivot"),))
     with pytest.raises(NotImplementedError, match='sensor "felt" measures a load'):
         fm.sensitivities(scene, 0.1, ["bob.mass_kg"], ["pivot.rotation"])
+
+
+@pytest.mark.parametrize("path", ["loop.position_a_m.0", "bob.mass_kg"])
+def test_changes_that_open_a_closure_are_refused(path):
+    """By any number: the jump to where it is closed depends on all. Changes that leave it closed are not."""
+    change = fm.Change(path=path, value=2.001)
+    scene = scenes.looped().event("longer", "time", 0.05, change).scene()
+    if path.startswith("loop"):
+        for by in ("longer.actions.0.value", "bob.mass_kg"):
+            with pytest.raises(NotImplementedError, match='event "longer" changes .* closure "loop" depends'):
+                admitted(scene, [by])
+    else:
+        assert admitted(scene, ["longer.actions.0.value"]).numbers
+
+
+def test_the_level_of_an_event_does_not_change_in_a_run():
+    """Neither by its full path nor by its short one."""
+    for path in ("events.floor.level", "floor.level"):
+        scene = falling().event("lower", "time", 0.1, fm.Change(path=path, value=-0.5))
+        with pytest.raises(fm.SceneError, match=f'"{path}" stays as it is in a run'):
+            fm.compile(scene.scene())
