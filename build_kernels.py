@@ -1,11 +1,14 @@
 """What hatchling runs where a wheel is built, or the checkout installed: it compiles flexmb's general kernels.
 
-They go into flexmb/ready/kernels, of the wheel or of the checkout, so that who runs a scene waits for no compiler. A
-wheel with kernels is for one version of Python and one platform; kernels that do not fit where it is installed are
-compiled there when first needed, as all special ones are. What is already there and still right is kept.
+They go into flexmb/ready/kernels, of the wheel or of the checkout, so that who runs a scene waits for no compiler: all
+of them into a wheel, and into a checkout those that the canonical cases and README's first examples need, half of the
+work; the others are compiled when first needed, or by `flexmb warmup --all`. A wheel with kernels is for one version of
+Python and one platform; kernels that do not fit where it is installed are compiled there when first needed, as all
+special ones are. What is already there and still right is kept.
 
-FLEXMB_BUILD_KERNELS=no leaves them out: the wheel then suits every Python and platform. FLEXMB_BUILD_PROCESSOR names
-the processor that they are for, by LLVM's name, where it is not this one: "x86-64-v3" for wheels that others install.
+FLEXMB_BUILD_KERNELS=no leaves them out: the wheel then suits every Python and platform; "first" and "all" are the other
+choices. FLEXMB_BUILD_PROCESSOR names the processor that they are for, by LLVM's name, where it is not this one:
+"x86-64-v3" for wheels that others install.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 FOLDER = Path("flexmb", "ready", "kernels")
+CHOICES = ("first", "all", "no")
 
 
 class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
@@ -28,9 +32,12 @@ class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """version: "standard" or "editable"; the wheel's tag and files are told in `build_data`."""
-        if os.environ.get("FLEXMB_BUILD_KERNELS") == "no":
+        choice = os.environ.get("FLEXMB_BUILD_KERNELS") or ("first" if version == "editable" else "all")
+        if choice not in CHOICES:
+            raise ValueError(f"FLEXMB_BUILD_KERNELS is {choice!r}: use one of {', '.join(CHOICES)}, or leave it unset")
+        if choice == "no":
             return
-        command = [sys.executable, "-m", "flexmb.ready.make", str(FOLDER)]
+        command = [sys.executable, "-m", "flexmb.ready.make", str(FOLDER), *(["--first"] if choice == "first" else [])]
         if processor := os.environ.get("FLEXMB_BUILD_PROCESSOR"):
             command += ["--processor", processor]
         path = os.pathsep.join(filter(None, (self.root, os.environ.get("PYTHONPATH"))))

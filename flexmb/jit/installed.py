@@ -10,6 +10,7 @@ import json
 import platform
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import llvmlite
 import numba
@@ -33,11 +34,8 @@ def installed_directory() -> Path | None:
 def unfit() -> str:
     """Why this process cannot use the installed kernels; an empty string if it can."""
     folder = installed_directory()
-    try:
-        made = json.loads((folder / MADE_BY).read_text(encoding="utf-8")) if folder else None
-    except (OSError, ValueError):
-        made = None
-    if not (isinstance(made, dict) and isinstance(made.get("versions"), dict)):
+    made = described(folder) if folder else {}
+    if not isinstance(made.get("versions"), dict):
         return "no kernels came with the installation"
     now = _maker()
     for name, version in now["versions"].items():
@@ -51,12 +49,28 @@ def unfit() -> str:
     return ""
 
 
-def description() -> str:
+@cache
+def is_whole() -> bool:
+    """Whether all general kernels came with the installation and fit, not only those that are needed first."""
+    folder = installed_directory()
+    return folder is not None and not unfit() and described(folder).get("whole") is True
+
+
+def described(folder: Path) -> dict[str, Any]:
+    """What the file MADE_BY says of the kernels in a folder; nothing where there is none that can be read."""
+    try:
+        made = json.loads((folder / MADE_BY).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return made if isinstance(made, dict) else {}
+
+
+def description() -> dict[str, object]:
     """The versions and the processor for which this process compiles, for the file MADE_BY beside its kernels."""
-    return json.dumps(_maker() | {"processor": compiled_for(_codegen())}, indent=1) + "\n"
+    return _maker() | {"processor": compiled_for(_codegen())}
 
 
-def _maker() -> dict[str, object]:
+def _maker() -> dict[str, Any]:
     versions = {
         "Python": ".".join(platform.python_version_tuple()[:2]), "numba": numba.__version__,
         "llvmlite": llvmlite.__version__, "NumPy": numpy.__version__,

@@ -1,12 +1,14 @@
-"""Compile all general kernels: `python -m flexmb.ready.make FOLDER [--processor x86-64-v3]`.
+"""Compile general kernels: `python -m flexmb.ready.make FOLDER [--first] [--processor x86-64-v3]`.
 
 Several processes divide the uses of `flexmb.ready.uses` among themselves. Kernels that are already in the folder are
-not compiled again; kernels that no use needs any more are deleted. The build hook runs this at installation.
+not compiled again; kernels that no use needs any more are deleted. The build hook runs this at installation. It says
+what it does: a line after every use, and where there is none for some seconds, how far it is.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import logging
 import multiprocessing
 import os
@@ -14,60 +16,118 @@ import shutil
 import sys
 import tempfile
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
-from flexmb.jit.installed import MADE_BY, description
+from flexmb.jit import progress
+from flexmb.jit.folder import cache_directory
+from flexmb.jit.installed import MADE_BY, described, description
 from flexmb.jit.once import compiled_once
 from flexmb.output.whole import whole_file
 
 KERNELS = "*.kernel"
 UNUSED = 0  # modification time that marks unused files; reading a kernel sets another one
+SILENCE = 5.0  # s after which a line says how far it is
+WORTH_NOTING = 0.1  # s of processor time of a kernel
 
 
-def make(folder: Path, processes: int, processor: str = "") -> list[Path]:
+class Used(NamedTuple):
+    """One use: how long it took (s), the traceback of a failure or "", processor time (s) of what it compiled."""
+
+    name: str
+    seconds: float
+    trouble: str
+    spent: dict[str, float]
+
+
+def make(folder: Path, processes: int, processor: str = "", first: bool = False) -> list[Path]:
     """The kernels in the folder after all uses, for this processor or another one by LLVM's name.
 
-    RuntimeError if a use has failed, raised after all others have finished and their kernels are in the folder.
+    first: only those of `FIRST`, unless the folder has been filled with all: what it has is renewed. RuntimeError if a
+    use has failed, raised after all others have finished and their kernels are in the folder.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with compiled_once(folder / MADE_BY):  # of two simultaneous installations, the second waits and finds the kernels
-        return _made(folder, processes, processor)
+        return _made(folder, processes, processor, first and not described(folder).get("whole"))
 
 
-def _made(folder: Path, processes: int, processor: str) -> list[Path]:
-    failed = []
+def make_the_rest(processes: int) -> Path:
+    """Compile what did not come along with the installation, into the folder of the user, which is returned.
+
+    OSError if there is none that is writable; RuntimeError as for `make`.
+    """
+    folder = cache_directory()
+    if folder is None:
+        raise OSError("no folder is writable to keep kernels: set NUMBA_CACHE_DIR to one that is")
+    with _environment({}):
+        _refuse_failures(_run(_names(first=False), processes, folder)[0])
+    return folder
+
+
+def _made(folder: Path, processes: int, processor: str, first: bool) -> list[Path]:
     for file in folder.glob(KERNELS):
         os.utime(file, (UNUSED, UNUSED))
-    with tempfile.TemporaryDirectory() as made, _environment(Path(made), processor):
-        names = list(_uses())
-        with multiprocessing.get_context("spawn").Pool(processes) as pool:
-            for done, (name, seconds, trouble) in enumerate(pool.imap_unordered(_use, names), 1):
-                print(f"{done:3d} of {len(names)}  {seconds:6.1f} s  {name}{trouble}", file=sys.stderr, flush=True)
-                failed += [name] if trouble else []
-            text = pool.apply(description)
+    with tempfile.TemporaryDirectory() as made, _environment({"NUMBA_CACHE_DIR": made} | _target(processor)):
+        used, now = _run(_names(first), processes, Path(made))
         for file in Path(made).rglob(KERNELS):
             with whole_file(folder / file.name) as place:
                 shutil.copyfile(file, place)
+    spent = dict[str, float]()
+    for each in used:
+        for name, seconds in each.spent.items():
+            spent[name] = spent.get(name, 0.0) + seconds
+    before = described(folder).get("seconds", {})
+    seconds = before | {name: round(found, 1) for name, found in spent.items() if found >= WORTH_NOTING}
     with whole_file(folder / MADE_BY) as place:
-        place.write_text(text, encoding="utf-8")
+        text = json.dumps(now | {"whole": not first, "seconds": dict(sorted(seconds.items()))}, indent=1)
+        place.write_text(text + "\n", encoding="utf-8")
     for file in folder.glob(KERNELS):
         if file.stat().st_mtime == UNUSED:
             file.unlink()
-    if failed:
-        raise RuntimeError(f"uses that failed, whose kernels may be missing: {'; '.join(failed)}")
+    _refuse_failures(used)
+    print(f"{sum(spent.values()):.0f} s of processor time were spent on kernels", file=sys.stderr)
     return sorted(folder.glob(KERNELS))
 
 
+def _refuse_failures(used: Iterable[Used]) -> None:
+    failed = [each.name for each in used if each.trouble]
+    if failed:
+        raise RuntimeError(f"uses that failed, whose kernels may be missing: {'; '.join(failed)}")
+
+
+def _run(names: Sequence[str], processes: int, made: Path) -> tuple[list[Used], dict[str, object]]:
+    """What the uses of these names have taken, and what their processes compile for; kernels come into `made`."""
+    start, used, before = perf_counter(), list[Used](), _kernels(made)
+    with multiprocessing.get_context("spawn").Pool(processes) as pool:
+        results = pool.imap_unordered(_use, names)
+        while len(used) < len(names):
+            try:
+                used.append(results.next(timeout=SILENCE))
+                name, seconds, trouble, _ = used[-1]
+                line = f"{len(used):3d} of {len(names)}  {seconds:6.1f} s  {name}{trouble}"
+            except multiprocessing.TimeoutError:
+                done, kernels = len(used), _kernels(made) - before
+                line = f"{done:3d} of {len(names)}  compiling, {kernels} kernels after {perf_counter() - start:.0f} s"
+            print(line, file=sys.stderr, flush=True)
+        return used, pool.apply(description)
+
+
+def _kernels(folder: Path) -> int:
+    return sum(1 for _ in folder.rglob(KERNELS))
+
+
+def _target(processor: str) -> dict[str, str]:
+    return {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""} if processor else {}
+
+
 @contextmanager
-def _environment(made: Path, processor: str) -> Iterator[None]:
+def _environment(more: dict[str, str]) -> Iterator[None]:
     """Set the environment of the processes that are started within; numba reads it when it is imported."""
     before = dict(os.environ)
-    os.environ |= {"FLEXMB_KERNELS": "general", "NUMBA_CACHE_DIR": str(made), "OPENBLAS_NUM_THREADS": "1"}
-    if processor:
-        os.environ |= {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
+    os.environ |= {"FLEXMB_KERNELS": "general", "OPENBLAS_NUM_THREADS": "1"} | more
     try:
         yield
     finally:
@@ -75,24 +135,28 @@ def _environment(made: Path, processor: str) -> Iterator[None]:
         os.environ |= before
 
 
-def _uses() -> dict[str, object]:
-    from flexmb.ready.uses import uses  # it imports numba, which must happen in the environment of the workers
+def _names(first: bool) -> list[str]:
+    """Of the first uses, or of all, in the order in which they are done."""
+    from flexmb.ready.uses import FIRST, uses  # it imports numba, which must happen in the environment of the workers
 
-    return dict(uses())
+    return list(FIRST) if first else [name for name, _ in uses()]
 
 
-def _use(name: str) -> tuple[str, float, str]:
-    """Run one use, in a worker process; returns its name, the time (s), and the traceback of a failure or ""."""
-    start = perf_counter()
+def _use(name: str) -> Used:
+    """Run one use, in a worker process."""
+    from flexmb.ready.uses import uses
+
+    start, trouble = perf_counter(), ""
     logging.getLogger("flexmb.jit").setLevel(logging.ERROR)  # no messages that kernels are being compiled
+    progress.spent.clear()
     try:
-        _uses()[name]()
+        dict(uses())[name]()
     except Exception:
-        return name, perf_counter() - start, f"\n{traceback.format_exc()}"
-    return name, perf_counter() - start, ""
+        trouble = f"\n{traceback.format_exc()}"
+    return Used(name, perf_counter() - start, trouble, dict(progress.spent))
 
 
-def _at_a_time() -> int:
+def at_a_time() -> int:
     """Number of processes: one for each core, but with 2 GiB of memory each, which compiling may need."""
     cores = os.cpu_count() or 1
     if not hasattr(os, "sysconf"):
@@ -105,11 +169,12 @@ def main(words: Sequence[str] | None = None) -> None:
     """The command line."""
     parser = argparse.ArgumentParser(prog="python -m flexmb.ready.make", description=__doc__)
     parser.add_argument("folder", type=Path, help="flexmb/ready/kernels of the installation")
+    parser.add_argument("--first", action="store_true", help="those that README and canonical need")
     parser.add_argument("--processor", default="", help="LLVM's name of another processor")
-    parser.add_argument("--processes", type=int, default=_at_a_time())
+    parser.add_argument("--processes", type=int, default=at_a_time())
     asked = parser.parse_args(words)
     start = perf_counter()
-    files = make(asked.folder, asked.processes, asked.processor)
+    files = make(asked.folder, asked.processes, asked.processor, asked.first)
     size = sum(file.stat().st_size for file in files)
     print(f"{len(files)} kernels, {size / 2**20:.1f} MiB, in {perf_counter() - start:.0f} s", file=sys.stderr)
 

@@ -40,23 +40,41 @@ BODIES: tuple[tuple[int, Level, Elimination], ...] = (
     (2, "full", "explicit"), (2, "ruthless", "woodbury"), (18, "ruthless", "fastest"),
 )  # fmt: skip
 LOOPS = {"loop": scenes.looped, "loop at rest shape": scenes.looped_at_rest_shape}  # the second has no Jacobians
+FIRST = (
+    "linear models", "radau5, tree, articulated", "single states of a loop", "dop853, loop, composite",
+    "generalised_alpha, tree, articulated", "single states", "dop853, loop at rest shape", "dop853, loop, articulated",
+    "rk4, tree, frisch", "dop853, tree, composite",
+)  # fmt: skip
+"""Those that the canonical cases and README's first examples need, the dearest first: an installation of a checkout
+does these. They were found by what each loads: all but 26 of their 119 kernels are needed."""
 T_END, STEP = 1e-3, 2.5e-4  # s
 BATCHED: tuple[Method, ...] = ("rk4", "dop853")
 
 
 def uses() -> Iterator[tuple[str, Use]]:
-    """The uses by name, in an order in which neighbours share few kernels: else the processes wait for each other.
+    """The uses by name: those of `FIRST`, then all others."""
+    every = dict(_uses())
+    for name in FIRST:
+        yield name, every.pop(name)
+    yield from every.items()
+
+
+def _uses() -> Iterator[tuple[str, Use]]:
+    """In an order in which neighbours share few kernels: else the processes wait for each other.
 
     Derivatives in dual numbers come beside those by recursion; what shares most kernels with others comes late.
     """
     yield "derivatives by numbers, tree", partial(_numbers, scenes.pendulum)
     yield "linear models", _linear_models
+    yield "linear models with controllers", _controlled_linear_models
+    yield "steady spins", _spins
     yield "derivatives of runs, loop", partial(_derivatives, scenes.looped)
     yield "derivatives by numbers, loop", partial(_numbers, scenes.looped)
     yield "laws that a scene may name", _laws
     yield "batches", _batches
     between = iter((
-        ("single states", _single_states),
+        ("single states", partial(_single_states, *BODIES[:1])),
+        ("single states, reduced bodies", _single_states_of_reduced_bodies),
         ("single states of a loop at rest shape", partial(_single_states_of_a_loop, scenes.looped_at_rest_shape)),
         ("derivatives of runs, tree", partial(_derivatives, scenes.pendulum)),
         ("single states of a loop", partial(_single_states_of_a_loop, scenes.looped)),
@@ -79,6 +97,8 @@ def _runs(method: Method) -> Iterator[tuple[str, Use]]:
             yield f"{method}, tree, {algorithm}", partial(_run, scenes.pendulum().scene(), method, algorithm)
             if algorithm in ON_CHAINS:
                 yield f"{method}, loop, {algorithm}", partial(_run, scenes.looped().scene(), method, algorithm)
+    if not INTEGRATORS[method].linearises:
+        yield f"{method}, loop at rest shape", partial(_run, scenes.looped_at_rest_shape().scene(), method)
     if INTEGRATORS[method].keeps_jacobian:
         yield f"{method}, many speeds", partial(_run, scenes.panelled(MANY_SPEEDS, "full").scene(), method)
     yield f"{method}, condensed", partial(_run, scenes.panelled(18, "ruthless").scene(), method, "articulated")
@@ -116,17 +136,33 @@ def _linear_models() -> None:
     rest = equilibrium(scenes.panelled(2, "full").scene())
     linearize(scenes.panelled(2, "full").scene(), rest, held=True)
     linearize(scenes.looped().scene())
+
+
+def _controlled_linear_models() -> None:
     linearize(scenes.with_feedback(scenes.pendulum()))
     linearize(scenes.with_feedback(scenes.looped()))
     for builder in (scenes.pendulum, scenes.looped):
         controlled = scenes.with_feedback(builder())
         ControlledMotion(controlled).evaluation_derivatives(compile(controlled).initial_state)
+
+
+def _spins() -> None:
     steady_spin(scenes.spinner().scene(), "pivot", 1.0)
     campbell(scenes.spinner().scene(), "pivot", [0.0, 1.0])
 
 
-def _single_states() -> None:
-    for modes, level, elimination in BODIES:
+def _single_states_of_reduced_bodies() -> None:
+    _single_states(*BODIES[1:])
+    system = compile(scenes.panelled(18, "ruthless").scene())
+    state, nested = system.initial_state, system.nested()
+    y = np.concatenate([state.q, state.u, [0.0]])
+    nested.motion(0.0, y)
+    nested.partitions(0.0, y)
+    nested.relative_motion(0.0, y)
+
+
+def _single_states(*bodies: tuple[int, Level, Elimination]) -> None:
+    for modes, level, elimination in bodies:
         system = compile(scenes.panelled(modes, level).scene(), elimination)
         state = system.initial_state
         for algorithm in ALGORITHMS:
@@ -154,11 +190,6 @@ def _single_states() -> None:
         system.derivative_evaluator()(state.t, state.q, state.u)
         system.evaluation_derivatives(state)
         assert np.isfinite(factors.log_determinant)
-    nested = system.nested()
-    y = np.concatenate([state.q, state.u, [0.0]])
-    nested.motion(0.0, y)
-    nested.partitions(0.0, y)
-    nested.relative_motion(0.0, y)
 
 
 def _numbers(builder: Callable[[], SceneBuilder]) -> None:

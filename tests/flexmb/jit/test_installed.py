@@ -132,7 +132,7 @@ REASONS = {
 @pytest.fixture
 def manifest(tmp_path, monkeypatch):
     """What describes the kernels that came, of this very process."""
-    (tmp_path / MADE_BY).write_text(description())
+    (tmp_path / MADE_BY).write_text(json.dumps(description()))
     monkeypatch.setattr(installed, "installed_directory", lambda: tmp_path)
     unfit.cache_clear()
     yield tmp_path / MADE_BY

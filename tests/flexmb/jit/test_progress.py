@@ -5,7 +5,11 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
+
+import llvmlite.binding
+from numba.core import event
 
 from flexmb.jit import progress
 from flexmb.jit.progress import announced
@@ -64,7 +68,7 @@ def test_a_slow_kernel_is_announced_once(tmp_path):
 
 
 def test_of_another_version_of_a_kernel_the_line_is_another(tmp_path):
-    """As of an integrator, which is compiled for runs with events and for those without."""
+    """As of a recursion, which is compiled for one state and for eight at once."""
     first, second = lines(tmp_path, 0.1, "whole")
     assert second == first.replace("compiling ", "compiling version 2 of ")
 
@@ -83,6 +87,7 @@ def test_the_logger_silences_it(tmp_path):
 
 
 def test_where_nothing_is_kept_the_line_says_so(monkeypatch, caplog):
+    progress.unfit()  # which takes its time once, on a loaded machine longer than the line is waited for
     monkeypatch.setattr(progress, "AFTER", 0.01)
     with caplog.at_level(logging.WARNING, "flexmb.jit"), announced(lines, None):
         time.sleep(0.3)
@@ -114,3 +119,30 @@ def test_of_what_is_compiled_on_the_way_nothing_is_said(monkeypatch, caplog):
     with caplog.at_level(logging.WARNING, "flexmb.jit"), announced(announced, None):
         time.sleep(0.3)
     assert "progress.announced" in caplog.records[-1].getMessage()
+
+
+def test_time_is_that_of_the_kernel_alone(monkeypatch):
+    """Without what it calls, which has an entry of its own; what failed counts too."""
+    monkeypatch.setattr(progress, "spent", spent := {})
+    with announced(lines, None), suppress(ValueError):
+        busy(0.02)
+        with announced(busy, None):
+            busy(0.1)
+            raise ValueError
+    assert spent["tests.flexmb.jit.test_progress.lines"] < 0.08 < spent["tests.flexmb.jit.test_progress.busy"]
+
+
+def busy(seconds: float) -> None:
+    start = time.thread_time()
+    while time.thread_time() < start + seconds:
+        pass
+
+
+def test_while_a_kernel_is_compiled_no_call_of_llvm_is_told():
+    """A kernel of a few lines makes hundreds; afterwards who listens hears them again."""
+    with event.install_recorder("numba:llvm_lock") as recorder:
+        with announced(lines, None), announced(busy, None):
+            llvmlite.binding.parse_assembly("")
+        assert len(recorder.buffer) == 0
+        llvmlite.binding.parse_assembly("")
+        assert len(recorder.buffer) > 0

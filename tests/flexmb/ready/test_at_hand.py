@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 import flexmb
-from flexmb.jit.installed import unfit
+from flexmb.jit.installed import is_whole
 from flexmb.ready.make import KERNELS
 from flexmb.ready.uses import uses
 from tests.repo.project import ROOT
 
-at_hand = pytest.mark.skipif(bool(unfit()), reason=f"there are no general kernels: {unfit()}")
+at_hand = pytest.mark.skipif(not is_whole(), reason="not all general kernels came with the installation")
 USE = """
 import flexmb as fm
 from tests.benchmarks.rivals import flexible_chain

@@ -1,0 +1,138 @@
+"""A checkout's installation compiles what README's examples and the canonical cases need, and tells of it."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import multiprocessing
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import flexmb
+from flexmb.jit import installed
+from flexmb.jit.installed import MADE_BY, described, is_whole
+from flexmb.ready import make
+from flexmb.ready.uses import FIRST, uses
+from tests.repo.project import ROOT
+from tests.repo.snippets import snippets
+
+whole = pytest.mark.skipif(not is_whole(), reason="not all general kernels came with the installation")
+BLOCKS = [block.code for block in snippets(ROOT / "README.md") if block.language == "python" and not block.why]
+README = "\n".join(BLOCKS[:4])  # a scene, its run, linear models, Jacobians: they read no file
+
+
+def test_first_uses_come_first() -> None:
+    names = [name for name, _ in uses()]
+    assert names[: len(FIRST)] == list(FIRST) and len(names) > len(FIRST)
+
+
+@pytest.mark.parametrize(
+    ("version", "asked", "first"),
+    [("editable", None, True), ("standard", None, False), ("editable", "all", False), ("standard", "first", True)],
+)
+def test_a_checkout_gets_the_first_and_a_wheel_all(monkeypatch, version: str, asked: str | None, first: bool) -> None:
+    assert ("--first" in command_of(monkeypatch, version, asked)) == first
+
+
+def test_a_choice_that_is_none_is_refused(monkeypatch) -> None:
+    assert command_of(monkeypatch, "editable", "no") == []
+    with pytest.raises(ValueError, match="use one of first, all, no"):
+        command_of(monkeypatch, "editable", "none")
+
+
+def command_of(monkeypatch, version: str, asked: str | None) -> list[str]:
+    """What the build hook starts."""
+    if asked is None:
+        monkeypatch.delenv("FLEXMB_BUILD_KERNELS", raising=False)
+    else:
+        monkeypatch.setenv("FLEXMB_BUILD_KERNELS", asked)
+    spec = importlib.util.spec_from_file_location("build_kernels", ROOT / "build_kernels.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    commands: list[list[str]] = []
+    monkeypatch.setattr(
+        module.subprocess, "run", lambda command, **_: commands.append(command) or SimpleNamespace(returncode=0)
+    )
+    hook = SimpleNamespace(root=str(ROOT))
+    module.KernelHook.initialize(hook, version, {"artifacts": []})
+    return commands[0] if commands else []
+
+
+def test_a_folder_that_says_nothing_of_it_is_not_whole(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(installed, "installed_directory", lambda: tmp_path)
+    monkeypatch.setattr(installed, "unfit", lambda: "")
+    for said in ("", "[]", "{}", json.dumps({"whole": False})):
+        (tmp_path / MADE_BY).write_text(said)
+        is_whole.cache_clear()
+        assert not is_whole()
+    (tmp_path / MADE_BY).write_text(json.dumps({"whole": True}))
+    is_whole.cache_clear()
+    assert is_whole()
+    is_whole.cache_clear()
+
+
+def test_silence_is_broken_by_how_far_it_is(tmp_path: Path, monkeypatch, capsys) -> None:
+    """And a use that fails says why, and is refused by its name."""
+    answers = [None, make.Used("one", 7.0, "", {}), None, make.Used("two", 8.0, "\nwhy", {})]
+    pool = SimpleNamespace(imap_unordered=lambda use, names: SimpleNamespace(next=answer), apply=lambda call: {})
+
+    def answer(timeout: float) -> Any:
+        (tmp_path / "some-00.kernel").touch()
+        assert timeout == make.SILENCE <= 5.0
+        found = answers.pop(0)
+        if found is None:
+            raise multiprocessing.TimeoutError
+        return found
+
+    monkeypatch.setattr(Pooled, "pool", pool, raising=False)
+    monkeypatch.setattr(make.multiprocessing, "get_context", lambda kind: SimpleNamespace(Pool=Pooled))
+    (tmp_path / "old-00.kernel").touch()
+    used, _ = make._run(["one", "two"], 1, tmp_path)
+    lines = capsys.readouterr().err.splitlines()
+    assert [line[:8] for line in lines] == ["  0 of 2", "  1 of 2", "  1 of 2", "  2 of 2", "why"]
+    assert "compiling, 1 kernels after 0 s" in lines[0]
+    with pytest.raises(RuntimeError, match="whose kernels may be missing: two$"):
+        make._refuse_failures(used)
+
+
+class Pooled:
+    """In place of processes."""
+
+    pool: Any
+
+    def __init__(self, processes: int) -> None:
+        assert processes == 1
+
+    def __enter__(self) -> Any:
+        return self.pool
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
+
+@whole
+@pytest.mark.slow
+def test_readme_and_canonical_need_nothing_beyond(tmp_path: Path) -> None:
+    """On a copy of this installation that has lost what the first uses do not load."""
+    package, out = tmp_path / "flexmb", tmp_path / "out"
+    shutil.copytree(Path(flexmb.__file__).parent, package)
+    folder = package / "ready" / "kernels"
+    (folder / MADE_BY).write_text(json.dumps(described(folder) | {"whole": False}))
+    path = os.pathsep.join((str(tmp_path), str(ROOT)))
+    environment = os.environ | {"PYTHONPATH": path, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    del environment["FLEXMB_KERNELS"]
+    for words in (
+        ["-m", "flexmb.ready.make", str(folder), "--first"],
+        ["-c", README],
+        ["-m", "crosscheck", "run", "canonical", "--out", str(out)],
+    ):
+        subprocess.run([sys.executable, *words], cwd=tmp_path, env=environment, check=True)
+    assert sorted(file.name for file in (tmp_path / "cache").rglob(make.KERNELS)) == []
