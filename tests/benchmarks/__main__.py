@@ -1,18 +1,20 @@
 """python -m tests.benchmarks: measure every row of what must hold and print the table. 1 where a row is not met.
 
+Rows are measured as a user has them who sets no variable, whatever FLEXMB_KERNELS says; with --special also by special
+kernels, which takes twice as long.
 With --write the measurements are kept and appended to the history, and docs/performance.md, its pictures and
 docs/performance-history.md are made of all that is kept.
 """
 
 from __future__ import annotations
 
-import os
 from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
+from flexmb.jit.installed import unfit
 from tests.benchmarks.must_hold import history
 from tests.benchmarks.must_hold.catalogue import all_rows
 from tests.benchmarks.must_hold.kept import Kept, Scaling, read, write
@@ -31,16 +33,18 @@ def main(
     ] = False,
     from_kept: Annotated[bool, typer.Option("--from-kept", help="Measure nothing: show what is kept.")] = False,
     scaling: Annotated[bool, typer.Option("--scaling", help="With --write: measure the curves of pictures.")] = False,
+    special: Annotated[bool, typer.Option("--special", help="Measure by special kernels, too.")] = False,
 ) -> None:
     """Measure the rows of what must hold, each against its rival in turns."""
     console = Console()
-    os.environ.setdefault("FLEXMB_KERNELS", "special")  # who times a scene compiles for it; see the rows of starts
+    if not from_kept and unfit():
+        raise typer.BadParameter(f"without general kernels the default is no default: {unfit()}")
     chosen = {name: row for name, row in all_rows().items() if _is_asked_for(name, words)}
     found = {name: kept for name, kept in read().rows.items() if name in chosen}
     curves = dict[str, Scaling]()
     if not from_kept:
         for name, row in chosen.items():
-            found[name] = measured_row(row)
+            found[name] = measured_row(row, special)
             if keep:  # a run that is stopped keeps what it has measured
                 results = read()
                 results.rows[name] = found[name]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import replace
 from math import inf, nan
@@ -14,9 +15,9 @@ from crosscheck.report.workprecision import Point, WorkPrecision
 from tests.benchmarks.must_hold import history
 from tests.benchmarks.must_hold.catalogue import all_rows
 from tests.benchmarks.must_hold.charts import dominated
-from tests.benchmarks.must_hold.kept import Kept, Results, read, write
+from tests.benchmarks.must_hold.kept import Kept, Results, Special, read, write
 from tests.benchmarks.must_hold.measure import measured_row
-from tests.benchmarks.must_hold.page import PAGE, page, verdict
+from tests.benchmarks.must_hold.page import PAGE, figures, page, special, verdict
 from tests.benchmarks.must_hold.reasons import REASONS
 from tests.benchmarks.must_hold.row import Call, Measured, RivalsDiffer, Row, how_many_times
 from tests.benchmarks.must_hold.scaling import FOLDER, PICTURES
@@ -160,3 +161,21 @@ def test_errors_below_the_doubt_of_the_reference_are_alike_and_a_failed_run_is_w
     assert not [*dominated(WorkPrecision("chart", "tip", "native", 1e-2, 1.0, (POINT, better)))]
     failed = replace(POINT, error=None)
     assert [*dominated(WorkPrecision("chart", "tip", "native", 1e-12, 1.0, (failed, better)))]
+
+
+def test_rows_are_measured_by_the_default_and_beside_it_by_special_kernels(monkeypatch) -> None:
+    """Whatever the process was told, which stays as it was; seconds are those of compiling for the special ones."""
+    monkeypatch.setenv("FLEXMB_KERNELS", "general")
+    told, asked = [], replace(HALF, measure=lambda: _told(told))
+    assert measured_row(asked).kernels == "auto" and told == [None]
+    kept = measured_row(asked, special=True)
+    assert told == [None, None, "special"] and os.environ["FLEXMB_KERNELS"] == "general"
+    assert kept.special is not None and kept.special.compiled_s == 0.0
+    kept = structs.replace(kept, special=Special(structs.replace(HALF.measure(), value=3.0), 7.2))
+    assert special(HALF, kept) == "3, 7 s" and "(special)" not in figures(HALF, kept)[0]
+    assert "(special)" in figures(HALF, structs.replace(kept, kernels="special"))[0]
+
+
+def _told(found: list[str | None]) -> Measured:
+    found.append(os.environ.get("FLEXMB_KERNELS"))
+    return Measured(3.0, 3.0, 3.0, "")

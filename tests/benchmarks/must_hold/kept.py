@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 
@@ -21,8 +22,19 @@ FILE = Path(__file__).with_name("results.json")
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "pin", "mujoco", "exudyn")
 
 
+class Special(msgspec.Struct, frozen=True):
+    """The same row by special kernels, and the processor time (s) that these took to compile."""
+
+    measured: Measured
+    compiled_s: float
+
+
 class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A row's last measurement, or why there is none (`failure`); `commit` has a + where sources were changed."""
+    """A row's last measurement, or why there is none (`failure`); `commit` has a + where sources were changed.
+
+    kernels: which ones `measured` is of, "auto" for those of the default; what was kept before rows were measured by
+    the default has no such entry, and is of special kernels.
+    """
 
     name: str
     date: str
@@ -30,6 +42,8 @@ class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     machine: str
     measured: Measured | None
     failure: str = ""
+    kernels: Literal["auto", "special"] = "special"
+    special: Special | None = None
 
 
 class Curve(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -2,21 +2,55 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 
-from tests.benchmarks.must_hold.kept import Kept, now, this_commit, this_machine
-from tests.benchmarks.must_hold.row import Row
+from flexmb.jit.progress import spent
+from tests.benchmarks.must_hold.kept import Kept, Special, now, this_commit, this_machine
+from tests.benchmarks.must_hold.row import Measured, Row
+
+VARIABLE = "FLEXMB_KERNELS"
 
 
-def measured_row(row: Row) -> Kept:
-    """The row's measurement, or the reason why there is none."""
+def measured_row(row: Row, special: bool = False) -> Kept:
+    """The row's measurement by what a user gets who sets no variable, or the reason why there is none.
+
+    special: measure it by special kernels, too.
+    """
+    with _by(None):
+        found, failure = _found(row)
+    beside = None
+    if special and found is not None:
+        before = sum(spent.values())
+        with _by("special"):
+            other, failure = _found(row)
+        beside = None if other is None else Special(other, sum(spent.values()) - before)
+    return Kept(row.name, now(), this_commit(), this_machine(), found, failure, "auto", beside)
+
+
+@contextmanager
+def _by(kernels: str | None) -> Iterator[None]:
+    """Rows take these kernels, or those of the default, whatever this process was told."""
+    told = os.environ.pop(VARIABLE, None)
+    if kernels is not None:
+        os.environ[VARIABLE] = kernels
     try:
-        found, failure = row.measure(), ""
+        yield
+    finally:
+        os.environ.pop(VARIABLE, None)
+        if told is not None:
+            os.environ[VARIABLE] = told
+
+
+def _found(row: Row) -> tuple[Measured | None, str]:
+    try:
+        return row.measure(), ""
     except subprocess.CalledProcessError as problem:
-        found, failure = None, f"exit code {problem.returncode}: {_last_line(problem.stderr or problem.stdout)}"
+        return None, f"exit code {problem.returncode}: {_last_line(problem.stderr or problem.stdout)}"
     except Exception as problem:  # whatever a rival or a missing peer raises: it is what the row has to say
-        found, failure = None, f"{type(problem).__name__}: {_last_line(str(problem))}"
-    return Kept(row.name, now(), this_commit(), this_machine(), found, failure)
+        return None, f"{type(problem).__name__}: {_last_line(str(problem))}"
 
 
 def _last_line(text: str | None) -> str:

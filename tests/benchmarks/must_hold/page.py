@@ -20,9 +20,12 @@ What must hold, and what was measured. This page is generated from `tests/benchm
 ```sh
 python -m tests.benchmarks                 # measure every row and print the table; it takes half an hour
 python -m tests.benchmarks -k kernel       # only rows with this word in their names
-python -m tests.benchmarks -k kernel --write   # keep the measurements and write this page
+python -m tests.benchmarks --special --write   # measure by special kernels too; keep all, and write this page
 python -m tests.benchmarks --from-kept --write   # write this page and the pictures anew
 ```
+
+Measured is what a user gets who sets nothing: the general kernels of the installation. Beside it stands what
+[special kernels](kernels.md) give, which contain only what a scene needs, with the processor time to compile them.
 
 Rivals take turns in one process, so that a busy machine slows both, and their results are compared before they are
 timed. A figure is the median over the rounds, its spread the quartiles; of seconds of whole processes the least and the
@@ -37,7 +40,11 @@ What these figures say is of one machine. What a change does to the work of a ke
 """
 
 
-HEAD = "| over, or of | measured | spread | goal | | behind it | row |", "|---|---|---|---|---|---|---|"
+HEAD = (
+    "| over, or of | measured | spread | special, s to compile | goal | | behind it | row |",
+    "|---|---|---|---|---|---|---|---|",
+)
+OF_SPECIAL = " (special)"  # a figure that is not of the default
 
 
 def page(results: Results) -> str:
@@ -75,7 +82,15 @@ def figures(row: Row, kept: Kept | None) -> tuple[str, str, str]:
     found = kept.measured
     value, low, high = (_number(each) for each in (found.value, found.low, found.high))
     apart = "" if found.difference is None else f"; results {found.difference:.0e} apart"
-    return f"{value} {_unit(row)}".strip(), f"{low} to {high}", f"{found.detail}{apart}"
+    mark = "" if kept.kernels == "auto" else OF_SPECIAL
+    return f"{value} {_unit(row)}".strip() + mark, f"{low} to {high}", f"{found.detail}{apart}"
+
+
+def special(row: Row, kept: Kept | None) -> str:
+    """Value by special kernels, and the seconds it takes to compile them."""
+    if kept is None or kept.special is None:
+        return ""
+    return f"{_number(kept.special.measured.value)} {_unit(row)}".strip() + f", {kept.special.compiled_s:.0f} s"
 
 
 def goal(row: Row) -> str:
@@ -93,7 +108,9 @@ def _number(value: float) -> str:
 
 def _summary(results: Results) -> str:
     words = [verdict(row, results.rows.get(name)) for name, row in all_rows().items()]
-    return f"{words.count('met')} of {len(words)} rows are met.\n"
+    marked = sum(kept.kernels != "auto" for kept in results.rows.values())
+    said = f" Of {marked} rows, marked{OF_SPECIAL}, the default was not measured yet." if marked else ""
+    return f"{words.count('met')} of {len(words)} rows are met.{said}\n"
 
 
 def _table(group: str, rows: list[Row], results: Results) -> str:
@@ -103,7 +120,8 @@ def _table(group: str, rows: list[Row], results: Results) -> str:
         value, spread, detail = figures(row, kept)
         word = verdict(row, kept)
         shown = word if word == "met" else f"**{word}**"
-        cells = (row.what, value, spread, goal(row), shown, detail.replace("|", "/"), f"`{row.name}`")
+        beside = special(row, kept)
+        cells = (row.what, value, spread, beside, goal(row), shown, detail.replace("|", "/"), f"`{row.name}`")
         lines.append(f"| {' | '.join(cells)} |")
     searched = [f"Settings that were searched: {text}" for text in dict.fromkeys(row.searched for row in rows) if text]
     return "\n".join([*lines, *(part for text in searched for part in ("", text)), *_reasons(rows, results)]) + "\n"
