@@ -67,12 +67,12 @@ def _watched(function: FunctionType, folder: Path | None) -> Iterator[None]:
     lock = getattr(getattr(ffi, "lib", None), "_lock", None)
     listeners = getattr(lock, "_cblist", None)
     if listeners:
-        lock._cblist = []  # type: ignore[union-attr]
+        lock._cblist = []
     try:
         yield
     finally:
         if listeners:
-            lock._cblist = listeners  # type: ignore[union-attr]
+            lock._cblist = listeners
         timer.cancel()
 
 

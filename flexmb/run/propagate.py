@@ -107,7 +107,7 @@ class Integration:
     def __call__(self, *given: Any) -> tuple[int, float]:
         """Integrate: (y, clock, accuracy, out, counts, memory, watch) of `Integrator`, all arrays in C order."""
         self.compile(*given)
-        return self._enter(self._problem, *given)  # type: ignore[no-any-return]
+        return self._enter(self._problem, *given)
 
     def forget(self) -> None:
         """Restore the initial state: closed chains store the branch that they are on."""
