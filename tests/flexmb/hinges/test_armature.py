@@ -205,10 +205,10 @@ def test_a_gimbal_may_start_where_its_axes_align_if_armatures_resist():
 
 
 @pytest.mark.parametrize(("make", "place"), [
-    (lambda: pendulum(armature=-0.1), r"rotation\.armature_kg_m2.*the armature is -0.1"),
+    (lambda: pendulum(armature=-0.1), r"rotation\.armature_kg_m2.*negative armature: -0.1"),
     (lambda: pendulum(armature=np.nan), r"rotation\.armature_kg_m2"),
     (lambda: SceneBuilder("bead").rigid_body("bead", mass=1.0, inertia=(1.0, 1.0, 1.0)).planar(
-        "plane", "ground", "bead", x=linear(armature=-1.0)), r"x\.armature_kg.*the armature is -1"),
+        "plane", "ground", "bead", x=linear(armature=-1.0)), r"x\.armature_kg.*negative armature: -1"),
 ])  # fmt: skip
 def test_impossible_armatures_are_refused_with_their_place(make, place):
     with pytest.raises(fm.SceneError, match=place):
