@@ -26,7 +26,7 @@ from flexmb.kept import kept
 from flexmb.parameters import kernels
 from flexmb.parameters.numbers import Number, numbers
 from flexmb.parameters.plant import Plant
-from flexmb.parameters.spectral import Derivative, NotSmooth, derivative
+from flexmb.parameters.spectral import WIDTHS, Derivative, NotSmooth, derivative
 from flexmb.parameters.steady import First, Steady, steady
 from flexmb.parameters.tables import ParameterBlock, Tables, blocks, diagonal, moments, numbers_of, parts, structure
 from flexmb.parameters.together import derivatives_together
@@ -280,6 +280,8 @@ class _Differentiation:
         self._plant, self._starts = plant, starts
         self._firsts: dict[str, First] = {}
         """By name of a number, what its first other value made of the tables."""
+        self._widths: dict[str, float] = {}
+        """Half-widths at which derivatives by these numbers were found at other values."""
         self._number: Number | None = None
         """Any of the numbers, for scenes with other values of all."""
         self.tables = _tables(plant, starts)
@@ -305,7 +307,8 @@ class _Differentiation:
             return self._middle if value == number.value else self._with(number, {number.name: value})
 
         try:
-            return derivative(at, number.value, number.scale, self._parts)
+            first = self._widths.get(number.name, WIDTHS[0])
+            return derivative(at, number.value, number.scale, self._parts, first)
         except NotSmooth as error:
             raise ParameterError(
                 f'parameter "{number.name}" = {number.value:g}: the motion has no derivative by it ({error}); take a '
@@ -320,7 +323,7 @@ class _Differentiation:
         def tables(values: Mapping[str, float]) -> Real:
             return self._with(chosen[0], values) if values else self._middle
 
-        found = iter(derivatives_together(tables, asked, self._parts, self.by))
+        found = iter(derivatives_together(tables, asked, self._parts, self.by, self._widths))
         return [known[each.name] if each.name in known else next(found) for each in chosen]
 
     def kept(self, like: Parameters, chosen: Sequence[Number]) -> Steady | None:
@@ -328,6 +331,7 @@ class _Differentiation:
         before = like.differentiation
         if like.names != tuple(each.name for each in chosen) or before._structure != self._structure:
             return None
+        self._widths = {name: rate.width for name, rate in zip(like.names, like._rates, strict=True)}
         if not like.steady.predicts(self._middle, {each.name: each.value for each in chosen}):
             return None
         self.diagonal = np.minimum(self.diagonal, before.diagonal)
@@ -340,7 +344,10 @@ class _Differentiation:
             assert self._number is not None  # of which there are values
             return self._at(self._number.scene_with(others))
 
-        return steady(tables, self._middle, values, self._firsts, rates)
+        sizes = np.zeros(len(self._middle))
+        for part in self._parts:
+            sizes[part] = np.max(np.abs(self._middle[part]), initial=0.0)
+        return steady(tables, self._middle, sizes, values, self._firsts, rates)
 
     def _with(self, number: Number, values: Mapping[str, float]) -> Real:
         """The tables with other values of a number and of others that belong to the same scene.

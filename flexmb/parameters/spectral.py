@@ -34,29 +34,33 @@ class NotSmooth(ValueError):
 
 
 class Derivative(NamedTuple):
-    """Derivatives (n,) and the estimate of their relative error."""
+    """Derivatives (n,), the estimate of their relative error, and the half-width, over scale, of their interval."""
 
     values: Real
     error: float
+    width: float = WIDTHS[0]
 
 
 def derivative(
-    function: Callable[[float], Real], x: float, scale: float, parts: Sequence[slice | Index]
-) -> Derivative:
+    function: Callable[[float], Real], x: float, scale: float, parts: Sequence[slice | Index],
+    first: float = WIDTHS[0],
+) -> Derivative:  # fmt: skip
     """df/dx (n,) at x of a function that returns (n,), or raises ValueError where it is not defined.
 
     scale: size of changes of x that change the function by its own size. Errors are relative to the largest derivative,
-    or value over scale, in each part of the values. NotSmooth where the estimated error is too large.
+    or value over scale, in each part of the values. first: the half-width that is tried first, that of a point nearby.
+    NotSmooth where the estimated error is too large.
     """
     middle = function(x)
     best, trouble = Derivative(np.zeros_like(middle), np.inf), ""
-    for is_hasty, width in product((True, False), WIDTHS):
+    nearby = [(False, first)] if first != WIDTHS[0] else []
+    for is_hasty, width in (*nearby, *product((True, False), WIDTHS)):
         try:
             found, settled = _on_interval(function, x, width * scale, middle, scale, parts, is_hasty)
         except ValueError as error:  # that the value is outside of its range: a smaller interval may not be
             trouble = str(error)
             continue
-        best = min(best, found, key=lambda each: each.error)
+        best = min(best, found._replace(width=width), key=lambda each: each.error)
         if best.error <= ENOUGH or found.error <= LARGEST and settled:
             break
     if not best.error <= LARGEST:

@@ -18,7 +18,8 @@ from flexmb.parameters.spectral import ENOUGH, Derivative
 from flexmb.typing import Flags, Index, Real
 
 LINEAR = 1e-13
-"""What rounding leaves of a linear change by an eighth, relative to an entry: its slope is then steady to 1e-12."""
+"""What rounding leaves of a linear change by an eighth, relative to a part of the tables, in which derivatives are
+compared too (`flexmb.parameters.spectral`): the slope is then steady to 1e-12."""
 
 
 class First(NamedTuple):
@@ -30,12 +31,14 @@ class First(NamedTuple):
 
 
 class Steady(NamedTuple):
-    """values: of all numbers where they were differentiated, with the tables `middle` (n,) there; rates: derivatives by
-    the steady ones, by name; changing (n,): entries that other numbers concern."""
+    """values: of all numbers where they were differentiated, with the tables `middle` (n,) there, and the sizes (n,) of
+    the parts they are in; rates: derivatives by the steady ones, by name; changing (n,): entries that other numbers
+    concern."""
 
     values: dict[str, float]
     rates: dict[str, Derivative]
     middle: Real
+    sizes: Real
     changing: Flags
 
     def predicts(self, middle: Real, values: Mapping[str, float]) -> bool:
@@ -45,12 +48,12 @@ class Steady(NamedTuple):
             np.zeros_like(middle),
         )
         off = np.abs(middle - self.middle - change)
-        allowed = ENOUGH * np.maximum(np.abs(middle), np.abs(self.middle))
+        allowed = LINEAR * self.sizes + ENOUGH * np.maximum(np.abs(middle), np.abs(self.middle))
         return bool(np.all((off <= allowed) | self.changing))
 
 
 def steady(
-    tables: Callable[[Mapping[str, float]], Real], middle: Real, values: Mapping[str, float],
+    tables: Callable[[Mapping[str, float]], Real], middle: Real, sizes: Real, values: Mapping[str, float],
     firsts: Mapping[str, First], rates: Sequence[Derivative],
 ) -> Steady:  # fmt: skip
     """Which of the numbers are steady at their `values`; none where that cannot be seen.
@@ -58,7 +61,7 @@ def steady(
     tables: all entries (n,) at other values by name, ValueError where there are none; firsts: by name; rates: the
     derivatives, in the order of `values`.
     """
-    none = Steady(dict(values), {}, middle, np.ones(len(middle), bool))
+    none = Steady(dict(values), {}, middle, sizes, np.ones(len(middle), bool))
     if any(name not in firsts for name in values):
         return none
     taken = np.zeros(len(middle), np.int64)
@@ -67,7 +70,7 @@ def steady(
     found = {
         name: rate
         for (name, value), rate in zip(values.items(), rates, strict=True)
-        if np.all(taken[firsts[name].places] == 1) and _is_linear(middle, value, firsts[name], rate)
+        if np.all(taken[firsts[name].places] == 1) and _is_linear(middle, sizes, value, firsts[name], rate)
     }
     changing = np.zeros(len(middle), bool)
     others = {name: firsts[name].value for name in values if name not in found}
@@ -80,18 +83,14 @@ def steady(
         return none
     for name in found:
         expected[firsts[name].places] = firsts[name].entries
-    if not _are_close(together, expected):
+    if np.any(np.abs(together - expected) > LINEAR * sizes):
         return none
-    return Steady(dict(values), found, middle, changing)
+    return Steady(dict(values), found, middle, sizes, changing)
 
 
-def _is_linear(middle: Real, value: float, first: First, rate: Derivative) -> bool:
+def _is_linear(middle: Real, sizes: Real, value: float, first: First, rate: Derivative) -> bool:
     at, change = first.places, first.value - value
     elsewhere = np.ones(len(middle), bool)
     elsewhere[at] = False
-    linear = middle[at] + change * rate.values[at]
-    return _are_close(first.entries, linear) and not np.any(rate.values[elsewhere])
-
-
-def _are_close(one: Real, other: Real) -> bool:
-    return bool(np.all(np.abs(one - other) <= LINEAR * np.maximum(np.abs(one), np.abs(other))))
+    off = np.abs(first.entries - middle[at] - change * rate.values[at])
+    return bool(np.all(off <= LINEAR * sizes[at])) and not np.any(rate.values[elsewhere])

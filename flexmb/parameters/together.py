@@ -21,16 +21,19 @@ Tables = Callable[[Mapping[str, float]], Real]
 
 
 def derivatives_together(
-    tables: Tables, chosen: Sequence[Number], parts: Sequence[slice | Index], by: Callable[[Number], Derivative]
-) -> list[Derivative]:
-    """d tables/dp (n,) for each of these numbers; `by` finds it for one number, or says what is wrong with it."""
+    tables: Tables, chosen: Sequence[Number], parts: Sequence[slice | Index], by: Callable[[Number], Derivative],
+    widths: Mapping[str, float],
+) -> list[Derivative]:  # fmt: skip
+    """d tables/dp (n,) for each of these numbers; `by` finds it for one number, or says what is wrong with it. widths:
+    those at which derivatives were found nearby, by name."""
     if len(chosen) < 2:
         return [by(each) for each in chosen]
     concerned = [_concerned(tables, each) for each in chosen]
     found = dict[int, Derivative]()
     for group in _groups(concerned):
         if len(group) > 1:
-            found |= _of_group(tables, chosen, concerned, group, parts)
+            first = min(widths.get(chosen[k].name, WIDTHS[0]) for k in group)
+            found |= _of_group(tables, chosen, concerned, group, parts, first)
     return [found[k] if k in found else by(each) for k, each in enumerate(chosen)]
 
 
@@ -61,7 +64,7 @@ def _groups(concerned: Sequence[Flags | None]) -> list[list[int]]:
 
 def _of_group(
     tables: Tables, chosen: Sequence[Number], concerned: Sequence[Flags | None], group: Sequence[int],
-    parts: Sequence[slice | Index],
+    parts: Sequence[slice | Index], first: float,
 ) -> dict[int, Derivative]:  # fmt: skip
     """Derivatives by the numbers of a group, nothing where they are not found together.
 
@@ -75,13 +78,15 @@ def _of_group(
         return tables({chosen[k].name: chosen[k].value + share * chosen[k].scale for k in group} if share else {})
 
     try:
-        rates = derivative(at, 0.0, 1.0, [each for each in places if len(each)])
+        rates = derivative(at, 0.0, 1.0, [each for each in places if len(each)], first)
     except (NotSmooth, ValueError):
         return {}
     strays = np.where(np.any(list(own.values()), axis=0), 0.0, np.abs(rates.values))
     if any(np.max(strays[part], initial=0.0) > nought(middle[part]) for part in parts):
         return {}
-    return {k: Derivative(np.where(mask, rates.values / chosen[k].scale, 0.0), rates.error) for k, mask in own.items()}
+    return {
+        k: rates._replace(values=np.where(mask, rates.values / chosen[k].scale, 0.0)) for k, mask in own.items()
+    }
 
 
 def _within(mask: Flags, part: slice | Index) -> Flags:

@@ -38,7 +38,7 @@ def found(table, by=tuple(VALUES)):
         step = 1e-20j
         exact = np.array(table(**VALUES | {name: VALUES[name] + step})).imag / 1e-20
         rates.append(parameters.Derivative(exact, 0.0))
-    return steady(at, middle, {name: VALUES[name] for name in by}, firsts, rates), at
+    return steady(at, middle, np.ones(len(middle)), {name: VALUES[name] for name in by}, firsts, rates), at
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -58,7 +58,7 @@ def test_tables_that_are_not_as_predicted_end_it():
 def test_a_number_that_cannot_change_so_far_leaves_none():
     """The same where another number was changed by nothing, of which one cannot know what it concerns."""
     held, at = found(lambda a, b, c: [a, b, c])
-    none = steady(at, at({}), VALUES, {}, [parameters.Derivative(np.zeros(3), 0.0)] * 3)
+    none = steady(at, at({}), np.ones(3), VALUES, {}, [parameters.Derivative(np.zeros(3), 0.0)] * 3)
     assert held.rates and not none.rates
 
 
