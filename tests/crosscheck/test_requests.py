@@ -173,6 +173,7 @@ def test_names_in_a_sweep_are_looked_up_first(change: dict[str, str], suggestion
         (("export", SCENE, "beem", "--out", "b.sid"), 'did you mean "beam"?'),
         (("equivalence", SCENE, "beem", "--axis", "y"), 'did you mean "beam"?'),
         (("warmup", SCENE, "--method", "dop85"), "use one of 'dop853'"),
+        (("warmup", SCENE, "--all"), "for every scene, method and algorithm: name none beside it"),
     ],
     ids=lambda each: each[0] if isinstance(each, tuple) else "",
 )
