@@ -22,8 +22,8 @@ from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, not_de
 from crosscheck.library.case import ComparisonSide
 from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import StoredReference
-from crosscheck.records.held import Asked, RecordedReference
 from crosscheck.records.packing import unpack
+from crosscheck.records.recorded_reference import RecordedReference, ReferenceGoals
 from flexmb.kept import kept
 from flexmb.typing import Real
 
@@ -86,7 +86,7 @@ def judge_reference(case: CaseResults) -> Iterator[Verdict]:
 
 
 def hold(
-    result: Result, reference: ReferenceSignals, asked: Asked, undetermined: Collection[str] = (),
+    result: Result, reference: ReferenceSignals, asked: ReferenceGoals, undetermined: Collection[str] = (),
     like: Result | None = None, goal_of: Callable[[str, float], float] = lambda channel, goal: goal,
     coordinates: Sequence[str] = (),
 ) -> Iterator[tuple[str, float, Finding]]:

@@ -6,6 +6,8 @@ could not distinguish the records of different states of the code, nor find its 
 
 from __future__ import annotations
 
+import hashlib
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -25,3 +27,15 @@ def source_folder(package: str) -> Path:
             "program or without sources only flexmb runs. Install both with pip to run crosscheck."
         )
     return folder
+
+
+@cache  # computed once: later edits of the files are not what this process has loaded
+def code_here() -> str:
+    """Digest of all sources of flexmb and crosscheck that this process imported; workers must have the same."""
+    digest = hashlib.sha256()
+    for package in OURS:
+        root = source_folder(package)
+        for file in sorted(root.rglob("*.py")):
+            digest.update(f"{package}/{file.relative_to(root).as_posix()}\n".encode())
+            digest.update(hashlib.sha256(file.read_bytes()).digest())
+    return digest.hexdigest()[:16]

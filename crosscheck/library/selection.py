@@ -58,7 +58,7 @@ def alone(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     foreign = joining(run, asked)
     run = _joined(run, asked)
     running = [engine for variant in run.variants if variant.name == of for engine in _all(variant)]
-    kept = tuple(engine for engine in running if engine in (asked or held(run, running)))
+    kept = tuple(engine for engine in running if engine in (asked or goals_for_reference(run, running)))
     needed = {(of, engine) for engine in kept}
     conserved = (_narrowed(run, item, kept, foreign) for item in run.conservations if item.variant == of and kept)
     return msgspec.structs.replace(
@@ -77,7 +77,7 @@ def joining(run: RunFile, asked: Iterable[str]) -> tuple[str, ...]:
     return tuple(engine for engine in asked if engine not in known)
 
 
-def held(run: RunFile, engines: Iterable[str]) -> dict[str, tuple[dict[str, float], dict[str, float]]]:
+def goals_for_reference(run: RunFile, engines: Iterable[str]) -> dict[str, tuple[dict[str, float], dict[str, float]]]:
     """Goals and scales, by engine, of those of `engines` that are compared with the stored reference.
 
     These are engines that a comparison of its variant expects to agree, or those that the table `[reference]` names; if

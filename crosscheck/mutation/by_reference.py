@@ -17,8 +17,8 @@ from crosscheck.judging.verdict import Signal, compare
 from crosscheck.library.patterns import most_specific
 from crosscheck.mutation.score import ShownIn
 from crosscheck.mutation.subject import JudgedVariant
-from crosscheck.records.held import Asked
-from crosscheck.running.held import held_reference
+from crosscheck.records.recorded_reference import ReferenceGoals
+from crosscheck.running.reference_record import recorded_reference
 from flexmb.kept import kept
 from flexmb.typing import Real
 
@@ -29,7 +29,7 @@ class ByReference:
 
     true: Result
     reference: ReferenceSignals
-    asked: Asked
+    asked: ReferenceGoals
 
     @kept
     def trusted(self) -> frozenset[str]:
@@ -65,7 +65,7 @@ class ByReference:
 def by_reference(what: JudgedVariant, true: Result) -> ByReference | str:
     """The stored reference of the subject's case, or why there is none that can be used."""
     run = msgspec.structs.replace(what.case.run, variants=(what.variant,))
-    recorded = held_reference(what.case, run)
+    recorded = recorded_reference(what.case, run)
     if recorded is None or recorded.variant != what.variant.name:
         return "the case has no stored reference of this variant that the engine is held against"
     if recorded.fault:

@@ -9,7 +9,7 @@ import msgspec
 from crosscheck.library.case import CaseError, Comparison, Variant
 from crosscheck.library.find import Case
 from crosscheck.library.reference import has_reference
-from crosscheck.library.selection import held
+from crosscheck.library.selection import goals_for_reference
 
 
 @dataclass(frozen=True)
@@ -94,4 +94,4 @@ def _held(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dict
     recipe = case.run.reference
     if recipe is None or recipe.variant != variant or not has_reference(case.folder):
         return {}, {}
-    return held(case.run, (engine,)).get(engine, ({}, {}))
+    return goals_for_reference(case.run, (engine,)).get(engine, ({}, {}))

@@ -15,7 +15,7 @@ from crosscheck.library.channels import CONSERVED
 from crosscheck.library.find import Case
 from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import has_reference, load_reference
-from crosscheck.library.selection import alone, held
+from crosscheck.library.selection import alone, goals_for_reference
 from crosscheck.pytest_plugin.request import Request, marks_of
 
 PREFIX = "crosscheck"
@@ -58,7 +58,7 @@ class CrosscheckItems(pytest.Collector):
         except CaseError as error:
             yield CannotBeHeld.from_parent(self, **stand_in, why=str(error), fails=True)
             return
-        goals, _ = held(case.run, (engine,)).get(engine, ({}, {}))
+        goals, _ = goals_for_reference(case.run, (engine,)).get(engine, ({}, {}))
         if not goals:
             why = f"the case does not hold {engine} against its reference: {reason_of(case, engine)}"
             yield CannotBeHeld.from_parent(self, **stand_in, why=why, fails=False)

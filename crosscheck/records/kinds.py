@@ -11,8 +11,8 @@ from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import Provenance, RunFile
 from crosscheck.library.claims import Claims
 from crosscheck.records.drawing import Drawing
-from crosscheck.records.held import RecordedReference
 from crosscheck.records.packing import Packed
+from crosscheck.records.recorded_reference import RecordedReference
 
 RunStatus = Literal["finished", "diverged", "failed", "crashed", "did not finish", "refused", "did not run"]
 

@@ -21,7 +21,7 @@ from queue import Empty, SimpleQueue
 from distributed import Client, Future
 from distributed.scheduler import KilledWorker
 
-from crosscheck.running.code_here import code_here
+from crosscheck.library.own_files import code_here
 from crosscheck.running.dask_worker import Crew, do_job
 from crosscheck.running.scheduler import Event, Events, Work
 from crosscheck.running.waiting import Waiting

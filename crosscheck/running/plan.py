@@ -24,9 +24,9 @@ from crosscheck.library.reference import has_reference, scene_digest
 from crosscheck.library.selection import alone, joining, select
 from crosscheck.records.drawing import FILM, Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
-from crosscheck.running.held import held_reference
 from crosscheck.running.job import MAIN, REFINED, Job
 from crosscheck.running.ladder import with_efforts
+from crosscheck.running.reference_record import recorded_reference
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from flexmb.scene.bodies import BeamBody, Modes, RigidBody, SidBody, StrainPolynomials
 from flexmb.scene.check import SceneWarning, check_and_warn, check_scene
@@ -75,7 +75,7 @@ def plan(
         readme=case.readme,
         variants=infos,
         accepted=case.accepted,
-        reference=held_reference(case, run),
+        reference=recorded_reference(case, run),
         files=case_digests(case.folder),
         asked=asked,
         joined=joining(case.run, asked),

@@ -26,8 +26,8 @@ from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler, Work
 from crosscheck.sampling.file import SweepFile, load_sweep
 from crosscheck.sampling.points import sample_values
+from crosscheck.sampling.refusals import require_sense
 from crosscheck.sampling.sample import SampleJob, SampleRecord, Written, run_sample
-from crosscheck.sampling.sense import require_sense
 from crosscheck.sampling.table import SamplesTable
 from flexmb.output.whole import take_away
 from flexmb.output.writing import in_words

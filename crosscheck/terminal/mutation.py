@@ -40,8 +40,8 @@ def _table(scores: Sequence[MutationScore]) -> Listing:
     for each in scores:
         counted = each.counted
         noticed = sum(mutant.outcome == "noticed" for mutant in counted)
-        scores = map(_figure, (each.score, each.score_at_goals, each.score_by_reference))
-        table.add(each.case, f"{noticed}/{len(counted)}", *scores)
+        shares = map(_figure, (each.score, each.score_at_goals, each.score_by_reference))
+        table.add(each.case, f"{noticed}/{len(counted)}", *shares)
     return table
 
 

@@ -23,11 +23,11 @@ from crosscheck.judging.verdict import Finding
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
 from crosscheck.records.archive import read
-from crosscheck.records.held import Asked, RecordedReference
 from crosscheck.records.kinds import RunRecord
-from crosscheck.running.held import held_reference
+from crosscheck.records.recorded_reference import RecordedReference, ReferenceGoals
 from crosscheck.running.job import Job
 from crosscheck.running.plan import plan
+from crosscheck.running.reference_record import recorded_reference
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import Listener, run_planned
 from crosscheck.timing.turns import Timed, in_turns
@@ -145,7 +145,7 @@ def timed(entered: Iterable[tuple[Rival, Rung]], rounds: int) -> dict[int, Timed
 
 
 def _reference(case: Case) -> RecordedReference:
-    held = held_reference(case, case.run)
+    held = recorded_reference(case, case.run)
     if held is None:
         raise CaseError(f"{case.name}: no stored reference to hold rivals against: `crosscheck regenerate` makes it")
     if held.fault:
@@ -178,7 +178,7 @@ def _rival(job: Job, level: str, case: CaseResults, reference: ReferenceSignals,
     )
 
 
-def _of_all(held: RecordedReference) -> Asked:
+def _of_all(held: RecordedReference) -> ReferenceGoals:
     """Goals and scales for an engine that no comparison expects to agree: those of the first other engine."""
     return next(iter(held.asked.values()))
 

@@ -19,7 +19,7 @@ from crosscheck.library.channels import CONSERVED, KINDS
 from crosscheck.library.find import Case, load_case, shipped_folder, shipped_names
 from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import KNOWLEDGE, has_reference
-from crosscheck.library.selection import expected_otherwise, held, select
+from crosscheck.library.selection import expected_otherwise, goals_for_reference, select
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.events import Latch
 from flexmb.scene.schema import Scene
@@ -117,7 +117,7 @@ def by_reference(case: Case, variant: str, engine: str) -> set[str]:
     recipe = case.run.reference
     if recipe is None or recipe.variant != variant or not has_reference(case.folder):
         return set()
-    goals = held(case.run, (engine,)).get(engine)
+    goals = goals_for_reference(case.run, (engine,)).get(engine)
     if goals is None:
         return set()
     stored = tomllib.loads((case.folder / KNOWLEDGE).read_text(encoding="utf-8"))["channels"]

@@ -20,8 +20,8 @@ import pytest
 from crosscheck.library import own_files
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import shipped_folder
+from crosscheck.library.own_files import code_here
 from crosscheck.records.sources import sources
-from crosscheck.running.code_here import code_here
 from tests.repo.installations import called, fresh_environment, packages_of, said
 from tests.repo.project import ROOT
 

@@ -14,10 +14,10 @@ from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import CaseResults, collect
 from crosscheck.library.find import load_case
 from crosscheck.library.reference import KNOWLEDGE, VALUES
-from crosscheck.library.selection import held
+from crosscheck.library.selection import goals_for_reference
 from crosscheck.records.archive import read
-from crosscheck.records.held import Asked
 from crosscheck.records.packing import pack, unpack
+from crosscheck.records.recorded_reference import ReferenceGoals
 from crosscheck.records.session import last_session
 from crosscheck.references.regenerate import regenerate
 from tests.crosscheck.sessions import PROVIDER, copy_case, run_here, sweep_here
@@ -97,7 +97,7 @@ def test_the_recipe_says_who_is_held(change: str, engines: set[str], folder: Pat
     other = copy_of(folder, tmp_path / "case")
     edit(other / "run.toml", "samples = 11\n", f"samples = 11\n{change}")
     run = load_case(other).run
-    assert set(held(run, ("fine", "stepper", "sloppy", "biased", "refuser"))) == engines
+    assert set(goals_for_reference(run, ("fine", "stepper", "sloppy", "biased", "refuser"))) == engines
 
 
 def test_an_engine_alone_needs_no_partner(folder: Path, tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def wrong(case: CaseResults, change: object) -> set[str]:
     times = unpack(recorded.times)
     channels = {name: unpack(packed) for name, packed in recorded.channels.items()}
     signals = change(ReferenceSignals(times, channels, recorded.uncertainties))
-    found = list(hold(case.get("rigid", "fine"), signals, Asked(goals={"marker:tip.position": 1e-6})))
+    found = list(hold(case.get("rigid", "fine"), signals, ReferenceGoals(goals={"marker:tip.position": 1e-6})))
     assert found
     return {finding.status for _, _, finding in found}
 

@@ -20,7 +20,7 @@ from crosscheck.library.case import Variant
 from crosscheck.library.channels import LINEAR_KINDS
 from crosscheck.library.find import Case, resolve
 from crosscheck.library.reference import load_reference
-from crosscheck.library.selection import held
+from crosscheck.library.selection import goals_for_reference
 from crosscheck.running.plan import variant_scene
 from flexmb.run.channels import channels_of, distance, family, magnitude
 from flexmb.typing import Real
@@ -88,7 +88,7 @@ def climbed(case: Case, variant: Variant, engine: str, times: Real, tolerances: 
 def test_u_bounds_the_error(case: Case, engine: str) -> None:
     assert case.run.reference is not None
     variant = case.run.variant(case.run.reference.variant)
-    if not (engine in variant.engines and engine in held(case.run, (engine,))):
+    if not (engine in variant.engines and engine in goals_for_reference(case.run, (engine,))):
         pytest.skip(f"{case.name} does not hold {engine} against its reference")
     reference = load_reference(case.folder)
     if not any(kind_of(channel) not in LINEAR_KINDS for channel in reference.channels):

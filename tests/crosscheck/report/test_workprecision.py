@@ -11,9 +11,9 @@ from msgspec.structs import replace
 from crosscheck.judging.results import collect
 from crosscheck.library.find import load_case
 from crosscheck.records.archive import read
-from crosscheck.records.held import Asked, RecordedReference
 from crosscheck.records.kinds import CaseRecord, Record, RunRecord
 from crosscheck.records.packing import pack, unpack
+from crosscheck.records.recorded_reference import RecordedReference, ReferenceGoals
 from crosscheck.report import workprecision
 from crosscheck.report.workprecision import WorkPrecision, work_precision
 from tests.crosscheck.sessions import copy_case, sweep_here
@@ -85,7 +85,7 @@ def with_stored(records: list[Record], uncertainty: float, shift: float = 0.0, *
     )
     stored = RecordedReference(
         variant="rigid",
-        asked={"fine": Asked(goals={"marker": 1e-6})},
+        asked={"fine": ReferenceGoals(goals={"marker": 1e-6})},
         times=pack(unpack(fine.times)[::2]),
         channels={TIP: pack(unpack(fine.channels[TIP])[::2] + shift)},
         uncertainties={TIP: uncertainty},

@@ -7,7 +7,7 @@ import msgspec
 from crosscheck.records.packing import Packed
 
 
-class Asked(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class ReferenceGoals(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Goals and scales of an engine's comparison with the reference, by patterns of channels."""
 
     goals: dict[str, float]
@@ -21,7 +21,7 @@ class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     """
 
     variant: str
-    asked: dict[str, Asked]
+    asked: dict[str, ReferenceGoals]
     times: Packed | None = None
     channels: dict[str, Packed] = {}
     uncertainties: dict[str, float] = {}

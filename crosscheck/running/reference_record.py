@@ -5,12 +5,12 @@ from __future__ import annotations
 from crosscheck.library.case import CaseError, RunFile
 from crosscheck.library.find import Case
 from crosscheck.library.reference import current_reference, has_reference
-from crosscheck.library.selection import held
-from crosscheck.records.held import Asked, RecordedReference
+from crosscheck.library.selection import goals_for_reference
 from crosscheck.records.packing import pack
+from crosscheck.records.recorded_reference import RecordedReference, ReferenceGoals
 
 
-def held_reference(case: Case, run: RunFile) -> RecordedReference | None:
+def recorded_reference(case: Case, run: RunFile) -> RecordedReference | None:
     """The case's stored reference with the engines of the reduced run file `run` that are compared with it.
 
     None if there is no reference or no such engine. If the stored files cannot be used or belong to another scene, the
@@ -20,9 +20,8 @@ def held_reference(case: Case, run: RunFile) -> RecordedReference | None:
     if recipe is None or not has_reference(case.folder):
         return None
     running = [engine for variant in run.variants if variant.name == recipe.variant for engine in variant.engines]
-    asked = {
-        engine: Asked(goals=goals, scales=scales) for engine, (goals, scales) in held(case.run, running).items()
-    }
+    found = goals_for_reference(case.run, running)
+    asked = {engine: ReferenceGoals(goals=goals, scales=scales) for engine, (goals, scales) in found.items()}
     if not asked:
         return None
     try:
