@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.text import Text
@@ -25,13 +25,14 @@ def import_(
     free_base: Annotated[bool, typer.Option("--free-base", help="URDF: the root link is free.")] = False,
     repair: Annotated[
         bool,
-        typer.Option("--repair", help="URDF: change impossible inertia tensors by the least amount."),
+        typer.Option("--repair", help="URDF, SID: change impossible inertia tensors by the least amount."),
     ] = False,
 ) -> None:
     """
     Convert a robot (URDF, MJCF) or a flexible body (SID) to a scene.
 
-    Notes list what the scene omits of the model. A SID body is welded to the ground at its first node.
+    Notes list what the scene omits of the model. A SID body is welded to the ground at its body frame, or at its first
+    node if no material is fixed to the frame.
 
     **Examples**
 
@@ -52,12 +53,17 @@ def export(
     scene: SceneFile,
     body: Annotated[str, typer.Argument(help="Name of a flexible body.", metavar="BODY", show_default=False)],
     out: Out,
+    dialect: Annotated[
+        Literal["wallrapp", "fembs"],
+        typer.Option(help="wallrapp: J 3 x 3, columns of Gr and Ge by mode; fembs: J 6 x 1, columns by axis."),
+    ] = "wallrapp",
     no_user_code: NoUserCode = False,
 ) -> None:
     """
     Write a flexible body of a scene (beam, modal or SID) as a SID file, all blocks to first order.
 
         flexmb export boom.toml strip --out strip.sid
+        flexmb export boom.toml strip --out strip.SID_FEM --dialect fembs
 
     **Exit code**: 0 written, 2 the scene or the body is wrong.
     """
@@ -77,7 +83,7 @@ def export(
         if body not in flexible:
             raise ValueError(f'"{body}" is not a flexible body of the scene: {closest(body, flexible)}')
         folder(out.parent)
-        write_sid(sid_of(flexible[body]), out)
+        write_sid(sid_of(flexible[body]), out, dialect)
     console.print("wrote", str(out), soft_wrap=True)
 
 
@@ -143,9 +149,11 @@ def _imported(model: Path, free_base: bool, repair: bool) -> tuple[Scene, tuple[
 
         found = read_urdf(model, free_base=free_base, repair=repair)
         return found.scene, found.notes
-    if free_base or repair:
-        raise ValueError("--free-base and --repair are for URDF: an MJCF has a freejoint, and MuJoCo's own checks")
+    if free_base:
+        raise ValueError("--free-base is for URDF: an MJCF has a freejoint, and a SID file's body is joined in a scene")
     if ending in (".xml", ".mjcf"):
+        if repair:
+            raise ValueError("--repair is for URDF and SID: MuJoCo, which compiles an MJCF, has its own checks")
         from flexmb.interchange.mjcf import read_mjcf
 
         found = read_mjcf(model)
@@ -154,19 +162,19 @@ def _imported(model: Path, free_base: bool, repair: bool) -> tuple[Scene, tuple[
         from flexmb.interchange.imported import naming
         from flexmb.interchange.sid import imported_sid, read_sid
 
-        imported = imported_sid(read_sid(model), model.stem)
+        imported = imported_sid(read_sid(model), model.stem, repair=repair)
         with naming(str(model)):
             return _held(imported.body), imported.notes
     raise ValueError(f'{model}: "{model.suffix}" is not a known kind of model: give .urdf, .xml (MJCF) or .sid')
 
 
 def _held(body: ModalBody | SidBody) -> Scene:
-    """The body welded to the ground at its first node."""
+    """The body welded to the ground at its body frame, or at its first node if no material is fixed to that."""
     from flexmb.scene.bodies import ModalBody
     from flexmb.scene.build import SceneBuilder
 
     assert isinstance(body, ModalBody)
-    node = body.nodes[0].name if body.nodes else "origin"
+    node = body.nodes[0].name if body.nodes and body.boundary == "free-free" else "origin"
     return SceneBuilder(body.name).add(body).weld("base", "ground", body.name, child_node=node).scene()
 
 

@@ -6,8 +6,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+import numpy as np
+
+from flexmb.scene.check.inertia import PRINTED
 from flexmb.scene.problems import SceneError
+from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
+from flexmb.typing import Real
 
 MAGNITUDE = 1e150
 """Largest magnitude of a number in an imported file; sums of a million squares of such numbers are still finite."""
@@ -33,6 +38,18 @@ class ImportedScene:
 def listed(names: list[str]) -> str:
     """Names for a note: the first five, and the number of the others."""
     return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+
+
+def possible_inertia(mass: float, tensor: Real, com: Real) -> Real:
+    """The tensor about a mass centre at com itself if it is possible, as the checks of scenes see it; else the one in
+    which negative second moments sum m x x' are zero."""
+    if mass == 0.0:
+        return np.zeros((3, 3))
+    second, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
+    if second[0] >= -PRINTED * float(np.max(np.abs(tensor))) - ROUNDING * mass * (com @ com):
+        return tensor
+    second = np.maximum(second, 0.0)
+    return np.sum(second) * np.eye(3) - (axes * second) @ axes.T
 
 
 @contextmanager

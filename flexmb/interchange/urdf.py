@@ -17,14 +17,12 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming, usable
+from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming, possible_inertia, usable
 from flexmb.interchange.urdf_mimic import Mimics
 from flexmb.scene.build import SceneBuilder
-from flexmb.scene.check.inertia import PRINTED
 from flexmb.scene.options import Placement
 from flexmb.scene.quaternions import about, quaternion_of
 from flexmb.scene.reading import Unreadable, read_text
-from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
 
@@ -166,7 +164,7 @@ class _Robot:
             self._number(place, inertial, "inertia", f"i{k}") for k in ("xx", "yy", "zz", "xy", "xz", "yz")
         )
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if self.repair and (changed := _largest((possible := _possible(mass, tensor, com)) - tensor)):
+        if self.repair and (changed := _largest((possible := possible_inertia(mass, tensor, com)) - tensor)):
             self.repaired.append(f"{name} (by {changed:.3g} of {_largest(tensor):.3g} kg m²)")
             tensor = possible
         turned = R @ tensor @ R.T
@@ -246,17 +244,6 @@ class _Robot:
 
     def _fail(self, place: str, what: str, remedy: str) -> NoReturn:
         raise ModelError(f"{self.file}: {place}: {what}: {remedy}")
-
-
-def _possible(mass: float, tensor: Real, com: Real) -> Real:
-    """The tensor itself if it is possible; else the one in which negative second moments sum m x x' are zero."""
-    if mass == 0.0:
-        return np.zeros((3, 3))
-    second, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
-    if second[0] >= -PRINTED * _largest(tensor) - ROUNDING * mass * (com @ com):  # the checks of scenes accept it
-        return tensor
-    second = np.maximum(second, 0.0)
-    return np.sum(second) * np.eye(3) - (axes * second) @ axes.T
 
 
 def _largest(a: Real) -> float:

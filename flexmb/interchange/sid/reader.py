@@ -1,4 +1,5 @@
-"""Reader of SID files, with Fortran exponents, any letter case, comments, blank lines, and blocks in any order."""
+"""Reader of SID files of both dialects, with Fortran exponents, any letter case, comments, blank lines, and blocks in
+any order."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from flexmb.interchange.imported import MAGNITUDE, usable
 from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor, node_shapes, shapes
+from flexmb.interchange.sid.dialect import inertia_of_six, with_columns_by_mode
 from flexmb.scene.reading import MIB, Unreadable, read_text
 from flexmb.typing import Real
 
@@ -71,6 +73,7 @@ class _Reader:
                     f'"{line.word}" is not a block of a modal body', f"blocks are frame, {', '.join(known.values())}"
                 )
         whole = self._complete(blocks, shapes(self.modes), "the body")
+        whole["Gr"], whole["Ge"] = with_columns_by_mode(*(whole[name] for name in ("J", "Cr", "Gr", "Ge")))
         return Sid(mass=mass, modes=names, nodes=tuple(nodes), **whole, file=self.file)
 
     def _refmod(self) -> tuple[float, tuple[str, ...]]:
@@ -133,6 +136,8 @@ class _Reader:
             zero = _mirrored(zero)
             if first is not None:
                 first = np.stack([_mirrored(each) for each in np.moveaxis(first, 1, 0)], axis=1)
+        if zero.shape != expected[name] and name == "J":
+            return inertia_of_six(Taylor(zero, first))
         return Taylor(
             zero.reshape(expected[name]), first if first is None else first.reshape(expected[name][0], self.modes, -1)
         )
@@ -152,16 +157,17 @@ class _Reader:
         return head, elements
 
     def _shape(self, name: str, expected: tuple[int, int], head: dict[str, int], start: int) -> tuple[int, int]:
-        """Rows and columns as a block is written that starts in that line: stresses may be a row."""
+        """Rows and columns as a block is written that starts in that line: stresses may be a row, J a vector of six."""
         rows, columns = expected
-        if name == "ksigma" and head.get("ncol") == self.modes and head.get("nrow") == 1:
-            rows, columns = columns, rows
         given = (head.get("nrow", rows), head.get("ncol", columns))
+        if (name, *given) in (("ksigma", 1, self.modes), ("J", 6, 1)):
+            rows, columns = given
         structure, order = head.get("structure", GENERAL), head.get("order", 0)
         if structure != ZEROS and given != (rows, columns) or structure not in range(5) or order not in (0, 1):
             self.line = self.line._replace(number=start)
             what = f"{name} is {given[0]} x {given[1]} of structure {structure}, order {order}"
-            self._fail(what, f"it has to be {rows} x {columns}, of structure 0 to 4, order 0 or 1")
+            either = " or 6 x 1" if name == "J" else ""
+            self._fail(what, f"it has to be {rows} x {columns}{either}, of structure 0 to 4, order 0 or 1")
         return rows, columns
 
     def _put(self, name: str, line: SidLine, value: float, target: Real | None) -> None:

@@ -4,26 +4,36 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import assert_never
 
 import numpy as np
 
 from flexmb.interchange.sid.blocks import Sid, SidNode, Taylor, node_shapes, shapes
+from flexmb.interchange.sid.dialect import Dialect, by_axis, six_of_inertia
 from flexmb.output.whole import write_whole
 
 GENERAL = 3  # "structure" of a full matrix
 
 
-def write_sid(sid: Sid, path: str | os.PathLike[str]) -> None:
-    """Write a SID file."""
-    write_whole(Path(path), "\n".join(_lines(sid)) + "\n")
+def write_sid(sid: Sid, path: str | os.PathLike[str], dialect: Dialect = "wallrapp") -> None:
+    """Write a SID file, in which the body has the name of the file, in one of the two dialects of `sid.dialect`."""
+    match dialect:
+        case "wallrapp":
+            written = sid
+        case "fembs":
+            written = replace(sid, J=six_of_inertia(sid.J), Gr=by_axis(sid.Gr), Ge=by_axis(sid.Ge))
+        case _:
+            assert_never(dialect)
+    write_whole(Path(path), "\n".join(_lines(written, " ".join(Path(path).stem.split()))) + "\n")
 
 
-def _lines(sid: Sid) -> Iterator[str]:
+def _lines(sid: Sid, name: str) -> Iterator[str]:
     m = len(sid.modes)
     yield f"{len(sid.nodes)} {m} : number of nodes, number of modes"
     yield "part"
-    yield "  new modal"
+    yield f"  new modal = {name}"
     yield "    refmod"
     yield f"      mass = {sid.mass:.17g}"
     yield f"      nelastq = {m}"
