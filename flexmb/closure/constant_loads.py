@@ -52,13 +52,13 @@ class ConstantLoads:
     def __init__(self, closures: Closures, w: TangentWorkspace, like: ConstantLoads | None = None) -> None:
         """like: those of closures with other numbers, in tables of the same structure, whose workspaces serve too."""
         self._check, self._w = closures.check, w
-        if like is not None:
+        if like is None:
+            c, cc = closures.constants
+            self._chain: Closed = closures.chain("articulated")
+            self._x: ChainJacobian = chain_jacobian(self._chain, len(self._chain.w.q), len(c.speed))
+            self._rows: ClosureTangentWorkspace = closure_tangent_workspace(cc)
+        else:
             self._chain, self._x, self._rows = closures.chain_in(like._chain), like._x, like._rows
-            return
-        self._chain: Closed = closures.chain("articulated")
-        c, cc = closures.constants
-        self._x: ChainJacobian = chain_jacobian(self._chain, len(self._chain.w.q), len(c.speed))
-        self._rows: ClosureTangentWorkspace = closure_tangent_workspace(cc)
 
     def changes(self, t: float, y: Real, load: Real) -> AtConstantLoads:
         """At y = [q, u, work] with loads (G,) of the rows."""

@@ -83,7 +83,8 @@ class ClosedEquations(Equations):
                 'closures join them: for a linear model use level "linear" or a better one'
             )
         c, root = self.constants, self._root
-        if not same_structure(system.closures.constants[1], root.system.closures.constants[1]):
+        own = system.closures.constants[1]
+        if root is not self and not same_structure(own, root._closures.constants[1]):
             self._root = root = self
         before = None if root is self else root._closures
         self._shared = system.closures.on_tree(c, lambda: workspace(c, system.nq, system.nu), before)

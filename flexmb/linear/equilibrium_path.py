@@ -177,7 +177,8 @@ class _Family:
     def by_number(self, p: float, at: Variations) -> Real:
         """dr/dp (f,) at a state."""
         if not NEAR * self.range <= abs(self._beside[0] - p) <= FAR * self.range:
-            self._beside = self._made(p + np.copysign(0.5 * FAR * self.range, self._middle - p), self._here[1])
+            aside = float(np.copysign(0.5 * FAR * self.range, self._middle - p))
+            self._beside = self._made(p + aside, self._here[1])
         other, beside = self._beside
         return (beside.loads(at.state, at) - self.equations(p).loads(at.state, at)) / (other - p)
 
