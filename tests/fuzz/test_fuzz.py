@@ -143,7 +143,7 @@ NOT_OF_USERS = {
     "crosscheck/references/regenerate.py:_provenance": "a digest",
     "crosscheck/report/ci.py:add_differences": "adds to a page of its own",
     "crosscheck/report/site.py": "a listing of its own pages, and scripts of the package",
-    "crosscheck/running/code_here.py": "a digest",
+    "crosscheck/library/own_files.py": "a digest",
     "crosscheck/running/plan.py:scene_identity": "a digest",
     "crosscheck/running/processes.py:memory_limit": "the kernel's words on memory",
     "crosscheck/running/worker.py:_serve": "a log, and nothing",
