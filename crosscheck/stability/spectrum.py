@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexmb.entry.tangent import jacobian, tangent_workspace
+from flexmb.entry.derivatives import jacobian
 from flexmb.system.tree_system import System
 from flexmb.tables.state import pack
 from flexmb.tables.status import OK, Status
@@ -20,7 +20,7 @@ def linearised(system: System, places: Sequence[int]) -> Real:
     """
     y = pack(system.initial_state)
     J = np.empty((len(y), len(y)))
-    status = jacobian(0.0, y, J, system.constants, tangent_workspace(system.constants, system.nq, system.nu))
+    status = jacobian(0.0, y, J, system.constants, system.own_derivatives)
     if status != OK:
         raise ArithmeticError(Status(status).advice)
     return J[np.ix_(places, places)]

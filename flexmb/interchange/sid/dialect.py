@@ -14,7 +14,7 @@ import numpy as np
 from flexmb.interchange.sid.blocks import Taylor
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.first_order import symmetric
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 Dialect = Literal["wallrapp", "fembs"]
 SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -51,7 +51,7 @@ def by_mode(block: Taylor) -> Taylor:
     return _reordered(block, np.arange(block.zero.shape[1]).reshape(3, -1).T.ravel())
 
 
-def _reordered(block: Taylor, order: Real) -> Taylor:
+def _reordered(block: Taylor, order: Index) -> Taylor:
     return Taylor(block.zero[:, order], None if block.first is None else block.first[:, :, order])
 
 
