@@ -65,6 +65,17 @@ def beam(elements: int = 4, modes: Any = 2) -> fm.Scene:
     return made.weld("root", "hub", "panel").scene()
 
 
+def user_law(outputs: Any) -> fm.Scene:
+    """A wheel that a law of a user's drives."""
+    made = fm.SceneBuilder("x").rigid_body("hub", mass=1.0, inertia=(0.1, 0.1, 0.1)).free("base", "ground", "hub")
+    made.sense_time("t").user_law("law", "t", "flexmb.control.attitude:eigenaxis_slew", outputs=outputs)
+    torque = fm.ControlSignal(source="law[0]", gain=-1.0)
+    made.wheel(
+        "w", "hub", axis=(0, 0, 1), mass=0.1, axial_inertia=1e-3, transverse_inertia=1e-3, torque=torque
+    )
+    return fm.compile(made.scene()).scene
+
+
 def functions() -> dict[str, Door]:
     """By the function and its argument; t_end = 1e15 is bounded by max_steps."""
     builder = fm.SceneBuilder("pendulum", gravity=(0.0, -9.81, 0.0))
@@ -125,6 +136,7 @@ def functions() -> dict[str, Door]:
         "campbell.rates": Door(lambda n: fm.campbell(scene, "pivot", [n]), (*huge, -1, 0)),
         "check_scene.t_end": Door(lambda n: fm.check_scene(scene, t_end=n), huge),
         "SceneBuilder.scene.t_end": Door(lambda n: builder.scene(t_end=n), huge),
+        "SceneBuilder.user_law.outputs": Door(lambda n: user_law(outputs=n)),
         "SceneBuilder.beam.elements": Door(lambda n: beam(elements=n)),
         "SceneBuilder.beam.modes": Door(lambda n: beam(modes=n), (0,)),
         "Modes.pieces": Door(lambda n: beam(modes=fm.Modes(count=2, pieces=n))),

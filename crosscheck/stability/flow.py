@@ -14,6 +14,7 @@ from flexmb.integrate.control import COUNTS
 from flexmb.integrate.dop853 import dop853
 from flexmb.integrate.memory import memory
 from flexmb.integrate.problem import Accuracy, Clock
+from flexmb.integrate.watch import nothing_watched
 from flexmb.run.propagate import recursion
 from flexmb.system.tree_system import System
 from flexmb.tables.state import pack
@@ -39,7 +40,7 @@ def flow(system: System, start: Real, time: float) -> Real:
     counts, accuracy = np.zeros(COUNTS, np.int64), Accuracy(RTOL, ATOL, system.nq + system.nu, MAX_STEPS)
     equations = recursion(system.recursion_constants, system.recursion_workspace())
     clock, begins = Clock(times, times[1:]), memory(len(start), 0)
-    status, _ = dop853(equations, start.copy(), clock, accuracy, out, counts, begins, None)
+    status, _ = dop853(equations, start.copy(), clock, accuracy, out, counts, begins, nothing_watched())
     if status != OK:
         raise StoppedError(Status(status))
     return np.asarray(out[1])

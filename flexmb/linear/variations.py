@@ -90,7 +90,8 @@ class Equations:
         self._indifferent: Index = wheels[self.constants.speed["stiffness"][wheels] == 0.0]
         # Workspaces have a row for each function, and tables of which coordinates are driven.
         self._as_system = same_structure(self.constants, system.constants)
-        self._root: Equations = like._root if like is not None and same_structure(self.constants, like.constants) else self
+        shared = like is not None and same_structure(self.constants, like.constants)
+        self._root: Equations = like._root if like is not None and shared else self
 
     @property
     def freedom(self) -> int:

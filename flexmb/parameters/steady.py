@@ -62,7 +62,7 @@ def steady(
     derivatives, in the order of `values`.
     """
     none = Steady(dict(values), {}, middle, sizes, np.ones(len(middle), bool))
-    if any(name not in firsts for name in values):
+    if not values or any(name not in firsts for name in values):
         return none
     taken = np.zeros(len(middle), np.int64)
     for name in values:

@@ -17,6 +17,7 @@ from flexmb.integrate.lane_problem import first_derivative, lane_problem
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.integrate.rk4_lanes import rk4_lanes
 from flexmb.integrate.settings import Settings
+from flexmb.integrate.watch import nothing_watched
 from flexmb.jit.lanes import LANES
 from flexmb.run.origin import Beginning
 from flexmb.run.propagate import Integration, recursion
@@ -158,15 +159,15 @@ class Alone:
 
     def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
         """See `Integrator`; out (T,nq+nu+1) does not contain the states of controllers."""
-        whole, memory = self._whole, self._method.memory
+        whole, memory, watch = self._whole, self._method.memory, nothing_watched()
         if whole is None:
-            return self._method.run(self._problem, y, clock, accuracy, out, counts, memory(len(y)), None)
+            return self._method.run(self._problem, y, clock, accuracy, out, counts, memory(len(y)), watch)
         if whole.feedback is None:
-            return whole(y, clock, accuracy, out, counts, memory(len(y)), None)
+            return whole(y, clock, accuracy, out, counts, memory(len(y)), watch)
         begin = Beginning(self._own.layout.known(float(clock.times[0]), y), y, None)
         y, clock, accuracy = whole.begin(begin, clock, accuracy, counts)
         found = np.empty((len(out), len(y)))
-        status, t = whole(y, clock, accuracy, found, counts, memory(len(y)), None)
+        status, t = whole(y, clock, accuracy, found, counts, memory(len(y)), watch)
         whole.ended(None)
         out[:, :-1], out[:, -1] = found[:, : out.shape[1] - 1], found[:, -1]
         return status, t

@@ -25,6 +25,9 @@ OfLaw = tuple[Annotated[Number, unit("of the law")], ...]
 Gain = Annotated[Number, Mixed]
 OfSignal = Annotated[Number, unit("of the signal")]
 
+MOST_OUTPUTS = 10_000
+"""Of a user's law, whose outputs have a place each in every row of a run."""
+
 
 class CoordinateSensor(SceneStruct, frozen=True, kw_only=True, tag="coordinate", tag_field="kind"):
     """Coordinates, or their speeds, of a hinge, wheel or point mass, or of `<body>.modes`, whichever `of` names.
@@ -166,7 +169,7 @@ class UserLaw(_Controller, frozen=True, kw_only=True, tag="user"):
     """
 
     function: str
-    outputs: Annotated[int, whole(1, remedy="give one or more")] = 1
+    outputs: Annotated[int, whole(1, MOST_OUTPUTS, noun="outputs", remedy=f"give 1 to {MOST_OUTPUTS}")] = 1
     initial: OfLaw = ()
     parameters: OfLaw = ()
 

@@ -11,6 +11,7 @@ import pytest
 import flexmb as fm
 from flexmb.integrate.problem import Clock
 from flexmb.integrate.settings import Settings
+from flexmb.integrate.watch import nothing_watched
 from flexmb.jit.direct import direct
 from flexmb.jit.kernel import kernel
 from flexmb.jit.pointer import REAL, STATUS, VECTOR
@@ -68,7 +69,7 @@ def test_a_run_besides_its_steps(benchmark, method, samples):
 
         def steps() -> None:
             counts[:] = 0
-            solve(system.initial_state.y, Clock(times, times[-1:]), accuracy, out, counts, memory, None)
+            solve(system.initial_state.y, Clock(times, times[-1:]), accuracy, out, counts, memory, nothing_watched())
 
         found = np.array([[_wall(whole), _wall(steps)] for _ in range(100)])
     besides = float(np.percentile(found[:, 0] - found[:, 1], 20))

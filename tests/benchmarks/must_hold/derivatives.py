@@ -19,6 +19,7 @@ from tests.benchmarks import peers
 from tests.benchmarks.compiled import pinocchio
 from tests.benchmarks.must_hold.row import Call, Measured, Row, how_many_times, measured
 from tests.benchmarks.rivals import flexible_chain, rigid_chain, turns
+from tests.flexmb.entry import dual_jacobian
 
 COMPILED, EVALUATIONS = "Derivatives from compiled code", "Jacobian of flexible chains"
 PYTHON = "Derivatives from Python"
@@ -101,10 +102,11 @@ def _flexible(modes: int) -> Measured:
     w, by_duals = derivative_workspace(c, nq, nu), tangent.tangent_workspace(c, nq, nu)
     evaluation = system.recursion_constants, system.recursion_workspace()
     jacobian(0.0, y, J, c, w)
-    tangent.jacobian(0.0, y, expected, c, by_duals)
+    dual_jacobian.jacobian(0.0, y, expected, c, by_duals)
     difference = float(np.max(np.abs(J - expected)) / np.max(np.abs(expected)))
     seconds = turns(lambda: _evaluations(100, y, *evaluation), lambda: _jacobians(10, y, J, c, w)) / [100, 10]
-    dual = turns(lambda: _evaluations(100, y, *evaluation), lambda: tangent.jacobian(0.0, y, J, c, by_duals)) / [100, 1]
+    by_dual_numbers = partial(dual_jacobian.jacobian, 0.0, y, J, c, by_duals)
+    dual = turns(lambda: _evaluations(100, y, *evaluation), by_dual_numbers) / [100, 1]
     today = np.median(dual[:, 1] / dual[:, 0])
     return measured(seconds[:, 1] / seconds[:, 0], f"{today:.0f} by dual numbers", difference)
 

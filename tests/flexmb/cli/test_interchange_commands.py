@@ -34,7 +34,7 @@ def test_a_robot_comes_in_with_notes(tmp_path):
 WRONG = {
     "ending": (("import", "robot.step"), "is not a known kind of model"),
     "missing": (("import", "robot.urdf"), "No such file"),
-    "mjcf and base": (("import", "robot.xml", "--free-base"), "are for URDF"),
+    "mjcf and base": (("import", "robot.xml", "--free-base"), "is for URDF"),
     "rigid": (
         ("export", "scene.toml", "load", "--out", "b.sid"), "is not a flexible body of the scene: use one of: rod",
     ),

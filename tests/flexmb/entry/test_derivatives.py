@@ -10,7 +10,8 @@ import pytest
 
 import flexmb
 from flexmb.dense import DenseSystem
-from flexmb.entry import derivatives, tangent
+from flexmb.entry import derivatives
+from flexmb.entry.tangent import tangent_workspace
 from flexmb.jain.derivatives.rigid_trees import is_rigid_tree
 from flexmb.scene.schema import Scene
 from flexmb.tables.status import Status
@@ -18,6 +19,7 @@ from tests import trees
 from tests.benchmarks.rivals import flexible_chain, rigid_chain
 from tests.bounds import UNIT_ROUNDOFF, algebra
 from tests.flexmb.connectors import connected_scenes
+from tests.flexmb.entry import dual_jacobian
 
 H = 2.0**-100
 T = 0.3  # s: no function of the trees is at rest there
@@ -46,7 +48,7 @@ def both(scene: Scene) -> Both | None:
     J, by_duals = np.full((2, len(y), len(y)), np.nan)
     w = derivatives.derivative_workspace(c, system.nq, system.nu)
     status = derivatives.jacobian(T, y, J, c, w)
-    assert status == tangent.jacobian(T, y, by_duals, c, tangent.tangent_workspace(c, system.nq, system.nu))
+    assert status == dual_jacobian.jacobian(T, y, by_duals, c, tangent_workspace(c, system.nq, system.nu))
     return Both(system, y, J, by_duals, w) if status == Status.OK else None
 
 

@@ -17,7 +17,7 @@ from flexmb.integrate.dop853_tableau import STAGES, STAGES_DENSE
 from flexmb.integrate.memory import memory
 from flexmb.integrate.problem import Accuracy, Clock, Problem, problem
 from flexmb.integrate.rk4 import rk4
-from flexmb.integrate.watch import Ends
+from flexmb.integrate.watch import Ends, nothing_watched
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
@@ -147,7 +147,7 @@ def solve(kind: int, times, *, rtol=None, step=None, ends=None, controlled=None,
     out, counts = np.full((len(times), len(y)), np.nan), np.zeros(COUNTS, np.int64)
     accuracy = Accuracy(rtol or 0.0, rtol or 0.0, controlled or len(y), max_steps, step or 0.0)
     status, t = (dop853 if step is None else rk4)(
-        of_kind, y, Clock(times, ends), accuracy, out, counts, memory(len(y), 0), None
+        of_kind, y, Clock(times, ends), accuracy, out, counts, memory(len(y), 0), nothing_watched()
     )
     return Result(status, t, y, out[: counts[3]], *map(int, counts[:3]), int(workspace.fault[0]))
 

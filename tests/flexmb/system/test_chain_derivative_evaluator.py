@@ -48,13 +48,14 @@ def test_it_gives_what_dense_factors_give(name: str, t: float) -> None:
     evaluator, state = system.derivative_evaluator(), moved(system, t)
     expected = system.acceleration_derivatives(state)
     rates = evaluator(state.t, state.q, state.u)
-    assert np.allclose(rates, expected.accelerations, rtol=0.0, atol=TOLERANCE * max(1.0, np.abs(rates).max()))
+    tolerance = max(TOLERANCE, 10.0 ** -system.digits_left(state))  # of loops with light bodies few are left
+    assert np.allclose(rates, expected.accelerations, rtol=0.0, atol=tolerance * max(1.0, np.abs(rates).max()))
     size = scales(system, state)
     for each in NAMES:
         found, wanted = getattr(evaluator, each), getattr(expected, each)
-        assert np.abs(found - wanted).max() < TOLERANCE * size[each], each
-    assert np.abs(system.closure_operators(state).J @ evaluator.by_force).max() < TOLERANCE * size["by_force"]
-    assert np.abs(evaluator.by_force - evaluator.by_force.T).max() < TOLERANCE * size["by_force"]
+        assert np.abs(found - wanted).max() < tolerance * size[each], each
+    assert np.abs(system.closure_operators(state).J @ evaluator.by_force).max() < tolerance * size["by_force"]
+    assert np.abs(evaluator.by_force - evaluator.by_force.T).max() < tolerance * size["by_force"]
 
 
 @pytest.mark.parametrize("name", ["flexible four-bar", "connected", "slider-crank", "coupled"])

@@ -63,6 +63,7 @@ GUARDED = {  # who holds arrays that kernels write, and why no two threads write
     "Closed": "held by those above and below",
     "ChainJacobian": "held by those above and below",
     "DerivativeCall": "held by those above and below",
+    "AnyBundle": "held by an Integration",
     "Integration": "one run takes it, and the next one makes another",
     "Linear": "held by an Integration",
     "_Careful": "behind a gate, which lets one thread pass",
