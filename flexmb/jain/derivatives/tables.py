@@ -116,25 +116,9 @@ BRANCHES, IN_ORDER, ALIKE = range(3)
 END_MOTION, END_DISPLACED, END_MOVED, END_SPEED, END_ROWS = 0, 6, 12, 18, 24
 
 
-AT_SECTION = np.dtype(  # of a beam of level exact
-    [
-        ("whole", _F, (3,)),  # the three integrals of its curvature since the section before
-        ("linear", _F, (3,)),
-        ("square", _F, (3,)),
-        ("force", _F, (3,)),  # on the section, body axes
-        ("torque", _F, (3,)),  # on it and on what turns with it
-    ],
-    align=True,
-)
-AT_TANGENT = np.dtype([("rate", _F, (3,))], align=True)  # velocity of the tangent at a Gauss point
-
-
 @bundle
 class Duals(Workspace):
     """A workspace whose numbers are duals, for derivatives of single hinges and bodies."""
-
-    at_section: Record  # (sections,) AT_SECTION
-    at_tangent: Record  # (Gauss points of one body,) AT_TANGENT
 
     numbers = DUAL
 
@@ -184,11 +168,7 @@ class Derivatives:
 def duals(c: Constants, nq: int, nu: int) -> Duals:
     """A dual workspace of the right sizes."""
     tables = workspace(c, nq, nu)
-    return Duals(
-        **{field.name: as_duals(getattr(tables, field.name)) for field in fields(tables)},
-        at_section=as_duals(np.zeros(len(c.section), AT_SECTION)),
-        at_tangent=as_duals(np.zeros(len(tables.tangent), AT_TANGENT)),
-    )
+    return Duals(**{field.name: as_duals(getattr(tables, field.name)) for field in fields(tables)})
 
 
 def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:
