@@ -37,6 +37,7 @@ UNTRIED = {  # what users may ask all the same: docs/threads.md
 EXEMPT = {
     *UNTRIED,
     *(f"{system}.{name}" for system in SYSTEMS for name in INSIDE),
+    "Parameters.arranged",  # of derivatives of runs
     "Batch.tables", "Batch.constants",  # of those who fill lanes
     "open_loop", "user_function", "no_user_code",  # a scene; a function; nothing
     "load_scene", "save_scene", "SceneBuilder",  # files and data, checked where they are compiled
@@ -52,6 +53,7 @@ EXEMPT = {
 INNER = {  # classes of the mechanics and of runs, which users meet only behind what they are given
     "Closures", "ClosureConstants", "NestedConstants", "DualConstants", "Constants", "Layout", "Timing", "Integration",
     "BodyLink", "FlexibleNode", "HingeKind", "Models", "Observation", "Settings", "Integrator",
+    "Steady", "_Differentiation",  # of parameters
     "Equations",  # of what derivatives are taken of
     "RunMethod",  # of the advisor's
     "FinalValue",  # data
