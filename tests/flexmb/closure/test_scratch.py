@@ -73,8 +73,9 @@ def writers(path: Path) -> Iterator[str]:
 
 def test_only_these_write_the_loads_that_act() -> None:
     """`factor.solve`, by which whatever moves a chain is found, does not."""
-    paths = sorted((ROOT / "flexmb").rglob("*.py"))
-    found = {path.relative_to(ROOT / "flexmb").as_posix(): set(writers(path)) for path in paths}
+    package = Path(fm.__file__).parent  # as installed
+    paths = sorted(package.rglob("*.py"))
+    found = {path.relative_to(package).as_posix(): set(writers(path)) for path in paths}
     assert {name: functions for name, functions in found.items() if functions} == WRITERS | OF_DUALS
 
 

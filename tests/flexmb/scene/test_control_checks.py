@@ -44,7 +44,7 @@ WRONG = [
     ((fm.GainTable(name="law", inputs=("angle",), points=(1.0, 0.0), values=(0.0, 0.0)),), "points", "sort them"),
     ((fm.GainTable(name="law", inputs=("angle",), points=(1.0,), values=()),), "values", "one value for each point"),
     ((fm.UserLaw(name="law", inputs=(), function="law"),), "$.controllers[0].function", "package.module:function"),
-    ((fm.UserLaw(name="law", inputs=(), function="a:b", outputs=0),), "$.controllers[0].outputs", "one or more"),
+    ((fm.UserLaw(name="law", inputs=(), function="a:b", outputs=0),), "$.controllers[0].outputs", "1 to 10000"),
     ((fm.CoordinateSensor(name="other", of="pivvot"), law()), "$.sensors[2].of", 'did you mean "pivot"?'),
     ((fm.MarkerSensor(name="other", marker="edge", quantity="position"), law()), "$.sensors[2].marker", "rim"),
     ((fm.LoadSensor(name="other", hinge="pivott"), law()), "$.sensors[2].hinge", 'did you mean "pivot"?'),
