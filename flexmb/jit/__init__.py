@@ -37,7 +37,7 @@ unoptimised, and that a kernel can be called without being linked into its calle
 of its symbols, and `NativeLowering`, in parts.py and linking.py); how a dispatcher uses its cache, and how a compiled
 version is stored as bytes (`NullCache`, `CompileResult`, `rtsys`, `global_compiler_lock`, `normalize_signature`, in
 cache.py); the address of a compiled version, and how the version for a call is found (`CompileResultWAP`,
-`get_call_template`, in hooks.py); who is told of every call of LLVM (`_cblist` of llvmlite's lock, in progress.py).
+`get_call_template`, in hooks.py).
 
 These internals of numba have no replacement: the protocol `_numba_type_`; the templates of `infer_global` and
 `infer_getattr`, for tables and lanes; `populate_array` and the structure of an array, in direct.py; and the statements

@@ -22,8 +22,6 @@ from pathlib import Path
 from time import thread_time
 from types import FunctionType
 
-from llvmlite.binding import ffi
-
 from flexmb.jit.installed import is_whole, unfit
 
 AFTER = 2.0  # s
@@ -58,21 +56,13 @@ def announced(function: FunctionType, folder: Path | None) -> Iterator[None]:
 
 @contextmanager
 def _watched(function: FunctionType, folder: Path | None) -> Iterator[None]:
-    """Announce it, and let numba tell nobody of every call of LLVM: each of the functions that are compiled one within
-    the other listens to all 1e5 calls, which takes 3.5 % of the time of compiling. `_cblist` is not public; should it
-    move in a later version, they listen."""
+    """Announce it, should it take long."""
     timer = threading.Timer(AFTER, _announce, (function, folder))
     timer.daemon = True
     timer.start()
-    lock = getattr(getattr(ffi, "lib", None), "_lock", None)
-    listeners = getattr(lock, "_cblist", None)
-    if listeners:
-        lock._cblist = []
     try:
         yield
     finally:
-        if listeners:
-            lock._cblist = listeners
         timer.cancel()
 
 

@@ -8,9 +8,6 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-import llvmlite.binding
-from numba.core import event
-
 from flexmb.jit import progress
 from flexmb.jit.progress import announced
 
@@ -136,13 +133,3 @@ def busy(seconds: float) -> None:
     start = time.thread_time()
     while time.thread_time() < start + seconds:
         pass
-
-
-def test_while_a_kernel_is_compiled_no_call_of_llvm_is_told():
-    """A kernel of a few lines makes hundreds; afterwards who listens hears them again."""
-    with event.install_recorder("numba:llvm_lock") as recorder:
-        with announced(lines, None), announced(busy, None):
-            llvmlite.binding.parse_assembly("")
-        assert len(recorder.buffer) == 0
-        llvmlite.binding.parse_assembly("")
-        assert len(recorder.buffer) > 0
