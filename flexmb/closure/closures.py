@@ -138,11 +138,19 @@ class Closures:
         return self._evaluated.cw.row["load"].copy()
 
     @property
-    def chosen_rows(self) -> Index:
-        """Numbers of the independent rows that carry the loads at the last evaluated motion."""
-        (_, cc), cw = self.constants, self._evaluated.cw
-        pairs = zip(cc.group["row_start"].tolist(), cw.rank.tolist(), strict=True)
-        return np.concatenate([np.zeros(0, np.int64), *(cw.chosen[at : at + rank] for at, rank in pairs)])
+    def coordinates(self) -> int:
+        """Number of coordinates of the tree."""
+        return len(self._chain.w.q)
+
+    @staticmethod
+    def chosen_in(s: Closed) -> Index:
+        """Numbers of the independent rows that carry the loads at the motion evaluated last in a chain."""
+        pairs = zip(s.cc.group["row_start"].tolist(), s.cw.rank.tolist(), strict=True)
+        return np.concatenate([np.zeros(0, np.int64), *(s.cw.chosen[at : at + rank] for at, rank in pairs)])
+
+    def expect_rows(self, s: Closed) -> None:
+        """Have the next motion in a chain choose as many rows as are counted, or count them where they are not."""
+        s.cw.rank[:] = self._counted[0].ranks
 
     def chain(self, algorithm: str, rate: float = 0.0) -> Closed:
         """The chain for an algorithm, with workspaces of its own; with a `rate` (1/s) closures are stabilised."""
@@ -208,7 +216,8 @@ class Closures:
         return t + step, there
 
     def _motion(self, t: float, y: Real, s: Closed) -> ClosedMotion:
-        s.cw.rank[:], self._evaluated = self._counted[0].ranks, s
+        self.expect_rows(s)
+        self._evaluated = s
         self._check(dynamics.linearise(*self._layout.whole(t, y), s), int(s.fault[0]))
         status = dynamics.closure_loads(s.w, s.cc, s.cw)
         self.is_singular = status == CLOSURE_SINGULAR

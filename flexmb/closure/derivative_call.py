@@ -1,11 +1,11 @@
-"""Derivatives of a closed chain's accelerations behind the gate of an evaluator: what a call writes is in one bundle.
+"""Derivatives of a closed chain's accelerations and loads: all that a call writes is in one bundle.
 
 As in `flexmb.closure.jacobian`, with the rows chosen anew at every state and not stabilised. M^-1 J' of these rows
 comes with it; a force on a speed changes the accelerations by a column of M^-1 and the loads f so that the rows stay,
 
     Lambda^-1 f = -J M^-1,    by_force = M^-1 + M^-1 J' f.
 
-`flexmb.closure.variation` has the same by dense factors of M, with the derivatives of the loads and by time.
+An evaluator calls it behind its gate; `flexmb.closure.variation` reads everything else from the bundle.
 """
 
 from __future__ import annotations
@@ -33,12 +33,14 @@ from flexmb.typing import Index, Real, Record
 
 @bundle
 class ChainDerivativeCall:
-    """Results (nu,nu), and the workspace; `unit` (nu,nu) is M^-1 J' of the chosen rows, in the order of places."""
+    """Results (nu,nu), and the workspace. In the order of places: `unit` (nu,nu), M^-1 J' of the chosen rows, and
+    `load_by_force` (G,nu); what the rows' loads, rates and accelerations do else is in `chain.changes`."""
 
     by_displacement: Real
     by_speed: Real
     by_force: Real
     unit: Real
+    load_by_force: Real
     chain: ChainJacobian
 
     @property
@@ -60,8 +62,13 @@ class ChainDerivativeCall:
 def chain_derivative_call(closures: Closures, nq: int, nu: int) -> tuple[Closed, ChainDerivativeCall]:
     """What `differentiate_chain` takes after t and y, of closures with counted independent rows; one per thread."""
     chain = closures.chain("articulated")
+    return chain, derivatives_of(chain, nq, nu)
+
+
+def derivatives_of(chain: Closed, nq: int, nu: int) -> ChainDerivativeCall:
+    """The bundle of results of a chain."""
     results = (np.zeros((nu, nu)) for _ in range(4))
-    return chain, ChainDerivativeCall(*results, chain_jacobian(chain, nq, nu))
+    return ChainDerivativeCall(*results, np.zeros((len(chain.cc.row), nu)), chain_jacobian(chain, nq, nu))
 
 
 @kernel
@@ -76,7 +83,7 @@ def differentiate_chain(t, y, s, x):
     if status != OK:
         return status
     changes, w, d = x.chain.changes, x.chain.tree.sweeps, x.chain.tree.tables
-    differentiate(s.c, w, d, s.cc, s.cw, changes, False, False)
+    differentiate(s.c, w, d, s.cc, s.cw, changes, False, True)
     count = put_rows(d, s.cc, s.cw, changes)
     solve(s.c, w, d, 2 * x.by_speed.shape[0] + count)
     hold_rows(d, s.cc, s.cw, changes)
@@ -105,8 +112,11 @@ def _motion(t, y, s):
 
 @sweep
 def _respond_to_forces(s, x, count):
-    """x.by_force, after the columns of `count` chosen rows were solved for."""
+    """x.by_force and x.load_by_force, after the columns of `count` chosen rows were solved for."""
     d, nu = x.chain.tree.tables, x.by_force.shape[0]
+    for r in range(x.load_by_force.shape[0]):
+        for place in range(nu):
+            x.load_by_force[r, place] = 0.0
     for place in range(nu):
         row = d.matrix[place]
         for n in range(count):
@@ -143,6 +153,7 @@ def _stop_column(s, x, place, again):
         first = s.cc.group[g].row_start
         for at in range(first, first + s.cw.rank[g]):
             load = s.cw.solution[s.cw.chosen[at]]
+            x.load_by_force[s.cw.chosen[at], place] += load
             for i in range(x.unit.shape[0]):
                 d.matrix[i, place] += x.unit[i, n] * load
             n += 1

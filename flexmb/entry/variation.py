@@ -8,7 +8,7 @@ import numpy as np
 
 from flexmb.jit.kernel import helper, kernel
 from flexmb.motion.coordinates import configuration_rate, load_state
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 MOST_SPEEDS = 6  # of a hinge
 
@@ -28,22 +28,42 @@ class ByAllDirections(NamedTuple):
         return np.column_stack(self)
 
 
+class RowChanges(NamedTuple):
+    """The loads (G,) of the rows of closures with their derivatives; trees have no rows.
+
+    chosen (r,): the independent rows, which carry the loads; response (r,r): J M^-1 J' of these.
+    """
+
+    loads: Real
+    of_loads: ByAllDirections
+    chosen: Index
+    response: Real
+
+    @property
+    def lever(self) -> Real:
+        """P = M^-1 J' Lambda (nu,G), the accelerations that give the rows unit accelerations: M is symmetric, so that
+        they are the loads by forces with the opposite sign."""
+        return -self.of_loads.by_force.T
+
+    @property
+    def inertia(self) -> Real:
+        """Lambda = (J M^-1 J')^-1 (G,G), the loads that give the chosen rows unit accelerations."""
+        found = np.zeros((len(self.loads), len(self.loads)))
+        found[np.ix_(self.chosen, self.chosen)] = np.linalg.inv(self.response)
+        return found
+
+
 class FreeVariation(NamedTuple):
-    """The accelerations (nu,) of a free motion and the loads (G,) of the rows of closures, with their derivatives.
+    """The accelerations (nu,) of a free motion with their derivatives, and the loads of the rows of closures.
 
     motion (nq,nu): N = d(qdot)/du, the change of the coordinates by displacements along the speeds. Columns of
-    prescribed coordinates and speeds vanish. Trees have no rows. lever (nu,G): P = M^-1 J' Lambda, accelerations that
-    give the rows unit accelerations; inertia (G,G): Lambda = (J M^-1 J')^-1, the loads for that; of the independent
-    rows, zero for the others.
+    prescribed coordinates and speeds vanish.
     """
 
     accelerations: Real
     of_accelerations: ByAllDirections
     motion: Real
-    loads: Real
-    of_loads: ByAllDirections
-    lever: Real
-    inertia: Real
+    rows: RowChanges
 
 
 @kernel

@@ -1,16 +1,11 @@
 """First variations of closed chains, in independent coordinates.
 
-The derivatives of the tree under constraint loads f, and those of the rows, are exact at fixed f
-(`flexmb.closure.constant_loads`). Let J be the Jacobian of the rows by the n free speeds, and L L' = M their mass
-matrix. Then J L'^-1 = U S V' has as many nonzero singular values as there are independent rows. With its null space
-V_0,
+How accelerations, loads and rates of the rows change is known (`flexmb.closure.variation`). Let J be the Jacobian of
+the rows by the n free speeds, and L L' = M their mass matrix. Then J L'^-1 = U S V' has as many nonzero singular values
+as there are independent rows. With its null space V_0, and Lambda = (J M^-1 J')^-1 of the independent rows,
 
-    P = L'^-1 V S^-1 U'     smallest change of speeds, in kinetic energy, with given row rates
+    P = M^-1 J' Lambda      smallest change of speeds, in kinetic energy, with given row rates
     N_0 = L'^-1 V_0         motions that the closures allow
-
-The loads change so that the row accelerations g'' stay zero, which adds M^-1 J' df = -P dg'':
-
-    dudot = d(udot)|f - P d(g'')|f
 
 E selects as many independent coordinates as there are allowed motions: those free coordinates that move most, weighted
 with the root of their own inertia (pivots of a QR decomposition). Closures remain fulfilled to first order under
@@ -27,9 +22,9 @@ from scipy.linalg import qr, solve_triangular
 
 from flexmb.closure.assembly import consistent
 from flexmb.closure.closures import ClosureError, Closures
-from flexmb.closure.constant_loads import Changes, ConstantLoads
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace
+from flexmb.closure.variation import ChainVariation
 from flexmb.entry.variation import coordinate_motion
 from flexmb.linear.variations import Equations, RestForces, Variations, same_structure
 from flexmb.system.closed import ClosedSystem
@@ -40,22 +35,11 @@ from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real
 
 
-class _Slopes(NamedTuple):
-    """udot (n,) of the free speeds with its derivatives, those of the rows' rates and accelerations, N of the tree."""
-
-    rates: Real
-    of_rates: Changes
-    of_row_rates: Changes
-    of_row_accelerations: Changes
-    motion: Real
-
-
 class _Freedom(NamedTuple):
-    """The motions that closures allow, of n speeds with a mass matrix (n,n): N_0 (n,f), and P (n,G)."""
+    """The motions that closures allow, of n speeds with a mass matrix (n,n): N_0 (n,f)."""
 
     mass: Real
     null: Real
-    lever: Real
 
     def independent(self) -> Index:
         """Indices (f,) of the independent coordinates."""
@@ -100,8 +84,8 @@ class ClosedEquations(Equations):
         return closure_tangent_workspace(self._closures.constants[1]) if self._root is self else self._root._rows_w
 
     @per_thread
-    def _constant_loads(self) -> ConstantLoads:
-        return ConstantLoads(self._closures, self._w, None if self._root is self else self._root._constant_loads)
+    def _chain(self) -> ChainVariation:
+        return ChainVariation(self._closures, self._w, None if self._root is self else self._root._chain)
 
     @property
     def freedom(self) -> int:
@@ -120,41 +104,46 @@ class ClosedEquations(Equations):
 
     def row_rates(self, state: State) -> Real:
         """J (G,n): rates of the rows by the free speeds."""
-        return self._slopes(state).of_row_rates.by_speed
+        return self._chain.at(state.t, pack(state)).J[:, self.free]
 
     def rates(self, state: State) -> Real:
         return self._closures.motion(state.t, pack(state)).accelerations[self.free]
 
     def loads(self, state: State, at: Variations) -> Real:
-        left = self._freedom(state, self._slopes(state).of_row_rates.by_speed)
-        return left.basis(at.chosen).T @ left.mass @ self.rates(state)
+        found = self._chain.at(state.t, pack(state))
+        left = self._freedom(state, found.J[:, self.free])
+        return left.basis(at.chosen).T @ left.mass @ found.accelerations[self.free]
 
     def forces(self, at: Variations) -> RestForces:
-        slopes, M, N = self._slopes(at.state), self.mass(at.state), at.basis
-        left = M @ slopes.of_rates.by_displacement + self._by_inertia(at.state, slopes.rates)
-        return RestForces(N.T @ M @ slopes.rates, -N.T @ left @ N)
+        found, M, N = self._chain.at(at.state.t, pack(at.state)), self.mass(at.state), at.basis
+        rates = found.accelerations[self.free]
+        left = M @ self._among_free(found.of_accelerations.by_displacement) + self._by_inertia(at.state, rates)
+        return RestForces(N.T @ M @ rates, -N.T @ left @ N)
 
     def variations(self, state: State) -> Variations:
-        slopes = self._slopes(state)
-        rows = slopes.of_row_rates
-        left = self._freedom(state, rows.by_speed)
-        chosen, P = left.independent(), left.lever
-        N, f, n = left.basis(chosen), self.freedom, len(self.free)
-        pairs = zip(slopes.of_rates, slopes.of_row_accelerations, strict=True)
-        by_displacement, by_speed, by_time = (free - P @ stopped for free, stopped in pairs)
+        y, free, motion = pack(state), self.free, np.zeros((self.system.nq, self.system.nu))
+        coordinate_motion(state.t, y, motion, self.constants, self._real_w)
+        found = self._chain.at(state.t, y)
+        of_rates, by_displacement = found.of_accelerations, self._among_free(found.of_accelerations.by_displacement)
+        J, rates_by_displacement, P = found.J[:, free], found.rates_by_displacement[:, free], found.rows.lever[free]
+        left = self._freedom(state, J)
+        chosen = left.independent()
+        N, f, n = left.basis(chosen), self.freedom, len(free)
 
         def dependent(x: Real) -> Real:
             """x (n,...) minus the part that the independent coordinates determine."""
             return x - N @ x[chosen]
 
-        T = dependent(-P @ rows.by_displacement @ N)
-        carried = dependent(P @ rows.by_speed @ state.u[self.free])  # displacement per second by prescribed motions
-        hurried = dependent(-P @ (rows.by_time + rows.by_displacement @ carried))
+        T = dependent(-P @ rates_by_displacement @ N)
+        carried = dependent(P @ J @ state.u[free])  # displacement per second by prescribed motions
+        hurried = dependent(-P @ (found.rates_by_time + rates_by_displacement @ carried))
+        by_speed = self._among_free(of_rates.by_speed)
         return Variations(
-            state, slopes.rates[chosen],
+            state, found.accelerations[free][chosen],
             (by_displacement @ N + by_speed @ T)[chosen], (by_speed @ N)[chosen],
-            (by_time + by_displacement @ carried + by_speed @ hurried)[chosen],
-            self._transport(state.u)[chosen] @ N, slopes.motion @ N, N.T @ left.mass @ N, chosen, self.movable(chosen),
+            (of_rates.by_time[free] + by_displacement @ carried + by_speed @ hurried)[chosen],
+            self._transport(state.u)[chosen] @ N, motion[:, free] @ N, N.T @ left.mass @ N, chosen,
+            self.movable(chosen),
             np.block([[N, np.zeros((n, f))], [T, N]]),
         )  # fmt: skip
 
@@ -170,27 +159,16 @@ class ClosedEquations(Equations):
         y = consistent(self._closures, state.t, pack(super().on_functions(state)))
         return State(y[: self.system.nq], y[self.system.nq : -1], state.t, self.system.layout)
 
-    def _slopes(self, state: State) -> _Slopes:
-        y, free, motion = pack(state), self.free, np.zeros((self.system.nq, self.system.nu))
-        coordinate_motion(state.t, y, motion, self.constants, self._real_w)
-        rates, load = self.rates(state), self._closures.row_loads
-        found = self._constant_loads.changes(state.t, y, load)
-
-        def of(changes: Changes, rows: Index | slice) -> Changes:
-            by_displacement, by_speed, by_time = changes
-            return Changes(by_displacement[rows][:, free], by_speed[rows][:, free], by_time[rows])
-
-        every = slice(None)
-        slopes = of(found.of_accelerations, free), of(found.of_row_rates, every), of(found.of_row_accelerations, every)
-        return _Slopes(rates, *slopes, motion[:, free])
+    def _among_free(self, of_all: Real) -> Real:
+        """Rows and columns (n,n) of the free speeds."""
+        return of_all[np.ix_(self.free, self.free)]
 
     def _freedom(self, state: State, J: Real) -> _Freedom:
         """DynamicsError at a singular position."""
         mass, rank = self.mass(state), self.rank
         weight = self._closures.constants[1].weight  # of rotations against translations
         root = np.linalg.cholesky(mass)
-        U, S, Vt = np.linalg.svd(weight[:, None] * solve_triangular(root, J.T, lower=True).T)
+        _, S, Vt = np.linalg.svd(weight[:, None] * solve_triangular(root, J.T, lower=True).T)
         if rank and not S[rank - 1] > DEPENDENT * S[0]:
             raise DynamicsError("the closures suppress fewer motions here than elsewhere: a singular position")
-        V = solve_triangular(root.T, Vt.T, lower=False)
-        return _Freedom(mass, V[:, rank:], V[:, :rank] / S[:rank] @ (U[:, :rank].T * weight))
+        return _Freedom(mass, solve_triangular(root.T, Vt[rank:].T, lower=False))

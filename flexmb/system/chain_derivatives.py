@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.closure.closures import Closures
-from flexmb.closure.constant_loads import ConstantLoads
 from flexmb.closure.derivative_call import ChainDerivativeCall, chain_derivative_call, differentiate_chain
 from flexmb.closure.given_motion import observe_given, rows_tangent
 from flexmb.closure.tables import Closed
+from flexmb.closure.variation import ChainVariation
 from flexmb.entry.given_motion import motion_tangent
 from flexmb.entry.observed_tangent import outputs_tangent
 from flexmb.entry.variation import FreeVariation
@@ -47,19 +47,16 @@ class ChainDerivatives(DifferentiableMotion):
         return fresh_derivative_evaluator(self, self.refusal, _OF_CHAINS)
 
     def _variation(self, t: float, y: Real) -> FreeVariation:
-        from flexmb.closure.variation import variation  # imported here, because it imports SciPy, which is slow
-
-        self.accelerations(self.layout.known(t, y))  # with its errors and warnings
-        mass = np.empty((self.nu, self.nu))
-        self._fill_mass_matrix(t, y, mass)
-        found = variation(self.closures, t, y, mass, self._coordinate_motion(t, y), self._constant_loads)
-        for part in (*found.of_accelerations, *found.of_loads):
+        found = self._chain_variation.at(t, y)
+        self.check_precision(t, y, self._chain_variation)
+        of_rates, of_loads = found.of_accelerations, found.rows.of_loads
+        for part in (found.accelerations, *of_rates, *of_loads):
             finite_result(part, t)
-        return found
+        return FreeVariation(found.accelerations, of_rates, self._coordinate_motion(t, y), found.rows)
 
     @per_thread
-    def _constant_loads(self) -> ConstantLoads:
-        return ConstantLoads(self.closures, self.own_tangent)
+    def _chain_variation(self) -> ChainVariation:
+        return ChainVariation(self.closures, self.own_tangent)
 
     @per_thread
     def _pushforward(self) -> Pushforward:

@@ -21,7 +21,7 @@ from flexmb.entry.derivatives import (
 from flexmb.entry.given_motion import motion_tangent, observe_given
 from flexmb.entry.observed_tangent import outputs_tangent
 from flexmb.entry.tangent import TangentWorkspace, tangent_workspace, time_derivative
-from flexmb.entry.variation import ByAllDirections, FreeVariation, coordinate_motion
+from flexmb.entry.variation import ByAllDirections, FreeVariation, RowChanges, coordinate_motion
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.kept import kept
@@ -158,13 +158,13 @@ class DifferentiableMotion(FreeMotion):
         for part in (by_displacement, by_speed, by_force):
             finite_result(part, t)
         of_rates = ByAllDirections(by_displacement, by_speed, by_force, self._by_time(t, y))
-        return FreeVariation(accelerations, of_rates, self._coordinate_motion(t, y), *self._no_rows)
+        return FreeVariation(accelerations, of_rates, self._coordinate_motion(t, y), self._no_rows)
 
     @kept
-    def _no_rows(self) -> tuple[Real, ByAllDirections, Real, Real]:
+    def _no_rows(self) -> RowChanges:
         """What a `FreeVariation` has of the rows of closures, in a tree."""
-        none = np.zeros((0, self.nu))
-        return np.zeros(0), ByAllDirections(none, none, none, np.zeros(0)), none.T, np.zeros((0, 0))
+        none, loads = np.zeros((0, self.nu)), np.zeros(0)
+        return RowChanges(loads, ByAllDirections(none, none, none, loads), np.zeros(0, np.int64), np.zeros((0, 0)))
 
     def _by_time(self, t: float, y: Real) -> Real:
         """Explicit derivatives (nu,) of the accelerations by time."""
@@ -306,8 +306,8 @@ class DifferentiableMotion(FreeMotion):
         """The free motion, and how it changes by displacements and speeds, forces and time."""
         at = self._variation(t, y)
         state, time = self._directions(at.motion, self.nu)[::3]
-        motion = GivenMotion(t, y, at.accelerations, at.loads)
-        return motion, Directions(state, at.of_accelerations.by_all, at.of_loads.by_all, time)
+        motion = GivenMotion(t, y, at.accelerations, at.rows.loads)
+        return motion, Directions(state, at.of_accelerations.by_all, at.rows.of_loads.by_all, time)
 
     def _under_forces(self, at: FreeVariation, t: float, y: Real, forces: Real) -> FreeVariation:
         """The motion under further generalised forces (nu,), which the scene's motion `at` is without.
@@ -315,15 +315,15 @@ class DifferentiableMotion(FreeMotion):
         They add accelerations x and row loads f with M x - J'f = forces and J x = 0. In a direction these change by
         M dx - J'df = -(dM x - dJ'f) and J dx = -dJ x.
         """
-        push, rows, nu = self._pushforward, self._row_count, self.nu
-        x, f = at.of_accelerations.by_force @ forces, at.of_loads.by_force @ forces
+        push, rows, nu = self._pushforward, at.rows, self.nu
+        x, f = at.of_accelerations.by_force @ forces, rows.of_loads.by_force @ forces
         directions = self._directions(at.motion, 0)
 
         def left(accelerations: Real, loads: Real) -> Real:
             """Derivatives of M accelerations - J' loads + c and J accelerations + gamma."""
             return push.derivatives(GivenMotion(t, y, accelerations, loads), directions, push.balance)
 
-        drift, opening = np.vsplit(finite_result(left(x, f) - left(np.zeros(nu), np.zeros(rows)), t), [nu])
+        drift, opening = np.vsplit(finite_result(left(x, f) - left(np.zeros(nu), np.zeros(len(f))), t), [nu])
 
         def turned(of: ByAllDirections, by_row: Real) -> ByAllDirections:
             less = of.by_force @ drift + by_row @ opening
@@ -333,8 +333,8 @@ class DifferentiableMotion(FreeMotion):
             )
 
         return at._replace(
-            accelerations=at.accelerations + x, of_accelerations=turned(at.of_accelerations, at.lever),
-            loads=at.loads + f, of_loads=turned(at.of_loads, at.inertia),
+            accelerations=at.accelerations + x, of_accelerations=turned(at.of_accelerations, rows.lever),
+            rows=rows._replace(loads=rows.loads + f, of_loads=turned(rows.of_loads, rows.inertia)),
         )  # fmt: skip
 
     def _as_given(self, t: float, y: Real, rates: Real) -> tuple[GivenMotion, Directions]:

@@ -123,14 +123,16 @@ def test_forces_move_only_what_closures_allow(name: str) -> None:
     system, state, rates, d = asked(name)
     found, J, free = rates.by_force, system.closure_operators(state).J, free_speeds(system)
     size = np.linalg.norm(J) * np.max(np.abs(found), initial=1.0)
-    np.testing.assert_array_equal(found, found.T)
-    np.testing.assert_array_equal(found, d.accelerations.by_force)
+    small = (1e-12 + rounding(system, state)) * np.max(np.abs(found), initial=1.0)
+    np.testing.assert_allclose(found, found.T, rtol=0.0, atol=small)
+    np.testing.assert_allclose(found, d.accelerations.by_force, rtol=0.0, atol=small)
     assert np.max(np.abs(J @ found)) <= 1e-11 * size
     assert np.max(np.abs(found @ J.T)) <= 1e-11 * size
     M = system.mass_matrix(state)[np.ix_(free, free)]
     inner = found[np.ix_(free, free)]
-    np.testing.assert_allclose(inner @ M @ inner, inner, rtol=0.0, atol=1e-10 * np.max(np.abs(inner)))
-    np.testing.assert_allclose(np.trace(inner @ M), free.sum() - system.rank, rtol=1e-9)
+    left = 1e-10 + rounding(system, state)
+    np.testing.assert_allclose(inner @ M @ inner, inner, rtol=0.0, atol=left * np.max(np.abs(inner)))
+    np.testing.assert_allclose(np.trace(inner @ M), free.sum() - system.rank, rtol=10.0 * left)
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "random loops 5"])
@@ -151,7 +153,8 @@ def test_closure_loads_do_no_work(name: str) -> None:
         speeding = d.markers[marker].velocity
         found = speeding.by_displacement @ u + speeding.by_speed @ udot + speeding.by_time
         scale = max(1.0, float(np.max(np.abs(motion.acceleration))), float(np.max(np.abs(udot))))
-        np.testing.assert_allclose(found, motion.acceleration, rtol=0.0, atol=1e-11 * scale)
+        known = 1e-11 + rounding(system, state)  # accelerations are found once here and once there
+        np.testing.assert_allclose(found, motion.acceleration, rtol=0.0, atol=known * scale)
 
 
 @pytest.mark.parametrize("name", ["driven flexible four-bar", "connected"])

@@ -33,7 +33,6 @@ LIBRARY = [
 WRITERS = {
     "closure/forces.py": {"row_loads", "_refine"},
     "closure/closures.py": {"_under"},
-    "closure/constant_loads.py": {"change_by_state"},
 }
 # In workspaces of dual numbers, which take what acts in the chain, and change it along every direction.
 OF_DUALS = {

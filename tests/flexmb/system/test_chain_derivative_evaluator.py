@@ -13,6 +13,7 @@ import flexmb as fm
 from flexmb.run.warm_up import looped
 from flexmb.system.derivative_evaluator import DerivativeEvaluator
 from tests.flexmb.closure import mechanisms as m
+from tests.flexmb.closure.dense_variation import dense
 from tests.flexmb.closure.test_jacobian import MOVING, Linearised
 from tests.flexmb.closure.test_stiff_loops import stiff_four_bar
 from tests.flexmb.system.test_copies import controlled
@@ -43,21 +44,26 @@ def scales(system: fm.System, state: fm.State) -> dict[str, float]:
 @pytest.mark.parametrize("t", [0.0, 0.1])
 @pytest.mark.parametrize("name", MOVING)
 def test_it_gives_what_dense_factors_give(name: str, t: float) -> None:
-    """In all directions, also those that closures do not allow, for the same choice of rows."""
+    """In all directions, also those that closures do not allow, for the same choice of rows; loads of rows as well."""
     system = fm.compile(MOVING[name]())
     evaluator, state = system.derivative_evaluator(), moved(system, t)
-    expected = system.acceleration_derivatives(state)
+    expected, public = dense(system, state), system.acceleration_derivatives(state)
     rates = evaluator(state.t, state.q, state.u)
     # With light bodies few digits are left, by an estimate, and dense factors lose those of the condition of M.
     condition = np.linalg.cond(system.mass_matrix(state))
     tolerance = max(TOLERANCE, 10.0 * 10.0 ** -system.digits_left(state), np.finfo(float).eps * condition)
-    assert np.allclose(rates, expected.accelerations, rtol=0.0, atol=tolerance * max(1.0, np.abs(rates).max()))
+    assert np.abs(expected.balance).max() < tolerance * max(1.0, np.abs(rates).max())
     size = scales(system, state)
     for each in NAMES:
         found, wanted = getattr(evaluator, each), getattr(expected, each)
+        np.testing.assert_array_equal(found, getattr(public, each))
         assert np.abs(found - wanted).max() < tolerance * size[each], each
+    assert np.abs(public.by_time - expected.by_time).max() < tolerance * max(1.0, np.abs(expected.by_time).max())
     assert np.abs(system.closure_operators(state).J @ evaluator.by_force).max() < tolerance * size["by_force"]
     assert np.abs(evaluator.by_force - evaluator.by_force.T).max() < tolerance * size["by_force"]
+    of_loads = system._variation(*system.layout.entering(state)).rows.of_loads
+    for found, wanted in zip(of_loads, expected[4:8], strict=True):
+        assert np.abs(found - wanted).max() < tolerance * max(1.0, np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("name", ["flexible four-bar", "connected", "slider-crank", "coupled"])
