@@ -104,6 +104,7 @@ def loads(s, hinges, closures):
     hinges (N,6), closures (C,6): [torque; force] on the outboard body about O, on body_b about frame B; World axes.
     """
     accelerate(s.route, s)
+    refine(s.route, s)  # as in runs, or rows of light bodies would keep accelerations of rounding
     transmit(s.route, s)
     world_loads(s.c, s.w, hinges)
     for i in range(s.cc.closure.shape[0]):
