@@ -55,6 +55,12 @@ class Spread(NamedTuple):
     closures: Real
     rounding: float
 
+    @property
+    def open_parts(self) -> dict[str, NDArray[np.bool_]]:
+        """The components that are not determined, by the names of these parts in a row of observed quantities."""
+        changes = {"drives": self.drives, "loads": self.hinges, "closures": self.closures}
+        return {name: self.leaves_open(change) for name, change in changes.items()}
+
     def leaves_open(self, changes: Real) -> NDArray[np.bool_]:
         """Which components are not determined by the motion, from their changes (k,...)."""
         found: NDArray[np.bool_] = np.any(np.abs(changes) > self.rounding, axis=0)

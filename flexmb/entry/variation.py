@@ -1,13 +1,23 @@
-"""How a free motion changes with the state: what trees and closed chains have in common; changes of the coordinates."""
+"""How a free motion changes with the state, forces and time: the record of trees and closed chains, and that of a tree.
+
+`flexmb.closure.variation` has that of a closed chain.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
+from flexmb.entry.derivatives import DerivativeWorkspace, acceleration_derivatives
+from flexmb.entry.tangent import TangentWorkspace, time_derivative
+from flexmb.jit.direct import direct
 from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
+from flexmb.kept import kept
 from flexmb.motion.coordinates import configuration_rate, load_state
+from flexmb.tables.arrays import Constants, Workspace
 from flexmb.typing import Index, Real
 
 MOST_SPEEDS = 6  # of a hinge
@@ -29,15 +39,19 @@ class ByAllDirections(NamedTuple):
 
 
 class RowChanges(NamedTuple):
-    """The loads (G,) of the rows of closures with their derivatives; trees have no rows.
+    """The loads (G,) of the rows of closures and their rates J u, with derivatives; trees have no rows.
 
-    chosen (r,): the independent rows, which carry the loads; response (r,r): J M^-1 J' of these.
+    chosen (r,): the independent rows, which carry the loads; unit (nu,r): M^-1 J' of these; J (G,nu): of all speeds.
+    rates_by_displacement (G,nu), rates_by_time (G,): derivatives of J u.
     """
 
     loads: Real
     of_loads: ByAllDirections
     chosen: Index
-    response: Real
+    unit: Real
+    J: Real
+    rates_by_displacement: Real
+    rates_by_time: Real
 
     @property
     def lever(self) -> Real:
@@ -47,23 +61,82 @@ class RowChanges(NamedTuple):
 
     @property
     def inertia(self) -> Real:
-        """Lambda = (J M^-1 J')^-1 (G,G), the loads that give the chosen rows unit accelerations."""
+        """Lambda = (J M^-1 J')^-1 (G,G), the loads that give the chosen rows unit accelerations; zero for others."""
         found = np.zeros((len(self.loads), len(self.loads)))
-        found[np.ix_(self.chosen, self.chosen)] = np.linalg.inv(self.response)
+        found[np.ix_(self.chosen, self.chosen)] = np.linalg.inv(self.J[self.chosen] @ self.unit)
         return found
 
 
 class FreeVariation(NamedTuple):
-    """The accelerations (nu,) of a free motion with their derivatives, and the loads of the rows of closures.
+    """The accelerations (nu,) of a free motion with their derivatives, and the rows of closures.
 
     motion (nq,nu): N = d(qdot)/du, the change of the coordinates by displacements along the speeds. Columns of
-    prescribed coordinates and speeds vanish.
+    prescribed coordinates and speeds vanish, but those of J.
     """
 
     accelerations: Real
     of_accelerations: ByAllDirections
     motion: Real
     rows: RowChanges
+
+
+Check = Callable[[int, int], None]  # raises unless a status is OK; the second number is the body or closure at fault
+
+
+class CoordinateMotion:
+    """N (nq,nu) of one system for one thread; w: a workspace of its tree."""
+
+    def __init__(self, c: Constants, w: Workspace) -> None:
+        self._shape, self._turns = (len(w.q), len(w.u)), bool(np.any(c.body["quaternion"] >= 0))
+        self._move = direct(coordinate_motion, VOID, REAL, VECTOR, MATRIX, c, w)
+
+    def at(self, t: float, y: Real) -> Real:
+        """At y = [q, u, work]; the same read-only array wherever there are no quaternions."""
+        return self._found(t, y) if self._turns else self._constant
+
+    @kept
+    def _constant(self) -> Real:
+        found = self._found(0.0, np.zeros(sum(self._shape) + 1))
+        found.flags.writeable = False
+        return found
+
+    def _found(self, t: float, y: Real) -> Real:
+        N = np.zeros(self._shape)
+        self._move(t, y, N)
+        return N
+
+
+class TreeVariation:
+    """How the motion of one tree changes, for one thread; `dual`: tables for dual numbers, `real`: any workspace."""
+
+    def __init__(
+        self, c: Constants, w: DerivativeWorkspace, dual: TangentWorkspace, real: Workspace, check: Check
+    ) -> None:
+        self._w, self._dual, self._check, self.motion = w, dual, check, CoordinateMotion(c, real)
+        self._is_driven, n = bool(len(c.function)), len(c.speed)
+        self._differentiate = direct(acceleration_derivatives, STATUS, REAL, VECTOR, MATRIX, MATRIX, MATRIX, c, w)
+        self._differentiate_by_time = direct(time_derivative, STATUS, REAL, VECTOR, VECTOR, c, dual)
+        none, loads = np.zeros((0, n)), np.zeros(0)
+        of_loads = ByAllDirections(none, none, none, loads)
+        self._no_rows = RowChanges(loads, of_loads, np.zeros(0, np.int64), none.T, none, none, loads)
+
+    @property
+    def doubt(self) -> Index:
+        """(1,) whether a pivot was at rounding level in the last motion."""
+        return self._w.doubt
+
+    def at(self, t: float, y: Real) -> FreeVariation:
+        """At y = [q, u, work]; DynamicsError where the accelerations do not exist."""
+        nu = len(self._w.sweeps.u)
+        by_state_and_force = tuple(np.empty((nu, nu)) for _ in range(3))
+        self._check(self._differentiate(t, y, *by_state_and_force), int(self._w.fault[0]))
+        rates, by_time = self._w.sweeps.speed["acceleration"].copy(), np.zeros(nu)
+        if self._is_driven:
+            drift = np.empty_like(y)
+            self._check(self._differentiate_by_time(t, y, drift), int(self._dual.fault[0]))
+            by_time = drift[-1 - nu : -1]
+        of_rates = ByAllDirections(*by_state_and_force, by_time)
+        return FreeVariation(rates, of_rates, self.motion.at(t, y), self._no_rows)
 
 
 @kernel

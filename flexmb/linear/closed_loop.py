@@ -26,7 +26,7 @@ from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.linear.equations import equations_of
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.observed import values
-from flexmb.linear.sensed import ChangedRow, sensed
+from flexmb.linear.sensed import ChangedRow, readable, sensed
 from flexmb.linear.variations import Equations
 from flexmb.scene.functions import Constant
 from flexmb.system import algorithms
@@ -97,7 +97,7 @@ class ClosedLoop:
         G, L = laws.by_signal[:drives], laws.by_signal[drives:]
         G_x, L_x = laws.by_state[:drives], laws.by_state[drives:]
         rows = slice(len(of_motion.outputs) - sensors, None)  # sensors come last
-        C, E = of_motion.C[rows], of_motion.D[rows]
+        C, E = readable(laws.by_signal, of_motion.C[rows]), readable(laws.by_signal, of_motion.D[rows])
         moved, said = _effect(equations, state, feedback.driven)
         pushed = np.vstack([np.zeros((n, drives)), moved[equations.variations(state).chosen]])
         A = np.block([[of_motion.A + pushed @ G @ C, pushed @ G_x], [L @ (C + said @ G @ C), L_x + L @ said @ G_x]])

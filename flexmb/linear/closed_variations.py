@@ -15,7 +15,7 @@ with the root of their own inertia (pivots of a QR decomposition). Closures rema
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
@@ -23,16 +23,16 @@ from scipy.linalg import qr, solve_triangular
 from flexmb.closure.assembly import consistent
 from flexmb.closure.closures import ClosureError, Closures
 from flexmb.closure.factor import DEPENDENT
-from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace
+from flexmb.closure.tables import ClosureConstants
 from flexmb.closure.variation import ChainVariation
-from flexmb.entry.variation import coordinate_motion
 from flexmb.linear.variations import Equations, RestForces, Variations, same_structure
 from flexmb.system.closed import ClosedSystem
+from flexmb.system.pushforward import GivenMotion
 from flexmb.tables.arrays import Constants
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, pack
 from flexmb.tables.workspaces import workspace
-from flexmb.typing import Index, Real
+from flexmb.typing import Flags, Index, Real
 
 
 class _Freedom(NamedTuple):
@@ -80,52 +80,42 @@ class ClosedEquations(Equations):
         return self._shared.for_thread(None if self._root is self else self._root._closures)
 
     @per_thread
-    def _rows_w(self) -> ClosureTangentWorkspace:
-        return closure_tangent_workspace(self._closures.constants[1]) if self._root is self else self._root._rows_w
+    def _free(self) -> ChainVariation:
+        like = None if self._root is self else cast(ChainVariation, self._root._free)
+        return ChainVariation(self._closures, self._w, like)
 
-    @per_thread
-    def _chain(self) -> ChainVariation:
-        return ChainVariation(self._closures, self._w, None if self._root is self else self._root._chain)
+    @property
+    def closures(self) -> ClosureConstants:
+        return self._closures.constants[1]
 
     @property
     def freedom(self) -> int:
         return len(self.free) - self.rank
 
-    def closure_loads(self, state: State) -> tuple[Real, Real]:
-        """The row loads (G,), and the resulting loads of closures (C,6) on body_b about frame B, World axes."""
-        found = self._closures.motion(state.t, pack(state))
-        return self._closures.row_loads, found.closures
+    def motion(self, state: State) -> GivenMotion:
+        y = pack(state)
+        return GivenMotion(state.t, y, self._closures.motion(state.t, y).accelerations, self._closures.row_loads)
 
-    def with_row_loads(self, load: Real) -> tuple[Any, ...]:
-        """`tangent_tables` and those of the closures, with these loads (G,) of the rows."""
-        self._rows_w.row["load"][:] = 0.0
-        self._rows_w.row["load"][:, 0] = load
-        return self.constants, self._w, self._closures.constants[1], self._rows_w
-
-    def row_rates(self, state: State) -> Real:
-        """J (G,n): rates of the rows by the free speeds."""
-        return self._chain.at(state.t, pack(state)).J[:, self.free]
-
-    def rates(self, state: State) -> Real:
-        return self._closures.motion(state.t, pack(state)).accelerations[self.free]
+    def undetermined(self, state: State) -> Flags:
+        observation, spread = self.system.observation, self._closures.motion(state.t, pack(state)).spread
+        return observation.undetermined(spread.open_parts if spread else {})
 
     def loads(self, state: State, at: Variations) -> Real:
-        found = self._chain.at(state.t, pack(state))
-        left = self._freedom(state, found.J[:, self.free])
+        found = self.free_variation(state)
+        left = self._freedom(state, found.rows.J[:, self.free])
         return left.basis(at.chosen).T @ left.mass @ found.accelerations[self.free]
 
     def forces(self, at: Variations) -> RestForces:
-        found, M, N = self._chain.at(at.state.t, pack(at.state)), self.mass(at.state), at.basis
+        found, M, N = self.free_variation(at.state), self.mass(at.state), at.basis
         rates = found.accelerations[self.free]
         left = M @ self._among_free(found.of_accelerations.by_displacement) + self._by_inertia(at.state, rates)
         return RestForces(N.T @ M @ rates, -N.T @ left @ N)
 
     def variations(self, state: State) -> Variations:
-        y, free, motion = pack(state), self.free, np.zeros((self.system.nq, self.system.nu))
-        coordinate_motion(state.t, y, motion, self.constants, self._real_w)
-        found = self._chain.at(state.t, y)
+        found, free = self.free_variation(state), self.free
         of_rates, by_displacement = found.of_accelerations, self._among_free(found.of_accelerations.by_displacement)
-        J, rates_by_displacement, P = found.J[:, free], found.rates_by_displacement[:, free], found.rows.lever[free]
+        J, rates_by_displacement = found.rows.J[:, free], found.rows.rates_by_displacement[:, free]
+        P = found.rows.lever[free]
         left = self._freedom(state, J)
         chosen = left.independent()
         N, f, n = left.basis(chosen), self.freedom, len(free)
@@ -136,13 +126,13 @@ class ClosedEquations(Equations):
 
         T = dependent(-P @ rates_by_displacement @ N)
         carried = dependent(P @ J @ state.u[free])  # displacement per second by prescribed motions
-        hurried = dependent(-P @ (found.rates_by_time + rates_by_displacement @ carried))
+        hurried = dependent(-P @ (found.rows.rates_by_time + rates_by_displacement @ carried))
         by_speed = self._among_free(of_rates.by_speed)
         return Variations(
             state, found.accelerations[free][chosen],
             (by_displacement @ N + by_speed @ T)[chosen], (by_speed @ N)[chosen],
             (of_rates.by_time[free] + by_displacement @ carried + by_speed @ hurried)[chosen],
-            self._transport(state.u)[chosen] @ N, motion[:, free] @ N, N.T @ left.mass @ N, chosen,
+            self._transport(state.u)[chosen] @ N, found.motion[:, free] @ N, N.T @ left.mass @ N, chosen,
             self.movable(chosen),
             np.block([[N, np.zeros((n, f))], [T, N]]),
         )  # fmt: skip

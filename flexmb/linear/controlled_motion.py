@@ -22,18 +22,17 @@ from flexmb.control.feedback import Feedback
 from flexmb.control.law_derivatives import LawDerivatives, law_derivatives
 from flexmb.control.loop_run import FreshStart
 from flexmb.linear.equations import built
-from flexmb.linear.sensed import ChangedRow, sensed
+from flexmb.linear.sensed import ChangedRow, readable, sensed
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.closed import ClosedSystem
 from flexmb.system.derivative_records import EvaluationDerivatives, OfControlledMotion, by_names
 from flexmb.system.derivatives import FreeRow, free_row
-from flexmb.system.kinks import NotDifferentiableError
 from flexmb.system.tree_system import System
 from flexmb.tables.arguments import finite, vector
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
-from flexmb.typing import Flags, Real
+from flexmb.typing import Real
 
 LARGE = 2.0**20
 """Change of a drive, whose effect is linear: large, so that the rounding of other loads is negligible."""
@@ -126,7 +125,7 @@ class ControlledMotion:
         seen = sensed(plant, ChangedRow(row.value, row.change, moving))
         seen[:, -1] += feedback.rates_of_time(state.t)
         said = sensed(plant, ChangedRow(row.value, by_drive, still))
-        seen, said = self._read(laws, seen), self._read(laws, said)
+        seen, said = readable(laws.by_signal, seen), readable(laws.by_signal, said)
 
         def through(of: Real, by_state: Real, by_time: Real) -> Real:
             """Derivatives along z, then by x, of what reads signals that change so along z."""
@@ -166,16 +165,6 @@ class ControlledMotion:
         row = np.empty(self._plant.observation.width)
         self._plant.observe_row(state.t, np.concatenate([state.q, state.u, [0.0]]), "articulated", row)
         return row
-
-    def _read(self, laws: LawDerivatives, change: Real) -> Real:
-        """The change of signals, without those of loads that the motion leaves open, which no law may read."""
-        is_open: Flags = np.any(~np.isfinite(change), axis=1)
-        if np.any(laws.by_signal[:, is_open]):
-            raise NotDifferentiableError(
-                "a controller reads a load that the motion does not determine, because closures are redundant: let it "
-                "read another one"
-            )
-        return np.where(is_open[:, None], 0.0, change)
 
 
 class _At(NamedTuple):

@@ -32,7 +32,15 @@ def equations_of(system: System, like: Equations | None = None) -> Equations:
     """The equations of a tree or a closed chain; NotImplementedError for closures on bodies of level "ruthless".
 
     like: equations of the same scene with other numbers, which are not used meanwhile; their workspaces are reused.
+    Without it those of a system are kept.
     """
+    if like is not None:
+        return _made(system, like)
+    kept: Equations | None = system.kept.get("equations")
+    return kept or cast(Equations, system.kept.setdefault("equations", _made(system, None)))
+
+
+def _made(system: System, like: Equations | None) -> Equations:
     if not isinstance(system, ClosedSystem):
         return Equations(system, None, like)
     from flexmb.linear.closed_variations import ClosedEquations  # imported only for scenes with closures

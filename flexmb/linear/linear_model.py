@@ -86,6 +86,9 @@ class Stability:
         return f"{self.verdict}: {found}"
 
 
+_OUTPUTS = ("C", "D")  # what may be NaN
+
+
 @dataclass(frozen=True, eq=False)
 class LinearModel:
     """x' = A x + B f, y = C x + D f about `state`, x = [xi; du]: displacements (n,) and changes of the speeds (n,).
@@ -93,7 +96,7 @@ class LinearModel:
     Names and units: `states` (2n), `inputs` (loads of hinges and wheels along their free speeds), `outputs` (the
     states, then displacement and rotation vector of every marker, World axes, then what sensors say). mass (n,n): mass
     matrix. motion (nq,n): dq = motion xi. rates (n,): udot at `state`, zero in an equilibrium; drift (n,): its explicit
-    derivative by time.
+    derivative by time. Rows of C and D are NaN where a sensor reads a load that redundant closures leave undetermined.
 
     For a closed chain the states are the independent coordinates and their speeds. The dependent ones follow the states
     among the outputs, and `motion` includes both.
@@ -120,7 +123,7 @@ class LinearModel:
         self._refuse_torn()
         for name in self._shapes:
             own = np.array(getattr(self, name), float)
-            arguments.finite(name, own)
+            arguments.finite(name, np.where(np.isnan(own), 0.0, own) if name in _OUTPUTS else own)
             own.flags.writeable = False
             object.__setattr__(self, name, own)
 
@@ -196,23 +199,26 @@ class LinearModel:
     def frequency_response(self, input: str, omega: ArrayLike, outputs: tuple[str, ...] = ()) -> Complex:
         """Response (W, outputs) of all, or the named, outputs to a unit harmonic load at each omega (rad/s).
 
-        (i omega - A) x = B f solved at each frequency: no modes are left out. KeyError for names that do not exist,
-        ValueError at an undamped resonance and for frequencies that are not finite, TypeError for anything that is not
-        a number.
+        y = C x + D f with (i omega - A) x = B f solved at each frequency: no modes are left out. KeyError for names
+        that do not exist, ValueError at an undamped resonance and for frequencies that are not finite, TypeError for
+        anything that is not a number.
         """
         self._refuse_torn()
-        b = self.B[:, _place(self.inputs, input, "input")]
+        column = _place(self.inputs, input, "input")
+        b = self.B[:, column]
         rows = [_place(self.outputs, name, "output") for name in outputs] or list(range(len(self.outputs)))
         frequencies = arguments.finite("omega", np.atleast_1d(arguments.array("omega", omega)))
         if frequencies.ndim != 1:
             raise ValueError(f"omega: give frequencies in a row, not an array of shape {frequencies.shape}")
         out, unit = np.empty((len(frequencies), len(rows)), complex), np.eye(len(self.A))
+        C, d = self.C[rows], self.D[rows, column]
+        known = ~np.isnan(C).any(axis=1)
         for i, frequency in enumerate(frequencies):
             try:
-                out[i] = self.C[rows] @ np.linalg.solve(1j * frequency * unit - self.A, b)
+                out[i] = C @ np.linalg.solve(1j * frequency * unit - self.A, b) + d
             except np.linalg.LinAlgError:
                 out[i] = np.inf
-            if not np.isfinite(out[i]).all():
+            if not np.isfinite(out[i][known]).all():
                 raise ValueError(f"omega = {frequency:g} rad/s is an undamped resonance: nothing is finite")
         return out
 

@@ -10,6 +10,7 @@ from flexmb.linear.equations import built, entering
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, Variations
 from flexmb.scene.schema import Scene
+from flexmb.system.pushforward import Directions
 from flexmb.system.tree_system import System
 from flexmb.system.watches import WatchedStates, of_states, warn
 from flexmb.tables.state import DynamicsError, State
@@ -135,15 +136,11 @@ def _markers(equations: Equations, at: Variations) -> tuple[list[tuple[str, str]
     names = [(f"{marker.name}.{label}", unit) for marker in system.scene.markers for label, unit in labels]
     rows = np.zeros((len(names), 2 * n))
     if names:
-        driven = _velocities(system, state, np.zeros(system.nu))
-        for i, column in enumerate(at.basis.T):
-            u = np.zeros(system.nu)
-            u[equations.free] = column
-            rows[:, i] = _velocities(system, state, u) - driven
+        speeds = np.zeros((system.nq + system.nu, n))
+        speeds[system.nq + equations.free] = at.basis
+        push, motion = equations.pushforward, equations.motion(state)
+        still = Directions(speeds, np.zeros((system.nu, n)), np.zeros((len(motion.loads), n)), np.zeros(n))
+        place, shape = system.observation.columns["markers"]
+        change = push.derivatives(motion, still, push.row)[place].reshape(*shape, n)
+        rows[:, :n] = np.concatenate([change[:, 15:18], change[:, 12:15]], axis=1).reshape(-1, n)
     return names, rows
-
-
-def _velocities(system: System, state: State, u: Real) -> Real:
-    """(6 K,) of all markers, [linear; angular]."""
-    found = system.evaluate(state.t, state.q, u).markers.values()
-    return np.concatenate([np.roll(marker.velocity, 3) for marker in found])

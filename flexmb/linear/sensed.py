@@ -21,9 +21,10 @@ from flexmb.scene.control import (
     Sensor,
     TimeSensor,
 )
+from flexmb.system.kinks import NotDifferentiableError
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError
-from flexmb.typing import Real
+from flexmb.typing import Flags, Real
 
 _PLACES = {
     "position": slice(0, 3), "angular_velocity": slice(12, 15), "velocity": slice(15, 18),
@@ -47,6 +48,20 @@ def sensed(system: System, at: ChangedRow) -> Real:
     """(S,k) change of all sensor signals, in the order of the scene."""
     rows = [np.zeros((0, at.change.shape[1])), *(_change(system, each, at) for each in system.scene.sensors)]
     return np.concatenate(rows)
+
+
+def readable(laws: Real, change: Real) -> Real:
+    """The change (S,k) of signals that laws read by (m,S), without those of loads that the motion leaves open.
+
+    `NotDifferentiableError` if a law reads one of these.
+    """
+    is_open: Flags = np.any(~np.isfinite(change), axis=1)
+    if np.any(laws[:, is_open]):
+        raise NotDifferentiableError(
+            "a controller reads a load that the motion does not determine, because closures are redundant: let it "
+            "read another one"
+        )
+    return np.where(is_open[:, None], 0.0, change)
 
 
 def sensor_names(system: System) -> Iterator[tuple[str, str]]:

@@ -16,21 +16,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from flexmb.entry import articulated
-from flexmb.entry.derivatives import DerivativeWorkspace, derivative_workspace, inverse_dynamics_derivatives, jacobian
-from flexmb.entry.tangent import TangentWorkspace, tangent_workspace, time_derivative
+from flexmb.entry.derivatives import DerivativeWorkspace, derivative_workspace, inverse_dynamics_derivatives
+from flexmb.entry.tangent import TangentWorkspace, tangent_workspace
+from flexmb.entry.variation import FreeVariation, TreeVariation
 from flexmb.scene.functions import Constant, Function, Ramp
+from flexmb.system.pushforward import GivenMotion, Pushforward, pushforward
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.functions import pack as pack_functions
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, pack
 from flexmb.tables.workspaces import workspace
-from flexmb.typing import Index, Real, Record
+from flexmb.typing import Flags, Index, Real, Record
+
+if TYPE_CHECKING:
+    from flexmb.closure.tables import ClosureConstants
+    from flexmb.closure.variation import ChainVariation
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,17 +125,43 @@ class Equations:
         system = self.system
         return system.own_workspace if self._as_system else workspace(self.constants, system.nq, system.nu)
 
-    @property
-    def tangent_tables(self) -> tuple[Any, ...]:
-        """Constants and workspaces of kernels for dual numbers."""
-        return self.constants, self._w
+    @per_thread
+    def _free(self) -> TreeVariation | ChainVariation:
+        return TreeVariation(self.constants, self._derivatives, self._w, self._real_w, self.system.check_status)
 
-    def check(self, status: int) -> None:
-        """DynamicsError unless a status of these kernels is OK."""
-        self.system.check_status(status, int(self._w.fault[0]))
+    @per_thread
+    def pushforward(self) -> Pushforward:
+        """Derivatives of everything observable along directions."""
+        tables = self.constants, self._w, self.system.observation.out
+        return pushforward(*tables, self.system.check_status, self.closures)
+
+    @property
+    def closures(self) -> ClosureConstants | None:
+        """The tables of closures, None of a tree."""
+        return None
+
+    def free_variation(self, state: State) -> FreeVariation:
+        """How all accelerations change; DynamicsError where these do not exist."""
+        found = self._free.at(state.t, pack(state))
+        if self._free.doubt[0]:
+            self.system.digits_left(state)  # raises if pivots are at rounding level
+        return found
+
+    def motion(self, state: State) -> GivenMotion:
+        """The motion with its accelerations, and the loads of rows; DynamicsError where these do not exist."""
+        y = pack(state)
+        status = articulated.accelerations(state.t, y, self.constants, self._real_w)
+        self.system.check_status(status, int(self._real_w.fault[0]))
+        return GivenMotion(state.t, y, self._real_w.speed["acceleration"].copy(), np.zeros(0))
+
+    def undetermined(self, state: State) -> Flags:
+        """Which entries of a row (E,) of everything observable the motion does not determine."""
+        return np.zeros(self.system.observation.width, bool)
 
     def held(self, t: float) -> Equations:
         """The same equations with every function of time held at its value at time t (s)."""
+        if not len(self.constants.function):
+            return self
         return self.with_functions(self.constant_functions(t))
 
     def spinning(self, speed: int, rate: float, state: State) -> Equations:
@@ -154,9 +186,7 @@ class Equations:
 
     def rates(self, state: State) -> Real:
         """udot (n,) of the free speeds; DynamicsError where they do not exist."""
-        status = articulated.accelerations(state.t, pack(state), self.constants, self._real_w)
-        self.system.check_status(status, int(self._real_w.fault[0]))
-        return self._real_w.speed["acceleration"][self.free]
+        return self.motion(state).accelerations[self.free]
 
     def turns(self, state: State) -> Real:
         """Angular velocities (N,3) rad/s of the bodies' frames, in their own axes."""
@@ -194,19 +224,12 @@ class Equations:
 
     def variations(self, state: State) -> Variations:
         """Exact derivatives at a state; DynamicsError where the accelerations do not exist."""
-        nq, n, y = self.system.nq, len(self.free), pack(state)
-        everything = np.arange(n)
-        J, drift = np.empty((len(y), len(y))), np.empty(len(y))
-        w = self._derivatives
-        self.system.check_status(jacobian(state.t, y, J, self.constants, w), int(w.fault[0]))
-        if w.doubt[0]:
-            self.system.digits_left(state)  # raises if pivots are at rounding level
-        rates = w.sweeps.speed["acceleration"][self.free]
-        self.system.check_status(time_derivative(state.t, y, drift, self.constants, self._w), int(self._w.fault[0]))
-        rows, motion = J[nq + self.free], J[:nq, nq + self.free]
+        found, free, n = self.free_variation(state), self.free, len(self.free)
+        of_rates, everything, both = found.of_accelerations, np.arange(n), np.ix_(free, free)
         return Variations(
-            state, rates, rows[:, :nq] @ motion, rows[:, nq + self.free], drift[nq + self.free],
-            self._transport(state.u), motion, self.mass(state), everything, self.movable(everything), np.eye(2 * n),
+            state, found.accelerations[free], of_rates.by_displacement[both], of_rates.by_speed[both],
+            of_rates.by_time[free], self._transport(state.u), found.motion[:, free], self.mass(state), everything,
+            self.movable(everything), np.eye(2 * n),
         )  # fmt: skip
 
     def moved(self, at: Variations, xi: Real) -> State:

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from flexmb.closure.closures import Closures
 from flexmb.closure.derivative_call import ChainDerivativeCall, chain_derivative_call, differentiate_chain
-from flexmb.closure.given_motion import observe_given, rows_tangent
 from flexmb.closure.tables import Closed
 from flexmb.closure.variation import ChainVariation
-from flexmb.entry.given_motion import motion_tangent
-from flexmb.entry.observed_tangent import outputs_tangent
-from flexmb.entry.variation import FreeVariation
-from flexmb.jit.direct import direct
-from flexmb.jit.pointer import STATUS
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.system.derivative_evaluator import DerivativeEvaluator, DerivativeRoute, fresh_derivative_evaluator
 from flexmb.system.derivatives import INSTEAD, DifferentiableMotion
-from flexmb.system.pushforward import Pushforward
+from flexmb.system.pushforward import Pushforward, pushforward
 from flexmb.tables.per_thread import per_thread
-from flexmb.tables.state import State, finite_result
+from flexmb.tables.state import State
 from flexmb.typing import Real
 
 
@@ -46,25 +38,14 @@ class ChainDerivatives(DifferentiableMotion):
         self._determine_rows("system.derivative_evaluator")
         return fresh_derivative_evaluator(self, self.refusal, _OF_CHAINS)
 
-    def _variation(self, t: float, y: Real) -> FreeVariation:
-        found = self._chain_variation.at(t, y)
-        self.check_precision(t, y, self._chain_variation)
-        of_rates, of_loads = found.of_accelerations, found.rows.of_loads
-        for part in (found.accelerations, *of_rates, *of_loads):
-            finite_result(part, t)
-        return FreeVariation(found.accelerations, of_rates, self._coordinate_motion(t, y), found.rows)
-
     @per_thread
-    def _chain_variation(self) -> ChainVariation:
+    def _variations(self) -> ChainVariation:
         return ChainVariation(self.closures, self.own_tangent)
 
     @per_thread
     def _pushforward(self) -> Pushforward:
-        own = self.closures.constants[1]
-        x, out = motion_tangent(self.nq, self.nu), outputs_tangent(self.observation.out)
-        tables, rows = (x, self.constants, self.own_tangent, out), rows_tangent(own, self.constants)
-        observe = direct(observe_given, STATUS, *tables[:3], own, rows, out)
-        return Pushforward(tables, rows, observe, self.check_status)
+        tables = self.constants, self.own_tangent, self.observation.out
+        return pushforward(*tables, self.check_status, self.closures.constants[1])
 
     @property
     def _row_count(self) -> int:

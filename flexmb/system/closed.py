@@ -237,9 +237,7 @@ class ClosedSystem(ChainDerivatives, System):
         self.observe_motion(t, y, motion.accelerations, motion.drives, motion.hinges)
         row = self.observation.row(t, motion.closures)
         if motion.spread is not None:
-            parts, spread = self.observation.columns_of(row[None]), motion.spread
-            for name, changes in (("loads", spread.hinges), ("closures", spread.closures), ("drives", spread.drives)):
-                parts[name][0][spread.leaves_open(changes)] = np.nan
+            row[self.observation.undetermined(motion.spread.open_parts)] = np.nan
         return row
 
     def _motion_or_across(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:

@@ -8,22 +8,15 @@ linear equations is solved for. `docs/derivatives.md` says what is held fixed.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, NamedTuple, TypeVar, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
 import numpy as np
 
-from flexmb.entry.derivatives import (
-    DerivativeWorkspace,
-    acceleration_derivatives,
-    derivative_workspace,
-    inverse_dynamics_derivatives,
-)
-from flexmb.entry.given_motion import motion_tangent, observe_given
-from flexmb.entry.observed_tangent import outputs_tangent
-from flexmb.entry.tangent import TangentWorkspace, tangent_workspace, time_derivative
-from flexmb.entry.variation import ByAllDirections, FreeVariation, RowChanges, coordinate_motion
+from flexmb.entry.derivatives import DerivativeWorkspace, derivative_workspace, inverse_dynamics_derivatives
+from flexmb.entry.tangent import TangentWorkspace, tangent_workspace
+from flexmb.entry.variation import ByAllDirections, FreeVariation, TreeVariation
 from flexmb.jit.direct import Direct, direct
-from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
+from flexmb.jit.pointer import MATRIX, REAL, VECTOR, VOID
 from flexmb.kept import kept
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.sizes import refuse_large_matrix
@@ -41,11 +34,14 @@ from flexmb.system.evaluator import Refusal
 from flexmb.system.free_motion import FreeMotion
 from flexmb.system.kinks import has_corners, refuse_kinks
 from flexmb.system.load_axes import Axes, referred
-from flexmb.system.pushforward import Directions, GivenMotion, Pushforward
+from flexmb.system.pushforward import Directions, GivenMotion, Pushforward, pushforward
 from flexmb.system.section_loads import SectionBalance
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Flags, Index, Real
+
+if TYPE_CHECKING:
+    from flexmb.closure.variation import ChainVariation
 
 _Four = TypeVar("_Four", OfFreeMotion, OfGivenMotion)
 INSTEAD = "have the controllers chained through by flexmb.ControlledMotion(scene)"
@@ -92,7 +88,7 @@ class DifferentiableMotion(FreeMotion):
             finite_result(part, t)
         return InverseDynamicsDerivatives(
             self.inverse_dynamics(state, rates), by_displacement, by_speed, M, self._inverse_by_time(t, y, rates),
-            self._coordinate_motion(t, y),
+            self._variations.motion.at(t, y),
         )  # fmt: skip
 
     @overload
@@ -150,29 +146,16 @@ class DifferentiableMotion(FreeMotion):
 
     def _variation(self, t: float, y: Real) -> FreeVariation:
         """How the free motion changes."""
-        w, nu = self.own_derivatives, self.nu
-        by_displacement, by_speed, by_force = (np.empty((nu, nu)) for _ in range(3))
-        self.check_status(self._differentiate(t, y, by_displacement, by_speed, by_force), int(w.fault[0]))
-        accelerations = finite_result(w.sweeps.speed["acceleration"].copy(), t)
-        self.check_precision(t, y, w)
-        for part in (by_displacement, by_speed, by_force):
+        found = self._variations.at(t, y)
+        self.check_precision(t, y, self._variations)
+        for part in (found.accelerations, *found.of_accelerations, *found.rows.of_loads):
             finite_result(part, t)
-        of_rates = ByAllDirections(by_displacement, by_speed, by_force, self._by_time(t, y))
-        return FreeVariation(accelerations, of_rates, self._coordinate_motion(t, y), self._no_rows)
+        return found
 
-    @kept
-    def _no_rows(self) -> RowChanges:
-        """What a `FreeVariation` has of the rows of closures, in a tree."""
-        none, loads = np.zeros((0, self.nu)), np.zeros(0)
-        return RowChanges(loads, ByAllDirections(none, none, none, loads), np.zeros(0, np.int64), np.zeros((0, 0)))
-
-    def _by_time(self, t: float, y: Real) -> Real:
-        """Explicit derivatives (nu,) of the accelerations by time."""
-        if not len(self.constants.function):
-            return np.zeros(self.nu)
-        drift = np.empty_like(y)
-        self.check_status(self._differentiate_by_time(t, y, drift), int(self.own_tangent.fault[0]))
-        return finite_result(drift[self.nq : -1], t)
+    @per_thread
+    def _variations(self) -> TreeVariation | ChainVariation:
+        w = self.own_derivatives, self.own_tangent, self.own_workspace
+        return TreeVariation(self.constants, *w, self.check_status)
 
     def _inverse_by_time(self, t: float, y: Real, rates: Real) -> Real:
         """The same of inverse dynamics at these accelerations (nu,)."""
@@ -185,9 +168,7 @@ class DifferentiableMotion(FreeMotion):
 
     @per_thread
     def _pushforward(self) -> Pushforward:
-        x, out = motion_tangent(self.nq, self.nu), outputs_tangent(self.observation.out)
-        tables = x, self.constants, self.own_tangent, out
-        return Pushforward(tables, None, direct(observe_given, STATUS, *tables), self.check_status)
+        return pushforward(self.constants, self.own_tangent, self.observation.out, self.check_status)
 
     @property
     def _row_count(self) -> int:
@@ -221,26 +202,10 @@ class DifferentiableMotion(FreeMotion):
         return derivative_workspace(self.constants, self.nq, self.nu)
 
     @per_thread
-    def _differentiate(self) -> Direct:
-        """(t, y, by_displacement, by_speed, by_force)."""
-        tables = self.constants, self.own_derivatives
-        return direct(acceleration_derivatives, STATUS, REAL, VECTOR, MATRIX, MATRIX, MATRIX, *tables)
-
-    @per_thread
     def _differentiate_inverse(self) -> Direct:
         """(t, y, rates, by_displacement, by_speed, by_acceleration)."""
         tables = self.constants, self.own_derivatives
         return direct(inverse_dynamics_derivatives, VOID, REAL, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, *tables)
-
-    @per_thread
-    def _move(self) -> Direct:
-        """(t, y, N)."""
-        return direct(coordinate_motion, VOID, REAL, VECTOR, MATRIX, self.constants, self.own_workspace)
-
-    @per_thread
-    def _differentiate_by_time(self) -> Direct:
-        """(t, y, out)."""
-        return direct(time_derivative, STATUS, REAL, VECTOR, VECTOR, self.constants, self.own_tangent)
 
     # Directions
 
@@ -272,21 +237,6 @@ class DifferentiableMotion(FreeMotion):
         if self.has_corners:
             self._inverse(t, y, np.zeros(self.nu))  # evaluates the connectors
             refuse_kinks(self, self.own_workspace)
-
-    def _coordinate_motion(self, t: float, y: Real) -> Real:
-        """N (nq,nu): derivatives of dq/dt by the speeds, constant where there are no quaternions."""
-        if not len(self.layout.quaternions):
-            return self._constant_motion
-        N = np.zeros((self.nq, self.nu))
-        self._move(t, y, N)
-        return N
-
-    @per_thread
-    def _constant_motion(self) -> Real:
-        N = np.zeros((self.nq, self.nu))
-        self._move(0.0, self._at_start, N)
-        N.flags.writeable = False
-        return N
 
     def _free_row(self, t: float, y: Real) -> FreeRow:
         """Everything observable of the free motion; NaN where this does not determine it."""
@@ -339,7 +289,7 @@ class DifferentiableMotion(FreeMotion):
 
     def _as_given(self, t: float, y: Real, rates: Real) -> tuple[GivenMotion, Directions]:
         """A motion with these accelerations, and its changes by displacements, speeds, accelerations and time."""
-        directions = self._directions(self._coordinate_motion(t, y), self.nu)
+        directions = self._directions(self._variations.motion.at(t, y), self.nu)
         directions.accelerations[:, 2 * self.nu : -1] = np.eye(self.nu)
         return GivenMotion(t, y, rates, np.zeros(0)), directions
 

@@ -13,7 +13,7 @@ from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.tables.named import parts_of
 from flexmb.tables.state import finite_result
-from flexmb.typing import Index, Real
+from flexmb.typing import Flags, Index, Real
 
 ENERGIES = ("kinetic", "strain", "spring", "gravity")
 
@@ -124,6 +124,13 @@ class Observation:
     def columns_of(self, rows: Real) -> dict[str, Real]:
         """Parts of rows (T,width) by the names in `columns`, (T, ...) each, which are views."""
         return {name: rows[:, place].reshape(len(rows), *shape) for name, (place, shape) in self.columns.items()}
+
+    def undetermined(self, parts: Mapping[str, Flags]) -> Flags:
+        """Which entries of a row (width,) are undetermined, from those of some of its parts."""
+        found = np.zeros(self.width, bool)
+        for name, is_open in parts.items():
+            found[self.columns[name][0]] = is_open.ravel()
+        return found
 
     def evaluation(self, row: Real) -> Evaluation:
         """A row (width,) by the names of the scene; arrays are parts of it."""

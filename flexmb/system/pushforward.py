@@ -11,12 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.closure.given_motion import RowsTangent
-from flexmb.entry.given_motion import MotionTangent
-from flexmb.entry.observed_tangent import OutputsTangent
+from flexmb.closure import given_motion as of_chains
+from flexmb.closure.given_motion import RowsTangent, rows_tangent
+from flexmb.closure.tables import ClosureConstants
+from flexmb.entry import given_motion as of_trees
+from flexmb.entry.given_motion import MotionTangent, motion_tangent
+from flexmb.entry.observation import Outputs
+from flexmb.entry.observed_tangent import OutputsTangent, outputs_tangent
 from flexmb.entry.tangent import TangentWorkspace
-from flexmb.jit.direct import Direct
+from flexmb.jit.direct import Direct, direct
 from flexmb.jit.lanes import LANES
+from flexmb.jit.pointer import STATUS
 from flexmb.tables.arrays import Constants
 from flexmb.typing import Real
 
@@ -39,6 +44,22 @@ class Directions(NamedTuple):
     time: Real
 
 
+def pushforward(
+    c: Constants,
+    w: TangentWorkspace,
+    out: Outputs,
+    check: Callable[[int, int], None],
+    closures: ClosureConstants | None = None,
+) -> Pushforward:
+    """Of a tree, or of a chain with closures, for one thread; `out`: outputs of the shapes and markers wanted."""
+    x, outputs = motion_tangent(len(w.q), len(w.u)), outputs_tangent(out)
+    tables = x, c, w, outputs
+    if closures is None:
+        return Pushforward(tables, None, direct(of_trees.observe_given, STATUS, *tables), check)
+    rows = rows_tangent(closures, c)
+    return Pushforward(tables, rows, direct(of_chains.observe_given, STATUS, x, c, w, closures, rows, outputs), check)
+
+
 class Pushforward:
     """The tables in dual numbers of one thread, and the kernel (): everything observable of the motion in them."""
 
@@ -57,7 +78,7 @@ class Pushforward:
         slice of the last axis of arrays of duals, whose first entry is the value. DynamicsError for connectors beyond
         their range."""
         found = []
-        for first in range(0, len(directions.time), LANES):
+        for first in range(0, max(1, len(directions.time)), LANES):
             some = slice(first, min(first + LANES, len(directions.time)))
             lanes = slice(1, 1 + some.stop - some.start)
             self._set(at, directions, some, lanes)
@@ -65,9 +86,16 @@ class Pushforward:
             found.append(np.array(read(lanes)))
         return np.hstack(found)
 
+    def value(self, at: GivenMotion) -> Real:
+        """The row (E,) of a motion."""
+        sizes = len(self.x.state) - 1, len(at.accelerations), len(at.loads)
+        self.derivatives(at, Directions(*(np.zeros((n, 0)) for n in sizes), np.zeros(0)), self.row)
+        return self.row(slice(0, 1))[:, 0]
+
     def row(self, lanes: slice) -> Real:
         """(E,lanes) of a row of observed quantities, laid out as `flexmb.system.observables.Observation.columns`."""
-        closures = [] if self.rows is None else [self.rows.loads[..., lanes].reshape(-1, lanes.stop - lanes.start)]
+        loads = None if self.rows is None else self.rows.loads
+        closures = [] if loads is None else [loads[..., lanes].reshape(6 * len(loads), lanes.stop - lanes.start)]
         return np.concatenate([self.out.every[:, lanes], self.out.drives[:, lanes], *closures])
 
     def balance(self, lanes: slice) -> Real:

@@ -36,7 +36,6 @@ WRITERS = {
 }
 # In workspaces of dual numbers, which take what acts in the chain, and change it along every direction.
 OF_DUALS = {
-    "closure/observed_tangent.py": {"closed_observed_jacobian"},
     "closure/tangent.py": {"change_by_time", "evaluate_held", "_hold_rows"},
     "sensitivity/chain.py": {"under_loads"},
 }

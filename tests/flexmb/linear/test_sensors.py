@@ -105,7 +105,18 @@ def test_by_the_state_as_runs_beside_it_say(make: Any) -> None:
 
         found, _ = spectral.at_zero(np.array([beside(x) for x in spectral.times(SPAN)]), SPAN)
         known = determined(scene, found)
+        np.testing.assert_array_equal(np.isnan(C).all(axis=1), ~known)
         assert np.max(np.abs((C @ z - found)[known])) <= DIFFERENCED * np.max(np.abs(found[known]))
+
+
+def test_loads_and_accelerations_answer_a_harmonic_load_at_once() -> None:
+    """Far above all resonances a response is that of a rigid push, D; without D it would vanish."""
+    model = fm.linearize(tree())
+    names = [name for name, _ in model.outputs]
+    j = [name for name, _ in model.inputs].index("elbow.rotation")
+    found = model.frequency_response("elbow.rotation", [1e9])
+    pushed = names.index("load elbow[4]")
+    assert found[-1][pushed] == pytest.approx(model.D[pushed, j], rel=1e-6) and abs(model.D[pushed, j]) > 1e-3
 
 
 @pytest.mark.parametrize(("make", "hinge"), [(tree, "elbow"), (four_bar, "pin")])
