@@ -142,5 +142,5 @@ def _markers(equations: Equations, at: Variations) -> tuple[list[tuple[str, str]
         still = Directions(speeds, np.zeros((system.nu, n)), np.zeros((len(motion.loads), n)), np.zeros(n))
         place, shape = system.observation.columns["markers"]
         change = push.derivatives(motion, still, push.row)[place].reshape(*shape, n)
-        rows[:, :n] = np.concatenate([change[:, 15:18], change[:, 12:15]], axis=1).reshape(-1, n)
+        rows[:, :n] = np.concatenate([change[:, 15:18], change[:, 12:15]], axis=1).reshape(len(names), n)
     return names, rows

@@ -8,7 +8,7 @@ function does: at x + a x^(1/3) to exp(-(2 sqrt(2) / 3) a^(3/2)) (Abramowitz & S
 from __future__ import annotations
 
 from itertools import pairwise
-from math import ceil, hypot, log, sqrt
+from math import ceil, hypot, inf, log, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +50,8 @@ def turn_between(left: Vector, right: Vector, length: float) -> float:
 def turns_of_pieces(body: BeamBody) -> list[RestTurn]:
     """The parts of the pieces of a beam that turn at rest."""
     ends, found = edges(body), list[RestTurn]()
+    if not 0.0 < body.length_m < inf:
+        return found  # a defect of its own
     for left, right in pairwise(body.stations):
         curvatures = hypot(*left.curvature_1_m), hypot(*right.curvature_1_m)
         if not any(curvatures) or not left.x_m < right.x_m:

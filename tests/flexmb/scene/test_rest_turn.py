@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+import flexmb as fm
 from flexmb.modal.exact import exact_model
 from flexmb.modal.strain_field import strain_field
 from flexmb.scene import schema as s
@@ -95,3 +96,11 @@ def test_points_that_the_check_asks_for_are_enough():
     enough = int(few.remedy.rpartition("= ")[2])
     assert enough == points_of_piece(body_of(coil(3, 11))) and "few_points" not in doubts(3, 11, enough)
     assert "cut it into more" in doubts(40, 12, 30)["few_polynomials"].remedy
+
+
+@pytest.mark.parametrize("length", [0.0, -0.0, -1.0, 1e-308])
+def test_a_length_that_is_none_is_refused_by_name(length: float) -> None:
+    """Before turns and points are estimated for it."""
+    scene = coil(2, 6).weld("clamp", "ground", "rod").scene()
+    with pytest.raises(fm.SceneError, match=r"length_m|stations cover"):
+        check_scene(replace(scene, bodies=(replace(scene.bodies[0], length_m=length),)))
