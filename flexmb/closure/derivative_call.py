@@ -62,13 +62,10 @@ class ChainDerivativeCall:
 def chain_derivative_call(closures: Closures, nq: int, nu: int) -> tuple[Closed, ChainDerivativeCall]:
     """What `differentiate_chain` takes after t and y, of closures with counted independent rows; one per thread."""
     chain = closures.chain("articulated")
-    return chain, derivatives_of(chain, nq, nu)
-
-
-def derivatives_of(chain: Closed, nq: int, nu: int) -> ChainDerivativeCall:
-    """The bundle of results of a chain."""
-    results = (np.zeros((nu, nu)) for _ in range(4))
-    return ChainDerivativeCall(*results, np.zeros((len(chain.cc.row), nu)), chain_jacobian(chain, nq, nu))
+    by_displacement, by_speed, by_force, unit = (np.zeros((nu, nu)) for _ in range(4))
+    of_loads = np.zeros((len(chain.cc.row), nu))
+    x = ChainDerivativeCall(by_displacement, by_speed, by_force, unit, of_loads, chain_jacobian(chain, nq, nu))
+    return chain, x
 
 
 @kernel

@@ -106,7 +106,7 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
     before: tuple[LinearModel, Complex] | None = None
     for rate in rates:
         spin = spun(system, hinge, float(rate), guess)
-        model, guess = linear_model(spin.equations, spin.state), spin.state
+        model, guess = linear_model(*spin.moving), spin.state
         turning.append(spin.moving)
         found, current = _spectrum(model)
         if before is None:

@@ -81,8 +81,7 @@ class ClosedEquations(Equations):
 
     @per_thread
     def _free(self) -> ChainVariation:
-        like = None if self._root is self else cast(ChainVariation, self._root._free)
-        return ChainVariation(self._closures, self._w, like)
+        return ChainVariation(self._closures, self._w, None if self._root is self else self._root._free)
 
     @property
     def closures(self) -> ClosureConstants:

@@ -44,15 +44,17 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
         seen = list[tuple[Equations, State]]()
 
         def of_motion(equations: Equations, at: State) -> LinearModel:
+            equations = equations.held(at.t) if held else equations
             seen.append((equations, equations.on_functions(at)))
-            return held_model(equations, at) if held else linear_model(equations, at)
+            return linear_model(*seen[-1])
 
         model = closed_loop(system, state, of_motion)
         warn(looked_at(seen))
         return model
     equations, state = entering(system, state)
     equations = equations.held(state.t) if held else equations
-    warn(looked_at([(equations, equations.on_functions(state))]))
+    state = equations.on_functions(state)
+    warn(looked_at([(equations, state)]))
     return linear_model(equations, state)
 
 
@@ -63,13 +65,13 @@ def looked_at(states: Sequence[tuple[Equations, State]]) -> WatchedStates:
 
 def held_model(equations: Equations, state: State) -> LinearModel:
     """The model with all functions of time held at their values at the state's time."""
-    return linear_model(equations.held(state.t), state)
+    equations = equations.held(state.t)
+    return linear_model(equations, equations.on_functions(state))
 
 
 def linear_model(equations: Equations, state: State) -> LinearModel:
-    """The model of equations whose functions of time are already held or replaced as wanted."""
+    """The model of equations whose functions of time are already held or replaced as wanted, at a state on these."""
     system, free = equations.system, equations.free
-    state = equations.on_functions(state)
     system.refuse_corners(*system.layout.entering(state))
     at, n = equations.variations(state), equations.freedom
     names, units = displacement_names(equations)

@@ -43,7 +43,7 @@ class SteadySpin:
         if not isinstance(self.equations, Equations):
             raise TypeError(f"equations is a {type(self.equations).__name__}: give those of steady_spin")
         self.equations.system.layout.entering(self.state)
-        return linear_model(self.equations, self.state)
+        return linear_model(*self.moving)
 
 
 def steady_spin(system: System | Scene, hinge: str, rate: float, guess: State | None = None) -> SteadySpin:
