@@ -88,8 +88,8 @@ class Pushforward:
 
     def value(self, at: GivenMotion) -> Real:
         """The row (E,) of a motion."""
-        sizes = len(self.x.state) - 1, len(at.accelerations), len(at.loads)
-        self.derivatives(at, Directions(*(np.zeros((n, 0)) for n in sizes), np.zeros(0)), self.row)
+        state, rates, loads = (np.zeros((n, 0)) for n in (len(at.y) - 1, len(at.accelerations), len(at.loads)))
+        self.derivatives(at, Directions(state, rates, loads, np.zeros(0)), self.row)
         return self.row(slice(0, 1))[:, 0]
 
     def row(self, lanes: slice) -> Real:
