@@ -5,21 +5,21 @@ The columns are solved in blocks of strips. What passes from body to body is six
 along a stretch of the tree these numbers stay in registers; only where the tree forks they are stored.
 """
 
-from flexmb.jain.derivatives import solve_bodies, solve_single
+from flexmb.jain.derivatives import solve_bodies
 from flexmb.jain.derivatives.hinges import force_to_world
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.spatial_vector import store6, vec6
 from flexmb.spatial.vector import mat3, vec3
-from flexmb.tables.features import MODES, SEVERAL, WHEELS
+from flexmb.tables.features import MODES
 
 
 @helper
 def solve(c, w, d, columns):
     """Replace the first `columns` columns of `matrix` by -M^-1 times them; rows of prescribed speeds vanish."""
     _gains(c, w, d)
-    for at in range(0, columns, _size(c, d)):
-        _block(c, w, d, at, c.body.shape[0])
+    for at in range(0, columns, solve_bodies.size(d)):
+        solve_bodies.solve_block(c, w, d, at, c.body.shape[0])
 
 
 @helper
@@ -29,33 +29,12 @@ def solve_with_inverse(c, w, d):
     A force on a speed acts on no innovation but its own and those inboard, whose places are before its own.
     """
     _gains(c, w, d)
-    nu, size = w.u.shape[0], _size(c, d)
+    nu, size = w.u.shape[0], solve_bodies.size(d)
     for at in range(0, 3 * nu, size):
         bodies = c.body.shape[0]
         if at >= 2 * nu:
             while d.places[d.order[bodies - 1]].hinge >= at + size - 2 * nu:
                 bodies -= 1
-        _block(c, w, d, at, bodies)
-
-
-@helper
-def _is_lean(c):
-    """Whether every hinge has a single axis, and no body has modes or wheels."""
-    return not (has(c, SEVERAL) or has(c, MODES) or has(c, WHEELS))
-
-
-@helper
-def _size(c, d):
-    """Number of columns of a block."""
-    return solve_single.size(d) if _is_lean(c) else solve_bodies.size(d)
-
-
-@helper
-def _block(c, w, d, at, bodies):
-    """The columns from `at` on, in the rows of the first bodies of the order."""
-    if _is_lean(c):
-        solve_single.solve_block(c, d, at, bodies)
-    else:
         solve_bodies.solve_block(c, w, d, at, bodies)
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexmb.frisch.conversion import from_integrals, to_integrals
 from flexmb.frisch.parameters import mode_parameters
 from flexmb.modal.integrals import modal_integrals
 from tests.bounds import gamma
 from tests.flexmb.frisch import exact
+from tests.flexmb.frisch.conversion import from_integrals, to_integrals
 
 PARTICLES, TURNING = exact.random_body(1, particles=True), exact.random_body(2)
 MIXED = replace(
