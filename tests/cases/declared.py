@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from crosscheck.engines.contract import ENERGIES
+from crosscheck.engines.exudyn import ExudynBeamEngine
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.judging.unjudged import TOLD_BY
 from crosscheck.library.case import TAKES_APART, RunFile, Variant
@@ -57,7 +58,8 @@ class Left:
 def offered(scene: Scene, variant: Variant, engine: str) -> list[str]:
     """Every channel that the engine may offer: names as `crosscheck.engines.signals` gives them.
 
-    Of a body that is taken apart a made-up joint stands for those between its parts.
+    Of a body that is taken apart a made-up joint stands for those between its parts. Exudyn's beams in a plane have
+    neither energies nor momentum, those in space have both.
     """
     joints = [item.name for item in (*scene.hinges, *scene.constraints, *scene.point_masses)]
     joints += [f"{body.name}.between" for body in scene.bodies if variant.transform in TAKES_APART]
@@ -78,7 +80,10 @@ def offered(scene: Scene, variant: Variant, engine: str) -> list[str]:
     found += [f"energy.{kind}" for kind in (*ENERGIES, "total")] + ["momentum.angular", "momentum.linear", "work"]
     found += [f"derivatives.{name}" for name in DERIVATIVES] if "derivatives" in variant.asks else []
     found += [FREQUENCIES] if "frequencies" in variant.asks else []
-    return [name for name in found if most_specific(GIVES_NONE.get(engine, ()), name) is None]
+    none = GIVES_NONE.get(engine, ())
+    if engine == ExudynBeamEngine.name and ExudynBeamEngine().supports(scene).reason.startswith("a planar beam"):
+        none += ("energy", "momentum")
+    return [name for name in found if most_specific(none, name) is None]
 
 
 def _driven(scene: Scene) -> Iterator[str]:
