@@ -26,9 +26,19 @@ from flexmb.kept import kept
 from flexmb.parameters import kernels
 from flexmb.parameters.numbers import Number, numbers
 from flexmb.parameters.plant import Plant
-from flexmb.parameters.spectral import WIDTHS, Derivative, NotSmooth, derivative
+from flexmb.parameters.spectral import WIDTHS, Derivative, NotSmooth, Parts, derivative
 from flexmb.parameters.steady import First, Steady, steady
-from flexmb.parameters.tables import ParameterBlock, Tables, blocks, diagonal, moments, numbers_of, parts, structure
+from flexmb.parameters.tables import (
+    ParameterBlock,
+    Tables,
+    blocks,
+    diagonal,
+    moments,
+    numbers_of,
+    parts,
+    structure,
+    wholes,
+)
 from flexmb.parameters.together import derivatives_together
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
@@ -286,14 +296,15 @@ class _Differentiation:
         """Any of the numbers, for scenes with other values of all."""
         self.tables = _tables(plant, starts)
         self.diagonal = diagonal(self.tables)
-        self._structure, self._parts = structure(self.tables), parts(self.tables, plant.nq)
-        own = numbers_of(self.tables)
+        self._structure, own = structure(self.tables), numbers_of(self.tables)
         self.size = len(own)
         """The count of all floats of the tables; what follows them tells the errors of some of them."""
         integrals = moments(self.tables, self.tables)
         ends = np.cumsum([self.size, *map(len, integrals)]).tolist()
-        self._parts += [slice(first, stop) for first, stop in itertools.pairwise(ends)]
+        sums = [slice(first, stop) for first, stop in itertools.pairwise(ends)]
         self._middle = np.concatenate([own, *integrals])
+        whole = np.r_[wholes(self.tables), np.zeros(ends[-1] - self.size)]
+        self._parts = Parts([*parts(self.tables, plant.nq), *sums], whole)
 
     @property
     def reached(self) -> set[str]:
@@ -344,10 +355,7 @@ class _Differentiation:
             assert self._number is not None  # of which there are values
             return self._at(self._number.scene_with(others))
 
-        sizes = np.zeros(len(self._middle))
-        for part in self._parts:
-            sizes[part] = np.max(np.abs(self._middle[part]), initial=0.0)
-        return steady(tables, self._middle, sizes, values, self._firsts, rates)
+        return steady(tables, self._middle, self._parts.sizes(self._middle), values, self._firsts, rates)
 
     def _with(self, number: Number, values: Mapping[str, float]) -> Real:
         """The tables with other values of a number and of others that belong to the same scene.

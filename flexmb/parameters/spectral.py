@@ -29,6 +29,26 @@ ROUNDING, MAGNIFIED = 1e-11, 2e-14
 NOUGHT = 3.0  # times this rounding: a part whose derivatives are no larger has none, and what is there is noise
 
 
+class Parts(NamedTuple):
+    """Entries (n,) of tables in parts, in each of which errors are relative to its size.
+
+    whole (n,): the size of the table that an entry is in, 0 where each part stands alone. A part whose entries are all
+    rounding beside that is zero: its own size would be that of the noise to be judged by it.
+    """
+
+    places: Sequence[slice | Index]
+    whole: Real | None = None
+
+    def sizes(self, values: Real) -> Real:
+        """(n,) the size of the part of each entry, with these values, or that of its table if the part is zero."""
+        found = np.zeros(len(values))
+        for part in self.places:
+            own = np.max(np.abs(values[part]), initial=0.0)
+            table = 0.0 if self.whole is None else np.max(self.whole[part], initial=0.0)
+            found[part] = own if own > ROUNDING * table else table
+        return found
+
+
 class NotSmooth(ValueError):
     """A function has no derivative, or none that is found to LARGEST; the message says what was met."""
 
@@ -42,9 +62,8 @@ class Derivative(NamedTuple):
 
 
 def derivative(
-    function: Callable[[float], Real], x: float, scale: float, parts: Sequence[slice | Index],
-    first: float = WIDTHS[0],
-) -> Derivative:  # fmt: skip
+    function: Callable[[float], Real], x: float, scale: float, parts: Parts, first: float = WIDTHS[0]
+) -> Derivative:
     """df/dx (n,) at x of a function that returns (n,), or raises ValueError where it is not defined.
 
     scale: size of changes of x that change the function by its own size. Errors are relative to the largest derivative,
@@ -73,9 +92,8 @@ def derivative(
 
 
 def _on_interval(
-    function: Callable[[float], Real], x: float, width: float, middle: Real, scale: float,
-    parts: Sequence[slice | Index], is_hasty: bool,
-) -> tuple[Derivative, bool]:  # fmt: skip
+    function: Callable[[float], Real], x: float, width: float, middle: Real, scale: float, parts: Parts, is_hasty: bool
+) -> tuple[Derivative, bool]:
     """By interpolation on [x - width, x + width]: points are added until the derivative does not change.
 
     Also whether what it still changes by is rounding, which a smaller interval would magnify: twice as many points
@@ -97,9 +115,9 @@ def _on_interval(
         if before is not None:
             # The middle is none of the points: it must lie on the interpolant of the others.
             jump = sum(weight * even[place] for place, weight in zip(places, _rest(intervals), strict=True)) / width
-            rounding = size * (ROUNDING / scale + MAGNIFIED / width)
+            rounding = parts.sizes(size) * (ROUNDING / scale + MAGNIFIED / width)
             earlier = error
-            error = max(_relative(each, now, rounding, parts) for each in (now - before, jump))
+            error = max(_relative(each, now, rounding, parts.places) for each in (now - before, jump))
             is_slow = is_hasty and error ** (INTERVALS[-1] / intervals) > ENOUGH
             if error <= ENOUGH or is_slow or intervals == INTERVALS[-2] and error > HOPELESS:
                 break
@@ -107,9 +125,9 @@ def _on_interval(
     return Derivative(now, error), earlier**2 <= ENOUGH
 
 
-def nought(values: Real) -> float:
-    """The largest derivative, for a change of a number by its scale, that is rounding in a part with these values."""
-    return float(NOUGHT * ROUNDING * np.max(np.abs(values), initial=0.0))
+def nought(sizes: Real) -> Real:
+    """The largest derivatives, for a change of a number by its scale, that are rounding in parts of these sizes."""
+    return NOUGHT * ROUNDING * sizes
 
 
 def _relative(change: Real, derivative: Real, rounding: Real, parts: Sequence[slice | Index]) -> float:

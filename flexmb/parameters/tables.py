@@ -104,6 +104,16 @@ def parts(tables: Tables, coordinates: int) -> list[slice | Index]:
     return found
 
 
+def wholes(tables: Tables) -> Real:
+    """(n,) of each float in that row the size of the largest in its table; zero of the initial state, whose coordinates
+    and speeds are no parts of one."""
+    each, size = list(columns(tables)), dict[str, float]()
+    for column in each:
+        own = float(np.max(np.abs(column.values), initial=0.0)) if column.table != "start" else 0.0
+        size[column.table] = max(size.get(column.table, 0.0), own)
+    return np.repeat([size[column.table] for column in each], [column.values.size for column in each])
+
+
 def moments(tables: Tables, weights: Tables) -> list[Real]:
     """By body, the integrals (k,) sum m a G of the second-order field G of point masses with a = 1, position and mode
     shapes in the tables `weights`.

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from flexmb.parameters.numbers import Number
-from flexmb.parameters.spectral import WIDTHS, Derivative, NotSmooth, derivative, nought
+from flexmb.parameters.spectral import WIDTHS, Derivative, NotSmooth, Parts, derivative, nought
 from flexmb.typing import Flags, Index, Real
 
 Tables = Callable[[Mapping[str, float]], Real]
@@ -21,7 +21,7 @@ Tables = Callable[[Mapping[str, float]], Real]
 
 
 def derivatives_together(
-    tables: Tables, chosen: Sequence[Number], parts: Sequence[slice | Index], by: Callable[[Number], Derivative],
+    tables: Tables, chosen: Sequence[Number], parts: Parts, by: Callable[[Number], Derivative],
     widths: Mapping[str, float],
 ) -> list[Derivative]:  # fmt: skip
     """d tables/dp (n,) for each of these numbers; `by` finds it for one number, or says what is wrong with it. widths:
@@ -64,25 +64,25 @@ def _groups(concerned: Sequence[Flags | None]) -> list[list[int]]:
 
 def _of_group(
     tables: Tables, chosen: Sequence[Number], concerned: Sequence[Flags | None], group: Sequence[int],
-    parts: Sequence[slice | Index], first: float,
+    parts: Parts, first: float,
 ) -> dict[int, Derivative]:  # fmt: skip
     """Derivatives by the numbers of a group, nothing where they are not found together.
 
     Errors are those of each number alone: relative to the largest derivative by it in each part of the tables.
     """
     own = {k: mask for k, mask in enumerate(concerned) if k in group and mask is not None}
-    middle = tables({})
-    places = [np.flatnonzero(_within(mask, part)) for mask in own.values() for part in parts]
+    allowed = nought(parts.sizes(tables({})))
+    places = [np.flatnonzero(_within(mask, part)) for mask in own.values() for part in parts.places]
 
     def at(share: float) -> Real:
         return tables({chosen[k].name: chosen[k].value + share * chosen[k].scale for k in group} if share else {})
 
     try:
-        rates = derivative(at, 0.0, 1.0, [each for each in places if len(each)], first)
+        rates = derivative(at, 0.0, 1.0, parts._replace(places=[each for each in places if len(each)]), first)
     except (NotSmooth, ValueError):
         return {}
     strays = np.where(np.any(list(own.values()), axis=0), 0.0, np.abs(rates.values))
-    if any(np.max(strays[part], initial=0.0) > nought(middle[part]) for part in parts):
+    if any(np.any(strays[part] > allowed[part]) for part in parts.places):
         return {}
     return {
         k: rates._replace(values=np.where(mask, rates.values / chosen[k].scale, 0.0)) for k, mask in own.items()

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexmb.control.wiring import law_numbers, profile_tables, wired
 from flexmb.parameters.numbers import Number
-from flexmb.parameters.spectral import derivative
+from flexmb.parameters.spectral import Parts, derivative
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.events import Impact
@@ -121,7 +121,7 @@ def _by_numbers(
 
     for k, number in enumerate(numbers):
         if number is not None:
-            parts = [slice(i, i + 1) for i in range(len(now))]
+            parts = Parts([slice(i, i + 1) for i in range(len(now))])
             rates = derivative(partial(at, number=number), number.value, number.scale, parts)
             found[:, k] = scales[k] * rates.values
     return found

@@ -11,7 +11,7 @@ from flexmb.modal.flexible import beam_model
 from flexmb.modal.following import followed
 from flexmb.modal.reduce import BeamModes, beam_modes
 from flexmb.modal.stations import inertia_stations, lumps
-from flexmb.parameters.spectral import MAGNIFIED, WIDTHS, derivative
+from flexmb.parameters.spectral import MAGNIFIED, WIDTHS, Parts, derivative
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.shapes import beam_section
@@ -76,7 +76,7 @@ def test_modes_against_fox_and_kapoor(key):
         )
 
     m = len(by_square)
-    found = derivative(numbers, value, value, [slice(0, m), slice(m, None)]).values
+    found = derivative(numbers, value, value, Parts([slice(0, m), slice(m, None)])).values
     # A number of little influence is found less exactly: rounding errors of omega^2 at the points of the interval, the
     # second one for functions as smooth as these. The weights of the derivative at its five points are 0, 2^0.5, -1/2.
     magnified = 2.0 * (np.sqrt(2.0) + 0.5) * MAGNIFIED / WIDTHS[1]

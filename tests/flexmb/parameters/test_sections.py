@@ -7,7 +7,7 @@ import pytest
 
 import flexmb
 from flexmb.modal.flexible import beam_model
-from flexmb.parameters.spectral import derivative
+from flexmb.parameters.spectral import Parts, derivative
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.values import with_values
@@ -46,7 +46,7 @@ def test_modes_by_an_element_of_the_stiffness(element: str) -> None:
     def numbers(x: float) -> np.ndarray:
         return np.diag(beam_model(at(x), body).stiffness)
 
-    found = derivative(numbers, value, size, [slice(None)]).values
+    found = derivative(numbers, value, size, Parts([slice(None)])).values
     rounding = 1e-12 * np.max(np.diag(beam_model(body).stiffness)) / size
     np.testing.assert_allclose(found, by_square, rtol=0.0, atol=1e-9 * np.max(np.abs(by_square)) + 10.0 * rounding)
 

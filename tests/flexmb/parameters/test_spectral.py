@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexmb.parameters.spectral import ENOUGH, NotSmooth, derivative
+from flexmb.parameters.spectral import ENOUGH, NotSmooth, Parts, derivative
 
-ONE = [slice(0, 1)]
+ONE = Parts([slice(0, 1)])
 
 
 def of(f, x: float, scale: float = 1.0):
@@ -58,3 +58,22 @@ def test_what_is_not_defined_nearby_needs_a_smaller_interval():
 
     with pytest.raises(NotSmooth, match="only here"):
         of(nowhere, 1.0)
+
+
+@pytest.mark.parametrize("size", [1e-14, 1e-9])
+def test_a_part_that_is_zero_beside_its_table_is_rounding(size):
+    """Noise of 1e-14 of the table is not asked for a derivative; a kink of 1e-9 of it is refused, as is the noise of a
+    part that belongs to no table."""
+
+    def table(x: float) -> np.ndarray:
+        return np.array([5.0 + x, size * abs(np.sin(1e6 * x))])
+
+    places = [slice(0, 1), slice(1, 2)]
+    if size < 1e-11:
+        found = derivative(table, 1.0, 1.0, Parts(places, np.full(2, 6.0)))
+        assert found.values[0] == pytest.approx(1.0, rel=1e-11) and found.error <= ENOUGH
+    else:
+        with pytest.raises(NotSmooth, match="drowns in rounding"):
+            derivative(table, 1.0, 1.0, Parts(places, np.full(2, 6.0)))
+    with pytest.raises(NotSmooth, match="drowns in rounding"):
+        derivative(table, 1.0, 1.0, Parts(places))
