@@ -35,6 +35,12 @@ def run(
     goal: common.Goals = None,
     efforts: common.Efforts = None,
     expect: common.Expect = None,
+    envelope: Annotated[
+        bool,
+        typer.Option(
+            "--envelope", help="Follow runs of the library's own engines over all of their steps; write envelope.csv."
+        ),
+    ] = False,
     baseline: Annotated[
         Path | None,
         typer.Option(
@@ -57,16 +63,22 @@ def run(
 
     **Writes** into `--out`: `report/` (open its `index.html`, to which `report.html` leads), `results.json` (small and
     sealed, for `crosscheck compare`), `verdicts.json`, `summary.md`, `junit.xml`, `badge.svg`, `badge.json`,
-    `records.jsonl`. With `--single-file`, `report.html` is the whole report. Until the session ends they say that it is
-    unfinished. A stopped session resumes: what is recorded is not run again if scene, effort, sources, libraries and
-    machine are the same. `crosscheck report` shows everything that the records hold. One session at a time writes into
-    a folder. An engine that exceeds its time or its part of the memory is stopped: *did not finish*. The others go on.
+    `records.jsonl`; with `--envelope` also `envelope.csv`. With `--single-file`, `report.html` is the whole report.
+    Until the session ends they say that it is unfinished. A stopped session resumes: what is recorded is not run again
+    if scene, effort, sources, libraries and machine are the same. `crosscheck report` shows everything that the records
+    hold. One session at a time writes into a folder. An engine that exceeds its time or its part of the memory is
+    stopped: *did not finish*. The others go on.
 
     `--accept` writes the E and U that this run has reached into `accepted.toml` beside each case's run.toml, to be
     reviewed and kept like code. Later runs say where E or U has grown to more than 10 times that, *worse than
     recorded*: a warning, and with `--strict` an error, as is a comparison of the library's own engines without
     accepted figures. Figures accepted with other efforts, scenes, rules or versions of engines are *stale*: accept them
     again. Nothing is accepted while anything is not as expected.
+
+    **Peaks**: the pages of cases list the largest loads. They are those of the samples, and peaks lie between these;
+    with `--envelope` each run of the library's own engines is followed once more over all of its steps and both sides
+    of events. `envelope.csv` has the least and greatest values of all channels of all engines, with their times, and
+    says over what.
 
     **Your own engine**: `--goal` replaces goals that it is not meant to meet, `--efforts` adds efforts where U is too
     large, and a file, `--expect`, keeps both, with failures that you expect and their reasons; `docs/expectations.md`
@@ -93,7 +105,7 @@ def run(
     chosen = common.claimed(chosen, expect, goal, efforts, asked)
     before = None if baseline is None else read_baseline(baseline, out)
     with common.sole_writer(out, strict):
-        _run(chosen, asked, records, shown, fresh, Limits(jobs, time_limit), scheduler_at(scheduler))
+        _run(chosen, asked, records, shown, fresh, envelope, Limits(jobs, time_limit), scheduler_at(scheduler))
         done = not accept or _accept(chosen, records, partial=bool(asked))
         outcome, page = write_all(records, out, strict, last_session, single_file)
         held = None if before is None else hold_against(before, outcome, out)
@@ -140,8 +152,8 @@ def _chosen(cases: list[str], engines: list[str] | None, alone: bool) -> tuple[C
 
 
 def _run(
-    cases: tuple[Case, ...], engines: tuple[str, ...], records: Path, shown: Verbosity, fresh: bool, limits: Limits,
-    scheduler: Scheduler,
+    cases: tuple[Case, ...], engines: tuple[str, ...], records: Path, shown: Verbosity, fresh: bool, envelopes: bool,
+    limits: Limits, scheduler: Scheduler,
 ) -> None:  # fmt: skip
     """Run the cases; until they are judged the outputs say that the session is unfinished."""
     from crosscheck.report import mark_unfinished
@@ -150,7 +162,10 @@ def _run(
 
     mark_unfinished(records, records.parent)
     with LiveProgress(common.console, shown) as live:
-        sweep(cases, engines, records, fresh=fresh, limits=limits, scheduler=scheduler, listener=live.hear)
+        sweep(
+            cases, engines, records, fresh=fresh, envelopes=envelopes, limits=limits, scheduler=scheduler,
+            listener=live.hear,
+        )  # fmt: skip
 
 
 def _alone(cases: tuple[Case, ...]) -> tuple[Case, ...]:

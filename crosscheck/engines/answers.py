@@ -10,7 +10,7 @@ import math
 import numbers
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -29,9 +29,12 @@ from crosscheck.engines.contract import (
     Support,
     Trajectory,
 )
+from crosscheck.engines.extremes import fault as fault_of_extremes
+from crosscheck.engines.extremes import has_extremes
 from crosscheck.engines.linear.answer import fault as fault_of_linear
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.trajectories import first_samples
+from flexmb.run.channels import channels_of
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -130,6 +133,7 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
         wall_s=_number(found.wall_s, "wall_s"),
         evaluations=_count(found.evaluations),
         undetermined=_undetermined(found, scene),
+        events=_events(found.events),
     )
     wrong = fault_of_linear(run.derivatives, run.frequencies, run.known_to, scene)
     _require(not wrong, wrong)
@@ -143,7 +147,7 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
                 f"markers[{name!r}].quaternion at t = {times[at]:g} s has norm {1.0 + defect[at]:.9g} or its inverse: "
                 "rotations are unit quaternions"
             )
-    return run
+    return replace(run, envelope=_envelope(found.envelope, run))
 
 
 def _reached(found: Any, times: Real, finished: bool) -> int:
@@ -244,6 +248,34 @@ def _undetermined(found: Trajectory, scene: Scene) -> tuple[str, ...]:
             f"undetermined has {each!r:.80}: the scene has no closures or couplings: the motion determines its loads",
         )
     return tuple(sorted(set(found.undetermined)))
+
+
+def _events(found: Any) -> tuple[tuple[str, float], ...]:
+    """Names and times (s) of what happened in a run."""
+    _instance(found, tuple, "events")
+    for each in found:
+        right = isinstance(each, tuple) and len(each) == 2 and isinstance(each[0], str)
+        _require(right, f"events has {each!r:.80}: it holds names with times")
+    return tuple((clean(name), _instant(t)) for name, t in found)
+
+
+def _instant(t: Any) -> float:
+    real = isinstance(t, numbers.Real) and not isinstance(t, bool) and math.isfinite(float(t))
+    _require(real, f"events has the time {t!r:.40}, which is no finite number")
+    return float(t)
+
+
+def _envelope(found: Any, run: Trajectory) -> dict[str, Real]:
+    """The envelope of a finished run, which contains the samples of each of its channels."""
+    channels, checked = channels_of(run) if run.status == "finished" else {}, {}
+    known = {name for name in channels if has_extremes(name) and name not in run.undetermined}
+    for name, rows in _named_by(found, "envelope", known):
+        where = f"envelope[{name!r}]"
+        _require(isinstance(rows, np.ndarray) and rows.ndim == 2, f"{where} is {_named(rows)} and not an array (5, k)")
+        checked[name] = _array(rows, where, len(rows), None)
+        wrong = fault_of_extremes(name, checked[name], run.times, channels[name])
+        _require(not wrong, f"{where} {wrong}")
+    return checked
 
 
 def _determined(run: Trajectory, output: str, name: str, values: Real) -> Real:

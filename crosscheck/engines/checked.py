@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from crosscheck.engines.answers import checked_ladder, checked_model, checked_run, checked_support, checked_version
 from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Support, Trajectory
@@ -74,5 +74,5 @@ class CheckedModel:
         return self.model.evaluate()
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
-        own = Run(times=run.times.copy(), linear=run.linear)
+        own = replace(run, times=run.times.copy())
         return checked_run(self.model.simulate(own, effort), run.times, self.scene)

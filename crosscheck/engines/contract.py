@@ -35,11 +35,13 @@ class Run:
     The first time is 0, unless the engine's `takes` names "t_start". The scene's initial state belongs to the first
     time; functions of time, controllers and events use the times as given.
     `linear`: what of the linearised motion is wanted at every sample, "derivatives", "frequencies" or both; an engine
-    that does not offer it leaves it out.
+    that does not offer it leaves it out. `envelope`: whether the run's envelope is wanted, which only the library's own
+    engines are asked for.
     """
 
     times: Real
     linear: tuple[LinearPart, ...] = ()
+    envelope: bool = False
 
     @property
     def t_start(self) -> float:
@@ -135,7 +137,9 @@ class Trajectory:
     far (Frobenius norm) they may be from those of the same state in exact arithmetic. `undetermined`: the channels
     "load:<name>.torque", "load:<name>.force" or "drive:<name>" that redundant closures leave undetermined; they may
     hold NaN and are not compared. An engine that names one that the motion determines has failed; on a scene without
-    closures and couplings that is all of them.
+    closures and couplings that is all of them. `events`: name and time (s) of what happened, in the order of time.
+    `envelope`, only where the run asks for it: by channel the extremes over all of its steps and both sides of events,
+    as rows of `crosscheck.engines.extremes`.
     """
 
     status: Status
@@ -156,6 +160,8 @@ class Trajectory:
     wall_s: float = 0.0
     evaluations: int = 0
     undetermined: tuple[str, ...] = ()
+    events: tuple[tuple[str, float], ...] = ()
+    envelope: dict[str, Real] = field(default_factory=dict)
 
 
 OUTPUTS: dict[str, tuple[int | None, ...]] = {

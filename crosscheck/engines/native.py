@@ -31,6 +31,7 @@ from crosscheck.engines.contract import (
     Support,
     Trajectory,
 )
+from crosscheck.engines.extremes import ROWS, has_extremes
 from crosscheck.engines.native_linear import linear_outputs
 from crosscheck.engines.pace import fastest_mode, pace
 from crosscheck.engines.steps import USUAL_S, ladder
@@ -38,6 +39,8 @@ from crosscheck.engines.trajectories import first_samples
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.modal.flexible import flexible_model
+from flexmb.run.channels import channels_of, is_vector
+from flexmb.run.envelope import Envelope, Extremes
 from flexmb.run.simulate import RunSettings, refuse_without_jacobian, simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.events import EndRun
@@ -47,6 +50,7 @@ from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.system.watches import WAIVERS
+from flexmb.typing import Real
 
 _TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 _RUNGS = 4  # of steps
@@ -208,11 +212,39 @@ class NativeModel:
             wall_s=done.statistics.run_s,
             evaluations=done.statistics.evaluations,
             undetermined=tuple(_undetermined(done)),
+            events=tuple((event.name, event.t) for event in done.events),
         )
         found = first_samples(found, int(np.isin(done.t, run.times).sum()))  # Zeno events end a run between samples
         states = (done.state_at(sample) for sample in range(len(found.times)))
         asked = linear_outputs(self._system, self._algorithm, states, run.linear)
-        return replace(found, **asked.as_outputs)
+        extremes = _extremes(done.envelope, found) if run.envelope and found.status == "finished" else {}
+        return replace(found, envelope=extremes, **asked.as_outputs)
+
+
+def _extremes(envelope: Envelope, run: Trajectory) -> dict[str, Real]:
+    """The envelope by channel, as rows of `crosscheck.engines.extremes`: channels cut it as they cut samples."""
+
+    def rows(found: Extremes) -> Real:
+        return np.array([found.least, found.t_least, found.greatest, found.t_greatest, found.error])
+
+    def of(parts: dict[str, Extremes]) -> dict[str, Real]:
+        return {name: rows(found) for name, found in parts.items()}
+
+    nothing = np.zeros((ROWS, 4))
+    places, speeds, energy = of(envelope.positions), of(envelope.velocities), of(envelope.energy)
+    seen = Trajectory(
+        status="finished", message="", times=np.zeros(ROWS),
+        markers={name: MarkerPath(place, nothing, speeds[name]) for name, place in places.items()},
+        loads=of(envelope.loads), wheel_loads=of(envelope.wheel_loads), drives=of(envelope.drives),
+        connectors=of(envelope.connectors), hinge_forces=of(envelope.hinge_forces),
+        energy={kind: found[:, 0] for kind, found in energy.items()}, momentum=rows(envelope.momentum),
+    )  # fmt: skip
+    found = channels_of(seen) | ({"energy.total": energy["total"]} if run.energy else {})
+    return {
+        name: np.hstack([values, *([rows(envelope.magnitudes[name])] if is_vector(name) else [])])
+        for name, values in found.items()
+        if has_extremes(name) and name not in run.undetermined
+    }
 
 
 def _undetermined(done: NativeTrajectory) -> Iterator[str]:

@@ -14,7 +14,7 @@ from crosscheck.judging.figures import recordable
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.unjudged import Unjudged, unjudged
 from crosscheck.judging.verdict import Verdict
-from crosscheck.records.kinds import ContractState
+from crosscheck.records.kinds import ENVELOPE, ContractState
 from flexmb.kept import kept
 
 NO_REFERENCE = "has a recipe of a reference, no reference yet: crosscheck regenerate {}"
@@ -152,7 +152,7 @@ class SessionOutcome:
 
     @kept
     def lost(self) -> list[Absence]:
-        """Runs that were asked for and did not run, or that failed without a verdict that shows it.
+        """Runs that were asked for and did not run, or that failed without a verdict that shows it, as envelopes do.
 
         Refusing and diverging are answers, and a case without a comparison of the engine expects nothing of it.
         """
@@ -162,6 +162,7 @@ class SessionOutcome:
             for each in self.absences
             if each.status == "did not run"
             or (each.status in FAULTS and (each.case, each.variant, each.engine) not in judged)
+            or (each.status in FAULTS and each.role == ENVELOPE)
         ]
 
     @property
@@ -291,10 +292,12 @@ def _made_with(session: Session) -> str:
 
 
 def _absences(case: CaseResults) -> list[Absence]:
-    """Every (variant, engine) of the case, and every control, whose result is missing."""
+    """Every (variant, engine) of the case, every control, and every envelope asked for, whose result is missing."""
     run = case.case.run
     wanted = [(variant.name, engine, "main") for variant in run.variants for engine in variant.engines]
     wanted += [(control.a.variant, control.a.engine, f"control:{control.name}") for control in run.controls]
+    envelopes = [key for key in case.results if key[2] == ENVELOPE]
+    wanted += [key for key in envelopes if case.get(*key[:2]).status == "finished"]
     found = []
     for variant, engine, role in wanted:
         result = case.get(variant, engine, role)

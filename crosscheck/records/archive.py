@@ -18,6 +18,7 @@ from typing import Any, BinaryIO, TypeVar
 
 import msgspec
 
+from crosscheck.engines.extremes import ROWS, has_extremes, width
 from crosscheck.library.channels import part_of
 from crosscheck.library.check import check_recorded
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Record, RunRecord, Written
@@ -119,7 +120,8 @@ def _checked(record: Any, limit: int) -> int:
 
 def _arrays(record: RunRecord | RecordedReference) -> dict[str, Packed]:
     """All arrays by name, for messages."""
-    return {**record.channels, **({} if record.times is None else {"times": record.times})}
+    of_run = {f"envelope of {name}": packed for name, packed in getattr(record, "envelope", {}).items()}
+    return {**record.channels, **({} if record.times is None else {"times": record.times}), **of_run}
 
 
 def _checked_arrays(arrays: Mapping[str, Packed], limit: int) -> int:
@@ -155,6 +157,13 @@ def _check_shapes(record: RunRecord) -> None:
             raise ValueError(f'there is no channel "{name}"')
         if part.width not in (None, packed.shape[1]):
             raise ValueError(f"{name} has {packed.shape[1]} columns")
+    for name, packed in record.envelope.items():
+        part = part_of(name)
+        if part is None or not has_extremes(name):
+            raise ValueError(f'there is no envelope of a channel "{name}"')
+        columns = None if part.width is None else width(name, part.width)
+        if len(packed.shape) != 2 or packed.shape[0] != ROWS or packed.shape[1] != (columns or packed.shape[1]):
+            raise ValueError(f"the envelope of {name} has the shape {packed.shape}")
 
 
 def _set_broken_lines_aside(file: Path, kind: Any) -> None:

@@ -14,6 +14,8 @@ from crosscheck.records.drawing import Drawing
 from crosscheck.records.packing import Packed
 from crosscheck.records.recorded_reference import RecordedReference
 
+ENVELOPE = "envelope"  # the role of a run that is made for its extremes over all steps
+
 RunStatus = Literal["finished", "diverged", "failed", "crashed", "did not finish", "refused", "did not run"]
 
 
@@ -115,13 +117,15 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
 class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
     """One run of one engine at one effort, or why there is none (then `effort` is empty).
 
-    `role` is "main", "refined", "control:<name>" or "film". `rung` is the number of the effort, from coarse to fine, of
-    `rungs`. `scene` identifies scene and sample times, `made_by` everything else that the result depends on (see
-    `made_by.py`; "" in older records). `compile_s` is conversion and warm-up, `wall_s` the solve alone.
+    `role` is "main", "refined", "control:<name>", "film" or "envelope". `rung` is the number of the effort, from coarse
+    to fine, of `rungs`. `scene` identifies scene and sample times, `made_by` everything else that the result depends on
+    (see `made_by.py`; "" in older records). `compile_s` is conversion and warm-up, `wall_s` the solve alone.
 
     `status`: "finished"; "diverged", by the engine's statement; "failed" if the adapter raised or broke the contract;
     "crashed" if its process died; "did not finish" within its limits of time and memory; "refused"; "did not run".
-    `undetermined` are channels that the motion does not determine, as the engine says; they are not stored.
+    `undetermined` are channels that the motion does not determine, as the engine says; they are not stored. `events`
+    are names and times (s) of what happened in the run. `envelope`, of the role "envelope", are extremes by channel, as
+    rows of `crosscheck.engines.extremes`.
     """
 
     case: str
@@ -146,6 +150,8 @@ class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
     times: Packed | None = None
     channels: dict[str, Packed] = {}
     undetermined: tuple[str, ...] = ()
+    events: tuple[tuple[str, float], ...] = ()
+    envelope: dict[str, Packed] = {}
 
     @property
     def key(self) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """The outputs of a session, made from its records alone:
 
-verdicts.json, report/, summary.md, junit.xml, results.json and the badge.
+verdicts.json, report/, summary.md, junit.xml, results.json, the badge and, of sessions with envelopes, envelope.csv.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,6 +14,7 @@ from crosscheck.records.session import standing
 from crosscheck.report.ci import VERDICTS, write_summary, write_verdicts
 from crosscheck.report.junit import write_junit
 from crosscheck.report.mutations import read_scores
+from crosscheck.report.peaks import write_envelope
 from crosscheck.report.site import Material, write_single, write_site
 from crosscheck.report.unfinished import mark_unfinished
 from crosscheck.sealed.badge import write_badges
@@ -41,6 +42,7 @@ def write_all(
     write_junit(outcome, out / "junit.xml", session)
     write_results(results_of(session, outcome, records), out)
     write_badges(outcome, out)
+    write_envelope(session, out)
     material = Material(session, outcome, read_scores(out))
     page = write_single(material, out) if single_file else write_site(material, out)
     return outcome, page

@@ -11,6 +11,7 @@ from crosscheck.judging.results import CaseResults
 from crosscheck.judging.unjudged import UnjudgedChannels, grouped
 from crosscheck.library.case import Provenance
 from crosscheck.report.mutations import CaseScore
+from crosscheck.report.peaks import PeakRow, largest_loads
 from crosscheck.report.places import CasePlace
 from crosscheck.report.views import (
     Block,
@@ -41,6 +42,7 @@ class CaseView:
     lost_controls: list[LostControl]
     unreferenced: str
     timings: list[dict[str, Any]]
+    peaks: list[PeakRow]
     mutation: CaseScore | None
 
 
@@ -68,6 +70,7 @@ def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, muta
         unjudged=grouped(each for each in outcome.unjudged if each.case == record.case),
         unreferenced=f"It {NO_REFERENCE.format(record.case)}" if record.case in outcome.unreferenced else "",
         timings=_timings(case),
+        peaks=largest_loads(case),
         mutation=mutation,
     )
 

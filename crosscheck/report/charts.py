@@ -21,11 +21,12 @@ from crosscheck.report.animation import animations
 from crosscheck.report.store import Store
 from crosscheck.report.workprecision import WorkPrecision, work_precision
 from flexmb.output.printable import printable
-from flexmb.run.channels import distance, family, matches, norms, signal_range, unit
+from flexmb.run.channels import distance, family, magnitude, matches, norms, signal_range, unit
 from flexmb.typing import Real
 
 COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}
 RUNAWAY = 20.0  # ratio of two signals beyond which the larger one does not determine the scale
+ROUNDING = 1e-12  # part of the largest channel of a panel: what is smaller is drawn as zero
 STILL, BAND = 1e-3, 0.05  # a signal whose range is below this part of its size counts as constant; its drawn band
 
 
@@ -54,6 +55,7 @@ def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[di
             chosen = {key: value for key, value in channels.items() if family(key).partition(".")[0] == kind.name}
             if chosen and kind.panel:
                 views = [_channel(store, case, channel, pairs) for channel, pairs in chosen.items()]
+                _without_rounding(views)
                 whose = {"comparison": printable(name), "title": kind.panel}
                 panels.append({**whose, "channels": views, "first": _first(views)})
     return panels
@@ -92,6 +94,8 @@ def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]
         "unit": unit(channel),
         "components": ["norm"] if channel in SYMBOL else COMPONENTS.get(width, [str(i + 1) for i in range(width)]),
         "size": min(signal_range(channel, result.values(channel)) for result in sides.values()),
+        "magnitude": max(magnitude(channel, result.values(channel)) for result in sides.values()),
+        "events": sorted({t for result in sides.values() for _, t in result.finest.events}),
         "range": _shown_range([_shown(channel, result.values(channel)) for result in sides.values()]),
         "sides": [
             {
@@ -137,6 +141,19 @@ def _shown_range(signals: list[Real]) -> list[float] | None:
     if high - low < STILL * largest:
         return [low - BAND * largest, high + BAND * largest]
     return None
+
+
+def _without_rounding(views: list[dict[str, Any]]) -> None:
+    """Channels of a panel that stay below the rounding of its largest one get limits between which they are straight.
+
+    A torque is a force times lengths of about a metre, a speed a rate times such lengths.
+    """
+    sizes = [view.pop("magnitude") for view in views]
+    turned = [view["name"].endswith(".orientation") for view in views]  # of size 1 whatever moves
+    least = ROUNDING * max((size for size, is_turned in zip(sizes, turned, strict=True) if not is_turned), default=0.0)
+    for view, size in zip(views, sizes, strict=True):
+        if 0.0 < size <= least:
+            view["range"] = [-least, least]
 
 
 def _drifts(store: Store, case: CaseResults) -> list[dict[str, Any]]:

@@ -91,4 +91,5 @@ def _packed(solved: Solved) -> RunRecord:
     if solved.times is None:
         return solved.record
     channels = {name: pack(values) for name, values in solved.channels.items()}
-    return msgspec.structs.replace(solved.record, times=pack(solved.times), channels=channels)
+    envelope = {name: pack(rows) for name, rows in solved.envelope.items()}
+    return msgspec.structs.replace(solved.record, times=pack(solved.times), channels=channels, envelope=envelope)

@@ -15,7 +15,7 @@ from crosscheck.drawing.film import EFFORT as FILM_EFFORT
 from crosscheck.drawing.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.engines.contract import Effort, LinearPart
 from crosscheck.engines.linear.coordinates import coordinate_names, is_counted
-from crosscheck.engines.registry import home
+from crosscheck.engines.registry import OWN_CODE, home
 from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, RunFile, Variant
 from crosscheck.library.digests import case_digests
 from crosscheck.library.find import Case
@@ -23,7 +23,7 @@ from crosscheck.library.mutations import mutate
 from crosscheck.library.reference import has_reference, scene_digest
 from crosscheck.library.selection import alone, joining, select
 from crosscheck.records.drawing import FILM, Drawing
-from crosscheck.records.kinds import CaseRecord, VariantInfo
+from crosscheck.records.kinds import ENVELOPE, CaseRecord, VariantInfo
 from crosscheck.running.job import MAIN, REFINED, Job
 from crosscheck.running.ladder import with_efforts
 from crosscheck.running.reference_record import recorded_reference
@@ -37,11 +37,13 @@ from flexmb.typing import Real
 
 
 def plan(
-    case: Case, asked: tuple[str, ...], provider: str, time_limit_s: float | None = None, films: bool = False
-) -> tuple[CaseRecord, list[Job]]:
+    case: Case, asked: tuple[str, ...], provider: str, time_limit_s: float | None = None, films: bool = False,
+    envelopes: bool = False,
+) -> tuple[CaseRecord, list[Job]]:  # fmt: skip
     """The record of a case, reduced to the engines asked for, and its jobs; `time_limit_s` replaces the case's own.
 
-    With `films` every variant has another run, from which its animation is made.
+    With `films` every variant has another run, from which its animation is made; with `envelopes` the library's own
+    engines have one from which their peaks are known.
     """
     run = (alone if case.alone else select)(case.run, asked)
     engines = {engine for variant in run.variants for engine in variant.engines}
@@ -53,6 +55,10 @@ def plan(
         scene, error = _attempt(case, variant)
         infos[variant.name] = _info(case, variant, scene, error)
         jobs += [_job(case, run, variant, MAIN, engine, scene, error, provider) for engine in variant.engines]
+        if envelopes:
+            own = (engine for engine in variant.engines if engine in OWN_CODE)
+            followed = (_job(case, run, variant, ENVELOPE, engine, scene, error, provider) for engine in own)
+            jobs += [replace(job, linear=(), kept=(), lean=True) for job in followed]
         if variant.refined is not None:
             scene, error = _attempt(case, refine(variant, variant.refined), variant.refined)
             crossing = _engines_compared_across(run, variant)

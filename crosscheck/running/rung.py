@@ -13,7 +13,7 @@ import numpy as np
 from crosscheck.engines.answers import BrokenContract, describe
 from crosscheck.engines.contract import Effort, Model, Run, Trajectory
 from crosscheck.engines.signals import signals_of
-from crosscheck.records.kinds import RunRecord
+from crosscheck.records.kinds import ENVELOPE, RunRecord
 from crosscheck.running.job import MAIN, Job
 from flexmb.typing import Real
 
@@ -25,11 +25,13 @@ FIRST_PART = 0.1  # of the samples: how much of a coarsest run is repeated if th
 
 
 class Solved(NamedTuple):
-    """An outcome: its record without arrays, and where there was a run the times (T,) and channels (T, k) to store."""
+    """An outcome: its record without arrays, and where there was a run the times (T,), channels (T, k) and envelope to
+    store."""
 
     record: RunRecord
     times: Real | None = None
     channels: Mapping[str, Real] = {}
+    envelope: Mapping[str, Real] = {}
 
 
 def solve_rung(model: Model, job: Job, effort: Effort, blank: RunRecord, stores_all: bool) -> Solved:
@@ -46,10 +48,10 @@ def solve_rung(model: Model, job: Job, effort: Effort, blank: RunRecord, stores_
         return Solved(msgspec.structs.replace(record, status="failed", message=describe(error)))
     record = msgspec.structs.replace(
         record, status=run.status, message=run.message, wall_s=wall_s, evaluations=run.evaluations,
-        undetermined=run.undetermined,
+        undetermined=run.undetermined, events=run.events,
     )  # fmt: skip
     stored = {name: values for name, values in channels.items() if stores_all or name in job.kept}
-    return Solved(record, run.times if len(run.times) else None, stored)
+    return Solved(record, run.times if len(run.times) else None, stored, run.envelope)
 
 
 def _timed(model: Model, job: Job, effort: Effort, coarsest: bool) -> tuple[Trajectory, float]:
@@ -57,7 +59,7 @@ def _timed(model: Model, job: Job, effort: Effort, coarsest: bool) -> tuple[Traj
     first_part = Run(job.times[: max(2, ceil(FIRST_PART * len(job.times)))], job.linear)
     begun = model.simulate(first_part, effort) if coarsest and not job.lean else None
     start = time.perf_counter()
-    run = model.simulate(Run(job.times, job.linear), effort)
+    run = model.simulate(Run(job.times, job.linear, job.role == ENVELOPE), effort)
     took_s = time.perf_counter() - start  # by this process' clock: the engine's `wall_s` may claim anything
     if run.status != "finished" or job.lean:
         return run, run.wall_s

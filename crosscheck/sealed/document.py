@@ -28,6 +28,8 @@ The file is one JSON object. Every key:
   - ``unjudged`` (left out if empty): the reason by "variant | engine | channel" of channels that are offered and judged
     by nothing, as `[[open]]` of the case gives it; a strict session demands one for each channel of the case's engines,
     and of engines that joined that theirs are as others have them;
+  - ``peaks`` (left out unless the session had ``--envelope``): by "variant | engine | channel" the largest magnitude
+    over all steps of a run, and its time (s);
   - ``runs``: by "variant | engine | role": ``status``, ``effort``, ``wall_s`` and ``compile_s`` of the finest effort.
 
 Figures have four digits, times three.
@@ -42,11 +44,12 @@ import msgspec
 
 from crosscheck.judging.figures import key_of
 from crosscheck.judging.outcome import SessionOutcome
+from crosscheck.judging.peaks import peaks
 from crosscheck.judging.results import CaseResults, Result, Session
 from crosscheck.judging.verdict import Status, Verdict, VerdictKind
 from crosscheck.library.claims import Claims
 from crosscheck.library.digests import file_digest
-from crosscheck.records.kinds import ContractState, RunStatus
+from crosscheck.records.kinds import ENVELOPE, ContractState, RunStatus
 
 FORMAT, VERSION = "crosscheck results", 1
 
@@ -88,6 +91,7 @@ class SealedCase(_SealedPart, frozen=True, kw_only=True):
     scenes: dict[str, str]
     verdicts: dict[str, dict[str, SealedVerdict]]
     runs: dict[str, SealedRun]
+    peaks: dict[str, tuple[float, float]] = {}
     not_applicable: dict[str, str] = {}
     unjudged: dict[str, str] = {}
     unreferenced: bool = False
@@ -161,7 +165,12 @@ def _case(case: CaseResults, outcome: SessionOutcome) -> SealedCase:
         files=case.case.files,
         scenes={variant: result.finest.scene for (variant, _, role), result in mains.items() if role == "main"},
         verdicts=judged,
-        runs={" | ".join(key): _run(result) for key, result in case.results.items()},
+        runs={" | ".join(key): _run(result) for key, result in case.results.items() if key[2] != ENVELOPE},
+        peaks={
+            " | ".join((*peak.whose, peak.channel)): (float(f"{peak.size:.4g}"), float(f"{peak.t:.6g}"))
+            for peak in peaks(case)
+            if peak.is_whole
+        },
         not_applicable={
             " | ".join(filter(None, (each.variant, each.engine, each.channel))): each.reason
             for each in outcome.inapplicable

@@ -115,6 +115,12 @@ def unit(channel: str) -> str:
     return next((symbol for ending, symbol in UNITS.items() if channel.endswith(ending)), "")
 
 
+def is_vector(channel: str) -> bool:
+    """Whether a channel is a vector of an item of the scene, whose magnitude means something."""
+    parts = "position", "velocity", "angular_velocity", "torque", "force"
+    return ":" in channel and channel.rpartition(".")[2] in parts
+
+
 @np.errstate(over="ignore", invalid="ignore")
 def distance(channel: str, a: Real, b: Real) -> Real:
     """Distance of two signals at each time, (T,): the Euclidean norm of a - b, for orientations the angle between them.

@@ -7,6 +7,8 @@ two points it is half of their difference.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from flexmb.run.envelope import Extremes, PartialEnvelope, columns_of, magnitudes_of, merged, part_of_extremes
@@ -39,7 +41,8 @@ def part_of(run: RunArrays, panels: Index, steps: int = 0, left_out: int = 0) ->
         part.columns[key] = part_of_extremes(found, slice(at, at + array.shape[1]))
         at += array.shape[1]
     for channel in magnitudes:
-        part.magnitudes[channel] = part_of_extremes(found, slice(at, at + 1))
+        size = part_of_extremes(found, slice(at, at + 1))
+        part.magnitudes[channel] = replace(size, least=np.maximum(size.least, 0.0))  # a polynomial may pass below zero
         at += 1
     return part
 

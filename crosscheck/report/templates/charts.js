@@ -97,7 +97,8 @@ function drawChannel(node, channel, series) {
   Plotly.react(node, traces, layout({
     margin: { l: 64, r: 12, t: 20, b: 44 + legend }, legend: BELOW,
     annotations: letters ? [{ xref: "paper", yref: "paper", x: 0, xanchor: "left", y: 1, yanchor: "bottom", showarrow: false, text: letters, font: { size: 10.5, color: tone("soft") } }] : [],
-    xaxis: { title: { text: "time, s", standoff: 4, font: { size: 12 } }, anchor: judged ? "y2" : "y" },
+    shapes: channel.events.map(t => ({ type: "line", x0: t, x1: t, yref: "paper", y0: 0, y1: 1, line: { color: tone("soft"), width: 1, dash: "dot" } })),
+    xaxis: { title: { text: "time, s" + (channel.events.length ? "; dotted lines: events" : ""), standoff: 4, font: { size: 12 } }, anchor: judged ? "y2" : "y" },
     yaxis: { domain: judged ? [0.46, 1] : [0, 1], title: { text: channel.unit, font: { size: 10.5 } }, exponentformat: "power",
       range: channel.range || undefined },
     ...below,
