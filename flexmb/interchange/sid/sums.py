@@ -79,7 +79,7 @@ class Sums:
         of_Gr = -0.5 * Gr + 0.25 * _trace(Gr)[..., None, None] * np.eye(3)
         slope = symmetric(Gr) if sid.J.first is None else np.moveaxis(sid.J.first, 1, 0)
         self._compare("M1 of J", "Gr", slope, symmetric(Gr), dust * scale.reach + PRINTED * largest(Gr))
-        self._compare("Cr", "Gr", sid.Cr.zero, _axial(of_Gr), dust * scale.reach + PRINTED * largest(Gr))
+        self._compare("Cr", "Gr", sid.Cr.zero, axial(of_Gr), dust * scale.reach + PRINTED * largest(Gr))
         return 0.25 * _trace(slope)[..., None, None] * np.eye(3) - 0.5 * slope + 0.5 * cross_matrix(sid.Cr.zero)
 
     def _of_spin(self) -> Real | None:
@@ -139,7 +139,7 @@ class Sums:
             rows = self._possible(given, inverse, is_beyond)
             self.Ct, self.P = rows[:, :, 0], rows[:, :, 1:]
             for name, before, after in (
-                ("Ct", given[:, :, 0], self.Ct), ("Cr", _axial(given[:, :, 1:]), _axial(self.P)),
+                ("Ct", given[:, :, 0], self.Ct), ("Cr", axial(given[:, :, 1:]), axial(self.P)),
                 ("M1 of J", symmetric(given[:, :, 1:]), symmetric(self.P)),
             ):  # fmt: skip
                 self._compare("Me", name, after, before, 0.0, "no distribution of mass has both: ")
@@ -268,7 +268,7 @@ def _matrices(side_by_side: Real) -> Real:
     return side_by_side.reshape(3, -1, 3).swapaxes(0, 1)
 
 
-def _axial(P: Real) -> Real:
+def axial(P: Real) -> Real:
     """sum m r x phi from P = sum m phi r' (...,3,3)."""
     return np.stack([P[..., 2, 1] - P[..., 1, 2], P[..., 0, 2] - P[..., 2, 0], P[..., 1, 0] - P[..., 0, 1]], axis=-1)
 

@@ -16,10 +16,12 @@ import numpy as np
 
 from flexmb.interchange.gram import EquivalentMasses, NoMasses, equivalent_masses
 from flexmb.interchange.imported import possible_inertia
+from flexmb.interchange.near_points import FARTHEST, NearPoints, points_with
 from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor
 from flexmb.interchange.sid.reader import read_sid
-from flexmb.interchange.sid.sums import PRINTED, Scale, Sums, largest, planar, second_moment
+from flexmb.interchange.sid.sums import PRINTED, Scale, Sums, axial, largest, planar, second_moment
 from flexmb.modal.cross import cross_matrix
+from flexmb.modal.first_order import symmetric
 from flexmb.scene.bodies import Level, ModalBody, SidBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
@@ -29,6 +31,8 @@ from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
+SOFT = 1e-12
+"""Share of the largest stiffness by which modes that have less, or none, are weighed."""
 AT_REST: tuple[Level, ...] = ("rigid", "ruthless")
 """Levels that need no change of inertia with the modes."""
 
@@ -131,21 +135,61 @@ def _repaired(sid: Sid, disagreements: list[str]) -> Sid:
 
 
 def _points(sid: Sid, sums: Sums, level: Level | None, disagreements: list[str]) -> EquivalentMasses:
-    """Point masses with the integrals of the file; those at rest alone, if no masses have all and `level` allows it."""
+    """Point masses with the integrals of the file. If no masses have all, those at rest are kept, and others that
+    `level` needs are near to those of the file."""
+    whole = _gram(sid, sums)
     try:
-        return equivalent_masses(_gram(sid, sums))
+        return equivalent_masses(whole)
     except NoMasses as error:
         of = f"no distribution of mass has Me, Gr and Oe of mode {max(error.field - 4, 0) // 3 + 1}"
-    if level not in (None, *AT_REST):
-        mixed = np.any(sums.change) and sid.Gr.first is None
-        remedy = "write the file with M1 of Gr" if mixed else "correct their signs"
-        raise SidError(f'{of}: {remedy}, or use level "ruthless", which needs what they are at rest only')
-    disagreements.append(f'{of}: only what they are at rest is taken, for level "ruthless"')
+    at_rest_only = level in (None, *AT_REST)
+    if at_rest_only:
+        disagreements.append(f'{of}: only what they are at rest is taken, for level "ruthless"')
+    with_change = sums.change
     sums.leave_at_rest()
     try:
-        return equivalent_masses(_gram(sid, sums))
+        at_rest = equivalent_masses(_gram(sid, sums))
     except NoMasses:
         raise SidError(f"{of}, Ct and Cr even at rest: correct their signs") from None
+    if at_rest_only:
+        return at_rest
+    found, distance = _near(sid, sums, whole)
+    mixed = np.any(with_change) and sid.Gr.first is None  # with geometric stiffness, which level "stiffened" needs
+    if mixed and level == "stiffened" or not distance <= FARTHEST:
+        remedy = "write the file with M1 of Gr" if mixed else "correct their signs"
+        raise SidError(
+            f"{of}; the nearest ones have frequencies that are off by {distance:.2g}, and the limit is {FARTHEST:g}: "
+            f'{remedy}, or use level "ruthless", which needs what they are at rest only'
+        )
+    disagreements.append(
+        f"{of}: at rest they are kept, and the change of inertia with the modes is that of near masses, which have "
+        f"frequencies that are off by {distance:.2g}"
+    )
+    sums.change, sums.at_rest_only = with_change, False
+    return found
+
+
+def _near(sid: Sid, sums: Sums, whole: Real) -> NearPoints:
+    """Points with the mass matrix of `sums` at rest, near to those with the sums `whole`, which none have.
+
+    Raises SidError if none have that mass matrix.
+    """
+    from scipy.linalg import eigh
+
+    centre = cross_matrix(sid.mdCM.zero[:, 0])
+    couplings = np.hstack([sums.Ct, axial(sums.P)])
+    rigid = np.block([[sid.mass * np.eye(3), -centre], [centre, sid.J.zero]])
+    S = np.block([[rigid, couplings.T], [couplings, sid.Me.zero]])
+    stiffness, V = eigh(symmetric(sid.Ke.zero), symmetric(sid.Me.zero))  # modes of unit mass
+    modes, fields = np.eye(len(S)), np.eye(len(whole))
+    modes[6:, 6:], fields[4:, 4:] = V, np.kron(V, np.eye(3))
+    omega = np.sqrt(np.maximum(stiffness, SOFT * largest(stiffness) or 1.0))
+    upper = np.triu(whole) + np.triu(whole, 1).T
+    try:
+        (mass, position, shapes), distance = points_with(modes.T @ S @ modes, fields.T @ upper @ fields, omega)
+    except NoMasses as error:
+        raise SidError(f"Me, Ct and Cr are not those of masses ({error}): correct their signs") from None
+    return NearPoints(EquivalentMasses(mass, position, shapes @ np.linalg.inv(V)), distance)
 
 
 def _gram(sid: Sid, sums: Sums | None) -> Real:

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.interchange.gram import NoMasses
+from flexmb.interchange.near_points import FARTHEST, RigidBlock, points_with
 from flexmb.interchange.superelement.element import ALIKE, DUST, MOTIONS, SuperElement, SuperElementError
 from flexmb.interchange.superelement.inertia import carried_sums
-from flexmb.interchange.superelement.points import RigidBlock, points_with
 from flexmb.scene.bodies import Level, ModalBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
@@ -27,8 +27,6 @@ LOOSE = 1e-12
 """Pivots of K below this fraction of the diagonal are zero: there is a mechanism, or an unconnected part."""
 DENSE = 1000
 """Number of rows up to which the dense eigensolver is used."""
-FARTHEST = 0.25
-"""Relative difference of frequencies up to which masses that nodes carry are near to M."""
 MASSLESS = 1e-13  # a mode has no mass if 1/omega^2 is below this fraction of the largest
 
 

@@ -133,6 +133,26 @@ def test_momentum_beyond_the_modal_mass_is_cut_for_level_ruthless():
         imported_sid(too_much, "rod", "linear")
 
 
+@pytest.mark.parametrize("level", ["linear", "full"])
+def test_a_level_that_needs_changes_of_inertia_takes_near_masses_where_none_have_them(level):
+    """Gr with a slope of which no masses have the second moments: at rest the body is that of the file all the same."""
+    given = points(2)
+    sid = sid_of(made(*given))
+
+    def spoiled(by: float) -> Sid:
+        slope = sid.Gr.first.copy()
+        slope[0, 0, 0] += by * np.abs(slope).max()
+        return replace(sid, Gr=Taylor(sid.Gr.zero, slope))
+
+    found = imported_sid(spoiled(-1.0), "made", level)
+    assert found.body.level == level
+    assert any(re.search(r"near masses, which have frequencies that are off by 0\.\d", each) for each in found.notes)
+    at_rest = mass_matrix(*given, np.zeros(3))
+    assert relative(of_body(found.body, np.zeros(3)), at_rest) < 1e-9
+    with pytest.raises(SidError, match="the limit is 0.25: .* level \"ruthless\""):
+        imported_sid(spoiled(4.0), "made", level)
+
+
 def planar_points() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     mass, position, modes = points(1)
     position[:, 1:] = 0.0

@@ -19,6 +19,8 @@ from flexmb.typing import Real
 MASSLESS = 1e-12  # share of the inertia below which there is none, as that of a line of points about itself
 SLIGHT = 1e-9  # share of the largest 1/omega^2 of the body below which a motion has next to no mass
 ROUNDING = 1e-9
+FARTHEST = 0.25
+"""Difference of frequencies, relative, up to which masses count as near."""
 
 
 class RigidBlock(NamedTuple):
