@@ -18,6 +18,7 @@ from flexmb.interchange.superelement import SuperElementError, read_super_elemen
 from flexmb.interchange.urdf import read_urdf
 from flexmb.scene.problems import SceneError
 from flexmb.scene.schema import Scene
+from tests.flexmb.interchange import made_matrices
 from tests.flexmb.interchange.made_bodies import beam, free_beam
 from tests.flexmb.interchange.made_robots import MJCF, arm, quadruped
 from tests.flexmb.interchange.test_superelement_files import NODES, K, M, large_field_dmig, written
@@ -55,6 +56,16 @@ def of_imports(folder: Path) -> dict[str, Kind]:
     matrices = (SuperElementError,)
     punched = (large_field_dmig("KAAX", K) + large_field_dmig("MAAX", M)).encode()
     packed, _ = written("dense", folder)
+    forms = [made_matrices.binary_op4({"K": K, "M": M}, form) for form in ("dense", "sparse", "big")]
+    (folder / "m_by_node.mtx").write_text(made_matrices.matrix_input(M))
+    for stem in ("b", "d"):
+        (folder / f"{stem}.mas").write_text(made_matrices.calculix(M))
+        (folder / f"{stem}.dof").write_text(made_matrices.dof(len(K)))
+    (folder / "d.sti").write_text(made_matrices.calculix(K))
+    written("ansys", folder)
+    at = [each.split(",") for each in NODES.splitlines()[1:]]
+    inp = "*NODE, NSET=ALL\n" + "".join(f"{', '.join(words)}\n" for words in at) + "*STEP\n"
+    grids = "".join(f"GRID,{i},,{x},{y},{z}\n" for i, x, y, z in at)
     return {
         "urdf": Kind("robot.urdf", tuple(map(_in_lines, robots)), xml, errors, _urdf),
         "mjcf": Kind("robot.xml", (MJCF.encode(), INERTIAL.encode()), xml, errors, _mjcf),
@@ -65,6 +76,34 @@ def of_imports(folder: Path) -> dict[str, Kind]:
         "mtx": Kind(
             "K.mtx", ((folder / "given.mtx").read_bytes(),), lines, matrices, lambda path: _structure(path, mass)
         ),
+        "coordinate": Kind(
+            "K.mtx", (made_matrices.coordinate(K).encode(),), lines, matrices, lambda path: _structure(path, mass)
+        ),
+        "matrix input": Kind(
+            "by_node.mtx", (made_matrices.matrix_input(K).encode(),), lines, matrices,
+            lambda path: _structure(path, path.with_name("m_by_node.mtx")),
+        ),
+        "calculix": Kind(
+            "b.sti", (made_matrices.calculix(K).encode(),), lines, matrices,
+            lambda path: _structure(path, path.with_suffix(".mas")),
+        ),
+        "dof": Kind(
+            "d.dof", (made_matrices.dof(len(K)).encode(),), lines, matrices,
+            lambda path: _element(
+                path.with_suffix(".sti"), path.with_suffix(".mas"), path.with_name("nodes.csv"), path
+            ),
+        ),
+        "mapping": Kind(
+            "K.mapping", (made_matrices.mapping(len(K)).encode(),), lines, matrices,
+            lambda path: _element(
+                path.with_suffix(".matrix"), path.with_name("M.matrix"), path.with_name("nodes.csv"), path
+            ),
+        ),
+        "op4 binary": Kind(
+            "packed.op4", tuple(forms), mutate.BYTES, matrices, lambda path: _structure(path, path)
+        ),
+        "inp": Kind("mesh.inp", (inp.encode(),), lines, matrices, lambda path: _nodes(path, mass)),
+        "grid": Kind("mesh.bdf", (grids.encode(),), lines, matrices, lambda path: _nodes(path, mass)),
         "nodes": Kind("nodes.csv", (NODES.encode(),), lines, matrices, lambda path: _nodes(path, mass)),
     }  # fmt: skip
 

@@ -1,8 +1,9 @@
 """Matrices and nodes of finite-element codes from files.
 
-Matrices: Matrix Market (`.mtx`, `.mm`), Harwell-Boeing (`.hb`, `.rb`, as Ansys writes from its .full file), and
-Nastran's OP4 in text form (`.op4`) and DMIG cards of a punch file (`.pch`, `.bdf`, `.dat`). Nodes: a CSV table with the
-columns id, x, y, z (m), and dofs (digits 1 to 6, 123456 if left out), in the order of the rows of the matrices.
+Matrices: Matrix Market and Abaqus' *MATRIX OUTPUT (`.mtx`), Harwell-Boeing (`.hb`, `.rb`, `.matrix`, as Ansys writes
+from its .full file, with a `.mapping` beside it), CalculiX (`.sti` and `.mas`, with a `.dof` beside), and Nastran's OP4
+(`.op4`) and DMIG cards of a punch file (`.pch`, `.bdf`, `.dat`). Nodes: an input file (`.bdf`, `.inp`), or a CSV table
+with the columns id, x, y, z (m), and dofs (digits 1 to 6, 123456 if left out), in the order of the matrices' rows.
 """
 
 from __future__ import annotations
@@ -10,28 +11,27 @@ from __future__ import annotations
 import csv
 import os
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from flexmb.interchange.imported import MAGNITUDE, usable
 from flexmb.interchange.superelement.element import SuperElement, SuperElementError, super_element
-from flexmb.interchange.superelement.matrix_market import market_matrix, refuse_large
-from flexmb.interchange.superelement.nastran import NamedMatrix, dmig_matrices, op4_matrices
-from flexmb.scene.reading import MIB, Unreadable, read_text, regular_size
+from flexmb.interchange.superelement.matrix_market import both_halves, market_matrix, refuse_large
+from flexmb.interchange.superelement.meshes import Nodes, grid_nodes, inp_nodes, number_of_node
+from flexmb.interchange.superelement.nastran import NamedMatrix, Row, dmig_matrices, op4_matrices
+from flexmb.interchange.superelement.op4_binary import binary_op4_matrices, is_binary_op4
+from flexmb.interchange.superelement.triplets import dof_rows, mapping_rows, triplets
+from flexmb.scene.reading import MIB, Unreadable, read_bytes, read_text, regular_size
 from flexmb.typing import Real
 
 LIMIT = 512 * MIB
-OP4, DMIG = (".op4",), (".pch", ".bdf", ".dat")
-MATRIX_MARKET, HARWELL_BOEING = (".mtx", ".mm"), (".hb", ".rb", ".rua", ".rsa")
-
-
-class Nodes(NamedTuple):
-    """ids, positions (n,3) m, and the digits of each node's displacements."""
-
-    ids: list[int]
-    position: list[list[float]]
-    dofs: list[str]
+INSTEAD = {
+    ".op2": "have Nastran write matrices by OUTPUT4 or as DMIG cards (EXTSEOUT with DMIGPCH)",
+    ".f06": "it is a listing; have Nastran write matrices by OUTPUT4 or as DMIG cards (EXTSEOUT with DMIGPCH)",
+    ".full": "have Ansys write it by HBMAT, with its mapping file", ".sub": "have Ansys write it by HBMAT",
+    ".sim": "have Abaqus write it by *MATRIX OUTPUT, FORMAT=MATRIX INPUT",
+}  # fmt: skip
+"""What to do with files of finite-element codes that hold matrices in a form of their own."""
 
 
 def read_super_element(
@@ -39,33 +39,82 @@ def read_super_element(
 ) -> SuperElement:
     """A structure from files of its matrices and its nodes; one file may hold both matrices, named K... and M....
 
-    DMIG matrices name the node and the displacement of each row; then the table only needs to list the nodes. Raises
+    Where a matrix names the node and the displacement of each row, the table only needs to list the nodes. Raises
     SuperElementError with the file, the place and the remedy, or OSError.
     """
     table = _nodes(Path(nodes))
     stiffness, mass = _matrix(Path(K), "K"), _matrix(Path(M), "M")
     if stiffness.rows is not None or mass.rows is not None:
         stiffness, mass, table = _by_labels(stiffness, mass, table)
+    rows = max(len(stiffness.matrix), len(mass.matrix))
+    stiffness, mass = (_with_rows(each, rows) if each.open_end else each for each in (stiffness, mass))
+    table = _by_size(rows, table)
     return super_element(stiffness.matrix, mass.matrix, table.position, table.ids, table.dofs)
 
 
 def _matrix(path: Path, letter: str) -> NamedMatrix:
     """The matrix of a file; if there are several, the one whose name begins with `letter`."""
     ending = path.suffix.lower()
-    if ending in OP4 + DMIG:
-        found = (op4_matrices if ending in OP4 else dmig_matrices)(str(path), _text(path))
-        chosen = found if len(found) == 1 else [each for each in found if each.name.upper().startswith(letter)]
-        if len(chosen) != 1:
-            names = ", ".join(each.name for each in found) or "none"
-            raise SuperElementError(
-                f"{path}: which matrix is {letter}? it has {names}: give a file with one whose name begins so"
-            )
-        return chosen[0]
-    if ending not in MATRIX_MARKET + HARWELL_BOEING:
-        known = ", ".join(MATRIX_MARKET + HARWELL_BOEING + OP4 + DMIG)
-        raise SuperElementError(f'{path}: "{ending}" is not a known format: write the matrix as one of {known}')
-    market = ending in MATRIX_MARKET
-    return NamedMatrix(letter, _whole(market_matrix(str(path), _text(path)) if market else _harwell_boeing(path)), None)
+    if ending not in READERS:
+        remedy = INSTEAD.get(ending, f"write the matrix as one of {', '.join(READERS)}")
+        raise SuperElementError(f'{path}: "{ending}" is not a known format: {remedy}')
+    found = READERS[ending](path)
+    chosen = found if len(found) == 1 else [each for each in found if each.name.upper().startswith(letter)]
+    if len(chosen) != 1:
+        names = ", ".join(each.name for each in found) or "none"
+        raise SuperElementError(
+            f"{path}: which matrix is {letter}? it has {names}: give a file with one whose name begins so"
+        )
+    return chosen[0]
+
+
+def _market(path: Path) -> list[NamedMatrix]:
+    """Of Matrix Market, or of *MATRIX OUTPUT, which has the same ending and no banner."""
+    text = _text(path)
+    if not text.lstrip().lower().startswith("%"):
+        return [triplets(str(path), text)]
+    return [NamedMatrix("", both_halves(market_matrix(str(path), text)), None)]
+
+
+def _op4(path: Path) -> list[NamedMatrix]:
+    try:
+        data = read_bytes(path, LIMIT)
+    except Unreadable as error:
+        raise SuperElementError(f"{path}: {error}") from None
+    return binary_op4_matrices(str(path), data) if is_binary_op4(data) else op4_matrices(str(path), _text(path))
+
+
+def _dmig(path: Path) -> list[NamedMatrix]:
+    return dmig_matrices(str(path), _text(path))
+
+
+def _calculix(path: Path) -> list[NamedMatrix]:
+    """With the rows of the file `.dof` beside it."""
+    beside = path.with_suffix(".dof")
+    if not beside.exists():
+        raise SuperElementError(f"{path}: {beside.name}, which names its rows, is not beside it: ccx writes all three")
+    return [_labelled(path, triplets(str(path), _text(path)), dof_rows(str(beside), _text(beside)))]
+
+
+def _ansys(path: Path) -> list[NamedMatrix]:
+    """With the rows of the mapping file beside it, if there is one."""
+    matrix = NamedMatrix("", both_halves(_harwell_boeing(path)), None)
+    for beside in (path.with_suffix(".mapping"), path.with_suffix(".MAPPING")):
+        if beside.exists():
+            return [_labelled(path, matrix, mapping_rows(str(beside), _text(beside)))]
+    return [matrix]
+
+
+def _labelled(path: Path, found: NamedMatrix, rows: list[Row]) -> NamedMatrix:
+    if len(found.matrix) > len(rows) or (len(found.matrix) < len(rows) and not found.open_end):
+        raise SuperElementError(f"{path}: it has {len(found.matrix)} rows, and the file beside it names {len(rows)}")
+    return _with_rows(found, len(rows))._replace(rows=rows)
+
+
+def _with_rows(found: NamedMatrix, count: int) -> NamedMatrix:
+    """With the last rows, which have no element."""
+    missing = count - len(found.matrix)
+    return NamedMatrix(found.name, np.pad(found.matrix, ((0, missing), (0, missing))), found.rows)
 
 
 def _harwell_boeing(path: Path) -> Real:
@@ -84,20 +133,24 @@ def _harwell_boeing(path: Path) -> Real:
     return dense
 
 
-def _whole(dense: Real) -> Real:
-    """A symmetric matrix, one half of which may be missing."""
-    lower = np.tril(dense, -1)
-    return dense + lower.T if np.any(lower) and not np.any(np.triu(dense, 1)) else dense
-
-
 def _text(path: Path) -> str:
     try:
         return read_text(path, LIMIT)
     except Unreadable as error:
-        raise SuperElementError(f"{path}: {error}; OP4 has to be in text form (FORMATTED)") from None
+        raise SuperElementError(f"{path}: {error}") from None
 
 
 def _nodes(path: Path) -> Nodes:
+    ending = path.suffix.lower()
+    if ending in MESHES:
+        found = MESHES[ending](str(path), _text(path))
+        if not found.ids:
+            raise SuperElementError(f"{path}: there is no node in it: give the input file that lists them")
+        return found
+    return _table(path)
+
+
+def _table(path: Path) -> Nodes:
     try:
         rows = list(csv.reader(read_text(path).splitlines()))
     except (Unreadable, csv.Error) as error:
@@ -111,7 +164,7 @@ def _nodes(path: Path) -> Nodes:
             continue
         try:
             identity, x, y, z, *dofs = (word.strip() for word in row)
-            found.ids.append(_number_of_node(identity))
+            found.ids.append(number_of_node(identity))
             found.position.append([float(word) for word in (x, y, z)])
             found.dofs.append(dofs[0] if dofs else "123456")
         except ValueError:
@@ -121,14 +174,6 @@ def _nodes(path: Path) -> Nodes:
     if not found.ids:
         raise SuperElementError(f"{path}: there is no node: add a line for each, under id,x,y,z")
     return found
-
-
-def _number_of_node(word: str) -> int:
-    """A node number; ValueError unless it is an integer of 64 bits."""
-    number = int(word)
-    if not -(2**63) <= number < 2**63:
-        raise ValueError(f"{word:.40} is too large")
-    return number
 
 
 def _by_labels(K: NamedMatrix, M: NamedMatrix, table: Nodes) -> tuple[NamedMatrix, NamedMatrix, Nodes]:
@@ -154,3 +199,25 @@ def _by_labels(K: NamedMatrix, M: NamedMatrix, table: Nodes) -> tuple[NamedMatri
         return NamedMatrix(given.name, full, rows)
 
     return spread(K), spread(M), Nodes(ids, [known[node] for node in ids], dofs)
+
+
+def _by_size(rows: int, table: Nodes) -> Nodes:
+    """Nodes of an input file, which does not say their displacements: all have three, or all six."""
+    if "" not in table.dofs:
+        return table
+    for digits in ("123", "123456"):
+        if rows == len(digits) * len(table.ids):
+            return table._replace(dofs=[digits] * len(table.ids))
+    raise SuperElementError(
+        f"K has {rows} rows, which is neither 3 nor 6 for each of {len(table.ids)} nodes: give matrices that name "
+        "their rows, or a table id,x,y,z,dofs"
+    )
+
+
+READERS = {
+    **dict.fromkeys((".mtx", ".mm"), _market), **dict.fromkeys((".hb", ".rb", ".rua", ".rsa", ".matrix"), _ansys),
+    ".op4": _op4, **dict.fromkeys((".pch", ".bdf", ".dat"), _dmig), **dict.fromkeys((".sti", ".mas"), _calculix),
+}  # fmt: skip
+"""By the ending of a file of matrices."""
+MESHES = {**dict.fromkeys((".bdf", ".dat", ".nas", ".pch"), grid_nodes), ".inp": inp_nodes}
+"""By the ending of a file that lists nodes; others are tables."""

@@ -49,6 +49,14 @@ def refuse_large(file: str, rows: int, columns: int) -> None:
         )
 
 
+def both_halves(matrix: Real) -> Real:
+    """A symmetric matrix, one half of which may be missing."""
+    lower, upper = np.tril(matrix, -1), np.triu(matrix, 1)
+    if np.any(lower) and np.any(upper):
+        return matrix
+    return matrix + lower.T + upper.T
+
+
 def _counts(file: str, line: str, many: int) -> list[int]:
     words = line.split()
     if len(words) != many or not all(word.isascii() and word.isdigit() and len(word) < 19 for word in words):

@@ -1,7 +1,4 @@
-"""Readers of Nastran's OP4 files in text form and of DMIG cards of punch files.
-
-pyNastran, which also reads them, requires an older NumPy than flexmb.
-"""
+"""Readers of Nastran's OP4 files in text form and of DMIG cards of punch files."""
 
 from __future__ import annotations
 
@@ -23,12 +20,17 @@ SYMMETRIC = 6
 FIELDS = {False: (8, 8), True: (8, 16)}  # of a card: characters of the first field, and of the others
 
 
+Row = tuple[int, int]
+"""Node and displacement, 1 to 6."""
+
+
 class NamedMatrix(NamedTuple):
-    """A matrix (N,N), and (node, displacement 1 to 6) of its rows, if the file has them."""
+    """A matrix (N,N), and what its rows are, if the file says it; `open_end`: last rows without elements may lack."""
 
     name: str
     matrix: Real
-    rows: list[tuple[int, int]] | None
+    rows: list[Row] | None
+    open_end: bool = False
 
 
 def op4_matrices(file: str, text: str) -> list[NamedMatrix]:
@@ -67,7 +69,7 @@ def _op4(file: str, lines: list[str], at: int) -> tuple[NamedMatrix, int]:
         line = lines[number]
         try:
             if "." in line:
-                values = [_real(line[i : i + width]) for i in range(0, len(line.rstrip()), width)]
+                values = [real(line[i : i + width]) for i in range(0, len(line.rstrip()), width)]
                 if not (0 <= column < columns and row >= 0 and row + len(values) <= rows):
                     raise ValueError("an element outside of the matrix")
                 matrix[row : row + len(values), column] = values
@@ -92,8 +94,8 @@ def _op4(file: str, lines: list[str], at: int) -> tuple[NamedMatrix, int]:
 def dmig_matrices(file: str, text: str) -> list[NamedMatrix]:
     """All real square matrices of the DMIG cards of a file, with fields of 8 or 16 characters, or with commas."""
     forms: dict[str, int] = {}
-    elements: dict[str, dict[tuple[tuple[int, int], tuple[int, int]], float]] = {}
-    for number, fields in _cards(text):
+    elements: dict[str, dict[tuple[Row, Row], float]] = {}
+    for number, fields in cards(text, "DMIG"):
         try:
             name = fields[1]
             if fields[2] == "0":
@@ -105,18 +107,17 @@ def dmig_matrices(file: str, text: str) -> list[NamedMatrix]:
             for i in range(5, len(fields) - 2, 4):
                 if fields[i]:
                     row = (int(fields[i]), int(fields[i + 1] or 0))
-                    elements[name][row, column] = _real(fields[i + 2])
+                    elements[name][row, column] = real(fields[i + 2])
             if any(not 1 <= component <= 6 for row, _ in elements[name] for component in (row[1], column[1])):
                 raise ValueError(f"matrix {name} has rows of scalar points")
         except (ValueError, IndexError, KeyError) as error:
             what = error if isinstance(error, ValueError) else "the card is not complete, or its header is missing"
             raise SuperElementError(f"{file}, line {number}: {what}: give real matrices of grid points") from None
-    return [_assembled(file, name, found, forms[name] == SYMMETRIC) for name, found in elements.items()]
+    return [assembled(file, name, found, forms[name] == SYMMETRIC) for name, found in elements.items()]
 
 
-def _assembled(
-    file: str, name: str, elements: dict[tuple[tuple[int, int], tuple[int, int]], float], symmetric: bool
-) -> NamedMatrix:
+def assembled(file: str, name: str, elements: dict[tuple[Row, Row], float], symmetric: bool) -> NamedMatrix:
+    """The matrix of elements by rows and columns; of a `symmetric` one, one half may be given."""
     rows = sorted({place for pair in elements for place in pair})
     if len(rows) > LARGEST:
         raise SuperElementError(f"{file}: matrix {name} has {len(rows)} rows, more than {LARGEST}: reduce it before")
@@ -129,10 +130,10 @@ def _assembled(
     return NamedMatrix(name, matrix, rows)
 
 
-def _cards(text: str) -> Iterator[tuple[int, list[str]]]:
-    """DMIG cards: the number of the first line, and the fields including those of continuation lines.
+def cards(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
+    """Cards of this name: the number of the first line, and the fields including those of continuation lines.
 
-    Field 0 is the card's name; from field 5 on, each element has four fields: node, displacement, real, imaginary.
+    Field 0 is the name. From field 5 of a DMIG on, each element has four: node, displacement, real, imaginary.
     """
     begun = 0
     card: list[str] = []
@@ -141,7 +142,7 @@ def _cards(text: str) -> Iterator[tuple[int, list[str]]]:
         if not line:
             continue
         fields = _fields(line)
-        if line.upper().startswith("DMIG"):
+        if fields[0].upper().rstrip("*") == name:
             if card:
                 yield begun, card
             begun, card = number, fields
@@ -163,7 +164,7 @@ def _fields(line: str) -> list[str]:
     return [line[:first].strip(), *(line[first + i * width : first + (i + 1) * width].strip() for i in range(count))]
 
 
-def _real(word: str) -> float:
+def real(word: str) -> float:
     """A Fortran number: 1.5, 1.5D+3, 1.5+3. ValueError if it is not one, or not finite."""
     text = re.sub(r"(?<=[\d.])([+-]\d+)$", r"E\1", word.strip().upper().replace("D", "E"))
     value = float(text)

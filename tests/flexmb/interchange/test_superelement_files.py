@@ -11,7 +11,8 @@ import scipy.sparse
 
 from flexmb.interchange.superelement import SuperElementError, read_super_element
 from flexmb.interchange.superelement.nastran import dmig_matrices, op4_matrices
-from tests.flexmb.interchange import frames
+from flexmb.interchange.superelement.op4_binary import binary_op4_matrices
+from tests.flexmb.interchange import frames, made_matrices
 
 DATA = Path(__file__).parent / "data"
 POSITION, MEMBERS = frames.straight(2, 0.7)
@@ -44,12 +45,37 @@ def written(kind: str, folder: Path) -> tuple[Path, Path]:
         case "pch":
             (folder / "both.pch").write_text(large_field_dmig("KAAX", K) + large_field_dmig("MAAX", M))
             return folder / "both.pch", folder / "both.pch"
+        case "coordinate" | "matrix_input":
+            for name, matrix in (("K", K), ("M", M)):
+                (folder / f"{name}.mtx").write_text(getattr(made_matrices, kind)(matrix))
+            return folder / "K.mtx", folder / "M.mtx"
+        case "calculix":
+            for name, matrix in (("b.sti", K), ("b.mas", M)):
+                (folder / name).write_text(made_matrices.calculix(matrix))
+            (folder / "b.dof").write_text(made_matrices.dof(len(K)))
+            return folder / "b.sti", folder / "b.mas"
+        case "ansys":
+            for name, matrix in (("K", K), ("M", M)):
+                scipy.io.hb_write(folder / f"{name}.matrix", scipy.sparse.csc_matrix(np.tril(matrix)))
+                (folder / f"{name}.mapping").write_text(made_matrices.mapping(len(K)))
+            return folder / "K.matrix", folder / "M.matrix"
+    if kind.startswith("binary"):
+        _, form, order, word = kind.split()
+        both = made_matrices.binary_op4({"KAAX": K, "MAAX": M}, form, order, int(word))  # type: ignore[arg-type]
+        (folder / "both.op4").write_bytes(both)
+        return folder / "both.op4", folder / "both.op4"
     return DATA / f"pynastran_{kind}.op4", DATA / f"pynastran_{kind}.op4"
 
 
-@pytest.mark.parametrize("kind", ["mtx", "sparse.mtx", "hb", "pch", "dense", "sparse"])
+KINDS = (
+    "mtx", "sparse.mtx", "hb", "pch", "dense", "sparse", "coordinate", "matrix_input", "calculix", "ansys",
+    "binary dense < 4", "binary sparse > 4", "binary big < 4", "binary big < 8", "binary dense > 8",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_same_structure_from_every_format(kind, tmp_path):
-    """OP4 files were written by pyNastran."""
+    """OP4 files in text form were written by pyNastran, which reads the binary ones exactly in this way."""
     (tmp_path / "nodes.csv").write_text(NODES)
     element = read_super_element(*written(kind, tmp_path), tmp_path / "nodes.csv")
     digits = 1e-9 if kind == "pch" else 1e-15
@@ -58,6 +84,91 @@ def test_the_same_structure_from_every_format(kind, tmp_path):
     assert np.max(np.abs(element.K[full] - K)) <= digits * np.max(np.abs(K))
     wanted = M[np.ix_(*[np.flatnonzero(element.place.ravel() >= 0)] * 2)]
     assert np.max(np.abs(element.M[full] - wanted)) <= digits * np.max(M)
+
+
+def test_what_calculix_writes_is_read_with_its_input_file():
+    """A brick: its mass is rho L B H, and six motions need no force."""
+    element = read_super_element(*(DATA / f"ccx_brick.{ending}" for ending in ("sti", "mas", "inp")))
+    assert element.M.shape == (24, 24) and element.ids.tolist() == [*range(1, 9)]
+    along = element.rigid(np.zeros(3))[:, 0]
+    assert along @ element.M @ along == pytest.approx(2700.0 * 1.0 * 0.3 * 0.2, rel=1e-12)
+
+
+GRIDS = {
+    "small": "GRID    1               0.      0.      0.\nGRID    2               .35     0.      0.\n"
+    "GRID,3,,7.-1,0.,0.\n",
+    "large": "".join(
+        f"GRID*   {i:16d}{'':16}{x:16.9f}{y:16.9f}\n*       {z:16.9f}\n" for i, (x, y, z) in enumerate(POSITION, 1)
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", [*GRIDS, "inp"])
+def test_nodes_of_input_files_are_those_of_the_table(kind, tmp_path):
+    file = tmp_path / ("mesh.inp" if kind == "inp" else "mesh.bdf")
+    lines = "".join(f"{i}, {x!r}, {y!r}\n" for i, (x, y, _) in enumerate(POSITION.tolist(), 1))
+    file.write_text(f"*Node, nset=All\n** hi\n{lines}*Node Print\n7,8\n" if kind == "inp" else GRIDS[kind])
+    (tmp_path / "nodes.csv").write_text(NODES)
+    for matrices in ("mtx", "calculix"):  # without names of rows, and with them
+        given = written(matrices, tmp_path)
+        found, wanted = (read_super_element(*given, nodes) for nodes in (file, tmp_path / "nodes.csv"))
+        assert np.array_equal(found.position, wanted.position) and np.array_equal(found.place, wanted.place)
+
+
+MESHES = {
+    "another system": ("m.bdf", "GRID,1,4,0.,0.,0.\n", "line 1: node 1 is in another coordinate system"),
+    "no coordinate": ("m.bdf", "GRID,1,,x,0.,0.\n", "line 1: GRID needs a number"),
+    "no grid": ("m.bdf", "CBAR,1,2\n", "there is no node in it"),
+    "instances": ("m.inp", "*INSTANCE, NAME=a\n", "line 1: .*write a flat input file"),
+    "cylindrical": ("m.inp", "*NODE, SYSTEM=C\n1, 0, 0, 0\n", "line 1: .*moves nodes"),
+    "no number": ("m.inp", "*NODE\n1, a, 0, 0\n", "line 2: a node is number, x, y, z"),
+    "too far": ("m.inp", "*NODE\n1, 1e300, 0, 0\n", "line 2: a node is number"),
+    "few": ("m.inp", "*NODE\n1, 0, 0, 0\n", "neither 3 nor 6 for each of 1 nodes"),
+}
+
+
+@pytest.mark.parametrize("fault", MESHES)
+def test_damaged_input_files_are_refused_with_line_and_remedy(fault, tmp_path):
+    name, text, words = MESHES[fault]
+    (tmp_path / name).write_text(text)
+    with pytest.raises(SuperElementError, match=words):
+        read_super_element(*written("mtx", tmp_path), tmp_path / name)
+
+
+BESIDE = {
+    "no dof": (None, "b.dof, which names its rows, is not beside it: ccx writes all three"),
+    "few": ("1.1\n", "it has 18 rows, and the file beside it names 1"),
+    "temperature": ("1.11\n", "line 1: 1 11 is not a node and one of its displacements"),
+    "twice": ("1.1\n1.1\n", "line 2: node 1 has displacement 1 twice"),
+}
+
+
+@pytest.mark.parametrize("fault", BESIDE)
+def test_files_of_rows_that_do_not_fit_are_refused(fault, tmp_path):
+    text, words = BESIDE[fault]
+    K_file, M_file = written("calculix", tmp_path)
+    K_file.with_suffix(".dof").unlink() if text is None else K_file.with_suffix(".dof").write_text(text)
+    (tmp_path / "nodes.csv").write_text(NODES)
+    with pytest.raises(SuperElementError, match=words):
+        read_super_element(K_file, M_file, tmp_path / "nodes.csv")
+
+
+def test_a_mapping_whose_rows_are_not_in_order_is_refused(tmp_path):
+    K_file, M_file = written("ansys", tmp_path)
+    K_file.with_suffix(".mapping").write_text(" Matrix Eqn Node DOF\n 2 1 UX\n")
+    (tmp_path / "nodes.csv").write_text(NODES)
+    with pytest.raises(SuperElementError, match="line 2: this is not row 1"):
+        read_super_element(K_file, M_file, tmp_path / "nodes.csv")
+
+
+def test_damaged_binary_op4_is_refused_wherever_it_is_cut():
+    whole = made_matrices.binary_op4({"K": K[:3, :3]}, "sparse")
+    for length in range(5, len(whole)):
+        with pytest.raises(SuperElementError, match="byte|has no end"):
+            binary_op4_matrices("f", whole[:length])
+    nan = made_matrices.binary_op4({"K": np.array([[np.nan]])})
+    with pytest.raises(SuperElementError, match="byte 32: .* finite numbers"):
+        binary_op4_matrices("f", nan)
 
 
 def test_dmig_in_small_fields_and_with_commas():
@@ -98,7 +209,16 @@ BAD = {
     "which": ("K.op4", SPARSE.replace("KAAX", "XAAX"), "which matrix is K"),
     "no DMIG": ("K.pch", "$ nothing\n", "it has none"),
     "no header": ("K.pch", "DMIG*   KAAX                           1               1\n", "line 1"),
-    "no matrix market": ("K.mtx", "1 2 3", "not a Matrix Market file"),
+    "no matrix market": ("K.mtx", "1 2 3 4", "line 1: 4 numbers are neither .* MATRIX INPUT, or as %%MatrixMarket"),
+    "no matrix": ("K.mtx", "** hello\n", "there is no element"),
+    "an internal node": ("K.mtx", "-3,1, 1,1, 2.0\n", "line 1: .* internal nodes"),
+    "temperature": ("K.mtx", "3,11, 1,1, 2.0\n", "line 1: a displacement is beyond 6"),
+    "an element twice": ("K.mtx", "1 1 2.0\n1 2 1.0\n1 1 3.0\n", "line 3: its element is there before"),
+    "twice by node": ("K.mtx", "1,1, 1,1, 2.0\n1,1, 1,1, 2.0\n", "line 2: its element is there before"),
+    "no number": ("K.mtx", "1 1 2.0\n1 1 x\n", "line 2: 1 1 x is not 2 numbers from 1 and a value"),
+    "half a number": ("K.mtx", "1 1.5 2.0\n", "line 1: 1 1.5 2.0 is not"),
+    "many rows": ("K.mtx", "99999 1 2.0\n", "too large for dense"),
+    "a listing": ("K.f06", "x", "not a known format: it is a listing; have Nastran write matrices by OUTPUT4"),
     "NUL in a number": ("K.mtx", "%%MatrixMarket matrix array real general\n1 1\n1\x000\n", "more than numbers"),
     "too few": ("K.mtx", "%%MatrixMarket matrix array real symmetric\n2 2\n1 2\n", "2 numbers, and 2 x 2 needs 3"),
     "outside of it": ("K.mtx", "%%MatrixMarket matrix coordinate real general\n2 2 1\n3 1 1.0\n", "element 1 lies"),
@@ -111,7 +231,7 @@ BAD = {
         "%%MatrixMarket matrix coordinate real general\n90000 90000 1\n1 1 1.0\n",
         "too large for dense",
     ),
-    "unknown": ("K.full", "x", "not a known format: write the matrix as one of .mtx"),
+    "unknown": ("K.xyz", "x", "not a known format: write the matrix as one of .mtx"),
 }
 
 

@@ -1,0 +1,130 @@
+"""Readers of matrices as rows, columns and values of their elements: of CalculiX, and of Abaqus' *MATRIX OUTPUT.
+
+CalculiX writes one half to `.sti` and `.mas`, and the node and displacement of each row to `.dof`. Abaqus' form
+COORDINATE has rows in the order of the numbers of nodes; its form MATRIX INPUT names node and displacement of both, and
+writes one half.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexmb.interchange.imported import usable
+from flexmb.interchange.superelement.element import SuperElementError
+from flexmb.interchange.superelement.matrix_market import LARGEST, both_halves, refuse_large
+from flexmb.interchange.superelement.nastran import NamedMatrix, Row, assembled
+from flexmb.typing import Index, Real
+
+COMMENT = "*"
+BY_PLACE, BY_NODE = 3, 5  # numbers in a line
+DISPLACEMENTS = {
+    "UX": 1, "UY": 2, "UZ": 3, "ROTX": 4, "ROTY": 5, "ROTZ": 6,
+    **{str(component): component for component in range(1, 7)},
+}  # fmt: skip
+"""Of a row, as Ansys and others name them."""
+
+
+def triplets(file: str, text: str) -> NamedMatrix:
+    """The matrix of a file. SuperElementError with file, line and remedy."""
+    lines = [(number, words) for number, words in _lines(text) if words]
+    if not lines:
+        raise SuperElementError(f"{file}: there is no element: write the matrix again")
+    width = len(lines[0][1])
+    if width not in (BY_PLACE, BY_NODE):
+        raise SuperElementError(
+            f"{file}, line {lines[0][0]}: {width} numbers are neither row, column and value, nor two nodes with their "
+            "displacements and a value: write the matrix by *MATRIX OUTPUT, FORMAT=COORDINATE or MATRIX INPUT, or as "
+            "%%MatrixMarket"
+        )
+    values = np.array([_element(file, number, words, width) for number, words in lines])
+    return _by_place(file, lines, values) if width == BY_PLACE else _by_node(file, lines, values)
+
+
+def _lines(text: str) -> list[tuple[int, list[str]]]:
+    return [
+        (number, [] if line.lstrip().startswith(COMMENT) else line.replace(",", " ").split())
+        for number, line in enumerate(text.split("\n"), 1)
+    ]
+
+
+def _element(file: str, number: int, words: list[str], width: int) -> list[float]:
+    try:
+        found = [float(word.upper().replace("D", "E")) for word in words]
+        whole = [int(word) for word in words[:-1]]
+    except ValueError:
+        found, whole = [], []
+    if len(found) != width or not usable(found[-1]) or not all(0 < each < 2**53 for each in whole):
+        raise SuperElementError(
+            f"{file}, line {number}: {' '.join(words):.60} is not {width - 1} numbers from 1 and a value: internal "
+            "nodes and other lines cannot be read, write the matrix again"
+        )
+    return found
+
+
+def _by_place(file: str, lines: list[tuple[int, list[str]]], values: Real) -> NamedMatrix:
+    i, j = values[:, :2].astype(np.int64).T
+    size = int(max(i.max(), j.max()))
+    refuse_large(file, size, size)
+    _refuse_repeated(file, lines, (i - 1) * size + j)
+    matrix = np.zeros((size, size))
+    matrix[i - 1, j - 1] = values[:, 2]
+    return NamedMatrix("", both_halves(matrix), None, open_end=True)
+
+
+def _by_node(file: str, lines: list[tuple[int, list[str]]], values: Real) -> NamedMatrix:
+    places = values[:, :4].astype(np.int64)
+    bad = np.flatnonzero((places[:, 1] > 6) | (places[:, 3] > 6))
+    if len(bad):
+        raise SuperElementError(
+            f"{file}, line {lines[bad[0]][0]}: a displacement is beyond 6: give matrices of displacements and rotations"
+        )
+    elements: dict[tuple[Row, Row], float] = {}
+    for (number, _), (a, b, c, d), value in zip(lines, places.tolist(), values[:, 4].tolist(), strict=True):
+        if ((a, b), (c, d)) in elements:
+            raise SuperElementError(f"{file}, line {number}: its element is there before: keep one of them")
+        elements[(a, b), (c, d)] = value
+    one_half = all((column, row) not in elements or row == column for row, column in elements)
+    return assembled(file, "", elements, one_half)
+
+
+def _refuse_repeated(file: str, lines: list[tuple[int, list[str]]], keys: Index) -> None:
+    _, first = np.unique(keys, return_index=True)
+    if len(first) < len(keys):
+        number = lines[int(np.setdiff1d(np.arange(len(keys)), first)[0])][0]
+        raise SuperElementError(f"{file}, line {number}: its element is there before: keep one of them")
+
+
+def dof_rows(file: str, text: str) -> list[Row]:
+    """Node and displacement of each row, as CalculiX writes them: 17.3 in a line."""
+    return _rows(file, [(number, line.strip().split(".")) for number, line in enumerate(text.split("\n"), 1)])
+
+
+def mapping_rows(file: str, text: str) -> list[Row]:
+    """Node and displacement of each row from the mapping file of Ansys: number, node and UX to ROTZ in a line.
+
+    The rows are in the order of their numbers, from 1; lines that do not begin with a number are headings.
+    """
+    lines = [(number, line.split()) for number, line in enumerate(text.split("\n"), 1)]
+    lines = [(number, words) for number, words in lines if words and words[0].isdigit()]
+    for count, (number, words) in enumerate(lines, 1):
+        if words[0] != str(count):
+            raise SuperElementError(f"{file}, line {number}: this is not row {count}: write the mapping file again")
+    return _rows(file, [(number, words[1:]) for number, words in lines])
+
+
+def _rows(file: str, lines: list[tuple[int, list[str]]]) -> list[Row]:
+    found: dict[Row, None] = {}
+    for number, words in lines:
+        if words in ([], [""]):
+            continue
+        component = DISPLACEMENTS.get(words[1].upper()) if len(words) == 2 else None
+        if component is None or not (words[0].isascii() and words[0].isdigit() and len(words[0]) < 16):
+            what = f"{' '.join(words):.40} is not a node and one of its displacements"
+            raise SuperElementError(f"{file}, line {number}: {what}: give matrices of displacements and rotations")
+        row = (int(words[0]), component)
+        if row in found:
+            raise SuperElementError(f"{file}, line {number}: node {row[0]} has displacement {component} twice")
+        found[row] = None
+        if len(found) > LARGEST:
+            refuse_large(file, len(found), len(found))
+    return list(found)
