@@ -47,13 +47,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if _searches(config) and getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
             item.add_marker(pytest.mark.slow)
     for line in LONG:
-        file, _, name = line.partition("::")
-        found = [item for item in by_file.get(TESTS / file, ()) if fnmatchcase(item.name, name)]
-        for item in found:
-            item.add_marker(pytest.mark.slow)
+        file, _, names = line.partition("::")
+        name, *kept = names.split(" but ")
+        of_file = by_file.get(TESTS / file, ())
         whole = TESTS / file in by_file and not any("::" in arg for arg in config.args)
-        if not found and (whole or not (TESTS / file).exists()):
-            raise pytest.UsageError(f"tests/slow.txt: no test is {line}: correct or remove the line")
+        for pattern in (name, *kept):
+            if not any(fnmatchcase(item.name, pattern) for item in of_file) and (
+                whole or not (TESTS / file).exists()
+            ):
+                raise pytest.UsageError(f"tests/slow.txt: no test is {file}::{pattern}: correct or remove the line")
+        for item in of_file:
+            if fnmatchcase(item.name, name) and not any(fnmatchcase(item.name, pattern) for pattern in kept):
+                item.add_marker(pytest.mark.slow)
 
 
 def pytest_collection_finish() -> None:

@@ -15,7 +15,7 @@ from tests.repo.project import PYPROJECT, ROOT
 
 CHECKS = {
     "ruff": ["-m", "ruff", "check", "--no-cache", "."],
-    "mypy": ["-m", "mypy", "--no-incremental"],
+    "mypy": ["-m", "mypy"],  # what it keeps in .mypy_cache saves a minute
     "import-linter": ["-c", "from importlinter.cli import lint_imports_command as main; main(['--no-cache'])"],
 }
 

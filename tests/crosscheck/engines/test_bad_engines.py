@@ -35,6 +35,7 @@ DEADLY = ("leaves_at_import", "falls_at_import", "interrupts_at_import")  # of t
 MILD = (*ANSWERS, *TIDY, *(name for name in MODULES if name not in DEADLY))
 HARD = (*CRASHES, *DEADLY, *UNTIDY)
 LATE = (*ENDLESS, *HANGING_MODULES)
+NEEDED = ("prints_megabytes", "leaves_children")  # by tests that name none
 LIMIT_S = 8.0  # for those that wait; who eats is to be stopped by what it holds, however slow the machine
 LIMIT_BYTES = 700e6
 
@@ -101,18 +102,32 @@ def mild(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) ->
 
 
 @pytest.fixture(scope="module")
-def hard(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
-    return Ran(tmp_path_factory.mktemp("hard"), HARD, patch)
+def hard(
+    tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> Ran:
+    return Ran(tmp_path_factory.mktemp("hard"), asked(HARD, request), patch)
 
 
 @pytest.fixture(scope="module")
-def late(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
-    return Ran(tmp_path_factory.mktemp("late"), LATE, patch, Limits(workers=2, time_s=LIMIT_S))
+def late(
+    tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> Ran:
+    return Ran(tmp_path_factory.mktemp("late"), asked(LATE, request), patch, Limits(workers=2, time_s=LIMIT_S))
 
 
 @pytest.fixture(scope="module")
-def hungry(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
-    return Ran(tmp_path_factory.mktemp("hungry"), tuple(HUNGRY), patch, Limits(workers=2, memory_bytes=LIMIT_BYTES))
+def hungry(
+    tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> Ran:
+    names, limits = asked(tuple(HUNGRY), request), Limits(workers=2, memory_bytes=LIMIT_BYTES)
+    return Ran(tmp_path_factory.mktemp("hungry"), names, patch, limits)
+
+
+def asked(names: tuple[str, ...], request: pytest.FixtureRequest) -> tuple[str, ...]:
+    """Those of whom a selected test asks: each of them costs processes."""
+    calls = [item.callspec for item in request.session.items if item.path == request.path and hasattr(item, "callspec")]
+    wanted = {call.params.get("name") for call in calls}
+    return tuple(name for name in names if name in wanted or name in NEEDED)
 
 
 def of(name: str, request: pytest.FixtureRequest) -> Ran:

@@ -337,11 +337,15 @@ class Kinds:
         }  # fmt: skip
 
 
-def faults(name: str, kind: Kind) -> Iterator[str]:
+SHARE = 3
+"""Unless there is time, one in so many of the uses of what is altered in one way is tried."""
+
+
+def faults(name: str, kind: Kind, thorough: bool = True) -> Iterator[str]:
     """What is not right about objects of a kind."""
     expected = {use: work(kind.sound) for use, work in kind.uses.items()}
-    for altered, change in kind.changes.items():
-        for use, work in kind.uses.items():
+    for i, (altered, change) in enumerate(kind.changes.items()):
+        for use, work in tried(kind, i, thorough).items():
             where = f"{use}({name}, {altered})"
             print(where, file=sys.stderr, flush=True)
             try:
@@ -358,6 +362,11 @@ def faults(name: str, kind: Kind) -> Iterator[str]:
                 yield f"{where}: another result than that of the sound one"
 
 
+def tried(kind: Kind, i: int, thorough: bool) -> dict[str, Callable[[Any], Any]]:
+    """Uses that the change of this number is tried with."""
+    return kind.uses if thorough else dict(list(kind.uses.items())[i % SHARE :: SHARE])
+
+
 def _is_not_finite(altered: str) -> bool:
     return "NaN" in altered or "infinite" in altered
 
@@ -371,10 +380,10 @@ def _agree(result: Any, expected: Any) -> bool:
 
 def main() -> None:
     faulthandler.enable()
-    found, count = list[str](), 0
-    for name, kind in Kinds("--thorough" in sys.argv).all.items():
-        found += faults(name, kind)
-        count += len(kind.changes) * len(kind.uses)
+    found, count, thorough = list[str](), 0, "--thorough" in sys.argv
+    for name, kind in Kinds(thorough).all.items():
+        found += faults(name, kind, thorough)
+        count += sum(len(tried(kind, i, thorough)) for i in range(len(kind.changes)))
     print("\n".join(found))
     print(f"{count} calls, {len(found)} faults")
 

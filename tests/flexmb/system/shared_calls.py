@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-THREADS = 8
+THREADS = 4
 WHOLE = "whole"
 
 
