@@ -62,7 +62,8 @@ class ChainDerivatives(DifferentiableMotion):
                 f'scene "{self.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
                 f'closures join them, and {what} does not support that: use level "linear" or a better one'
             )
-        self.initial_state  # noqa: B018 - counts the independent rows, without which no position is seen to be singular
+        if self.closures.rank < 0:
+            self.initial_state  # noqa: B018 - counts the independent rows, or no position is seen to be singular
 
     def _given(self, accelerations: Real) -> Real:
         raise NotImplementedError(

