@@ -16,7 +16,7 @@ from tests.flexmb.system.argument_kinds import W
 from tests.flexmb.system.shared_calls import numbers
 
 CASES = Path(__file__).parents[3] / "cases"
-LARGE = 1e150, 1e152, 1e160, 1e307, -1e152
+LARGE = 1e150, 1e152, 1e160, 1e308, -1e152, -1e308
 
 
 def questions(system: fm.System, rates: Any) -> dict[str, Any]:
