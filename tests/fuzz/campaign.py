@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.fuzz.kinds import kinds
-from tests.fuzz.worker import ALARM_S, BAD
+from tests.fuzz.worker import ASLEEP_S, BAD
 
 SHARES = {  # of the others one each
     "scene": 6, "run file": 4, "verify csv": 5, "npz": 4, "records": 4, "mjcf": 3, "urdf": 3, "sid": 3, "sweep": 3,
@@ -77,7 +77,7 @@ def _start(folder: Path, seed: int, keep: Path) -> Any:
 def _ask(worker: Any, line: str) -> str:
     try:
         worker.stdin.write(line)
-        return _wait(worker, ALARM_S + GRACE_S)
+        return _wait(worker, ASLEEP_S + GRACE_S)
     except BrokenPipeError:
         return ""
 

@@ -98,7 +98,7 @@ def _bare() -> None:
 
 @pytest.mark.parametrize(("does", "outcome"), [(_hang, "hang"), (_raise, "traceback"), (_bare, "no file named")])
 def test_a_reader_that_misbehaves_is_seen(kinds, monkeypatch: pytest.MonkeyPatch, does, outcome: str) -> None:
-    monkeypatch.setattr("tests.fuzz.worker.ALARM_S", 1)
+    monkeypatch.setattr("tests.fuzz.worker.ASLEEP_S", 1.0)
     folder, found = kinds
     spoiled = replace(found["scene"], accept=lambda path: does(), place="")
     assert read(spoiled, folder / "scene.toml")[0] == outcome

@@ -21,7 +21,8 @@ from tests.fuzz.kinds import Kind, kinds
 from tests.fuzz.mutate import mutant
 
 BAD = ("traceback", "hang", "growth", "wrong accept", "died", "no file named")
-ALARM_S = 10
+BUSY_S = 10.0  # s of processor time, and
+ASLEEP_S = 120.0  # s on the clock, which says more of the machine's load: beyond them a reader hangs
 GROWTH = 500 * 2**20
 CEILING = 3 * 2**30  # of address space beyond what the process has when it starts: it must not take the machine down
 PLACES = ("directory", "pipe", "loop", "endless", "missing", "unreadable name")
@@ -51,8 +52,7 @@ def main(folder: Path, seed: int, keep: Path) -> None:
 
 def read(kind: Kind, path: Path) -> tuple[str, str]:
     """What comes of reading a file: outcome and detail."""
-    signal.signal(signal.SIGALRM, _ring)
-    signal.alarm(ALARM_S)
+    _set_alarms(BUSY_S, ASLEEP_S)
     try:
         wrong = kind.accept(path)
         return ("wrong accept", wrong) if wrong else ("accepted", "")
@@ -65,7 +65,7 @@ def read(kind: Kind, path: Path) -> tuple[str, str]:
     except BaseException as error:
         return "traceback", f"{type(error).__name__}: {error!s:.200}\n{traceback.format_exc()[-1500:]}"
     finally:
-        signal.alarm(0)
+        _set_alarms(0.0, 0.0)
 
 
 def content(kind: Kind, name: str, seed: int, number: int) -> tuple[str, bytes | str]:
@@ -141,6 +141,14 @@ def _status(field: str) -> int:
         if line.startswith(field + ":"):
             return int(line.split()[1]) * 1024
     raise KeyError(field)
+
+
+def _set_alarms(busy: float, asleep: float) -> None:
+    """Ring after so many seconds of processor time, and on the clock; never after 0."""
+    signal.signal(signal.SIGPROF, _ring)
+    signal.signal(signal.SIGALRM, _ring)
+    signal.setitimer(signal.ITIMER_PROF, busy)
+    signal.setitimer(signal.ITIMER_REAL, asleep)
 
 
 def _ring(number: int, frame: Any) -> None:
