@@ -22,7 +22,6 @@ from flexmb.jit.counting import count
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
-from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables.state import pack
@@ -142,7 +141,7 @@ class Bench:
 def _operations(system: System, algorithm: Algorithm) -> int:
     state = system.initial_state
     y = pack(state)
-    if isinstance(system, ClosedSystem):
+    if system.closures is not None:
         chain = system.closures.chain(algorithm)
         return count(closed.rhs, 0.0, y, np.zeros_like(y), chain, 0).operations.total
     chosen = ALGORITHMS[algorithm]

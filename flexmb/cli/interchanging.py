@@ -92,7 +92,9 @@ def reduce(
         Path, typer.Argument(help="K: .mtx, .sti, .hb, .matrix, .op4 or .pch.", metavar="K", show_default=False)
     ],
     mass: Annotated[Path, typer.Argument(help="M, or the file of K again.", metavar="M", show_default=False)],
-    nodes: Annotated[Path, typer.Argument(help="CSV: id,x,y,z[,dofs]; .inp or .bdf.", metavar="NODES", show_default=False)],
+    nodes: Annotated[
+        Path, typer.Argument(help="CSV: id,x,y,z[,dofs]; .inp or .bdf.", metavar="NODES", show_default=False)
+    ],
     interface: Annotated[
         str, typer.Option(help="Numbers of the interface nodes, for hinges, loads and markers.", show_default=False)
     ],

@@ -30,7 +30,6 @@ from flexmb.linear.sensed import ChangedRow, readable, sensed
 from flexmb.linear.variations import Equations
 from flexmb.scene.functions import Constant
 from flexmb.system import algorithms
-from flexmb.system.closed import ClosedSystem
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
 from flexmb.typing import Real
@@ -45,7 +44,7 @@ def closed_loop(system: System, state: State, model: Callable[[Equations, State]
 
     NotImplementedError for sampled controllers.
     """
-    if isinstance(system, ClosedSystem):
+    if system.constraints:
         state = system.admissible(state, "state")
     loop = ClosedLoop(system, state)
     found = loop.at(state, loop.initial, model)

@@ -26,8 +26,8 @@ from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tables import ClosureConstants
 from flexmb.closure.variation import ChainVariation
 from flexmb.linear.variations import Equations, RestForces, Variations, same_structure
-from flexmb.system.closed import ClosedSystem
 from flexmb.system.pushforward import GivenMotion
+from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, pack
@@ -58,20 +58,22 @@ class ClosedEquations(Equations):
     _root: ClosedEquations
 
     def __init__(
-        self, system: ClosedSystem, constants: Constants | None = None, like: ClosedEquations | None = None
+        self, system: System, constants: Constants | None = None, like: ClosedEquations | None = None
     ) -> None:
         super().__init__(system, constants, like)
-        if system.closures.at_rest:
+        closures = system.closures
+        assert closures is not None  # of a closed chain
+        if closures.at_rest:
             raise NotImplementedError(
                 f'scene "{system.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
                 'closures join them: for a linear model use level "linear" or a better one'
             )
         c, root = self.constants, self._root
-        own = system.closures.constants[1]
+        own = closures.constants[1]
         if root is not self and not same_structure(own, root._closures.constants[1]):
             self._root = root = self
         before = None if root is self else root._closures
-        self._shared = system.closures.on_tree(c, lambda: workspace(c, system.nq, system.nu), before)
+        self._shared = closures.on_tree(c, lambda: workspace(c, system.nq, system.nu), before)
         self.rank: int = system.rank if root is self else root.rank
         """Number of independent rows of the closures."""
 

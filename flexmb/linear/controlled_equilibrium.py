@@ -17,7 +17,6 @@ from flexmb.linear.equations import equations_of
 from flexmb.linear.linearize import held_model
 from flexmb.linear.newton import LONGEST, SMALLEST, STEPS, EquilibriumError
 from flexmb.linear.variations import Equations
-from flexmb.system.closed import ClosedSystem
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
@@ -43,7 +42,7 @@ def resting(system: System, guess: State) -> State:
     """
     t, y = system.layout.entering(guess)
     start = replace(guess, u=np.zeros_like(guess.u))
-    if isinstance(system, ClosedSystem):
+    if system.constraints:
         start = system.admissible(start)
     equations = equations_of(system).held(t)
     loop = ClosedLoop(system, start)

@@ -25,9 +25,8 @@ from flexmb.linear.equations import built
 from flexmb.linear.sensed import ChangedRow, readable, sensed
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
-from flexmb.system.closed import ClosedSystem
 from flexmb.system.derivative_records import EvaluationDerivatives, OfControlledMotion, by_names
-from flexmb.system.derivatives import FreeRow, free_row
+from flexmb.system.linearisation import FreeRow
 from flexmb.system.tree_system import System
 from flexmb.tables.arguments import finite, vector
 from flexmb.tables.per_thread import per_thread
@@ -117,7 +116,7 @@ class ControlledMotion:
         plant, feedback, state = self._plant, self._feedback, self._entering(state)
         y = self._begin(state, states, {} if held is None else held)
         laws = law_derivatives(feedback, state.t, y)
-        row = free_row(plant, state, "ControlledMotion")
+        row = plant.linearisation.free_row(state, "ControlledMotion")
         drives, k = len(feedback.driven), row.change.shape[1]
         moving, still = np.zeros((plant.nq + plant.nu, k)), np.zeros((plant.nq + plant.nu, drives))
         moving[: plant.nq, : plant.nu], moving[plant.nq :, plant.nu : 2 * plant.nu] = row.motion, np.eye(plant.nu)
@@ -142,7 +141,7 @@ class ControlledMotion:
     def _entering(self, state: State) -> State:
         """The state, checked; of a closed chain with its closures closed."""
         self._plant.layout.entering(state)
-        return self._plant.admissible(state, "state") if isinstance(self._plant, ClosedSystem) else state
+        return self._plant.admissible(state, "state") if self._plant.constraints else state
 
     def _begin(self, state: State, states: Any, held: Mapping[str, Any]) -> Real:
         """y (n,) = [q, u, x, work] with these states and outputs of sampled controllers in force."""

@@ -10,7 +10,6 @@ from flexmb.scene.check import check_scene
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_large_matrix
-from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
@@ -41,7 +40,7 @@ def equations_of(system: System, like: Equations | None = None) -> Equations:
 
 
 def _made(system: System, like: Equations | None) -> Equations:
-    if not isinstance(system, ClosedSystem):
+    if system.constraints is None:
         return Equations(system, None, like)
     from flexmb.linear.closed_variations import ClosedEquations  # imported only for scenes with closures
 
@@ -61,6 +60,6 @@ def entering(system: System | Scene, state: State | None) -> tuple[Equations, St
     if state is None:
         return equations, equations.system.initial_state
     equations.system.layout.entering(state)
-    if isinstance(equations.system, ClosedSystem):
+    if equations.system.constraints:
         return equations, equations.system.admissible(state, "state")
     return equations, state

@@ -10,7 +10,6 @@ from flexmb.run.propagate import Integration, Raw
 from flexmb.run.run_arrays import Statistics
 from flexmb.run.trajectory import Trajectory, gathered
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.free_motion import FreeMotion
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, NotFiniteError
 from flexmb.tables.status import Status
@@ -80,7 +79,7 @@ def doubt_about(system: System, solve: Integration) -> str | None:
     )
 
 
-def ending(system: FreeMotion, status: Status, fault: int, t: float) -> str:
+def ending(system: System, status: Status, fault: int, t: float) -> str:
     """How a run ended at t (s), in words; fault: the index of the item at which an evaluation failed."""
     if status is Status.OK:
         return f"finished at t = {t:g} s"

@@ -241,16 +241,12 @@ def _again(stage: RunPart, state: Given, algorithm: Algorithm, stabilise: float,
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
     """NotImplementedError if a method that needs Jacobians is used where there are none."""
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
-    if system.scene.constraints:
-        from flexmb.system.closed import ClosedSystem  # imported here because trees do not need it
-
-        assert isinstance(system, ClosedSystem)
-        if system.closures.at_rest:
-            raise NotImplementedError(
-                f'method "{method}" needs Jacobians, which are not available for closed chains with a body of level '
-                f'"ruthless", such as "{system.fault_name(Status.OUT_OF_RANGE, system.closures.at_rest[0])}": its '
-                f'inertia is not where closures join it; use level "linear" or a better one, or method {others}'
-            )
+    if system.closures is not None and system.closures.at_rest:
+        raise NotImplementedError(
+            f'method "{method}" needs Jacobians, which are not available for closed chains with a body of level '
+            f'"ruthless", such as "{system.fault_name(Status.OUT_OF_RANGE, system.closures.at_rest[0])}": its '
+            f'inertia is not where closures join it; use level "linear" or a better one, or method {others}'
+        )
     if not algorithms.chosen(algorithm).jacobian:
         alone = " or ".join(f'"{name}"' for name in algorithms.WITH_JACOBIAN)
         raise NotImplementedError(

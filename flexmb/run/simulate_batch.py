@@ -24,7 +24,6 @@ from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes
 from flexmb.system.batch import Batch, number_of_threads
 from flexmb.system.compile import compile_batch
-from flexmb.system.free_motion import FreeMotion
 from flexmb.system.tree_system import System
 from flexmb.system.watches import Said, WatchedStates, said
 from flexmb.tables import arguments
@@ -104,7 +103,7 @@ def _watched(runs: BatchTrajectory) -> Iterator[str]:
         yield f'scene "{batch.systems[0].scene.name}": {worst}{more}'
 
 
-def _turns(system: FreeMotion, t: Real, q: Real, u: Real, n: int) -> Real:
+def _turns(system: System, t: Real, q: Real, u: Real, n: int) -> Real:
     return system.turns(float(t[n]), q[n], u[n])
 
 

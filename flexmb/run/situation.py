@@ -233,10 +233,7 @@ class Situation:
         with asking(before.kernels):  # the same kind of kernels during the whole run
             self.system = assembled(scene)
         self._built.append(self.system)
-        if scene.constraints:
-            from flexmb.system.closed import ClosedSystem  # imported here because trees do not need it
-
-            assert isinstance(self.system, ClosedSystem) and isinstance(before, ClosedSystem)
+        if self.system.closures is not None:
             self.system.closures.begin_at(at.t, at.y, before.closures)
 
     def _instant(self, t: float, y: Real) -> EventInstant:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -17,9 +16,6 @@ from flexmb.scene.tree import watches_signals
 from flexmb.sensitivity.part_scene import all_changes, changed
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
-
-if TYPE_CHECKING:
-    from flexmb.system.closed import ClosedSystem
 
 _SCHEDULE = "period_s", "offset_s", "delay_s"
 _CLOSED = 1e-9  # m and rad, to which starts are closed with room for rounding
@@ -63,9 +59,9 @@ def refuse_opened_closures(system: System) -> None:
     if not scene.constraints:
         return
     start = system.initial_state
-    before = cast("ClosedSystem", system).closure_gaps(start)
+    before = system.closure_gaps(start)
     for change in all_changes(scene):
-        other = cast("ClosedSystem", assembled(changed(scene, [change])))
+        other = assembled(changed(scene, [change]))
         gaps = other.closure_gaps(other.state(start.q, start.u, start.t))
         for name, gap in gaps.items():
             if not np.allclose(gap, before[name], rtol=0.0, atol=_CLOSED):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,13 @@ from flexmb.building.links import BodyLink
 from flexmb.closure.asked import AskedFor, Value, Wishes
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.hinges import Free, Spherical
-from flexmb.system.tree_system import System
 from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.system.tree_system import System
+
+Given = Literal["guess", "scene", "state"] | NDArray[np.bool_]
+"""Which values of a state must be kept: none, those that the scene gives, all, or those that are named (nq+nu+1,)."""
 
 
 class _Item(NamedTuple):

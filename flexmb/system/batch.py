@@ -26,7 +26,7 @@ from flexmb.jit.bundle import broaden
 from flexmb.jit.direct import ADDRESS, address, addresses, settled
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import INDEX, MATRIX, STATUS, VECTOR, VOID, WHOLE
-from flexmb.system.free_motion import FreeMotion
+from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
 from flexmb.tables.lane_tables import LaneWorkspace, lane_constants, lane_workspace, structural_difference
@@ -82,10 +82,10 @@ class Batch:
     has another structure than the first.
     """
 
-    def __init__(self, systems: Sequence[FreeMotion]) -> None:
+    def __init__(self, systems: Sequence[System]) -> None:
         self.systems = listed("systems", systems)
         for i, system in enumerate(self.systems):
-            if not isinstance(system, FreeMotion):
+            if not isinstance(system, System):
                 raise TypeError(f"systems[{i}] is a {type(system).__name__}: compile_batch makes a batch of scenes")
             _refuse_other_structure(i, system, self.systems[0])
         self.shares_constants = len(self.systems) == 1
@@ -104,7 +104,7 @@ class Batch:
         """Copies and pickles hold the systems, which are made anew from their scenes."""
         return Batch, (self.systems,)
 
-    def system(self, copy: int) -> FreeMotion:
+    def system(self, copy: int) -> System:
         """The system of a copy; ValueError or TypeError if there is no copy of this number."""
         place = arguments.index("copy", copy, sys.maxsize if self.shares_constants else len(self.systems))
         return self.systems[0 if self.shares_constants else place]
@@ -234,7 +234,7 @@ def listed(name: str, given: Iterable[Any]) -> tuple[Any, ...]:
     return found
 
 
-def _refuse_other_structure(i: int, system: FreeMotion, first: FreeMotion) -> None:
+def _refuse_other_structure(i: int, system: System, first: System) -> None:
     if system.layout != first.layout:
         one, other = first.layout.q, system.layout.q
         strange = sorted(name for name in {**one, **other} if one.get(name) != other.get(name))

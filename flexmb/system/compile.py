@@ -1,4 +1,4 @@
-"""Scenes become systems: `System` for trees, `ClosedSystem` where closures close loops."""
+"""Scenes become systems."""
 
 from __future__ import annotations
 
@@ -56,9 +56,7 @@ def assembled(scene: Scene, elimination: Elimination = "fastest") -> System:
     scene = _read(scene)
     with collector_paused(), built(scene):
         if scene.constraints:
-            from flexmb.system.closed import ClosedSystem  # imported here, because trees do not need it
-
-            return ClosedSystem(scene)
+            return System(scene, closed=True)
         return System(scene, elimination)
 
 

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from flexmb.entry import articulated, composite, unsplit
 from flexmb.entry.consistent import consistent_accelerations, held_hinges
+from flexmb.entry.derivatives import DerivativeWorkspace, derivative_workspace
 from flexmb.entry.observation import observe, observe_motion, transmitted
+from flexmb.entry.tangent import TangentWorkspace, tangent_workspace
 from flexmb.jain.elimination import Elimination
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
@@ -161,7 +163,7 @@ class Mechanics(SceneArrays):
         `consistent_inverse_dynamics` finds the modal accelerations that belong to given hinge accelerations.
         """
         t, y = self.layout.entering(state)
-        return finite_result(self._inverse(t, y, self.layout.rates("accelerations", accelerations))[0], t)
+        return finite_result(self.inverse_at(t, y, self.layout.rates("accelerations", accelerations))[0], t)
 
     def modal_residual(self, state: State, accelerations: Real) -> dict[str, Real]:
         """Modal rows T^f of inverse dynamics by body: the modal forces that these accelerations would need."""
@@ -201,7 +203,7 @@ class Mechanics(SceneArrays):
         status = self._recur(t, y, np.empty_like(y))
         return None if status == OK and not w.doubt[0] else self.precision(state)
 
-    def _inverse(self, t: float, y: Real, rates: Real) -> tuple[Real, Real]:
+    def inverse_at(self, t: float, y: Real, rates: Real) -> tuple[Real, Real]:
         """tau (nu,), and the loads (N,6) that the hinges then transmit, World axes."""
         tau, loads = np.zeros(self.nu), np.zeros((len(self.constants.body), 6))
         self._invert(t, y, rates, tau, loads)
@@ -224,7 +226,7 @@ class Mechanics(SceneArrays):
         """Everything observable for accelerations (nu,): hinge loads by inverse dynamics, drives from the workspace."""
         out, t, y = self.observation.out, arguments.number("t", t), self._fitting(y)
         out.rates[:], out.drives[:] = rates, self.own_workspace.speed["drive"]
-        out.loads[:] = self._inverse(t, y, out.rates)[1]
+        out.loads[:] = self.inverse_at(t, y, out.rates)[1]
         self._observe_motion(t, y)
 
     def observe_motion(self, t: float, y: Real, rates: Real, drives: Real, loads: Real) -> None:
@@ -259,6 +261,16 @@ class Mechanics(SceneArrays):
     def observation(self) -> Observation:
         """The arrays for everything observable at one state, with their names."""
         return Observation(self.observed_names, self.nu)
+
+    @per_thread
+    def own_tangent(self) -> TangentWorkspace:
+        """For derivatives by dual numbers."""
+        return tangent_workspace(self.constants, self.nq, self.nu)
+
+    @per_thread
+    def own_derivatives(self) -> DerivativeWorkspace:
+        """For derivatives by the recursion."""
+        return derivative_workspace(self.constants, self.nq, self.nu)
 
     @per_thread
     def own_matrices(self) -> Matrices:

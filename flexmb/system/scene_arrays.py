@@ -1,4 +1,4 @@
-"""A scene turned into arrays: constants of the kernels, and places of coordinates by the names of the scene."""
+"""A scene turned into arrays: constants of the kernels, places of coordinates by the names of the scene, its states."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ from flexmb.building.models import wheels_by_body
 from flexmb.building.numbering import Numbering
 from flexmb.jain.elimination import Elimination, with_elimination
 from flexmb.kept import kept
+from flexmb.motion import coordinates
 from flexmb.scene import schema as s
 from flexmb.scene.connectors import AlongHinge, HingeSpring
 from flexmb.system.observables import Names
+from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
 from flexmb.tables.features import GENERAL
+from flexmb.tables.state import State
 from flexmb.tables.status import Status
-from flexmb.typing import Index
+from flexmb.typing import Index, Real
 
 
 class SceneArrays:
@@ -44,6 +47,41 @@ class SceneArrays:
         self.signals = assembled.signals
         self.layout = numbering.layout
         self.nq, self.nu = self.layout.nq, self.layout.nu
+
+    def state(self, q: Real, u: Real, t: float = 0.0) -> State:
+        """State from q (nq,), u (nu,) and t (s), which are copied; quaternions are scaled to unit length.
+
+        Raises ValueError where lengths do not fit, numbers are not finite or a quaternion is zero, and TypeError for
+        anything but real numbers.
+        """
+        return self.layout.state(q, u, t)
+
+    def scene_state(self, t: float) -> State:
+        """The scene's initial values with prescribed motions at their values for time t (s); closures may be open."""
+        t = arguments.number("t", t)
+        return self.layout.known(t, self._projected(t, self._at_start))
+
+    def _projected(self, t: float, y: Real) -> Real:
+        """A copy of y with work zero, prescribed motions at their values for time t, and quaternions of unit length."""
+        y = np.r_[y[:-1], 0.0]
+        coordinates.project(t, y, self.constants)
+        return y
+
+    @kept
+    def _at_start(self) -> Real:
+        """(nq+nu+1,) [q, u, 0] of the scene at t = 0."""
+        q, u = np.zeros(self.nq), np.zeros(self.nu)
+        for link in self.links:
+            name = link.hinge.name
+            q[self.coordinate(name)], u[self.speed(name)] = link.kind.state(link.hinge)
+        for wheel in self.scene.wheels:
+            q[self.coordinate(wheel.name)], u[self.speed(wheel.name)] = wheel.angle_rad, wheel.speed_rad_s
+        for modal in self.scene.modal_states:
+            name = f"{modal.body}.modes"
+            if self.coordinate(name).stop > self.coordinate(name).start:
+                q[self.coordinate(name)] = modal.coordinates
+                u[self.speed(name)] = modal.rates or 0.0
+        return self._projected(0.0, np.concatenate([q, u, [0.0]]))
 
     @kept
     def recursion_constants(self) -> Constants:

@@ -34,21 +34,24 @@ FOR_ONE = """## Not shared
 | the array that an evaluator returns | each thread has one of its own, and overwrites it at its next call |
 """
 
+CHAINS = "`System` of a closed chain"
+
 
 def page() -> str:
     """The text of docs/threads.md."""
     asked = [name for name in calls() if not name.endswith(", attributes")]
-    attributes = {name.split(",")[0] for name in calls() if name.endswith(", attributes")}
+    attributes = {f"`{name.split(',')[0]}`" for name in calls() if name.endswith(", attributes")}
     methods, functions = defaultdict[str, set[str]](set), set[str]()
     for name in asked:
         kind, _, method = name.split(",")[0].partition(".")
+        kind = CHAINS if name.endswith(", chain") and method else f"`{kind}`"
         if method:
             methods[kind].add(method)
         else:
-            functions.add(kind)
+            functions.add(kind.strip("`"))
     rows = [
-        f"| `{kind}` | {_listed(methods[kind], kind)}{'; all attributes' if kind in attributes else ''} |"
-        for kind in sorted({*methods, *attributes})
+        f"| {kind} | {_listed(methods[kind], kind)}{'; all attributes' if kind in attributes else ''} |"
+        for kind in sorted({*methods, *attributes}, key=lambda kind: kind.replace("`", ""))
     ]
     untried = [f"| `{name}` | {why} |" for name, why in sorted(UNTRIED.items())]
     parts = [
@@ -66,7 +69,7 @@ def page() -> str:
 def _listed(names: Iterable[str], kind: str = "") -> str:
     """Marked where few threads ask, or where all are refused."""
     marks = {name: "*" if name in LONG and not kind else "" for name in names}
-    marks |= {name: " (refused)" for name in names if kind == "ClosedSystem" and name in REFUSED}
+    marks |= {name: " (refused)" for name in names if kind == CHAINS and name in REFUSED}
     return ", ".join(f"`{name}`{marks[name]}" for name in sorted(marks))
 
 

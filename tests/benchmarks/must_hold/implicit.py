@@ -16,7 +16,7 @@ from flexmb.closure.tables import Closed
 from flexmb.integrate.problem import Linear
 from flexmb.scene.files import load_scene
 from flexmb.system import by_recursion
-from flexmb.system.closed import ClosedSystem
+from flexmb.system.constraints import Constraints
 from tests.benchmarks.must_hold.row import Call, Measured, Row, how_many_times
 from tests.benchmarks.rivals import flexible_chain
 from tests.flexmb.closure import dual_jacobian
@@ -60,14 +60,14 @@ def _by_duals(scene: fm.Scene) -> Call:
     call, samples, result = _loop(scene)
 
     def run() -> None:
-        with patch.object(ClosedSystem, "_linear", _dual):
+        with patch.object(Constraints, "_linear", _dual):
             call()
 
     return Call(run, samples, result)
 
 
-def _dual(system: ClosedSystem, chain: Closed, _: Closed) -> Linear:
-    tangent = dual_jacobian.chain_tangent(chain.c, chain.cc, system.nq, system.nu)
+def _dual(_: Constraints, chain: Closed, __: Closed) -> Linear:
+    tangent = dual_jacobian.chain_tangent(chain.c, chain.cc, len(chain.w.q), len(chain.w.u))
     return Linear(dual_jacobian.jacobian, jacobian.move, jacobian.resolve, chain, tangent, settles=True)
 
 

@@ -37,10 +37,10 @@ class Dense(NamedTuple):
 def dense(system: Any, state: fm.State) -> Dense:
     """At a state that fulfils the closures, for the loads and the choice of rows that the product has made."""
     t, y = system.layout.entering(state)
-    at, nu = system._variation(t, y), system.nu
+    at, nu = system.linearisation._variation(t, y), system.nu
     free, chosen = np.flatnonzero(system.constants.speed["prescribed"] < 0), at.rows.chosen
     held = np.setdiff1d(np.arange(nu), free)
-    push, directions = system._pushforward, system._directions(at.motion, 0)
+    push, directions = system.linearisation._pushforward, system.linearisation._directions(at.motion, 0)
     directions.accelerations[held, -1] = at.of_accelerations.by_time[held]  # as their functions do
     change = push.derivatives(GivenMotion(t, y, at.accelerations, at.rows.loads), directions, push.balance)
     balance = push.balance(slice(0, 1))[:, 0]

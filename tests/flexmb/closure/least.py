@@ -6,13 +6,12 @@ from __future__ import annotations
 import numpy as np
 
 import flexmb
-from flexmb.system.closed import ClosedSystem
 from flexmb.tables.state import pack
 
 
 def least_loads(
-    system: ClosedSystem, state: flexmb.State, algorithm: flexmb.Algorithm = "articulated"
+    system: flexmb.System, state: flexmb.State, algorithm: flexmb.Algorithm = "articulated"
 ) -> dict[str, np.ndarray]:
     """By hinge and closure (6,), World axes."""
-    motion = system._motion(state.t, pack(state), algorithm)
-    return system._by_load(motion.hinges, motion.closures)
+    motion = system.constraints._motion(state.t, pack(state), algorithm)
+    return system.constraints._by_load(motion.hinges, motion.closures)

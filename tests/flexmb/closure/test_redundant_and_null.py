@@ -51,7 +51,7 @@ def check(seed: int) -> None:
         size = np.max(np.abs(dense.M) @ np.abs(rates) + np.abs(dense.right))
         assert np.max(np.abs(Vt[rank:] @ missing), initial=0.0) <= bound * size * condition  # of Vt itself
         least = U[:, :rank] @ (Vt[:rank] @ missing / values[:rank])
-        motion = system._motion(*system.layout.packed(0.0, state.q, state.u), algorithm)
+        motion = system.constraints._motion(*system.layout.packed(0.0, state.q, state.u), algorithm)
         for closure, load in zip(scene.closures, motion.closures, strict=True):
             expected = wrench[closure.name] @ least
             assert np.max(np.abs(load - expected)) <= bound * size * condition**2

@@ -92,8 +92,8 @@ def test_without_the_closure_loads_stiffness_is_another():
     """What the test above would notice: loads whose direction does not turn."""
     system = fm.compile(m.four_bar(rate=0.0))
     t, y = system.layout.entering(system.initial_state)
-    at, push = system._variation(t, y), system._pushforward
-    directions = system._directions(at.motion, 0)
+    at, push = system.linearisation._variation(t, y), system.linearisation._pushforward
+    directions = system.linearisation._directions(at.motion, 0)
     loads = at.rows.loads, np.zeros_like(at.rows.loads)
     turned, still = (push.derivatives(GivenMotion(t, y, at.accelerations, f), directions, push.balance) for f in loads)
     turning = at.of_accelerations.by_force @ (turned - still)[: system.nu, : system.nu]

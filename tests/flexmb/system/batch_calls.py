@@ -141,7 +141,7 @@ def of_batches(w: World) -> Calls:
     found.add("Batch.accelerations", evaluated(batch.accelerations), at, **of_copies)
     closed = {"q": np.array([start.q] * COPIES), "u": np.array([start.u] * COPIES), "t": 0.5, "threads": 1}
     found.add(
-        "ClosedSystem.accelerations_batch", evaluated(chain.accelerations_batch), closed,
+        "System.accelerations_batch, chain", evaluated(chain.accelerations_batch), closed,
         q=closing, u=closing, t=times, threads=THREADS,
     )  # fmt: skip
     others = [[*scenes, w.renamed.scene], [scenes[0], chain.scene], [chain.scene, scenes[0]], batch, [tree]]

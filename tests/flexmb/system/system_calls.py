@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 import flexmb as fm
-from flexmb.system.closed import ClosedSystem
 from tests.flexmb.system.argument_kinds import (
     ALGORITHM,
     Calls,
@@ -39,41 +38,53 @@ LOOKS: dict[str, Callable[[Any], Any]] = {
     "closure_operators": lambda it: it.Lambda_inverse,
     "factorise": lambda it: it.log_determinant,
 }
+TREE, CHAIN = "tree", "chain"
+
+
+def kind_of(system: fm.System) -> str:
+    """What it is in the names of calls."""
+    return CHAIN if system.constraints else TREE
+
+
+def of_system(kind: str, call: str) -> str:
+    """The name of a call: "System.accelerations, composite"; of a chain "System.accelerations, composite, chain"."""
+    return f"System.{call}" if kind == TREE else f"System.{call}, {kind}"
 
 
 def of_any(system: fm.System, state: fm.State) -> Calls:
     """Of a tree or a closed chain, with controllers or without; the kinds are of those in `argument_kinds.py`."""
-    found, kind = Calls(), type(system).__name__
-    closed = isinstance(system, ClosedSystem)
+    found, closed = Calls(), system.constraints is not None
+    kind = kind_of(system)
     at, rates = closed_states if closed else states, np.arange(1.0, system.nu + 1.0)
     y, of_y = _of_y(system, state)
     pointwise = ["mass_matrix", "bias", "energy", "momentum", "digits_left", "precision", "admissible", "applied",
                  "mass_properties", "hinge_loads", "factorise"]  # fmt: skip
     pointwise += ["closure_operators", "closure_gaps", "determined_loads"] if closed else ["partitions", "operators"]
     for name in pointwise:
-        found.add(f"{kind}.{name}", getattr(system, name), {"state": state}, LOOKS.get(name, itself), state=at)
-    found.add(f"{kind}.hinge_loads, outboard", lambda state: system.hinge_loads(state, axes="outboard"),
+        found.add(of_system(kind, name), getattr(system, name), {"state": state}, LOOKS.get(name, itself), state=at)
+    found.add(of_system(kind, "hinge_loads, outboard"), lambda state: system.hinge_loads(state, axes="outboard"),
               {"state": state}, state=at)  # fmt: skip
     for algorithm in algorithms_of(system):
         asked = {"algorithm": algorithm}
-        found.add(f"{kind}.accelerations, {algorithm}", system.accelerations, {"state": state, **asked},
+        found.add(of_system(kind, f"accelerations, {algorithm}"), system.accelerations, {"state": state, **asked},
                   state=at, **ALGORITHM)  # fmt: skip
-        found.add(f"{kind}.evaluate, {algorithm}", system.evaluate, {**y, **asked}, **of_y, **ALGORITHM)
+        found.add(of_system(kind, f"evaluate, {algorithm}"), system.evaluate, {**y, **asked}, **of_y, **ALGORITHM)
         if not closed:
-            found.add(f"{kind}.evaluator, {algorithm}", system.evaluator(algorithm), y, np.copy, **of_y)
+            found.add(of_system(kind, f"evaluator, {algorithm}"), system.evaluator(algorithm), y, np.copy, **of_y)
     for name, speeds in {"inverse_dynamics": vectors, "modal_residual": vectors,
                          "consistent_inverse_dynamics": but_modal}.items():  # fmt: skip
-        found.add(f"{kind}.{name}", getattr(system, name), {"state": state, "accelerations": rates},
+        found.add(of_system(kind, name), getattr(system, name), {"state": state, "accelerations": rates},
                   state=at, accelerations=speeds)  # fmt: skip
     asked = {"algorithm": "articulated", "stabilise": 0.0}
-    found.add(f"{kind}.route", system.route, asked, lambda it: it.rhs, stabilise=wrong_only_number, **ALGORITHM)
-    found.add(f"{kind}.scene_state", system.scene_state, {"t": 0.5}, t=numbers)
+    found.add(of_system(kind, "route"), system.route, asked, lambda it: it.rhs, stabilise=wrong_only_number,
+              **ALGORITHM)  # fmt: skip
+    found.add(of_system(kind, "scene_state"), system.scene_state, {"t": 0.5}, t=numbers)
     for name in ("coordinate", "speed"):
-        found.add(f"{kind}.{name}", getattr(system, name), {"name": system.scene.hinges[0].name}, name=names)
-    found.add(f"{kind}.parameters", system.parameters, {"names": ["gravity_m_s2.0", "gravity_m_s2.1"]},
+        found.add(of_system(kind, name), getattr(system, name), {"name": system.scene.hinges[0].name}, name=names)
+    found.add(of_system(kind, "parameters"), system.parameters, {"names": ["gravity_m_s2.0", "gravity_m_s2.1"]},
               lambda by: by.accelerations(state),
               names=chosen(None, 5, "arm", [], ["nobody"], ["elbow"], [None], [1]))  # fmt: skip
-    found.add(f"{kind}.inertia_regressor", system.inertia_regressor, {"bodies": [system.scene.bodies[0].name]},
+    found.add(of_system(kind, "inertia_regressor"), system.inertia_regressor, {"bodies": [system.scene.bodies[0].name]},
               lambda regressor: regressor.values, bodies=chosen(5, "arm", ["nobody"], [None], [1]))  # fmt: skip
     found.add(f"simulate, {kind}", lambda state: fm.simulate(system, _soon(state), state=state, samples=3),
               {"state": state}, seen, state=but_none(at))  # fmt: skip
@@ -84,14 +95,14 @@ def of_any(system: fm.System, state: fm.State) -> Calls:
 
 def algorithms_of(system: fm.System) -> tuple[str, ...]:
     """Those that it can be asked for."""
-    if isinstance(system, ClosedSystem):
+    if system.constraints:
         return "articulated", "composite"
     return "articulated", "unsplit", "composite", "frisch", "frisch_as_printed"
 
 
 def _of_y(system: fm.System, state: fm.State) -> tuple[dict[str, Any], dict[str, Any]]:
     """Time, coordinates and speeds as arguments, and their kinds."""
-    kinds = (wrong_only, wrong_only) if isinstance(system, ClosedSystem) else (quaternion_first, vectors)
+    kinds = (wrong_only, wrong_only) if system.constraints else (quaternion_first, vectors)
     return {"t": state.t, "q": state.q.copy(), "u": state.u.copy()}, dict(zip("tqu", (numbers, *kinds), strict=True))
 
 
@@ -102,8 +113,8 @@ def _soon(state: Any) -> float:
 
 def _differentiated(system: fm.System, state: fm.State) -> Calls:
     """Of what has no controllers."""
-    found, kind = Calls(), type(system).__name__
-    at = closed_states if isinstance(system, ClosedSystem) else states
+    found, kind = Calls(), kind_of(system)
+    at = closed_states if system.constraints else states
     rates = np.arange(1.0, system.nu + 1.0)
     y, of_y = _of_y(system, state)
     evaluator = system.derivative_evaluator()
@@ -113,13 +124,13 @@ def _differentiated(system: fm.System, state: fm.State) -> Calls:
         return value.copy(), *(each.copy() for each in (evaluator.by_displacement, evaluator.by_speed,
                                                         evaluator.by_force))  # fmt: skip
 
-    found.add(f"{kind}.derivative_evaluator", evaluator, y, parts, **of_y)
-    found.add(f"{kind}.acceleration_derivatives", system.acceleration_derivatives,
+    found.add(of_system(kind, "derivative_evaluator"), evaluator, y, parts, **of_y)
+    found.add(of_system(kind, "acceleration_derivatives"), system.acceleration_derivatives,
               {"state": state, "forces": rates}, state=at, forces=but_none(vectors))  # fmt: skip
-    found.add(f"{kind}.inverse_dynamics_derivatives", system.inverse_dynamics_derivatives,
+    found.add(of_system(kind, "inverse_dynamics_derivatives"), system.inverse_dynamics_derivatives,
               {"state": state, "accelerations": rates}, state=at, accelerations=vectors)  # fmt: skip
-    found.add(f"{kind}.evaluation_derivatives", system.evaluation_derivatives, {"state": state}, state=at)
-    found.add(f"{kind}.hinge_load_derivatives", system.hinge_load_derivatives, {"state": state}, state=at)
+    found.add(of_system(kind, "evaluation_derivatives"), system.evaluation_derivatives, {"state": state}, state=at)
+    found.add(of_system(kind, "hinge_load_derivatives"), system.hinge_load_derivatives, {"state": state}, state=at)
     found.add(f"linearize, {kind}", lambda state: fm.linearize(system, state), {"state": state},
               lambda model: model.A, state=but_none(at))  # fmt: skip
     return found
@@ -154,10 +165,10 @@ def of_the_tree(w: World) -> Calls:
 def of_the_chain(w: World) -> Calls:
     """What it is always refused has no other arguments."""
     chain, start, found = w.chain, w.chain.initial_state, of_any(w.chain, w.chain.initial_state)
-    found.add("ClosedSystem.state", chain.state, {"q": start.q.copy(), "u": start.u.copy(), "t": 0.5},
+    found.add(of_system(CHAIN, "state"), chain.state, {"q": start.q.copy(), "u": start.u.copy(), "t": 0.5},
               q=wrong_only, u=wrong_only, t=numbers)  # fmt: skip
     for name, given in REFUSED.items():
-        found.add(f"ClosedSystem.{name}", lambda name=name, given=given: refused(
+        found.add(of_system(CHAIN, name), lambda name=name, given=given: refused(
             getattr(chain, name), *(start for _ in given)))  # fmt: skip
     return found
 

@@ -61,7 +61,7 @@ def test_it_gives_what_dense_factors_give(name: str, t: float) -> None:
     assert np.abs(public.by_time - expected.by_time).max() < tolerance * max(1.0, np.abs(expected.by_time).max())
     assert np.abs(system.closure_operators(state).J @ evaluator.by_force).max() < tolerance * size["by_force"]
     assert np.abs(evaluator.by_force - evaluator.by_force.T).max() < tolerance * size["by_force"]
-    of_loads = system._variation(*system.layout.entering(state)).rows.of_loads
+    of_loads = system.linearisation._variation(*system.layout.entering(state)).rows.of_loads
     for found, wanted in zip(of_loads, expected[4:8], strict=True):
         assert np.abs(found - wanted).max() < tolerance * max(1.0, np.abs(wanted).max())
 

@@ -26,7 +26,6 @@ from flexmb.closure.closures import Closures
 from flexmb.jit.direct import Direct
 from flexmb.kept import kept
 from flexmb.run.warm_up import looped
-from flexmb.system.closed import ClosedSystem
 from flexmb.system.evaluator import Evaluator
 from flexmb.tables.features import asking
 from flexmb.tables.per_thread import per_thread
@@ -248,7 +247,6 @@ def test_nothing_that_calls_write_into_is_kept_for_all_threads(made):
 
 def test_closures_count_their_rows_for_all_threads():
     system = fm.compile(looped())
-    assert isinstance(system, ClosedSystem)
     assert in_a_thread(lambda: system.rank) == system.closures.rank == in_a_thread(lambda: system.closures.rank) > 0
     assert isinstance(in_a_thread(lambda: system.closures), Closures)
 

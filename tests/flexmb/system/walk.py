@@ -20,23 +20,20 @@ from tests.flexmb.system import public_calls
 INSIDE = {  # of the mechanics, for numbers that have been examined
     "nested_system", "precision_if_doubtful", "observe_recursion", "observe_rates", "observe_motion", "observe_row",
     "check_status", "check_precision", "all_loads", "referred_loads", "with_numbers", "fault_name", "turns",
-    "refuse_corners",
+    "refuse_corners", "inverse_at", "by_hinge", "undetermined", "in_axes",
 }  # fmt: skip
-SYSTEMS = "System", "ClosedSystem"
 UNTRIED = {  # what users may ask all the same: docs/threads.md
-    **{f"{system}.{name}": "makes a new workspace, which is for one thread" for system in SYSTEMS
+    **{f"System.{name}": "makes a new workspace, which is for one thread"
        for name in ("workspace", "recursion_workspace", "composite_workspace")},
     "NestedSystem.workspace": "makes a new workspace, which is for one thread",
     "Parameters.workspace": "makes a new workspace, which is for one thread",
     "Trajectory.plot": "draws by matplotlib, whose figures are for one thread",
     "Campbell.plot": "draws by matplotlib, whose figures are for one thread",
     "Trajectory.to_rerun": "writes by the library rerun",
-    "ClosedSystem.section_loads": "the closed chain of the tests has no beam; as of a System",
-    "ClosedSystem.section_load_derivatives": "the closed chain of the tests has no beam; as of a System",
 }  # fmt: skip
 EXEMPT = {
     *UNTRIED,
-    *(f"{system}.{name}" for system in SYSTEMS for name in INSIDE),
+    *(f"System.{name}" for name in INSIDE),
     "Parameters.arranged",  # of derivatives of runs
     "Batch.tables", "Batch.constants",  # of those who fill lanes
     "open_loop", "user_function", "no_user_code",  # a scene; a function; nothing
@@ -51,6 +48,7 @@ EXEMPT = {
     "NotDifferentiableError", "PrecisionWarning", "SceneError", "SceneWarning",
 }  # fmt: skip
 INNER = {  # classes of the mechanics and of runs, which users meet only behind what they are given
+    "Constraints", "Linearisation",  # of a system
     "Closures", "ClosureConstants", "NestedConstants", "DualConstants", "Constants", "Layout", "Timing", "Integration",
     "BodyLink", "FlexibleNode", "HingeKind", "Models", "Observation", "Settings", "Integrator",
     "Steady", "_Differentiation",  # of parameters
