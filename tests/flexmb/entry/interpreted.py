@@ -1,7 +1,7 @@
 """The derivatives by recursion, interpreted as Python, with one of their terms left out: for planted errors.
 
 A compiled kernel takes 20 s to compile anew, its interpreted twin a fraction of a second for a small scene. Dual
-numbers are Python objects here.
+numbers are Python objects here. An index beyond an array, which a kernel does not check, is an IndexError.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from flexmb.jain.derivatives.tables import Derivatives
 from flexmb.jit import duals
 from flexmb.jit.counting import Interpreter, _counting
 from flexmb.jit.lanes import LANES
-from flexmb.tables.arrays import Constants
+from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.features import contained
 from tests.flexmb.entry.terms import Term
 
@@ -39,24 +39,65 @@ def accelerations(c: Constants, w: DerivativeWorkspace, term: Term | None = None
     """After an evaluation by the compiled kernel in w; without a term of the recursion."""
     tables = _run(sweeps.accelerations_and_power, term, c, w)
     order, nu = w.tables.place, len(w.tables.place)
-    matrix, work = np.array(tables.matrix[order], float), np.array(tables.work, float)
+    matrix, work = np.array(tables.matrix, float)[order], np.array(tables.work, float)
     return Interpreted(matrix[:, order], matrix[:, nu + order], work[order], work[nu + order])
 
 
 def mass_matrix(c: Constants, w: DerivativeWorkspace, term: Term | None = None) -> np.ndarray:
     """M (nu,nu), a product of the same recursion."""
     order, nu = w.tables.place, len(w.tables.place)
-    matrix = _run(sweeps.inverse_dynamics, term, c, w, True).matrix
-    return np.array(matrix[np.ix_(order, 2 * nu + order)], float)
+    matrix = np.array(_run(sweeps.inverse_dynamics, term, c, w, True).matrix, float)
+    return matrix[np.ix_(order, 2 * nu + order)]
 
 
 def _run(kernel: Any, term: Term | None, c: Constants, w: DerivativeWorkspace, *further: Any) -> Any:
     """The tables of the derivatives after a call; the constants say which features the scene has, and no more."""
-    constants, tables = _counting(c, float), _tables(w.tables)
-    object.__setattr__(constants, "_numba_type_", SimpleNamespace(features=contained(c)))
+    tables = checked(_tables(w.tables))
     with np.errstate(all="ignore"):
-        _Without(term)(kernel)(constants, _counting(w.sweeps, float), tables, *further)
+        _Without(term)(kernel)(constants(c), checked(_counting(w.sweeps, float)), tables, *further)
     return tables
+
+
+def constants(c: Constants) -> Any:
+    """The constants of a scene with Python's numbers and with its own features."""
+    found = checked(_counting(c, float))
+    object.__setattr__(found, "_numba_type_", SimpleNamespace(features=contained(c)))
+    return found
+
+
+class _Checked(np.ndarray):
+    """An array that is used as kernels use it: negative indices do not count from the end, and slices end in it."""
+
+    def __getitem__(self, index: Any) -> Any:
+        self._check(index)
+        return super().__getitem__(index)
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        self._check(index)
+        super().__setitem__(index, value)
+
+    def _check(self, index: Any) -> None:
+        for one, extent in zip(index if isinstance(index, tuple) else (index,), self.shape, strict=False):
+            if isinstance(one, slice):
+                start, stop = one.start or 0, extent if one.stop is None else one.stop
+            else:
+                start, stop = one, one + 1
+            if not 0 <= start <= stop <= extent:
+                raise IndexError(f"{one} of {extent}")
+
+
+def checked(value: Any) -> Any:
+    """The same namespace, bundle or array, whose arrays are checked."""
+    if isinstance(value, np.ndarray):
+        if value.dtype == object:
+            for each in value.flat:
+                if isinstance(each, SimpleNamespace):
+                    checked(each)
+        return value.view(_Checked)
+    for name, each in vars(value).items():
+        if isinstance(each, np.ndarray | SimpleNamespace | Constants | Workspace):
+            object.__setattr__(value, name, checked(each))
+    return value
 
 
 def _tables(d: Derivatives) -> Any:

@@ -20,6 +20,7 @@ from tests.benchmarks.rivals import flexible_chain, rigid_chain
 from tests.bounds import UNIT_ROUNDOFF, algebra
 from tests.flexmb.connectors import connected_scenes
 from tests.flexmb.entry import dual_jacobian
+from tests.flexmb.guards import NOTHING, guarded
 
 H = 2.0**-100
 T = 0.3  # s: no function of the trees is at rest there
@@ -46,8 +47,10 @@ def both(scene: Scene) -> Both | None:
     c, state = system.constants, system.initial_state
     y = np.concatenate([state.q, state.u, [0.0]])
     J, by_duals = np.full((2, len(y), len(y)), np.nan)
-    w = derivatives.derivative_workspace(c, system.nq, system.nu)
-    status = derivatives.jacobian(T, y, J, c, w)
+    tables, space = guarded(c, NOTHING), guarded(derivatives.derivative_workspace(c, system.nq, system.nu))
+    w = space.bundle
+    status = derivatives.jacobian(T, y, J, tables.bundle, w)
+    assert not space.written()
     assert status == dual_jacobian.jacobian(T, y, by_duals, c, tangent_workspace(c, system.nq, system.nu))
     return Both(system, y, J, by_duals, w) if status == Status.OK else None
 
