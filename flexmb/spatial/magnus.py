@@ -35,6 +35,19 @@ def magnus_change(at, whole, linear, square):
 
 
 @helper
+def magnus_transposed(at, x):
+    """(whole, linear, square) whose products with the arguments of `magnus_change` sum up to x times its result."""
+    a, linear, inner, E, F = at
+    on_E, on_F = scale(1.0 / 240.0, cross(F, x)), scale(1.0 / 240.0, cross(x, E))
+    turned = scale(1.0 / 60.0, on_F)
+    on_inner = cross(a, turned)
+    on_C = add(on_E, on_inner)
+    on_a = add(axpy(20.0, on_E, cross(turned, inner)), cross(linear, on_C))
+    on_square = axpy(-1.0 / 12.0, on_a, axpy(-2.0, on_inner, on_E))
+    return add(x, on_a), add(on_F, cross(on_C, a)), on_square
+
+
+@helper
 def magnus_bend(at, whole, linear, square):
     """The second derivative of Omega where its arguments change at these constant rates."""
     (a, inner), e, f = _changes(at, whole, linear, square)

@@ -8,6 +8,7 @@ the origin of the body frame.
 from flexmb.jain.derivatives import affine
 from flexmb.jain.derivatives.hinges import force_to_world
 from flexmb.jain.derivatives.ports import seed_mode
+from flexmb.jain.derivatives.strained import strained_force
 from flexmb.jain.derivatives.strips_of import put_strips, strips_of
 from flexmb.jain.derivatives.tables import MODE_BY_RATE, MODE_BY_TURN, MODE_FORCE, MODE_ROW, MODE_ROWS
 from flexmb.jit.duals import rate, seeded
@@ -15,7 +16,7 @@ from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
 from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import put, strip, width
-from flexmb.levels import full
+from flexmb.levels import exact, full
 from flexmb.levels.body import LEVELS, body_inertia, is_at_rest
 from flexmb.levels.section_motion import move_sections
 from flexmb.spatial.inertia import inertia_times, load_inertia, rotate_inertia, shift_inertia, store_inertia
@@ -26,6 +27,8 @@ from flexmb.tables.features import LEVEL, SECTIONS
 
 FULL_NUMBER = LEVELS.index(full.LEVEL)
 FULL = f"{LEVEL} {FULL_NUMBER}"
+EXACT_NUMBER = LEVELS.index(exact.LEVEL)
+EXACT = f"{LEVEL} {EXACT_NUMBER}"
 
 
 @helper
@@ -33,33 +36,45 @@ def flexible_force(c, w, d, k):
     """Inertia, `by_rate` and force of body k alone, and the rows and columns of its modes."""
     R, V, A = mat3(d.body[k].rotation, 0), vec6(w.body[k].velocity, 0), _acceleration(d, k)
     if has(c, FULL) and c.body[k].level == FULL_NUMBER and c.body[k].point_start == c.body[k].point_stop:
-        _by_integrals(c, w, d, k, V, A)
+        _in_floats(c, w, d, k, V, A)
+        affine.differentiate(c, w, d, k, V, A)
+        _to_world(c, d, d.plain, k, R)
+        _elastic_rows(c, d, d.plain, k)
+    elif has(c, EXACT) and c.body[k].level == EXACT_NUMBER:
+        _in_floats(c, w, d, k, V, A)
+        _by_duals(c, w, d, k, V, A)
+        _with_the_motion(d.plain, d, c.body[k].modes, k, V)
         _to_world(c, d, d.plain, k, R)
         _elastic_rows(c, d, d.plain, k)
     else:
         _by_duals(c, w, d, k, V, A)
+        _with_the_motion(d.duals, d, c.body[k].modes, k, V)
         _to_world(c, d, d.duals, k, R)
         _elastic_rows(c, d, d.duals, k)
 
 
 @sweep
-def _by_integrals(c, w, d, k, V, A):
-    e, nm = d.plain, c.body[k].modes
+def _in_floats(c, w, d, k, V, A):
+    """The force of body k and its masses, to `plain`."""
+    e = d.plain
     store6(e.body[k].velocity, 0, V)
-    for n in range(0, nm, width(e)):
+    for n in range(0, c.body[k].modes, width(e)):
         put(e, e.eta[k], n, strip(w, w.eta[k], n))
         put(e, e.etad[k], n, strip(w, w.etad[k], n))
+    if has(c, SECTIONS):
+        move_sections(c, e, k)
     body_inertia(c, e, k)
     _force(c, w, e, k, A)
-    affine.differentiate(c, w, d, k, V, A)
 
 
 @sweep
 def _by_duals(c, w, d, k, V, A):
+    """The derivatives of the force and of the rows of the modes, along one direction in each lane."""
     e, nm = d.duals, c.body[k].modes
     store6(e.body[k].velocity, 0, V)
     for n in range(nm):
         e.eta[k, n], e.etad[k, n] = w.eta[k, n], w.etad[k, n]
+        e.etadd[k, n] = w.speed[c.body[k].etad_index + n].acceleration
     last = 3 if is_at_rest(c.body[k].level) else 3 + 2 * nm
     if is_at_rest(c.body[k].level):
         _no_rows(d, k, nm)
@@ -67,13 +82,13 @@ def _by_duals(c, w, d, k, V, A):
         count = min(LANES, last - first)
         for lane in range(count):
             _seed(e, k, nm, first + lane, lane)
-        if has(c, SECTIONS):
-            move_sections(c, e, k)
-        body_inertia(c, e, k)
-        _force(c, w, e, k, A)
+        if has(c, EXACT) and c.body[k].level == EXACT_NUMBER:
+            strained_force(c, e, k, A)
+        else:
+            body_inertia(c, e, k)
+            _force(c, w, e, k, A)
         for lane in range(count):
             _keep(c, w, d, k, first + lane, lane)
-    _with_the_motion(e, d, nm, k, V)
 
 
 @helper

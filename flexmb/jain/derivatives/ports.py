@@ -29,7 +29,7 @@ from flexmb.jit.kernel import helper, sweep
 from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import width
 from flexmb.levels.body import is_at_rest
-from flexmb.levels.section_motion import move_sections
+from flexmb.levels.section_motion import move_section
 from flexmb.spatial.cross6 import motion_cross
 from flexmb.spatial.rows import column6, strips6
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, scale6, shift_motion, store6, sub6, sum6, vec6
@@ -180,8 +180,8 @@ def _change(c, w, d, k, i):
                 seed_mode(e, k, nm, first + lane, lane)
             else:
                 _seed_along_speeds(w, e, k, nm, lane)
-        if has(c, SECTIONS):
-            move_sections(c, e, k)
+        if has(c, SECTIONS) and c.port[i].section >= 0:
+            move_section(c, e, k, c.port[i].section)
         move_port(c, e, k, i)
         _store_relative(c, w, d, k, i)
         for lane in range(count):

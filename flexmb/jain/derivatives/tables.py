@@ -116,9 +116,24 @@ BRANCHES, IN_ORDER, ALIKE = range(3)
 END_MOTION, END_DISPLACED, END_MOVED, END_SPEED, END_ROWS = 0, 6, 12, 18, 24
 
 
+AT_SECTION = np.dtype(  # of a beam of level exact
+    [
+        ("whole", _F, (3,)),  # the three integrals of its curvature since the section before
+        ("linear", _F, (3,)),
+        ("square", _F, (3,)),
+        ("rate", _F, (3,)),  # of its tangent, at a Gauss point
+        ("force", _F, (3,)),  # on the section, body axes
+        ("torque", _F, (3,)),  # on it and on what turns with it
+    ],
+    align=True,
+)
+
+
 @bundle
 class Duals(Workspace):
     """A workspace whose numbers are duals, for derivatives of single hinges and bodies."""
+
+    at_section: Record  # (sections,) AT_SECTION
 
     numbers = DUAL
 
@@ -168,7 +183,10 @@ class Derivatives:
 def duals(c: Constants, nq: int, nu: int) -> Duals:
     """A dual workspace of the right sizes."""
     tables = workspace(c, nq, nu)
-    return Duals(**{field.name: as_duals(getattr(tables, field.name)) for field in fields(tables)})
+    return Duals(
+        **{field.name: as_duals(getattr(tables, field.name)) for field in fields(tables)},
+        at_section=as_duals(np.zeros(len(c.section), AT_SECTION)),
+    )
 
 
 def derivatives(c: Constants, nq: int, nu: int) -> Derivatives:

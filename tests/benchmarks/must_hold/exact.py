@@ -42,6 +42,7 @@ def rows() -> list[Row]:
         most("exact_momentum", GROUP, "free flight, bent by 0.5 rad, momenta", 1e-10, partial(_flight, 1), unit=""),
         most("exact_plane", COST, "4 modes in the plane, of a stiffened body of 4", 1.5, partial(_cost, _plane)),
         most("exact_space", COST, "12 modes in space, of a stiffened body of 4", 4.0, partial(_cost, _space)),
+        most("exact_pieces", COST, "derivatives of eight pieces of a body, of eight welded bodies", 20.0, _pieces),
         Row("exact_soromox", COST, "SoRoMoX for each dof, its authors' figure, 5 bodies of 12 modes", 25.0, _soromox),
     ]
 
@@ -124,6 +125,19 @@ def _pendulum(modes: Modes, level: str) -> fm.System:
 def _cost(system: Callable[[str], fm.System]) -> Measured:
     exact, stiffened = (kernel(system(level)) for level in ("exact", "stiffened"))
     seconds = turns(exact.call, stiffened.call, rounds=ROUNDS) / exact.samples
+    mine, other = np.median(seconds, axis=0)
+    return measured(seconds[:, 0] / seconds[:, 1], f"{duration(mine)} against {duration(other)}")
+
+
+def _pieces() -> Measured:
+    """Of accelerations, in space, from Python."""
+    scene, polynomials = load_scene(scenes.PRINCETON), StrainPolynomials(torsion=4, bending_y=4, bending_z=4)
+    calls = list[Callable[[], object]]()
+    for each in (scenes.strained(scene, polynomials, 8), scenes.welded(scene, 8, polynomials)):
+        system = fm.compile(each)
+        state = system.initial_state
+        calls.append(partial(system.derivative_evaluator(), 0.0, state.q, state.u))
+    seconds = turns(*calls, rounds=ROUNDS)
     mine, other = np.median(seconds, axis=0)
     return measured(seconds[:, 0] / seconds[:, 1], f"{duration(mine)} against {duration(other)}")
 

@@ -3,6 +3,7 @@ side, and against dual numbers."""
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ import flexmb as fm
 from flexmb.closure import dynamics
 from flexmb.closure.jacobian import chain_jacobian, jacobian
 from flexmb.scene import schema as s
+from flexmb.system.watches import WAIVERS
 from tests.flexmb.closure import dual_jacobian, loops
 from tests.flexmb.closure import mechanisms as m
 from tests.flexmb.closure.coupled import coupled_tree
@@ -39,9 +41,20 @@ def connected() -> s.Scene:
     return scene.scene()
 
 
+def strained(scene: s.Scene) -> s.Scene:
+    """The scene with its beams at level exact."""
+    modes = s.Modes(count=2, families=("bending_y", "bending_z"))
+    bodies = tuple(
+        msgspec.structs.replace(body, level="exact", modes=modes) if isinstance(body, s.BeamBody) else body
+        for body in scene.bodies
+    )
+    return msgspec.structs.replace(scene, bodies=bodies, allow=WAIVERS)
+
+
 MOVING = {
     "four-bar, overconstrained": lambda: m.four_bar(rate=2.0),
     "flexible four-bar": lambda: m.four_bar(rate=2.0, modes=3),
+    "exact four-bar": lambda: strained(m.four_bar(rate=2.0, modes=1)),
     "driven flexible four-bar": lambda: m.four_bar(
         prescribed=s.Sine(amplitude=0.3, angular_frequency_rad_s=3.0, offset=1.0), modes=1
     ),

@@ -38,8 +38,8 @@ class Term(NamedTuple):
 
 
 def modules() -> list[str]:
-    """Names of the modules of the recursion."""
-    return [each.name for each in pkgutil.iter_modules(derivatives.__path__)]
+    """Names of the modules of the recursion but that of strained beams, which `test_strained.py` holds."""
+    return [each.name for each in pkgutil.iter_modules(derivatives.__path__) if each.name != "strained"]
 
 
 def terms(module: str) -> Iterator[Term]:

@@ -66,7 +66,7 @@ def test_it_gives_what_dense_factors_give(name: str, t: float) -> None:
         assert np.abs(found - wanted).max() < tolerance * max(1.0, np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("name", ["flexible four-bar", "connected", "slider-crank", "coupled"])
+@pytest.mark.parametrize("name", ["flexible four-bar", "exact four-bar", "connected", "slider-crank", "coupled"])
 def test_it_gives_what_dual_numbers_give(name: str) -> None:
     system = fm.compile(MOVING[name]())
     evaluator, state = system.derivative_evaluator(), moved(system, 0.1)

@@ -1,0 +1,230 @@
+"""The force of a beam of level exact and the rows of its modes, without its mass matrix: for duals, O(P) a mode.
+
+M_m alpha_m + b_m is applied, never formed. Outward, the sections of `flexmb.levels.section_motion` move with the modal
+accelerations too. The force of each point is then that of its whole acceleration, and by the principle of virtual power
+the row of mode n is the sum of these forces times the velocities that a unit speed of the mode gives their points:
+inward, forces at sections become forces F on the tangents at the Gauss points, by the transposed weights, then torques
+t x F on the sections, which each passes to the one before it. No velocity of a single mode is needed. Points at the
+root sit on no section: they move with the body frame, and no mode moves them.
+
+Modal masses beside the points, from a matrix that was added, are constant, as is their share of the rows, which is left
+out. Only the derivatives of the rows are right.
+"""
+
+from flexmb.jit.features import has
+from flexmb.jit.kernel import helper, sweep
+from flexmb.levels.section_motion import ANGLE, IDENTITY, LINEAR, SQUARE, STRETCH, WHOLE, ZERO3
+from flexmb.spatial.magnus import magnus, magnus_bend, magnus_change, magnus_transposed
+from flexmb.spatial.rotation import (
+    exponential,
+    exponential_coefficients,
+    in_powers,
+    left_jacobian,
+    left_jacobian_rate,
+    left_jacobian_times,
+)
+from flexmb.spatial.rows import column3
+from flexmb.spatial.scalar import sincos
+from flexmb.spatial.spatial_vector import ZERO6, store6, sum6
+from flexmb.spatial.vector import (
+    add,
+    add3,
+    axpy,
+    cross,
+    dot,
+    mat3,
+    matmul,
+    rotate_sym,
+    scale,
+    store3,
+    store9,
+    sub,
+    sym6,
+    sym_times,
+    times,
+    times_t,
+    vec3,
+)
+from flexmb.tables.features import BENT_IN_PLANE, BENT_IN_SPACE
+
+
+@sweep
+def strained_force(c, e, k, A):
+    """The force of body k, body axes, to e.body.hinge_force, and the rows of its modes to e.zf.
+
+    Its modal displacements, speeds and accelerations are in e.eta, e.etad and e.etadd, the velocity of its frame in
+    e.body; A is the acceleration of the frame.
+    """
+    first, stop = c.body[k].section_start, c.body[k].section_stop
+    for j in range(first, stop):
+        if has(c, BENT_IN_PLANE) and c.body[k].planar:
+            _turn_about_axis(c, e, k, j)
+        elif has(c, BENT_IN_SPACE):
+            _turn(c, e, k, j)
+    for j in range(first, stop):
+        _place(c, e, k, j)
+    F = ZERO6
+    for j in range(c.body[k].point_start, c.body[k].point_stop):
+        F = sum6(F, _load_of_point(c, e, k, j, A))
+    store6(e.body[k].hinge_force, 0, F)
+    for n in range(c.body[k].modes):
+        e.zf[k, n] = 0.0
+    for j in range(first, stop):
+        _take_tangent(c, e, k, j)
+    for j in range(stop - 1, first - 1, -1):
+        if has(c, BENT_IN_PLANE) and c.body[k].planar:
+            moment = dot(vec3(c.body[k].bending_axis, 0), vec3(e.at_section[j].torque, 0))
+            for n in range(c.body[k].modes):
+                e.zf[k, n] += c.section_rows[j, ANGLE, n] * moment
+        elif has(c, BENT_IN_SPACE):
+            _pass_torque(c, e, k, j)
+
+
+@helper
+def _sum(c, k, j, row, x):
+    """Three rows of section j times one number x (m,) of each mode."""
+    found = ZERO3
+    for n in range(c.body[k].modes):
+        found = axpy(x[n], column3(c.section_rows[j], row, n), found)
+    return found
+
+
+@sweep
+def _integrals(c, k, j, x):
+    """Those of the three integrals of the curvature."""
+    return _sum(c, k, j, WHOLE, x), _sum(c, k, j, LINEAR, x), _sum(c, k, j, SQUARE, x)
+
+
+@sweep
+def _turn(c, e, k, j):
+    """R, w and alpha of section j from those of the section before."""
+    i, own = c.section[j].before, e.at_section[j]
+    whole, linear, square = _integrals(c, k, j, e.eta[k])
+    store3(own.whole, 0, whole)
+    store3(own.linear, 0, linear)
+    store3(own.square, 0, square)
+    turn, at = magnus(whole, linear, square)
+    whole, linear, square = _integrals(c, k, j, e.etad[k])
+    rate, bent = magnus_change(at, whole, linear, square), magnus_bend(at, whole, linear, square)
+    whole, linear, square = _integrals(c, k, j, e.etadd[k])
+    bent = add(bent, magnus_change(at, whole, linear, square))
+    p = exponential_coefficients(dot(turn, turn))
+    R, omega, alpha = IDENTITY, ZERO3, ZERO3
+    if i >= 0:
+        R, omega, alpha = mat3(e.section[i].R, 0), vec3(e.section[i].omega, 0), vec3(e.section[i].alpha, 0)
+    more = times(R, left_jacobian_times(turn, p, rate))
+    bent = times(R, add(left_jacobian_rate(turn, p, rate), left_jacobian_times(turn, p, bent)))
+    alpha = add(alpha, add(cross(omega, more), bent))
+    _bend(c, e, k, j, matmul(R, exponential(turn, p)), add(omega, more), alpha)
+
+
+@sweep
+def _turn_about_axis(c, e, k, j):
+    """The same where all sections turn about one axis."""
+    axis = vec3(c.body[k].bending_axis, 0)
+    angle, rate, bent = 0.0, 0.0, 0.0
+    for n in range(c.body[k].modes):
+        slope = c.section_rows[j, ANGLE, n]
+        angle = e.eta[k, n] * slope + angle
+        rate = e.etad[k, n] * slope + rate
+        bent = e.etadd[k, n] * slope + bent
+    sine, cosine = sincos(angle)
+    _bend(c, e, k, j, in_powers(axis, sine, 1.0 - cosine), scale(rate, axis), scale(bent, axis))
+
+
+@sweep
+def _bend(c, e, k, j, R, omega, alpha):
+    """Store the turn of section j, and at Gauss points the change of the tangent, its rate and its acceleration."""
+    store9(e.section[j].R, 0, R)
+    store3(e.section[j].omega, 0, omega)
+    store3(e.section[j].alpha, 0, alpha)
+    g = c.section[j].gauss
+    if g < 0:
+        return
+    at_rest = vec3(c.section[j].tangent, 0)
+    stretched, rate, faster = at_rest, ZERO3, ZERO3
+    if c.body[k].stretching:
+        stretched = add(at_rest, _sum(c, k, j, STRETCH, e.eta[k]))
+        rate = times(R, _sum(c, k, j, STRETCH, e.etad[k]))
+        faster = times(R, _sum(c, k, j, STRETCH, e.etadd[k]))
+    tangent = times(R, stretched)
+    store3(e.tangent[g].change, 0, sub(tangent, at_rest))
+    turning = cross(omega, tangent)
+    store3(e.at_section[j].rate, 0, add(turning, rate))
+    turning = cross(omega, add(turning, scale(2.0, rate)))
+    store3(e.tangent[g].acceleration, 0, add(add(cross(alpha, tangent), turning), faster))
+
+
+@helper
+def _place(c, e, k, j):
+    """Position of section j, its velocity and acceleration; no load yet."""
+    r, v, a = vec3(c.section[j].position, 0), ZERO3, ZERO3
+    for i in range(c.body[k].section_start, c.body[k].section_stop):
+        g = c.section[i].gauss
+        if g >= 0:
+            weight = c.section_weight[j, g]
+            r = axpy(weight, vec3(e.tangent[g].change, 0), r)
+            v = axpy(weight, vec3(e.at_section[i].rate, 0), v)
+            a = axpy(weight, vec3(e.tangent[g].acceleration, 0), a)
+    store3(e.section[j].r, 0, r)
+    store3(e.section[j].v, 0, v)
+    store3(e.section[j].a, 0, a)
+    store3(e.at_section[j].force, 0, ZERO3)
+    store3(e.at_section[j].torque, 0, ZERO3)
+
+
+@sweep
+def _load_of_point(c, e, k, j, A):
+    """The force of point j (6), about the body origin; it is added to the loads of its section, if it is on one."""
+    i, mass, spin = c.point[j].section, c.point[j].mass, vec3(e.body[k].velocity, 0)
+    R, r, w_rel, v_rel, alpha, a = IDENTITY, vec3(c.point[j].position, 0), ZERO3, ZERO3, ZERO3, ZERO3
+    if i >= 0:
+        at = e.section[i]
+        R, r, w_rel, v_rel = mat3(at.R, 0), vec3(at.r, 0), vec3(at.omega, 0), vec3(at.v, 0)
+        alpha, a = vec3(at.alpha, 0), vec3(at.a, 0)
+    arm = times(R, vec3(c.point[j].offset, 0))
+    r, swing = add(r, arm), cross(w_rel, arm)
+    a = add(a, add(cross(alpha, arm), cross(w_rel, swing)))
+    a = add(a, cross(spin, add(cross(spin, r), scale(2.0, add(v_rel, swing)))))
+    force = scale(mass, add(a, add(A[1], cross(A[0], r))))
+    inertia = rotate_sym(R, sym6(c.point[j].inertia, 0))
+    turning, whole = add(add(A[0], alpha), cross(spin, w_rel)), add(spin, w_rel)
+    torque = add(sym_times(inertia, turning), cross(whole, sym_times(inertia, whole)))
+    if i >= 0:
+        add3(e.at_section[i].force, 0, force)
+        add3(e.at_section[i].torque, 0, add(torque, cross(arm, force)))
+    return add(torque, cross(r, force)), force
+
+
+@sweep
+def _take_tangent(c, e, k, j):
+    """What the forces at all sections do by the tangent of section j: a torque on it, and the rows of stretch."""
+    g = c.section[j].gauss
+    if g < 0:
+        return
+    force = ZERO3
+    for i in range(c.body[k].section_start, c.body[k].section_stop):
+        force = axpy(c.section_weight[i, g], vec3(e.at_section[i].force, 0), force)
+    tangent = add(vec3(c.section[j].tangent, 0), vec3(e.tangent[g].change, 0))
+    add3(e.at_section[j].torque, 0, cross(tangent, force))
+    if c.body[k].stretching:
+        along = times_t(mat3(e.section[j].R, 0), force)
+        for n in range(c.body[k].modes):
+            e.zf[k, n] += dot(column3(c.section_rows[j], STRETCH, n), along)
+
+
+@sweep
+def _pass_torque(c, e, k, j):
+    """The rows of the modes that turn section j against the one before, which then carries its torque too."""
+    i, own = c.section[j].before, e.at_section[j]
+    torque = vec3(own.torque, 0)
+    turn, at = magnus(vec3(own.whole, 0), vec3(own.linear, 0), vec3(own.square, 0))
+    R = IDENTITY
+    if i >= 0:
+        R = mat3(e.section[i].R, 0)
+        add3(e.at_section[i].torque, 0, torque)
+    J = matmul(R, left_jacobian(turn, exponential_coefficients(dot(turn, turn))))
+    whole, linear, square = magnus_transposed(at, times_t(J, torque))
+    for n in range(c.body[k].modes):
+        row = dot(column3(c.section_rows[j], WHOLE, n), whole) + dot(column3(c.section_rows[j], LINEAR, n), linear)
+        e.zf[k, n] += row + dot(column3(c.section_rows[j], SQUARE, n), square)
