@@ -1,4 +1,5 @@
-"""The accepted steps of a run: their times, and every so many of their states, as an integrator finds them.
+"""The accepted steps of a run: their times, every so many of their states, and the fastest ones, as an integrator finds
+them.
 
 An integrator projects the state at the end of every step that it accepts. The problem that it is given here passes all
 that it is asked on to another one, and keeps what was projected. Times of samples within steps are kept, too.
@@ -6,6 +7,7 @@ that it is asked on to another one, and keeps what was projected. Times of sampl
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,6 +26,25 @@ ADDRESSES = 4
 
 
 @bundle
+class FastestStates:
+    """The states of a run, at ends of steps and at samples, in which the speeds `entry` (m,) of y are largest together.
+
+    size (K,): their sums of absolute values, those of K states that were too slow to be kept at first; state (K,1+n): t
+    (s) and the first n numbers of y; least (1,): the place of the smallest.
+    """
+
+    entry: Index
+    slow: Real  # (1,) the sum of those that are too slow
+    size: Real
+    state: Real
+    least: Index
+
+    def empty(self) -> None:
+        """Forget all states."""
+        self.size[:], self.state[:], self.least[0] = self.slow[0], np.nan, 0
+
+
+@bundle
 class RecordedSteps:
     """The steps of one part of a run; `count` goes on where `time` is full.
 
@@ -35,6 +56,23 @@ class RecordedSteps:
     count: Index  # (1,) of times; the first is that of the start
     time: Real  # (room,) s
     state: Real  # (rooms,n) at every `every`-th time
+    fastest: FastestStates
+
+
+@helper
+def _keep_if_fast(t, y, f):
+    """Keep a state in place of the slowest one that is kept, if it is faster."""
+    total = 0.0
+    for i in range(f.entry.shape[0]):
+        total += abs(y[f.entry[i]])
+    least = f.least[0]
+    if total > f.size[least]:
+        f.size[least], f.state[least, 0] = total, t
+        for i in range(1, f.state.shape[1]):
+            f.state[least, i] = y[i - 1]
+        for place in range(f.size.shape[0]):
+            if f.size[place] < f.size[f.least[0]]:
+                f.least[0] = place
 
 
 @helper
@@ -66,6 +104,8 @@ def project(t, y, s):
     if n < s.time.shape[0] and n % s.every[0] == 0:
         for i in range(s.state.shape[1]):
             s.state[n // s.every[0], i] = y[i]
+    if s.fastest.entry.shape[0] > 0:
+        _keep_if_fast(t, y, s.fastest)
 
 
 @kernel
@@ -100,7 +140,20 @@ def resolve(y, u, x, how, s):
     nothing_at(s.address[RESOLVE], (y, u, x, how, s.address[CONSTANTS]))
 
 
-def recorded(posed: Problem | StiffProblem, room: int) -> tuple[Any, RecordedSteps]:
+def fastest_states(entries: Sequence[int], slow: float, count: int, numbers: int) -> FastestStates:
+    """Room for so many states, of so many first numbers of y each, whose sum of these speeds exceeds `slow`."""
+    entry, states = np.array(entries, np.int64), np.full((count, 1 + numbers), np.nan)
+    return FastestStates(entry, np.array([slow]), np.full(count, slow), states, np.zeros(1, np.int64))
+
+
+def nothing_fast() -> FastestStates:
+    """Of runs in which nobody looks at speeds."""
+    return fastest_states([], np.inf, 0, 0)
+
+
+def recorded(
+    posed: Problem | StiffProblem, room: int, fastest: FastestStates | None = None
+) -> tuple[Any, RecordedSteps]:
     """The same problem with a record of its steps, which has room for so many times and no states but the first."""
     kernels = [each.__wrapper_address__() for each in (posed.rhs, posed.project, posed.back, posed.leap)]
     tables = posed.constants.kernel_address, posed.workspace.kernel_address
@@ -109,6 +162,7 @@ def recorded(posed: Problem | StiffProblem, room: int) -> tuple[Any, RecordedSte
     record = RecordedSteps(
         address=np.array([*kernels[:2], *tables, *kernels[2:], *moving]), every=np.array([room + 1]),
         count=np.zeros(1, np.int64), time=np.zeros(room), state=np.zeros((1, 0)),
+        fastest=fastest or nothing_fast(),
     )  # fmt: skip
     own = posed._replace(
         rhs=pointer(rhs, STATUS, REAL, VECTOR, VECTOR, record, record),

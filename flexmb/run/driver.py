@@ -85,6 +85,8 @@ class Driver:
         self._whole: Trajectory | None = None
         self._cut: Restart | None = None
         """Restart before a step that the end of the run cut short and in which an event was found."""
+        self.fastest: list[Real] = []
+        """States in which bodies may have turned faster than their level describes, see `Raw`."""
         self.was_interrupted = False
         """Whether Ctrl-C ended the run; set when the run is over."""
 
@@ -137,6 +139,7 @@ class Driver:
         if segment.early:
             self._agenda.pass_over(segment.found, segment.raw.t, segment.early)
         self._join(segment.part)
+        self.fastest += [segment.raw.fastest] if len(segment.raw.fastest) else []
         levels = segment.levels
         if levels is not None and levels.kept[0]:
             self._sides.take(watched, levels.kept_side, levels.kept_came)

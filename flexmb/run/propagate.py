@@ -15,7 +15,7 @@ from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import Memory, memory
 from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, problem, stiff_problem
-from flexmb.integrate.recorded import RecordedSteps, recorded
+from flexmb.integrate.recorded import RecordedSteps, fastest_states, recorded
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import CROSSED, Watch, nothing_watched
 from flexmb.jit.direct import undispatched
@@ -38,11 +38,15 @@ if TYPE_CHECKING:
     from flexmb.control.memory import LoopMemory
 
 
+_NONE: Real = np.zeros((0, 0))
+
+
 class Raw(NamedTuple):
     """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost.
 
     y (n,): the last good state; memory, controllers: what is needed to resume there, None if a leap passed the end;
-    paused: whether it stopped at the level of an event.
+    paused: whether it stopped at the level of an event; fastest (K,1+nq+nu): t (s), q and u of states in which bodies
+    may have turned faster than their level describes.
     """
 
     states: Real
@@ -57,6 +61,7 @@ class Raw(NamedTuple):
     memory: Memory | None
     paused: bool = False
     controllers: LoopMemory | None = None
+    fastest: Real = _NONE
 
 
 def recursion(constants: Constants, workspace: Any) -> Problem:
@@ -96,6 +101,12 @@ class Integration:
             moving = route.rhs, constants, self._workspace
             self.batch = batch(system, moving, algorithm.observing, system.nq + system.nu + 1)
         self._enter: Any = None  # the compiled integrator
+        self._turns: tuple[list[int], float, int] | None = None
+        if not all(link.is_rigid for link in system.links):
+            from flexmb.system.level_range import turns_to_watch  # imported here as many scenes have no flexible bodies
+
+            self._turns = turns_to_watch(system)
+        self._posed, self._record = self._recording()
         self._at_first = [(array, array.copy()) for array in route.remembered(constants)]
 
     @property
@@ -107,7 +118,21 @@ class Integration:
     def __call__(self, *given: Any) -> tuple[int, float]:
         """Integrate: (y, clock, accuracy, out, counts, memory, watch) of `Integrator`, all arrays in C order."""
         self.compile(*given)
-        return self._enter(self._problem, *given)
+        return self._enter(self._posed, *given)
+
+    def _recording(self) -> tuple[Any, RecordedSteps | None]:
+        """The problem; if bodies may turn too fast for their levels it keeps its fastest states."""
+        if self._turns is None:
+            return self._problem, None
+        return recorded(self._problem, 0, fastest_states(*self._turns, self.system.nq + self.system.nu))
+
+    @property
+    def fastest(self) -> Real:
+        """Of what was integrated since the last `begin`: see `Raw`."""
+        if self._record is None:
+            return _NONE
+        found = self._record.fastest.state
+        return found[~np.isnan(found[:, 0])].copy()
 
     def forget(self) -> None:
         """Restore the initial state: closed chains store the branch that they are on."""
@@ -117,13 +142,16 @@ class Integration:
     def compile(self, *given: Any) -> None:
         """Compile for a call with these arguments, unless that has been done."""
         if self._enter is None:
-            self._enter = undispatched(self._integrator.run, self._problem, *given)
+            self._enter = undispatched(self._integrator.run, self._posed, *given)
 
     def begin(self, begin: Beginning, clock: Clock, accuracy: Accuracy, counts: Index) -> tuple[Real, Clock, Accuracy]:
         """State, clock and accuracy of a run; for a scene with controllers, those of the closed loop."""
         if self.feedback is None:
+            if self._record is not None:
+                self._record.fastest.empty()
             return begin.y, clock, accuracy
         self._problem, y, clock, accuracy = self.feedback.begin(begin, clock, accuracy, self._linear)
+        self._posed, self._record = self._recording()
         if self._batched:
             self._batch_outputs(len(y))
         self.feedback.heed(counts[STOP : STOP + 1])
@@ -228,5 +256,5 @@ def integrate(
     controllers = solve.ended((t, y) if is_over else None)
     return Raw(
         out[: counts[SAMPLES]], Status.OK if paused else Status(status), solve.fault, t, counts.tolist(),
-        begun - start, end - begun, interrupted, y, memory, paused, controllers,
+        begun - start, end - begun, interrupted, y, memory, paused, controllers, solve.fastest,
     )  # fmt: skip

@@ -134,7 +134,7 @@ def run_stages(
     whole: Trajectory | None = None
     for stage in stages:
         start = state if whole is None else whole.values_at(-1)
-        run, warned, was_interrupted = _looked_at(stage.system, *_run(stage, start, settings, algorithm, stabilise))
+        run, warned, was_interrupted = _looked_at(stage.system, _run(stage, start, settings, algorithm, stabilise))
         for warning in warned:
             warnings.warn(warning, stacklevel=3)
         whole = run if whole is None else whole.then(run)
@@ -151,7 +151,7 @@ def run_with_course(system: System, times: Real, settings: Settings) -> tuple[Tr
     refuse_large_run(system, len(times), settings, "articulated")
     course: list[Leg] = []
     made = _run(RunPart(system, times), None, settings, "articulated", 0.0, course)
-    run, warned, was_interrupted = _looked_at(system, *made)
+    run, warned, was_interrupted = _looked_at(system, made)
     for warning in warned:
         warnings.warn(warning, stacklevel=3)
     if was_interrupted or run.status is Status.INTERRUPTED:
@@ -165,17 +165,27 @@ def run_of_many(system: System, times: Real, settings: Settings, algorithm: Algo
     refuse_large_run(system, len(times), settings, algorithm)
     if settings.integrator.linearises:
         refuse_without_jacobian(system, algorithm, settings.method)
-    run, _, was_interrupted = _run(RunPart(system, times), None, settings, algorithm, 0.0)
+    run, _, was_interrupted, _ = _run(RunPart(system, times), None, settings, algorithm, 0.0)
     if was_interrupted or run.status is Status.INTERRUPTED:
         raise Interrupted(run)
     return run
 
 
+class _Made(NamedTuple):
+    """The trajectory of one stage, what there is to warn of, whether Ctrl-C ended it, and its fastest states, each
+    (K,1+nq+nu): see `flexmb.run.propagate.Raw`."""
+
+    trajectory: Trajectory
+    warned: list[Warning]
+    was_interrupted: bool
+    fastest: list[Real]
+
+
 def _run(
     stage: RunPart, state: Given, settings: Settings, algorithm: Algorithm, stabilise: float,
     course: list[Leg] | None = None,
-) -> tuple[Trajectory, list[Warning], bool]:  # fmt: skip
-    """The trajectory of one stage, what there is to warn of, and whether Ctrl-C ended it; course: see `Driver`."""
+) -> _Made:  # fmt: skip
+    """One stage; course: see `Driver`."""
     system, times = stage
     t = float(times[0])
     begin = origin(system, t, state, settings.method)
@@ -183,7 +193,7 @@ def _run(
     if start is not None and start.status != Status.OK:
         raw = unmoved(begin, Status(start.status), start.fault)
         with integration(system, algorithm, stabilise, settings.integrator) as solve:
-            return observed(system, times, raw, algorithm, solve), [], False
+            return _Made(observed(system, times, raw, algorithm, solve), [], False, [])
     again = partial(_again, stage, state, algorithm, stabilise)
     made_by = None if system.scene.events else Making(system, times, settings, again)
     driver = Driver(system, times, settings, algorithm, stabilise, begin.events, made_by)
@@ -197,7 +207,7 @@ def _run(
     if start is not None and start.is_low:
         warned.append(PrecisionWarning(start.warning))
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
-    return trajectory, warned, driver.was_interrupted
+    return _Made(trajectory, warned, driver.was_interrupted, driver.fastest)
 
 
 def _followed(
@@ -212,19 +222,18 @@ def _followed(
         return follow([Stretch(system, origin(system, float(times[0]), state, settings.method), stopped)], until)
     course: list[Leg] = []
     ends = times if settings.integrator.fixed else times[[0, -1]]
-    _, _, was_interrupted = _run(RunPart(system, ends), state, settings, algorithm, stabilise, course)
-    if was_interrupted:
+    if _run(RunPart(system, ends), state, settings, algorithm, stabilise, course).was_interrupted:
         raise KeyboardInterrupt
     return follow([Stretch(leg.system, leg.begin, leg.raw.t) for leg in course], until)
 
 
-def _looked_at(
-    system: System, trajectory: Trajectory, warned: list[Warning], was_interrupted: bool
-) -> tuple[Trajectory, list[Warning], bool]:
-    """The same, with what watches of accuracy say of the samples."""
+def _looked_at(system: System, made: _Made) -> tuple[Trajectory, list[Warning], bool]:
+    """Trajectory, warnings and interruption, with what watches of accuracy say of the samples and the fastest steps."""
+    trajectory, warned, was_interrupted, fastest = made
     t, q, u = trajectory.t, trajectory.q, trajectory.u
     failed = not trajectory.finished
     seen = WatchedStates(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]), failed, trajectory.loads)
+    seen = seen._replace(fastest=np.vstack(fastest)) if fastest and not failed else seen
     for each in said(seen):
         warned = [*warned, SceneWarning(f'scene "{system.scene.name}": {each}')]
         trajectory = replace(trajectory, message=f"{trajectory.message}; {each}")

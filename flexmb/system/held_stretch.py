@@ -17,6 +17,7 @@ from flexmb.scene.collocation import gauss_rule
 from flexmb.scene.schema import Scene
 from flexmb.scene.sections import EXTENSION, mass_per_length, stiffness_on_axis
 from flexmb.scene.strains import strains
+from flexmb.system.level_range import of_hinges
 from flexmb.system.section_loads import SectionBalance
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
@@ -85,12 +86,10 @@ def unstretched(system: System, t: Real, q: Real, u: Real, loads: Mapping[str, R
 def _largest(system: System, u: Real, loads: Mapping[str, Real]) -> tuple[Real, Real]:
     """The largest force (T,) N across any hinge or closure, infinite where undetermined, and the speeds (T,) of hinges,
     which bound how fast a beam turns (rad/s): with its weight they bound what pulls at its sections."""
-    force, hinges = np.zeros(len(u)), np.ones(u.shape[1], bool)
+    force = np.zeros(len(u))
     for load in loads.values():
         force = np.maximum(force, np.nan_to_num(np.linalg.norm(load[:, 3:], axis=1), nan=np.inf))
-    for row in system.constants.body:
-        hinges[int(row["etad_index"]) : int(row["etad_index"] + row["modes"])] = False
-    return force, np.abs(u[:, hinges]).sum(axis=1)
+    return force, np.abs(u[:, of_hinges(system)]).sum(axis=1)
 
 
 def _stretched(system: System, body: BeamBody, state: State) -> Unstretched:

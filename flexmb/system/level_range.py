@@ -17,7 +17,7 @@ from flexmb.building.links import BodyLink
 from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import BeamBody
 from flexmb.system.tree_system import System
-from flexmb.typing import Real
+from flexmb.typing import Flags, Real
 
 UNPULLED = ("ruthless", "linear", "full")
 """Levels without geometric stiffness."""
@@ -57,14 +57,11 @@ def too_fast(system: System, t: Real, u: Real, turns: Callable[[int], Real]) -> 
 
     turns: angular velocities (N,3) rad/s of the bodies in a state, by its number, as `System.turns`.
     """
-    firsts: dict[int, float] | None = system.kept.get("level_range")
-    if firsts is None:
-        found = {k: _first(link) for k, link in enumerate(system.links)}
-        firsts = system.kept.setdefault("level_range", {k: first for k, first in found.items() if first > 0.0})
+    firsts = _firsts(system)
     if not firsts:
         return
     fastest = {k: (0.0, 0) for k in firsts}
-    for n in _suspects(system, u, np.sqrt(ALLOWED) * min(firsts.values())):
+    for n in _suspects(system, u, _slow(firsts)):
         w = turns(n)
         for k in firsts:
             rate = _across(system.links[k], w[k])
@@ -75,6 +72,37 @@ def too_fast(system: System, t: Real, u: Real, turns: Callable[[int], Real]) -> 
             yield TooFast(link.name, link.level.name, float(t[n]), rate, firsts[k], _remedy(link))
 
 
+def turns_to_watch(system: System) -> tuple[list[int], float, int] | None:
+    """The entries of y = [q, u, ...] that are speeds of hinges, the sum of their sizes (rad/s) up to which no body
+    turns too fast for its level, and how many states are looked at; None where no body can, or the scene waives it."""
+    firsts = {} if "level_range" in system.scene.allow else _firsts(system)
+    if not firsts:
+        return None
+    return (system.nq + np.flatnonzero(of_hinges(system))).tolist(), _slow(firsts), LOOKED_AT
+
+
+def _firsts(system: System) -> dict[int, float]:
+    """The lowest frequencies (rad/s) of the bodies that turns may take out of the range of their levels."""
+    firsts: dict[int, float] | None = system.kept.get("level_range")
+    if firsts is None:
+        found = {k: _first(link) for k, link in enumerate(system.links)}
+        firsts = system.kept.setdefault("level_range", {k: first for k, first in found.items() if first > 0.0})
+    return firsts
+
+
+def _slow(firsts: dict[int, float]) -> float:
+    """The speed (rad/s) up to which nothing is said of any body."""
+    return float(np.sqrt(ALLOWED)) * min(firsts.values())
+
+
+def of_hinges(system: System) -> Flags:
+    """Which speeds (nu,) are those of hinges; those of modes turn no body as a whole."""
+    hinges = np.ones(system.nu, bool)
+    for body in system.constants.body:
+        hinges[int(body["etad_index"]) : int(body["etad_index"] + body["modes"])] = False
+    return hinges
+
+
 def _remedy(link: BodyLink) -> str:
     if isinstance(link.body, BeamBody):
         return 'take level "stiffened" or "exact"'
@@ -82,14 +110,11 @@ def _remedy(link: BodyLink) -> str:
 
 
 def _suspects(system: System, u: Real, slow: float) -> list[int]:
-    """The numbers of the states with the largest speeds of hinges; those of modes turn no body as a whole.
+    """The numbers of the states with the largest speeds of hinges.
 
     Where all speeds together are below `slow` (rad/s), nothing turns faster.
     """
-    hinges = np.ones(u.shape[1], bool)
-    for body in system.constants.body:
-        hinges[int(body["etad_index"]) : int(body["etad_index"] + body["modes"])] = False
-    size = np.abs(u[:, hinges]).sum(axis=1)
+    size = np.abs(u[:, of_hinges(system)]).sum(axis=1)
     order = np.argsort(-size, kind="stable")[:LOOKED_AT]
     return [int(n) for n in order if size[n] > slow]
 

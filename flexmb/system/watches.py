@@ -20,12 +20,15 @@ from flexmb.system.tree_system import System
 from flexmb.tables.state import State
 from flexmb.typing import Real
 
+_NONE: Real = np.zeros((0, 0))
+
 
 class WatchedStates(NamedTuple):
     """States that are looked at: coordinates q (T,nq) and speeds u (T,nu) at t (T,) s.
 
     turns: angular velocities (N,3) rad/s of the bodies in a state, by its number. failed: whether a run ended early,
     which may have diverged. loads: those (T,6) of hinges and closures, by name, None where they were not asked for.
+    fastest: further states of a run, at ends of its steps, see `flexmb.run.propagate.Raw`.
     """
 
     system: System
@@ -35,6 +38,7 @@ class WatchedStates(NamedTuple):
     turns: Callable[[int], Real]
     failed: bool = False
     loads: Mapping[str, Real] | None = None
+    fastest: Real = _NONE
 
 
 class AccuracyFinding(Protocol):
@@ -72,7 +76,15 @@ class Said(NamedTuple):
 def _level_range(seen: WatchedStates) -> Iterator[AccuracyFinding]:
     from flexmb.system.level_range import too_fast  # imported here because many scenes have no flexible bodies
 
-    return too_fast(seen.system, seen.t, seen.u, seen.turns)
+    system, T, more = seen.system, len(seen.t), seen.fastest
+    if not len(more):
+        return too_fast(system, seen.t, seen.u, seen.turns)
+    t, u = np.r_[seen.t, more[:, 0]], np.vstack([seen.u, more[:, 1 + system.nq :]])
+
+    def turns(n: int) -> Real:
+        return seen.turns(n) if n < T else system.turns(float(t[n]), more[n - T, 1 : 1 + system.nq], u[n])
+
+    return too_fast(system, t, u, turns)
 
 
 def _few_points(seen: WatchedStates) -> Iterator[AccuracyFinding]:

@@ -135,7 +135,7 @@ class Arc:
             every = max(1, -(-room * len(y) * 8 // MEMORY)) if motion.is_plain else 1
             record = recorded.RecordedSteps(
                 address=motion.begin(), every=np.array([every]), count=np.zeros(1, np.int64), time=np.zeros(room),
-                state=np.zeros((-(-room // every), len(y))),
+                state=np.zeros((-(-room // every), len(y))), fastest=recorded.nothing_fast(),
             )  # fmt: skip
             posed = problem(recorded.rhs, recorded.project, record, record)
             counts, out = np.zeros(COUNTS, np.int64), np.empty((len(clock.times), len(y)))

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import flexmb as fm
 from flexmb.cli import app
+from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.scene.bodies import Level, Modes
 from flexmb.scene.files import save_scene
 from flexmb.scene.shapes import beam_section
@@ -51,6 +52,41 @@ def test_what_turns_slowly_or_about_its_own_axis_is_silent():
     (word,) = said(arm(1.5 * FIRST))
     assert "unstable" in word
     assert said(replace(arm(1.5 * FIRST), allow=("level_range",))) == []
+
+
+TURN_S = 1.875 / (0.6 * FIRST)
+"""Of a turn by 1 rad from rest to rest, which is fastest in the middle: 0.6 FIRST."""
+STEPS = {"rk4": 1e-3, "generalised_alpha": 2e-3}
+
+
+def turned(end: float = 1.0) -> fm.SceneBuilder:
+    builder = fm.SceneBuilder("arm").beam("ruler", length=1.0, elements=8, section=RULER, modes=Modes(count=4))
+    turn = fm.SmoothStep(start_value=0.0, end_value=end, start_s=0.0, duration_s=TURN_S)
+    return builder.revolute("hub", "ground", "ruler", axis=(0, 0, 1), prescribed=turn)
+
+
+def steered(builder: fm.SceneBuilder) -> fm.SceneBuilder:
+    builder.marker("tip", "ruler", node="tip").sense_marker("place", "tip", "position").pid("law", "place[1]", kp=0.0)
+    return builder.force("push", "ruler", node="tip", direction=(0, 1, 0), function=fm.ControlSignal(source="law"))
+
+
+@pytest.mark.parametrize("method", INTEGRATORS)
+def test_a_turn_between_output_times_is_noticed(method):
+    """Both output times are at rest; every method, alone, with a controller, and in two parts."""
+    cut = steered(turned()).event("now", "time", 0.45 * TURN_S, fm.Change(path="law.kp", value=0.0))
+    for builder in (turned(), steered(turned()), cut):
+        with pytest.warns(fm.SceneWarning, match="of its first frequency") as caught:
+            run = fm.simulate(builder.scene(), TURN_S, method, samples=2, step=STEPS.get(method), rtol=1e-6, atol=1e-8)
+        (text,) = (str(each.message) for each in caught)
+        t = float(text.split("at t = ")[1].split(" s")[0])
+        assert abs(t - TURN_S / 2.0) < 0.1 * TURN_S and "take level" in run.message
+    plain = replace(turned().scene(), allow=("level_range",))
+    given = {"samples": 2, "step": STEPS.get(method), "rtol": 1e-6, "atol": 1e-8}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        looked, waived = (fm.simulate(each, TURN_S, method, **given) for each in (turned().scene(), plain))
+    assert np.array_equal(looked.q, waived.q) and np.array_equal(looked.loads["hub"], waived.loads["hub"])
+    assert fm.simulate(turned(0.6).scene(), TURN_S, method, **given).message.startswith("finished")  # 0.36 FIRST
 
 
 def test_linear_models_and_campbell_diagrams_warn_once():
