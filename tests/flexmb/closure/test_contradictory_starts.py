@@ -131,9 +131,11 @@ def test_modes_move_by_no_more_than_hinges_need():
 
 
 @pytest.mark.slow
-def test_modes_of_many_scenes_move_by_no_more_than_hinges_need():
-    found = [check(seed) for seed in range(500)]
-    assert {each: found.count(each) for each in set(found)}["by modes"] > 5
+@pytest.mark.parametrize("first", range(0, 500, 100))
+def test_modes_of_many_scenes_move_by_no_more_than_hinges_need(first):
+    """500 scenes in parts, so that a loaded machine ends some of them."""
+    found = [check(seed) for seed in range(first, first + 100)]
+    assert {"kept", "by hinges", "by modes"} <= set(found)
 
 
 def geared_arm(level: str) -> flexmb.SceneBuilder:
