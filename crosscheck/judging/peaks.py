@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,16 +57,22 @@ class PeakOfChannel:
         return float(self.extremes[ERROR, self._greatest[1]])
 
 
-def peaks(case: CaseResults) -> Iterator[PeakOfChannel]:
-    """Those of the finished main runs, by variant and engine in the order of the case."""
+def has_envelopes(case: CaseResults) -> bool:
+    """Whether envelopes of its runs were asked for."""
+    return any(role == ENVELOPE for _, _, role in case.results)
+
+
+def peaks(case: CaseResults, kinds: Collection[str] | None = None) -> Iterator[PeakOfChannel]:
+    """Those of the finished main runs, by variant and engine in the order of the case; of all kinds of channels or of
+    some."""
     for variant in case.case.run.variants:
         for engine in variant.engines:
             result = case.get(variant.name, engine)
             if result.status == "finished":
-                yield from _of(case, result)
+                yield from _of(case, result, kinds)
 
 
-def _of(case: CaseResults, result: Result) -> Iterator[PeakOfChannel]:
+def _of(case: CaseResults, result: Result, kinds: Collection[str] | None) -> Iterator[PeakOfChannel]:
     whose = result.variant, result.engine
     followed = case.results.get((*whose, ENVELOPE))
     same = followed is not None and followed.status == "finished" and followed.finest.scene == result.finest.scene
@@ -74,7 +80,8 @@ def _of(case: CaseResults, result: Result) -> Iterator[PeakOfChannel]:
     lost = "" if followed is None or same else f", as its envelope {followed.status}: {followed.message}"
     open_ = case.undetermined(result.variant)
     for channel in result.channels:
-        if not has_extremes(channel) or channel in open_:
+        wanted = kinds is None or channel.partition(":")[0] in kinds
+        if not wanted or not has_extremes(channel) or channel in open_:
             continue
         if channel in whole:
             yield PeakOfChannel(*whose, channel, unpack(whole[channel]), "all steps", is_whole=True)

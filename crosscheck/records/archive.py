@@ -115,13 +115,13 @@ def _checked(record: Any, limit: int) -> int:
     if not (0 <= record.rung <= max(record.rungs - 1, 0) and sized):
         raise ValueError(f"effort {record.effort_value} on rung {record.rung} of {record.rungs} is none")
     _check_shapes(record)
-    return _checked_arrays(_arrays(record), limit)
+    envelope = {f"envelope of {name}": packed for name, packed in record.envelope.items()}
+    return _checked_arrays({**_arrays(record), **envelope}, limit)
 
 
 def _arrays(record: RunRecord | RecordedReference) -> dict[str, Packed]:
     """All arrays by name, for messages."""
-    of_run = {f"envelope of {name}": packed for name, packed in getattr(record, "envelope", {}).items()}
-    return {**record.channels, **({} if record.times is None else {"times": record.times}), **of_run}
+    return {**record.channels, **({} if record.times is None else {"times": record.times})}
 
 
 def _checked_arrays(arrays: Mapping[str, Packed], limit: int) -> int:

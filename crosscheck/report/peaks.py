@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crosscheck.engines.extremes import components
-from crosscheck.judging.peaks import PeakOfChannel, peaks
+from crosscheck.judging.peaks import PeakOfChannel, has_envelopes, peaks
 from crosscheck.judging.results import CaseResults, Session
-from crosscheck.records.kinds import ENVELOPE
 from flexmb.output.whole import take_away, write_csv
 from flexmb.run.channels import family, unit
 
@@ -37,7 +36,7 @@ class PeakRow(NamedTuple):
 def largest_loads(case: CaseResults) -> list[PeakRow]:
     """The largest loads of each kind, by variant and channel, engines below each other."""
     chosen: dict[tuple[str, str], None] = {}
-    found = [peak for peak in peaks(case) if peak.channel.partition(":")[0] in LOADS]
+    found = list(peaks(case, LOADS))
     kinds: dict[tuple[str, str, str], list[PeakOfChannel]] = {}
     for peak in found:
         kinds.setdefault((*peak.whose, family(peak.channel)), []).append(peak)
@@ -56,7 +55,7 @@ def _row(peak: PeakOfChannel) -> PeakRow:
 
 def write_envelope(session: Session, out: Path) -> None:
     """Write the extremes of all channels of sessions with envelopes; otherwise remove an earlier session's file."""
-    cases = [case for case in session.cases if any(role == ENVELOPE for _, _, role in case.results)]
+    cases = [case for case in session.cases if has_envelopes(case)]
     if not cases:
         take_away(out / FILE)
         return

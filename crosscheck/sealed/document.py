@@ -44,7 +44,7 @@ import msgspec
 
 from crosscheck.judging.figures import key_of
 from crosscheck.judging.outcome import SessionOutcome
-from crosscheck.judging.peaks import peaks
+from crosscheck.judging.peaks import has_envelopes, peaks
 from crosscheck.judging.results import CaseResults, Result, Session
 from crosscheck.judging.verdict import Status, Verdict, VerdictKind
 from crosscheck.library.claims import Claims
@@ -168,7 +168,7 @@ def _case(case: CaseResults, outcome: SessionOutcome) -> SealedCase:
         runs={" | ".join(key): _run(result) for key, result in case.results.items() if key[2] != ENVELOPE},
         peaks={
             " | ".join((*peak.whose, peak.channel)): (float(f"{peak.size:.4g}"), float(f"{peak.t:.6g}"))
-            for peak in peaks(case)
+            for peak in (peaks(case) if has_envelopes(case) else ())
             if peak.is_whole
         },
         not_applicable={
