@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from flexmb.scene.schema import ModalBody, Scene, SidBody
 
 SID = (".sid", ".sid_fem")
+SHOWN = 10  # modes of a reduced body that are shown beside those of the structure
 Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.", show_default=False)]
 
 
@@ -102,6 +103,16 @@ def reduce(
     modes: Annotated[int, typer.Option(help="Number of fixed-interface modes.")] = 8,
     free: Annotated[bool, typer.Option("--free", help="Free-free modes about the mass centre.")] = False,
     damping: Annotated[float, typer.Option(help="Damping ratio of every mode.")] = 0.0,
+    rigid: Annotated[
+        list[str] | None,
+        typer.Option(help="Tie a surface rigidly (RBE2) to a new node: 900=1-20,31 or 900@X,Y,Z=1-20."),
+    ] = None,
+    mean: Annotated[
+        list[str] | None, typer.Option(help="The same, with the surface's mean motion (RBE3); it stays flexible.")
+    ] = None,
+    attach: Annotated[
+        str, typer.Option(help="Numbers of further nodes that get static modes, for loads and markers.")
+    ] = "",
 ) -> None:
     """
     Reduce finite-element matrices to a flexible body (Craig and Bampton): a SID file, or a scene with the body.
@@ -111,30 +122,35 @@ def reduce(
     **Examples**
 
         flexmb reduce K.mtx M.mtx nodes.csv --interface 1,12 --modes 8 --out panel.sid
-        flexmb reduce panel.pch panel.pch nodes.csv --interface 101 --free --damping 0.005 --out panel.toml
+        flexmb reduce panel.pch panel.pch panel.bdf --interface 101 --free --damping 0.005 --out panel.toml
+        flexmb reduce b.sti b.mas b.inp --rigid 900=1-20 --mean 901=81-100 --interface 900,901 --out b.toml
 
     **Exit code**: 0 written, 2 the matrices are not those of a free structure, or do not fit the nodes.
     """
     with no_traceback():
         import numpy as np
 
+        from flexmb.cli.numbers_of_nodes import numbers_of, tie_of
         from flexmb.interchange.sid import sid_of, write_sid
-        from flexmb.interchange.superelement import read_super_element, reduced
+        from flexmb.interchange.superelement import compared, read_super_element, reduced
 
         check_folder(out.parent)
         if out.suffix.lower() not in (*SID, ".toml"):
             raise ValueError(f'--out: "{out.suffix}" is neither a SID file (.sid) nor a scene (.toml)')
-        try:
-            chosen = [int(word) for word in interface.split(",")]
-        except ValueError:
-            raise ValueError(f"--interface is numbers of nodes such as 1,12; got {interface!r}") from None
+        chosen, further = numbers_of("--interface", interface), numbers_of("--attach", attach) if attach else []
+        ties = [*(tie_of("rigid", word) for word in rigid or ()), *(tie_of("mean", word) for word in mean or ())]
+        structure = read_super_element(stiffness, mass, nodes)
         made = reduced(
-            read_super_element(stiffness, mass, nodes), chosen, modes, name=out.stem,
-            boundary="free-free" if free else "clamped-free", damping_ratio=damping,
+            structure, chosen, modes, name=out.stem, boundary="free-free" if free else "clamped-free",
+            damping_ratio=damping, ties=ties, attached=further,
         )  # fmt: skip
         centre, moments = (" ".join(f"{each:.6g}" for each in row) for row in (made.centre, np.diag(made.inertia)))
         console.print(f"mass {made.mass:.6g} kg, centre {centre} m, moments of inertia {moments} kg m²")
         console.print("frequencies", " ".join(f"{each:.6g}" for each in made.frequencies), "Hz", soft_wrap=True)
+        console.print("mode  given Hz      reduced Hz    off       MAC", soft_wrap=True)
+        for number, (own, given, mac) in enumerate(zip(*compared(structure, made, SHOWN), strict=True), 1):
+            row = f"{number:4d}  {given:<12.6g}  {own:<12.6g}  {own / given - 1.0:<8.1g}  {mac:.4f}"
+            console.print(row, soft_wrap=True, highlight=False)
         if out.suffix.lower() == ".toml":
             _write(_held(made.body), out, made.notes)
             return

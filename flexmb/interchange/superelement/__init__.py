@@ -1,8 +1,11 @@
 """Finite-element matrices with interface nodes, reduced to flexible bodies by the method of Craig and Bampton."""
 
+from flexmb.interchange.superelement.comparison import Comparison as Comparison
+from flexmb.interchange.superelement.comparison import compared as compared
 from flexmb.interchange.superelement.element import SuperElement as SuperElement
 from flexmb.interchange.superelement.element import SuperElementError as SuperElementError
 from flexmb.interchange.superelement.element import super_element as super_element
 from flexmb.interchange.superelement.files import read_super_element as read_super_element
+from flexmb.interchange.superelement.interface import Tie as Tie
 from flexmb.interchange.superelement.reduction import ReducedBody as ReducedBody
 from flexmb.interchange.superelement.reduction import reduced as reduced

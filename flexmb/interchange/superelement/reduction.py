@@ -1,4 +1,4 @@
-"""Craig-Bampton reduction: constraint modes of the interface and fixed-interface normal modes.
+"""Craig-Bampton reduction: constraint modes of the interface, fixed-interface normal modes, and static corrections.
 
 With the boundary "clamped-free" the first interface node is the body frame, and all others move; with "free-free" all
 move, the six rigid-body motions are removed, and the body frame is at the mass centre. Both describe the same motions
@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.interchange.gram import NoMasses
+from flexmb.interchange.imported import listed
 from flexmb.interchange.near_points import FARTHEST, RigidBlock, points_with
 from flexmb.interchange.superelement.element import ALIKE, DUST, MOTIONS, SuperElement, SuperElementError
 from flexmb.interchange.superelement.inertia import carried_sums
+from flexmb.interchange.superelement.interface import Interface, Tie, interface_of
 from flexmb.scene.bodies import Level, ModalBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
@@ -25,6 +27,9 @@ from flexmb.typing import Real
 
 LOOSE = 1e-12
 """Pivots of K below this fraction of the diagonal are zero: there is a mechanism, or an unconnected part."""
+Boundary = Literal["clamped-free", "free-free"]
+SPANNED = 1e-9
+"""Share of a static response's energy below which modes have all of it."""
 DENSE = 1000
 """Number of rows up to which the dense eigensolver is used."""
 MASSLESS = 1e-13  # a mode has no mass if 1/omega^2 is below this fraction of the largest
@@ -48,31 +53,38 @@ class ReducedBody:
     inertia: Real
     shapes: Real
     notes: tuple[str, ...]
+    interface: Interface
 
 
 def reduced(
     element: SuperElement, interface: Sequence[int], modes: int, *, name: str = "body",
-    boundary: Literal["clamped-free", "free-free"] = "clamped-free", damping_ratio: float = 0.0, level: Level = "full",
+    boundary: Boundary = "clamped-free", damping_ratio: float = 0.0, level: Level = "full",
+    ties: Sequence[Tie] = (), attached: Sequence[int] = (),
 ) -> ReducedBody:  # fmt: skip
-    """A flexible body whose nodes are the `interface` nodes, named by their numbers.
+    """A flexible body whose nodes are the `interface` nodes, named by their numbers, and those of `attached`.
 
     `modes`: the number of fixed-interface modes, in addition to the 6 constraint modes of each interface node, less the
-    six rigid-body motions. `damping_ratio` applies to every mode. Raises SuperElementError for interface nodes without
-    rotations, an impossible number of modes, mechanisms, and a mass matrix that is not positive semidefinite.
+    six rigid-body motions. `ties` tie surfaces to interface nodes of their own. `attached` nodes of the structure get
+    static modes for a force along each axis, and torques if they turn, while the interface is held: loads there have
+    their exact static response. `damping_ratio` applies to every mode. Raises SuperElementError for interface nodes
+    without rotations, an impossible number of modes, mechanisms, and a mass matrix that is not positive semidefinite.
     """
     if not 0.0 <= damping_ratio < 1.0:
         raise SuperElementError(f"the damping ratio is {damping_ratio:g}: give a number from 0 to 1, such as 0.005")
-    nodes = [element.node(number) for number in dict.fromkeys(interface)]
-    held = _interface_rows(element, nodes)
-    _refuse_loose(element, held)
-    if len(held) + modes <= 6:
+    face = interface_of(element, interface, ties)
+    extra = [element.node(number) for number in dict.fromkeys(attached) if number not in face.ids]
+    held = len(face.motion.indptr) - 1
+    _refuse_loose(element, np.unique(face.T[:, :held].nonzero()[0]))
+    loads = _loads(element, face, extra)
+    if held + modes + loads.shape[1] <= 6:
         raise SuperElementError("one interface node without modes is a rigid body: give modes, or more nodes")
-    T = _shapes(element.K, element.M, held, modes)
+    T = face.T @ _shapes(face.by_coordinates(element.K), face.by_coordinates(element.M), held, modes, loads)
     clamped = boundary == "clamped-free"
     whole = element.rigid(np.zeros(3))
     centre = RigidBlock.of(whole.T @ element.M @ whole).centre
-    origin = element.position[nodes[0]] if clamped else centre
-    frequencies, V = _modes(element.K, element.M, T[:, 6:] if clamped else T, None if clamped else whole)
+    origin = face.position[0] if clamped else centre
+    R = None if clamped else _unit_rigid(element)
+    frequencies, V = _modes(element.K, element.M, T[:, 6:] if clamped else T, R)
     shapes = _at_nodes(element, V)
     translation, rotation = shapes[:, :3], shapes[:, 3:]
     omega = 2.0 * np.pi * frequencies
@@ -91,18 +103,34 @@ def reduced(
         "boundary": boundary,
         "level": level,
         "nodes": [
-            {
-                "name": str(element.ids[i]),
-                "position_m": element.position[i] - origin,
-                "translation_modes": translation[i].T,
-                "rotation_modes": rotation[i].T,
-            }
-            for i in nodes
+            _node(number, position - origin, *np.split(motion, 2))
+            for number, position, motion in zip(
+                (*face.ids, *element.ids[extra]), (*face.position, *element.position[extra]),
+                (*(face.motion @ V).reshape(-1, 6, len(omega)), *shapes[extra]), strict=True,
+            )
         ],
-    }
+    }  # fmt: skip
     mass, mass_centre, J = RigidBlock.of(spatial)
-    notes = _notes(distance)
-    return ReducedBody(to_struct(plain(body), ModalBody), origin, frequencies, mass, mass_centre, J, shapes, notes)
+    notes = (*_notes(distance), *_without_rotations(element, extra))
+    made = to_struct(plain(body), ModalBody)
+    return ReducedBody(made, origin, frequencies, mass, mass_centre, J, shapes, notes, face)
+
+
+def _node(number: int, position: Real, translation: Real, rotation: Real) -> dict[str, object]:
+    return {
+        "name": str(number), "position_m": position, "translation_modes": translation.T, "rotation_modes": rotation.T,
+    }  # fmt: skip
+
+
+def _without_rotations(element: SuperElement, nodes: list[int]) -> tuple[str, ...]:
+    still = [str(element.ids[i]) for i in nodes if np.any(element.place[i, 3:] < 0)]
+    return (f"nodes without rotations keep theirs in the body frame: {listed(still)}",) if still else ()
+
+
+def _loads(element: SuperElement, face: Interface, nodes: list[int]) -> Real:
+    """Unit loads along the displacements of these nodes, by coordinates (N', loads)."""
+    rows = element.place[nodes]
+    return np.asarray(face.T[rows[rows >= 0]].toarray().T)
 
 
 def _notes(distance: float) -> tuple[str, ...]:
@@ -122,19 +150,6 @@ def _notes(distance: float) -> tuple[str, ...]:
     )
 
 
-def _interface_rows(element: SuperElement, nodes: list[int]) -> NDArray[np.int64]:
-    if not nodes:
-        raise SuperElementError("there is no interface node: name those that hinges, loads or markers use")
-    for i in nodes:
-        missing = [motion for motion, row in zip(MOTIONS, element.place[i], strict=True) if row < 0]
-        if missing:
-            raise SuperElementError(
-                f"interface node {element.ids[i]} has no {missing[0]}: an interface needs all six motions; tie its "
-                "surface to a node that has them, by rigid or distributing elements"
-            )
-    return element.place[nodes].ravel()
-
-
 def _refuse_loose(element: SuperElement, held: NDArray[np.int64]) -> None:
     """SuperElementError for a displacement inside whose stiffness is zero, or what programs write in place of it."""
     lever = element.lever()
@@ -148,58 +163,92 @@ def _refuse_loose(element: SuperElement, held: NDArray[np.int64]) -> None:
         )
 
 
-def _shapes(K: Real, M: Real, held: NDArray[np.int64], modes: int) -> Real:
-    """Constraint modes and the lowest fixed-interface modes: columns (N, held + modes)."""
+def _shapes(K: Real, M: Real, held: int, modes: int, loads: Real) -> Real:
+    """Constraint modes of the first `held` coordinates, the lowest fixed-interface modes, and what static responses to
+    `loads` (N,l) there have beyond these: columns (N, held + modes + at most l)."""
     from scipy.linalg import cho_solve
 
-    inside = np.setdiff1d(np.arange(len(K)), held)
-    if not 0 <= modes <= len(inside):
-        raise SuperElementError(
-            f"{modes} modes are requested, and the structure held at its interface has {len(inside)}"
-        )
-    T = np.zeros((len(K), len(held) + modes))
-    T[held, np.arange(len(held))] = 1.0
-    if len(inside) == 0:
-        return T
-    K_ii, M_ii = K[np.ix_(inside, inside)], M[np.ix_(inside, inside)]
+    inside = len(K) - held
+    if not 0 <= modes <= inside:
+        raise SuperElementError(f"{modes} modes are requested, and the structure held at its interface has {inside}")
+    if inside == 0:
+        return np.eye(held)
+    K_ii, M_ii = K[held:, held:], M[held:, held:]
     L = _factor(K_ii, "K lets a part move without force while the interface is held")
-    T[np.ix_(inside, np.arange(len(held)))] = -cho_solve((L, True), K[np.ix_(inside, held)])
+    columns = np.zeros((inside, 0))
     if modes:
         compliance, columns = _highest(M_ii, L, modes)
         if compliance[0] <= MASSLESS * compliance[-1]:
             there = int(np.count_nonzero(compliance > MASSLESS * compliance[-1]))
             raise SuperElementError(f"{modes} modes are asked for, and M gives mass to {there} of them: ask for fewer")
-        T[np.ix_(inside, len(held) + np.arange(modes))] = columns[:, ::-1]
-    return T
+    static = _beyond(columns, cho_solve((L, True), loads[held:]), loads[held:])
+    constraint = -cho_solve((L, True), K[held:, :held])
+    return np.block([
+        [np.eye(held), np.zeros((held, modes + static.shape[1]))], [constraint, columns[:, ::-1], static],
+    ])  # fmt: skip
 
 
-def _modes(K: Real, M: Real, T: Real, rigid: Real | None) -> tuple[Real, Real]:
-    """Frequencies (m,) Hz, ascending, and orthonormal modes (N,m) of the motions T without those of `rigid` (N,6).
+def _beyond(modes: Real, responses: Real, loads: Real) -> Real:
+    """What of the responses to loads is orthogonal to the modes, which have unit stiffness, as orthonormal columns."""
+    energy = np.einsum("il,il->l", responses, loads)
+    size = np.sqrt(np.where(energy > 0.0, energy, 1.0))
+    responses, loads = responses[:, energy > 0.0] / size[energy > 0.0], loads[:, energy > 0.0] / size[energy > 0.0]
+    share = modes.T @ loads
+    values, vectors = np.linalg.eigh(responses.T @ loads - share.T @ share)
+    kept = values > SPANNED
+    return (responses - modes @ share) @ (vectors[:, kept] / np.sqrt(values[kept]))
+
+
+def all_modes(element: SuperElement, face: Interface, boundary: Boundary, count: int) -> tuple[Real, Real]:
+    """Frequencies (m,) Hz, ascending, and modes (N,m) of the whole structure, at most `count`: with the first node of
+    the interface held, or free."""
+    T = face.T[:, 6:] if boundary == "clamped-free" else face.T
+    K, M = (np.asarray(T.T @ (T.T @ each).T) for each in (element.K, element.M))
+    if boundary == "free-free":
+        K, M = _without_rigid(K, M, T.T @ (element.M @ _unit_rigid(element)))
+    L = _factor(K, "K lets the structure move without force beyond its six rigid-body motions")
+    compliance, columns = _highest(M, L, min(count, len(K)))
+    there = np.flatnonzero(compliance > MASSLESS * compliance[-1])[::-1]
+    return 1.0 / (2.0 * np.pi * np.sqrt(compliance[there])), np.asarray(T @ columns[:, there])
+
+
+def _unit_rigid(element: SuperElement) -> Real:
+    """The rigid-body motions (N,6), orthonormal by M. SuperElementError if one has no inertia."""
+    from scipy.linalg import solve_triangular
+
+    rigid = element.rigid(np.zeros(3))
+    try:
+        return np.asarray(solve_triangular(np.linalg.cholesky(rigid.T @ element.M @ rigid), rigid.T, lower=True).T)
+    except np.linalg.LinAlgError:
+        raise SuperElementError(
+            "M gives a rigid-body motion no inertia, so that there is no mean frame: clamp the first interface node"
+        ) from None
+
+
+def _without_rigid(k: Real, m: Real, held: Real) -> tuple[Real, Real]:
+    """k that holds the rigid-body motions, and m without their inertia; held = T' M R with orthonormal R."""
+    return k + np.trace(k) / np.trace(held @ held.T) * held @ held.T, m - held @ held.T
+
+
+def _modes(K: Real, M: Real, T: Real, R: Real | None) -> tuple[Real, Real]:
+    """Frequencies (m,) Hz, ascending, and orthonormal modes (N,m) of the motions T without the rigid ones R (N,6).
 
     With M-orthonormal R, K + s M R R' M holds the rigid-body motions and M - M R R' M takes their inertia away.
     """
-    from scipy.linalg import eigh, solve_triangular
+    from scipy.linalg import eigh
 
     energy, terms = np.einsum("im,ij,jm->m", T, K, T, optimize=True), np.diag(K) @ T**2
     T = T / np.sqrt(np.where(energy > LOOSE * terms, energy, terms))  # rigid-body motions have no energy
     k, m = T.T @ K @ T, T.T @ M @ T
     elastic = m
-    if rigid is not None:
-        try:
-            R = solve_triangular(np.linalg.cholesky(rigid.T @ M @ rigid), rigid.T, lower=True).T
-        except np.linalg.LinAlgError:
-            raise SuperElementError(
-                "M gives a rigid-body motion no inertia, so that there is no mean frame: clamp the first interface node"
-            ) from None
-        held = T.T @ (M @ R)
-        k = k + np.trace(k) / np.trace(held @ held.T) * held @ held.T
-        elastic = m - held @ held.T
+    if R is not None:
+        k, elastic = _without_rigid(k, m, T.T @ (M @ R))
     _factor(k, "K lets the structure move without force beyond its six rigid-body motions")
     compliance, columns = eigh(0.5 * (elastic + elastic.T), 0.5 * (k + k.T))
     kept = np.flatnonzero(compliance > MASSLESS * compliance[-1])[::-1]
-    kept = kept if rigid is None else kept[: len(compliance) - 6]
+    kept = kept if R is None else kept[: len(compliance) - 6]
     V = T @ (columns[:, kept] / np.sqrt(np.einsum("im,ij,jm->m", columns[:, kept], m, columns[:, kept], optimize=True)))
-    if rigid is not None:  # their share in the columns is rounding
+    if R is not None:  # their share in the columns is rounding
         V = V - R @ (R.T @ (M @ V))
     largest = V[np.argmax(np.abs(V), axis=0), np.arange(V.shape[1])]
     return 1.0 / (2.0 * np.pi * np.sqrt(compliance[kept])), V * np.sign(largest)
@@ -245,3 +294,10 @@ def _at_nodes(element: SuperElement, V: Real) -> Real:
     """Translations and rotations (n,6,m) of the nodes, zero for those without a row."""
     padded = np.concatenate([V, np.zeros((1, V.shape[1]))])  # index -1 selects the row of zeros
     return padded[element.place]
+
+
+def displacements(element: SuperElement, shapes: Real) -> Real:
+    """The inverse: displacements (N,m) of the structure from those of its nodes."""
+    V = np.zeros((len(element.K), shapes.shape[2]))
+    V[element.place[element.place >= 0]] = shapes[element.place >= 0]
+    return V

@@ -39,6 +39,19 @@ WRONG = {
         ("export", "scene.toml", "load", "--out", "b.sid"), "is not a flexible body of the scene: use one of: rod",
     ),
     "interface": (("reduce", "K.mtx", "M.mtx", "n.csv", "--interface", "a", "--out", "b.sid"), "numbers of nodes"),
+    "range": (("reduce", "K.mtx", "M.mtx", "n.csv", "--interface", "9-1", "--out", "b.sid"), "from the lower to the"),
+    "attach": (
+        ("reduce", "K.mtx", "M.mtx", "n.csv", "--interface", "1", "--attach", "x", "--out", "b.sid"),
+        "--attach is numbers",
+    ),
+    "tie": (
+        ("reduce", "K.mtx", "M.mtx", "n.csv", "--interface", "1", "--mean", "900@1=2", "--out", "b.sid"),
+        "--mean is a new",
+    ),
+    "surface": (
+        ("reduce", "K.mtx", "M.mtx", "n.csv", "--interface", "1", "--rigid", "900", "--out", "b.sid"),
+        "--rigid is numbers",
+    ),
     "out": (("reduce", "K.mtx", "M.mtx", "n.csv", "--interface", "1", "--out", "b.txt"), "neither a SID file"),
     "no matrix": (
         ("reduce", "K.mtx", "M.mtx", "scene.toml", "--interface", "1", "--out", "b.sid"),

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import eigh
 
 import flexmb as fm
 from flexmb.interchange.sid import imported_sid, sid_of
-from flexmb.interchange.superelement import SuperElementError, reduced, reduction, super_element
+from flexmb.interchange.superelement import SuperElementError, Tie, compared, reduced, reduction, super_element
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.integrals import modal_integrals
 from tests.bounds import relative
@@ -170,6 +172,103 @@ def test_a_panel_of_solids_with_tied_faces_has_the_frequencies_of_the_reduced_ma
         assert relative(found / exact, np.ones(6 + modes)) < 1e-9, (boundary, level)
 
 
+SOLID_K, SOLID_M, SOLID_AT = solids.panel((4, 3, 1))
+SOLID = super_element(SOLID_K, SOLID_M, SOLID_AT, dofs=["123"] * len(SOLID_AT))
+SURFACES = [tuple(1 + np.flatnonzero(SOLID_AT[:, 0] == x)) for x in FACES]
+INNER = 1 + int(np.flatnonzero((SOLID_AT[:, 0] == 0.5) & (SOLID_AT[:, 1] > 0.0))[0])
+
+
+def surfaces(kind: str) -> list[Tie]:
+    return [Tie(900 + i, nodes, kind) for i, nodes in enumerate(SURFACES)]  # type: ignore[arg-type]
+
+
+def constrained(kind: str, modes: int) -> np.ndarray:
+    """Frequencies (Hz), the first node held, of the motions of Craig and Bampton by constraints C u = D p, in NumPy."""
+    C, D = list[np.ndarray](), list[np.ndarray]()
+    for i, nodes in enumerate(SURFACES):
+        rows = np.array([3 * (node - 1) + a for node in nodes for a in range(3)])
+        at = SOLID_AT[np.array(nodes) - 1]
+        R = np.vstack([np.hstack([np.eye(3), -np.cross(np.eye(3), -(r - at.mean(axis=0)))]) for r in at])
+        pick = np.eye(len(SOLID_K))[rows]
+        C.append(pick if kind == "rigid" else np.linalg.solve(R.T @ R, R.T) @ pick)
+        place = np.zeros((len(C[-1]), 12))
+        place[:, 6 * i : 6 * i + 6] = R if kind == "rigid" else np.eye(6)
+        D.append(place)
+    C, D = np.vstack(C), np.vstack(D)
+    inner = np.linalg.svd(C)[2][len(C) :].T  # motions with C u = 0
+    particular = np.linalg.lstsq(C, D)[0]
+    k = inner.T @ SOLID_K @ inner
+    static = particular - inner @ np.linalg.solve(k, inner.T @ SOLID_K @ particular)
+    fixed = inner @ eigh(k, inner.T @ SOLID_M @ inner)[1][:, :modes]
+    T = np.hstack([static[:, 6:], fixed])
+    return np.sqrt(eigh(T.T @ SOLID_K @ T, T.T @ SOLID_M @ T, eigvals_only=True)) / (2.0 * np.pi)
+
+
+@pytest.mark.parametrize("kind", ["rigid", "mean"])
+def test_tied_surfaces_have_the_frequencies_of_craig_and_bampton(kind):
+    """And the free body those of a free-free one that is held at the same node in a scene."""
+    exact = constrained(kind, 5)
+    made = reduced(SOLID, [900, 901], 5, ties=surfaces(kind))
+    assert relative(made.frequencies / exact, np.ones(11)) < 1e-9
+    assert [node.name for node in made.body.nodes] == ["900", "901"]
+    free = reduced(SOLID, [900, 901], 5, ties=surfaces(kind), boundary="free-free").body
+    held = fm.SceneBuilder("held").add(free).weld("root", "ground", "body", child_node="900").scene()
+    found = np.sort(np.abs(np.linalg.eigvals(fm.linearize(fm.compile(held)).A)))[::2] / (2.0 * np.pi)
+    assert relative(found / exact, np.ones(11)) < 1e-9
+
+
+def test_a_rigid_tie_is_the_elimination_of_its_surface():
+    K, M, position, dofs = solids.tied(SOLID_K, SOLID_M, SOLID_AT, [np.array(each) - 1 for each in SURFACES])
+    eliminated = reduced(super_element(K, M, position, dofs=dofs), [1, 2], 4)
+    assert relative(reduced(SOLID, [900, 901], 4, ties=surfaces("rigid")).frequencies, eliminated.frequencies) < 1e-9
+
+
+def test_a_tie_may_sit_beside_its_surface():
+    """At the same place the same body; elsewhere another lever, and the same frequencies of the free structure."""
+    at = [SOLID_AT[np.array(nodes) - 1].mean(axis=0) for nodes in SURFACES]
+    moved = [replace(tie, position=tuple(p + [0.1, 0.2, 0.0])) for tie, p in zip(surfaces("mean"), at, strict=True)]
+    named = [replace(tie, position=tuple(p)) for tie, p in zip(surfaces("mean"), at, strict=True)]
+    plain, same, other = (
+        reduced(SOLID, [900, 901], 5, ties=ties, boundary="free-free") for ties in (surfaces("mean"), named, moved)
+    )
+    assert np.array_equal(plain.frequencies, same.frequencies)
+    assert relative(plain.frequencies / other.frequencies, np.ones(11)) < 1e-9
+    assert np.allclose(other.body.nodes[0].position_m, np.array(plain.body.nodes[0].position_m) + [0.1, 0.2, 0.0])
+
+
+@pytest.mark.parametrize("modes", [0, 4, len(SOLID_K) - 6 * 8])
+def test_an_attached_node_has_the_exact_static_response_to_loads(modes):
+    """With all fixed-interface modes the attachment adds nothing."""
+    if modes > 4:
+        modes = reduced(SOLID, [900, 901], 0, ties=surfaces("rigid")).interface.T.shape[1] - 12
+    ties = surfaces("rigid")
+    made, bare = (reduced(SOLID, [900, 901], modes, ties=ties, attached=nodes) for nodes in ([INNER], []))
+    node = made.body.nodes[-1]
+    assert node.name == str(INNER) and "nodes without rotations" in made.notes[-1]
+    assert len(made.frequencies) == 6 + modes + (3 if modes <= 4 else 0)
+    shape = np.array(node.translation_modes)
+    found = shape.T @ (shape / (2.0 * np.pi * made.frequencies[:, None]) ** 2)
+    T = made.interface.T[:, 6:].toarray()
+    row = slice(3 * (INNER - 1), 3 * INNER)
+    exact = (T @ np.linalg.solve(T.T @ SOLID_K @ T, T.T[:, row]))[row]
+    assert relative(found, exact) < 1e-8
+    shape = bare.shapes[INNER - 1, :3].T
+    without = shape.T @ (shape / (2.0 * np.pi * bare.frequencies[:, None]) ** 2)
+    assert (relative(without, exact) > 1e-3) == (modes <= 4)
+
+
+@pytest.mark.parametrize("boundary", ["clamped-free", "free-free"])
+def test_frequencies_and_shapes_stand_beside_those_of_the_structure(boundary):
+    """Rayleigh and Ritz: never lower. With all modes they are the structure's, and MAC is 1, for pairs of modes too."""
+    few = compared(SOLID, reduced(SOLID, [900, 901], 8, ties=surfaces("mean"), boundary=boundary), 5)
+    assert np.all(few.reduced >= few.given * (1.0 - 1e-9)) and np.all(few.mac > 0.99)
+    poor = compared(SOLID, reduced(SOLID, [900, 901], 0, ties=surfaces("mean"), boundary=boundary), 6)
+    assert np.min(poor.mac) < 0.99 and np.max(poor.reduced / poor.given) > 1.01
+    every = compared(BEAM, reduced(BEAM, [1, TIP], len(BEAM.K) - 12, boundary=boundary), 12)
+    assert relative(every.reduced / every.given, np.ones(12)) < 1e-6
+    assert relative(every.mac, np.ones(12)) < 1e-6
+
+
 def test_of_a_panel_of_solids_with_tied_faces_the_whole_kinetic_energy_is_exact():
     """1/2 int v'v of v = v0 + w x (r + u) + u', by the untied matrices: tied faces move rigidly to first order."""
     K, M, position = solids.panel((3, 2, 1))
@@ -324,6 +423,25 @@ BAD = {
     "sums overflow": (lambda: super_element(np.sign(STIFFNESS) * 1e308, BEAM.M, POSITION), "at most 1e\\+60"),
     "far away": (lambda: super_element(STIFFNESS, BEAM.M, POSITION * 1e300), "a coordinate of a node is not finite"),
 }
+
+
+BAD |= {
+    "on a line": (
+        lambda: reduced(SOLID, [900], 2, ties=[Tie(900, SURFACES[0][:4])]), "node 900 does not show all six motions"
+    ),
+    "its number is taken": (lambda: reduced(SOLID, [1], 2, ties=[Tie(1, SURFACES[0])]), "node 1 is there already"),
+    "no interface of it": (lambda: reduced(BEAM, [1], 2, ties=[Tie(900, (2, 3))]), "900, which is no interface node"),
+    "a node twice": (lambda: reduced(SOLID, [900], 2, ties=[Tie(900, (1, 1, 2, 7))]), "lists a node twice"),
+    "shared": (
+        lambda: reduced(SOLID, [900, 901], 2, ties=[Tie(900, SURFACES[0]), Tie(901, SURFACES[0])]),
+        "node 901 shares displacements",
+    ),
+    "far tie": (
+        lambda: reduced(SOLID, [900], 2, ties=[Tie(900, SURFACES[0], position=(0.0, 0.0, float("nan")))]),
+        "the position of node 900 is not finite",
+    ),
+    "no node to attach": (lambda: reduced(BEAM, [1], 2, attached=[77]), "there is no node 77"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("fault", BAD)
