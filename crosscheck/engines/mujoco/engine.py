@@ -6,7 +6,7 @@ from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, Model, Support
 from crosscheck.engines.links import links, obstacle
 from crosscheck.engines.pace import pace
-from crosscheck.engines.peer import PeerEngine, inertia_obstacle, needed
+from crosscheck.engines.peer import PeerEngine, inertia_obstacle, is_bare_frame, needed
 from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.scene.schema import Scene
 
@@ -36,7 +36,7 @@ class MujocoEngine(PeerEngine):
 
     def obstacle(self, scene: Scene) -> str:
         reason = obstacle(scene, "MuJoCo", ("spherical",), KNOWN, couplings=True, armatures=True)
-        return reason or inertia_obstacle(links(scene), "MuJoCo")
+        return reason or inertia_obstacle((each for each in links(scene) if not is_bare_frame(each)), "MuJoCo")
 
     def supports(self, scene: Scene) -> Support:
         support = super().supports(scene)

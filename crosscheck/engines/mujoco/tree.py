@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import quaternion_of, rotation_matrix
 from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, by_motion
+from crosscheck.engines.peer import is_bare_frame
 from crosscheck.engines.rigid_tree import Slot, scene_start
 from flexmb.typing import Real
 
@@ -84,9 +85,10 @@ def build_tree(
         body.explicitinertial = True
         body.mass = link.inertia.mass
         body.ipos = link.inertia.com
-        principal, axes = _principal(link.inertia.inertia)
-        body.inertia = principal
-        body.iquat = quaternion_of(axes)
+        if not is_bare_frame(link):
+            principal, axes = _principal(link.inertia.inertia)
+            body.inertia = principal
+            body.iquat = quaternion_of(axes)
         for k, freedom in enumerate(link.freedoms):
             _add_joints(body, freedom, joint_name(link, k))
         bodies.append(body)

@@ -6,6 +6,8 @@ import pytest
 from crosscheck.engines.contract import EngineMissing, Snapshot
 from crosscheck.engines.links import first_armature
 from crosscheck.engines.registry import engines
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Scene
 from tests.crosscheck.engines.random_scenes import KINDS, LATER_KINDS, random_scene
 from tests.trees import with_armatures
@@ -87,6 +89,22 @@ def test_random_tree_with_armatures(name, driven):
     else:
         _compare(armed, name)
         _notices_armatures(scene, armed, name)
+
+
+@pytest.mark.parametrize("name", [name for name in ENGINES if name != "pinocchio"])
+def test_frames_without_mass_that_are_welded_to_others(name):
+    """What every robot's file has: a base, a flange that carries the next link, a tool. MuJoCo refused them."""
+    none = (0.0, 0.0, 0.0)
+    builder = SceneBuilder("arm", gravity=(0.0, 0.0, -9.81))
+    for frame in ("base", "flange", "tool"):
+        builder.rigid_body(frame, mass=0.0, inertia=none)
+    for link in ("upper", "lower"):
+        builder.rigid_body(link, mass=1.0, com=(0.1, 0.0, -0.5), inertia=(0.1, 0.1, 0.01))
+    builder.weld("b", "ground", "base").revolute("j", "base", "upper", axis=(0, 1, 0), angle=0.5, rate=1.0)
+    builder.weld("f", "upper", "flange", parent_position=(0, 0, -1), parent_quaternion=(0.8, 0.6, 0.0, 0.0))
+    builder.revolute("k", "flange", "lower", axis=(1, 0, 0), angle=0.2, rate=-2.0)
+    builder.weld("t", "lower", "tool", parent_position=(0, 0, -1)).marker("end", "tool").marker("middle", "flange")
+    _compare(builder.force("push", "tool", direction=(0, 1, 0), function=Constant(value=3.0)).scene(), name)
 
 
 def _notices_armatures(scene: Scene, armed: Scene, name: str) -> None:
