@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import webbrowser
 from dataclasses import replace
 from pathlib import Path
@@ -19,11 +20,17 @@ if TYPE_CHECKING:
     from crosscheck.judging.outcome import SessionOutcome
     from crosscheck.library.find import Case
 
+MOST_SAMPLES = 100_000
+
 
 @common.app.command()
 def run(
     cases: common.CaseWords,
     engine: common.EngineNames = None,
+    t_end: Annotated[
+        float | None, typer.Option("--t-end", metavar="S", help="Of a scene or a robot: how long to simulate it.")
+    ] = None,
+    samples: Annotated[int, typer.Option(help="Of a scene or a robot: output times from 0 to the end.")] = 201,
     alone: Annotated[
         bool, typer.Option("--alone", help="Hold the engines against the stored references only; no partners run.")
     ] = False,
@@ -80,6 +87,10 @@ def run(
     of events. `envelope.csv` has the least and greatest values of all channels of all engines, with their times, and
     says over what.
 
+    **A scene or a robot** (`.toml`, `.urdf`, `.xml`, `.sid`) with `--t-end` needs no case: a folder `cases/NAME` in
+    `--out` gets its scene, with a marker at the frame of every body, and a run.toml with usual goals. Native and all
+    other codes that are installed run it; what one of them cannot represent is *not applicable*.
+
     **Your own engine**: `--goal` replaces goals that it is not meant to meet, `--efforts` adds efforts where U is too
     large, and a file, `--expect`, keeps both, with failures that you expect and their reasons; `docs/expectations.md`
     has its keys. `--baseline OLD` lets only what became worse fail the session; without OLD it is written, and the
@@ -93,10 +104,12 @@ def run(
 
     **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
     `crosscheck run all -e mycode --alone --out results` · `crosscheck run ./my_case --accept` ·
-    `crosscheck run all --strict --time-limit 600` · `crosscheck run 'pendulums/*' -e mycode --baseline main.json`
+    `crosscheck run all --strict --time-limit 600` · `crosscheck run 'pendulums/*' -e mycode --baseline main.json` ·
+    `crosscheck run my.urdf --t-end 5`
     """
     common.check_limit(time_limit)
     shown = common.verbosity(quiet, verbose)
+    cases, engine = _of_models(cases, engine, t_end, samples, out)
     chosen, asked, records = _chosen(cases, engine, alone), tuple(engine or ()), out / "records.jsonl"
     from crosscheck.cli.baseline import hold_against, read_baseline
     from crosscheck.records.session import last_session
@@ -138,6 +151,40 @@ def report(
     with common.sole_writer(out):
         outcome, page = write_all(records, out, strict, standing, single_file)
     _conclude(outcome, page, records, shown, out if as_json else None, open_report)
+
+
+def _of_models(
+    words: list[str], engines: list[str] | None, t_end: float | None, samples: int, out: Path
+) -> tuple[list[str], list[str] | None]:
+    """The words with a case folder in place of each scene or robot, and the engines, all installed codes for these."""
+    from crosscheck.library.case_error import CaseError
+    from crosscheck.library.model_case import is_model, scene_of, write_case
+
+    models = [word for word in words if is_model(word)]
+    if not models:
+        if t_end is not None:
+            common.refuse("--t-end is of a scene or a robot (.toml, .urdf, .xml, .sid): a case has its own duration")
+        return words, engines
+    if len(models) < len(words):
+        common.refuse("cases and models are run one after the other: all engines run models, and cases name theirs")
+    if t_end is None or not 0.0 < t_end < math.inf or not 2 <= samples <= MOST_SAMPLES:
+        common.refuse(f"a scene or a robot needs --t-end in s, above zero, and 2 to {MOST_SAMPLES} --samples")
+    folders = {out / "cases" / Path(word).stem: word for word in models}
+    if len(folders) < len(models):
+        common.refuse("two models have the same name: rename one, or run each alone")
+    try:
+        read = {folder: scene_of(Path(word)) for folder, word in folders.items()}
+    except CaseError as error:
+        common.refuse(str(error))
+    from crosscheck.running.installed import OWN_CODE, codes_for, partner_of  # after what may be wrong
+
+    codes = codes_for([scene for scene, _ in read.values()])
+    partners = {folder: partner_of(scene, codes) for folder, (scene, _) in read.items()}
+    for folder, (scene, notes) in read.items():
+        write_case(scene, folder, (OWN_CODE[0], partners[folder]), t_end, samples)
+        for note in notes:
+            common.errors.print(f"note: {folders[folder]}: {note}", soft_wrap=True, markup=False)
+    return [str(folder) for folder in folders], engines or list(dict.fromkeys([*codes, *partners.values()]))
 
 
 def _chosen(cases: list[str], engines: list[str] | None, alone: bool) -> tuple[Case, ...]:

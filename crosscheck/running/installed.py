@@ -6,9 +6,11 @@ import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from crosscheck.engines.registry import (
     BUILT_IN,
+    OWN_CODE,
     PROVIDER,
     BrokenPlugIn,
     NoSuchEngine,
@@ -21,7 +23,11 @@ from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Scheduler, Work
 
 ANSWER_LIMIT_S = 60.0
+SECOND = "native-radau5"
 ABSENT, USELESS = "not installed", "does not work"  # why an engine cannot be used
+
+if TYPE_CHECKING:
+    from flexmb.scene.schema import Scene
 
 
 @dataclass(frozen=True)
@@ -38,6 +44,23 @@ class EngineState:
 def describe_engines() -> list[EngineState]:
     """All engines, built-in ones and plug-ins; plug-ins are asked in their own processes."""
     return _describe((*BUILT_IN, *plug_ins()), PROVIDER, run_jobs)
+
+
+def codes_for(scenes: Sequence[Scene]) -> list[str]:
+    """The engines that are installed and work, but for built-in ones that can represent none of the scenes; of our own
+    only the first, as the others share its code."""
+    names = [state.name for state in describe_engines() if state.version and state.name not in OWN_CODE[1:]]
+    return [name for name in names if name not in BUILT_IN or any(_takes(name, scene) for scene in scenes)]
+
+
+def partner_of(scene: Scene, codes: Iterable[str]) -> str:
+    """The first of the built-in codes beside our own that can represent a scene; our own second method without one."""
+    others = (name for name in codes if name in BUILT_IN and name not in OWN_CODE)
+    return next((name for name in others if _takes(name, scene)), SECOND)
+
+
+def _takes(name: str, scene: Scene) -> bool:
+    return find_engine(PROVIDER, name).supports(scene).kind != "no"
 
 
 def require_engines(

@@ -13,9 +13,8 @@ from flexmb.output.printable import printable
 from flexmb.output.writing import check_folder, folder
 
 if TYPE_CHECKING:
-    from flexmb.scene.schema import ModalBody, Scene, SidBody
+    from flexmb.scene.schema import Scene
 
-SID = (".sid", ".sid_fem")
 SHOWN = 10  # modes of a reduced body that are shown beside those of the structure
 Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.", show_default=False)]
 
@@ -45,9 +44,11 @@ def import_(
     **Exit code**: 0 written, 2 the model cannot be a scene: the message names the place and the remedy.
     """
     with no_traceback():
+        from flexmb.interchange.models import read_model
+
         check_folder(out.parent)
-        scene, notes = _imported(model, free_base, repair)
-        _write(scene, out, notes)
+        found = read_model(model, free_base, repair)
+        _write(found.scene, out, found.notes)
 
 
 def export(
@@ -131,6 +132,7 @@ def reduce(
         import numpy as np
 
         from flexmb.cli.numbers_of_nodes import numbers_of, tie_of
+        from flexmb.interchange.models import SID, held
         from flexmb.interchange.sid import sid_of, write_sid
         from flexmb.interchange.superelement import compared, read_super_element, reduced
 
@@ -152,48 +154,12 @@ def reduce(
             row = f"{number:4d}  {given:<12.6g}  {own:<12.6g}  {own / given - 1.0:<8.1g}  {mac:.4f}"
             console.print(row, soft_wrap=True, highlight=False)
         if out.suffix.lower() == ".toml":
-            _write(_held(made.body), out, made.notes)
+            _write(held(made.body), out, made.notes)
             return
         _tell(made.notes)
         folder(out.parent)
         write_sid(sid_of(made.body), out)
     console.print("wrote", str(out), soft_wrap=True)
-
-
-def _imported(model: Path, free_base: bool, repair: bool) -> tuple[Scene, tuple[str, ...]]:
-    ending = model.suffix.lower()
-    if ending == ".urdf":
-        from flexmb.interchange.urdf import read_urdf
-
-        found = read_urdf(model, free_base=free_base, repair=repair)
-        return found.scene, found.notes
-    if free_base:
-        raise ValueError("--free-base is for URDF: an MJCF has a freejoint, and a SID file's body is joined in a scene")
-    if ending in (".xml", ".mjcf"):
-        if repair:
-            raise ValueError("--repair is for URDF and SID: MuJoCo, which compiles an MJCF, has its own checks")
-        from flexmb.interchange.mjcf import read_mjcf
-
-        found = read_mjcf(model)
-        return found.scene, found.notes
-    if ending in SID:
-        from flexmb.interchange.imported import naming
-        from flexmb.interchange.sid import imported_sid, read_sid
-
-        imported = imported_sid(read_sid(model), model.stem, repair=repair)
-        with naming(str(model)):
-            return _held(imported.body), imported.notes
-    raise ValueError(f'{model}: "{model.suffix}" is not a known kind of model: give .urdf, .xml (MJCF) or .sid')
-
-
-def _held(body: ModalBody | SidBody) -> Scene:
-    """The body welded to the ground at its body frame, or at its first node if no material is fixed to that."""
-    from flexmb.scene.bodies import ModalBody
-    from flexmb.scene.build import SceneBuilder
-
-    assert isinstance(body, ModalBody)
-    node = body.nodes[0].name if body.nodes and body.boundary == "free-free" else "origin"
-    return SceneBuilder(body.name).add(body).weld("base", "ground", body.name, child_node=node).scene()
 
 
 def _write(scene: Scene, out: Path, notes: tuple[str, ...]) -> None:

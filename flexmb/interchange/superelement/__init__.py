@@ -1,6 +1,6 @@
 """Finite-element matrices with interface nodes, reduced to flexible bodies by the method of Craig and Bampton."""
 
-from flexmb.interchange.superelement.comparison import Comparison as Comparison
+from flexmb.interchange.superelement.comparison import SideBySide as SideBySide
 from flexmb.interchange.superelement.comparison import compared as compared
 from flexmb.interchange.superelement.element import SuperElement as SuperElement
 from flexmb.interchange.superelement.element import SuperElementError as SuperElementError

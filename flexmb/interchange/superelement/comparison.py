@@ -16,7 +16,7 @@ of their combinations."""
 BEYOND = 6  # modes of the structure above those that are asked for, in case a reduced one is in another order
 
 
-class Comparison(NamedTuple):
+class SideBySide(NamedTuple):
     """By mode of the body: its frequency, that of the structure's mode like it (Hz), and their MAC, from 0 to 1.
 
     The modal assurance criterion (a' M b)² / (a' M a · b' M b) says how alike two shapes are.
@@ -27,7 +27,7 @@ class Comparison(NamedTuple):
     mac: Real
 
 
-def compared(element: SuperElement, made: ReducedBody, count: int) -> Comparison:
+def compared(element: SuperElement, made: ReducedBody, count: int) -> SideBySide:
     """The lowest `count` modes of a body beside those of the structure with the same ties and boundary."""
     frequencies, modes = all_modes(element, made.interface, made.body.boundary, count + BEYOND)
     V = displacements(element, made.shapes)[:, :count]
@@ -36,4 +36,4 @@ def compared(element: SuperElement, made: ReducedBody, count: int) -> Comparison
     groups = np.abs(frequencies[:, None] - frequencies) <= ALIKE * frequencies
     share = share @ groups
     best = np.argmax(share, axis=1)
-    return Comparison(made.frequencies[:count], frequencies[best], share[np.arange(len(best)), best])
+    return SideBySide(made.frequencies[:count], frequencies[best], share[np.arange(len(best)), best])

@@ -1,0 +1,105 @@
+"""A case folder made of anybody's scene or robot: markers at the frame of every body, usual goals, one variant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from crosscheck.library.case_error import CaseError
+from flexmb.output.whole import write_whole
+from flexmb.scene.bodies import Body, RigidBody
+from flexmb.scene.files import inline, load_scene, save_scene
+from flexmb.scene.hinges import Weld
+from flexmb.scene.schema import Marker, Scene
+from flexmb.scene.tree import GROUND, node_names, ordered
+
+SCENE = ".toml"
+GOALS = {"marker": 1e-6, "energy": 1e-6, "load": 1e-5}
+
+
+def is_model(word: str) -> bool:
+    """Whether the word is the name of a scene or of a model that scenes are made from, not of a case."""
+    from flexmb.interchange.models import ENDINGS
+
+    path = Path(word)
+    return path.suffix.lower() in (SCENE, *ENDINGS) and path.name != "run.toml" and not path.is_dir()
+
+
+def scene_of(model: Path) -> tuple[Scene, tuple[str, ...]]:
+    """The scene of a model, with markers, and notes on what it omits of that.
+
+    CaseError, which names the file, for a model that cannot be a scene.
+    """
+    from flexmb.interchange.models import read_model
+    from flexmb.interchange.sid import with_sid_bodies
+    from flexmb.scene.check import check_scene
+
+    try:
+        if model.suffix.lower() == SCENE:
+            scene, notes = load_scene(model), tuple[str, ...]()
+            check_scene(scene)
+        else:
+            found = read_model(model)
+            scene, notes = found.scene, found.notes
+        return with_markers(with_sid_bodies(scene)), notes
+    except (ValueError, OSError, ImportError) as error:
+        raise CaseError(str(error)) from None
+
+
+def write_case(scene: Scene, folder: Path, engines: tuple[str, str], t_end: float, samples: int) -> None:
+    """Write scene.toml and run.toml of a scene's case into `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    save_scene(scene, folder / "scene.toml")
+    write_whole(folder / "run.toml", run_file(scene, engines, t_end, samples))
+
+
+def with_markers(scene: Scene) -> Scene:
+    """The scene with a marker at the frame of every body that can move and has none there, named after the body."""
+    still = _still(scene)
+    there = {(each.body, each.node) for each in scene.markers if not any(each.offset_m)}
+    taken = {each.name for each in scene.markers}
+    added = list[Marker]()
+    for body in scene.bodies:
+        node = _frame(body)
+        if node and body.name not in still and (body.name, node) not in there:
+            name = next(each for each in _names(body.name) if each not in taken)
+            taken.add(name)
+            added.append(Marker(name=name, body=body.name, node=node))
+    return replace(scene, markers=(*scene.markers, *added))
+
+
+def run_file(scene: Scene, engines: tuple[str, str], t_end: float, samples: int) -> str:
+    """The run file: two engines, and whatever ones join them, over `t_end` s; a chart of the last marker."""
+    goals = ", ".join(f"{key} = {goal!r}" for key, goal in GOALS.items())
+    lines = [
+        "# Written by crosscheck run; the next run of the model writes it anew: edit a copy of the folder.",
+        f"title = {inline(scene.name or 'scene')}",
+        f"duration_s = {t_end!r}",
+        f"samples = {samples}",
+        f'[[variant]]\nname = "given"\nengines = ["{engines[0]}", "{engines[1]}"]',
+        f'[[comparison]]\nname = "all engines"\nvariant = "given"\ngoals = {{ {goals} }}',
+    ]
+    if scene.markers:
+        channel = inline(f"marker:{scene.markers[-1].name}.position")
+        lines.append(f'[[chart]]\nobservable = {channel}\nvariants = ["given"]\nreference = "given"')
+    return "\n".join(lines) + "\n"
+
+
+def _still(scene: Scene) -> set[str]:
+    """The rigid bodies that are welded to the ground, by others too: there is no motion to compare."""
+    still = {GROUND}
+    for body, hinge in ordered(scene):
+        if isinstance(body, RigidBody) and isinstance(hinge, Weld) and hinge.parent in still:
+            still.add(body.name)
+    return still
+
+
+def _frame(body: Body) -> str:
+    """The node at a body's frame, or its first one; "" if it has none."""
+    names = node_names(body)
+    return "origin" if "origin" in names else next(iter(names), "")
+
+
+def _names(name: str) -> tuple[str, ...]:
+    return (name, f"{name} frame", *(f"{name} frame {number}" for number in range(2, 99)))
