@@ -157,12 +157,14 @@ def _use(name: str) -> Used:
 
 
 def at_a_time() -> int:
-    """Number of processes: one for each core, but with 2 GiB of memory each, which compiling may need."""
+    """Number of processes: one for each core, and one more where there are several, because one often waits for a
+    kernel that another compiles; but with 2.5 GiB of memory each, which compiling may need."""
     cores = os.cpu_count() or 1
+    processes = cores + (cores > 1)
     if not hasattr(os, "sysconf"):
-        return cores
+        return processes
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return int(max(1, min(cores, memory // 2**31)))
+    return int(max(1, min(processes, memory // (5 * 2**29))))
 
 
 def main(words: Sequence[str] | None = None) -> None:

@@ -23,7 +23,7 @@ from tests.fuzz import kinds as subject
 from tests.fuzz.campaign import campaign, table
 from tests.fuzz.worker import BAD, content, read
 
-MUTANTS = 650  # some twenty of each kind
+MUTANTS = 1300  # some forty of each kind
 BY_LINES = {"records", "map records"}  # a broken line is set aside, and a file hardly ever refused
 
 
