@@ -13,7 +13,7 @@ from crosscheck.judging.uncertainty import RungSignal, estimate, observed_order,
 from flexmb.typing import Real
 
 CHANNEL = "marker:tip.velocity"
-SAMPLES = 200
+SAMPLES = 100
 COVERAGE = 0.95  # the share of problems whose error U must bound
 METHODS: dict[str, tuple[int, Callable[..., Real]]] = {}
 
