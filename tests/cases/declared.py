@@ -23,7 +23,7 @@ from crosscheck.library.reference import KNOWLEDGE, has_reference
 from crosscheck.library.selection import expected_otherwise, goals_for_reference, select
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.events import Latch
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import BeamBody, Scene
 
 GIVES_NONE = {
     "exudyn": ("work", "derivatives"),
@@ -58,11 +58,12 @@ class Left:
 def offered(scene: Scene, variant: Variant, engine: str) -> list[str]:
     """Every channel that the engine may offer: names as `crosscheck.engines.signals` gives them.
 
-    Of a body that is taken apart a made-up joint stands for those between its parts. Exudyn's beams in a plane have
+    Of a beam that is taken apart a made-up joint stands for those between its parts. Exudyn's beams in a plane have
     neither energies nor momentum, those in space have both.
     """
     joints = [item.name for item in (*scene.hinges, *scene.constraints, *scene.point_masses)]
-    joints += [f"{body.name}.between" for body in scene.bodies if variant.transform in TAKES_APART]
+    apart = scene.bodies if variant.transform in TAKES_APART else ()
+    joints += [f"{body.name}.between" for body in apart if isinstance(body, BeamBody)]
     items = {
         "marker": [item.name for item in scene.markers],
         "load": joints,
