@@ -77,10 +77,10 @@ def interface_of(element: SuperElement, numbers: Sequence[int], ties: Sequence[T
         beyond.append(_Block(rows, rest))
     others = np.flatnonzero(~taken)
     beyond.append(_Block(others, None))
-    T, motion = (_side_by_side(each, len(element.K)) for each in ([*columns, *beyond], motions))
+    whole, moved = (_side_by_side(each, len(element.K)) for each in ([*columns, *beyond], motions))
     return Interface(
-        np.array(numbers, dtype=np.int64), np.array(positions), coo_array(T[0], shape=T[1]).tocsr(),
-        coo_array(motion[0], shape=motion[1]).tocsr().T.tocsr(),
+        np.array(numbers, dtype=np.int64), np.array(positions), coo_array(whole[0], shape=whole[1]).tocsr(),
+        coo_array(moved[0], shape=moved[1]).tocsr().T.tocsr(),
     )  # fmt: skip
 
 
@@ -92,19 +92,23 @@ class _Block:
     entries: Real | None
 
 
-def _side_by_side(blocks: list[_Block], rows: int) -> tuple[tuple[Real, tuple[Real, Real]], tuple[int, int]]:
-    values, i, j, at = list[Real](), list[Real](), list[Real](), 0
+_Entries = tuple[Real, tuple[NDArray[np.int64], NDArray[np.int64]]]
+
+
+def _side_by_side(blocks: list[_Block], rows: int) -> tuple[_Entries, tuple[int, int]]:
+    """The values of all blocks side by side, with their rows and columns, and the shape."""
+    values, i, j, at = list[Real](), list[NDArray[np.int64]](), list[NDArray[np.int64]](), 0
     for block in blocks:
         if block.entries is None:
             values.append(np.ones(len(block.rows)))
             i.append(block.rows)
-            j.append(at + np.arange(len(block.rows)))
+            j.append(at + np.arange(len(block.rows), dtype=np.int64))
             at += len(block.rows)
             continue
         place, column = np.nonzero(block.entries)
         values.append(block.entries[place, column])
         i.append(block.rows[place])
-        j.append(at + column)
+        j.append(at + column.astype(np.int64))
         at += block.entries.shape[1]
     return (np.concatenate(values), (np.concatenate(i), np.concatenate(j))), (rows, at)
 
