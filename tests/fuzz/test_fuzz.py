@@ -23,19 +23,23 @@ from tests.fuzz import kinds as subject
 from tests.fuzz.campaign import campaign, table
 from tests.fuzz.worker import BAD, content, read
 
-MUTANTS = 1300  # some forty of each kind
+MUTANTS = 650  # some twenty of each kind
 BY_LINES = {"records", "map records"}  # a broken line is set aside, and a file hardly ever refused
+SELDOM = {"section matrices"}  # of twenty mutants none may be accepted
+BOTH = {"refused", "accepted"}
 
 
-def test_no_mutant_is_bad(tmp_path: Path) -> None:
+@pytest.mark.parametrize("times", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_no_mutant_is_bad(tmp_path: Path, times: int) -> None:
     """A run on request: python -m tests.fuzz --mutants 50000."""
-    results = campaign(MUTANTS, seed=1, workers=min(2, os.cpu_count() or 1), keep=tmp_path / "bad")
+    results = campaign(times * MUTANTS, seed=1, workers=min(2, os.cpu_count() or 1), keep=tmp_path / "bad")
     bad = [each for each in results if each["outcome"] in BAD]
     assert not bad, f"\n{table(results)}\n" + "\n".join(f"{each['kind']} {each['number']}: {each}" for each in bad[:10])
-    assert len(results) == MUTANTS
+    assert len(results) == times * MUTANTS
     for kind in {result["kind"] for result in results}:  # a kind whose mutants all come out alike is not tested
         outcomes = {result["outcome"] for result in results if result["kind"] == kind}
-        assert outcomes >= ({"accepted"} if kind in BY_LINES else {"refused", "accepted"}), kind
+        rare = times == 1 and kind in SELDOM
+        assert outcomes >= ({"accepted"} if kind in BY_LINES else {"refused"} if rare else BOTH), kind
 
 
 @pytest.fixture(scope="module")
