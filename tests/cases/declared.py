@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from crosscheck.engines.contract import ENERGIES
 from crosscheck.engines.exudyn import ExudynBeamEngine
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.registry import OWN_CODE
 from crosscheck.judging.unjudged import TOLD_BY
 from crosscheck.library.case import TAKES_APART, RunFile, Variant
 from crosscheck.library.channels import CONSERVED, KINDS
@@ -59,9 +60,10 @@ def offered(scene: Scene, variant: Variant, engine: str) -> list[str]:
     """Every channel that the engine may offer: names as `crosscheck.engines.signals` gives them.
 
     Of a beam that is taken apart a made-up joint stands for those between its parts. Exudyn's beams in a plane have
-    neither energies nor momentum, those in space have both.
+    neither energies nor momentum, those in space have both. Loads of point masses are given by flexmb alone.
     """
-    joints = [item.name for item in (*scene.hinges, *scene.constraints, *scene.point_masses)]
+    joints = [item.name for item in (*scene.hinges, *scene.constraints)]
+    joints += [item.name for item in scene.point_masses if engine in OWN_CODE]
     apart = scene.bodies if variant.transform in TAKES_APART else ()
     joints += [f"{body.name}.between" for body in apart if isinstance(body, BeamBody)]
     items = {
