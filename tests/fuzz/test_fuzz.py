@@ -188,21 +188,21 @@ def _readers() -> set[tuple[str, str]]:
 def test_every_reader_of_files_is_tried(kinds: tuple[Path, dict[str, subject.Kind]]) -> None:
     """Readers are found by what they call; those that no kind reaches are listed with a reason."""
     folder, found = kinds
-    codes = set[CodeType]()
+    codes = dict[int, CodeType]()  # by identity: their hash reads all of them
 
-    def seen(frame: FrameType, event: str, _: object) -> None:
-        codes.add(frame.f_code)
+    def seen(frame: FrameType, event: str, _: object) -> None:  # of calls alone
+        codes[id(frame.f_code)] = frame.f_code
 
     for kind in found.values():
         for seed in (*kind.seeds[:2], kind.seeds[-1]):
             (folder / kind.file).write_bytes(seed)
-            sys.setprofile(seen)
+            sys.settrace(seen)
             try:
                 read(kind, folder / kind.file)
             finally:
-                sys.setprofile(None)
+                sys.settrace(None)
         subject._prepare(folder)
-    reached = {(_place(Path(code.co_filename)), code.co_name) for code in codes}
+    reached = {(_place(Path(code.co_filename)), code.co_name) for code in codes.values()}
     readers = _readers()
     missing = [":".join(place) for place in sorted(readers - reached)]
     idle = [place for place in NOT_OF_USERS if not any(":".join(each).startswith(place) for each in readers)]
