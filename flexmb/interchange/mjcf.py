@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming
+from flexmb.interchange.mjcf_closures import CONNECT, WELD, MjcfClosures
 from flexmb.interchange.mjcf_couplings import JOINT, TENDON, MjcfCouplings, tendon_that_acts
 from flexmb.interchange.mjcf_text import refuse_bad_text
 from flexmb.scene.build import SceneBuilder
@@ -25,6 +26,7 @@ from flexmb.typing import Real
 
 FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
 SINGLE = (SLIDE, HINGE)
+KNOWN_EQUALITIES = (CONNECT, WELD, JOINT, TENDON)
 JOINT_TRANSMISSIONS = (0, 1)  # mjtTrn: joint, jointinparent, which are the same for hinges and slides
 
 
@@ -32,12 +34,12 @@ def read_mjcf(path: str | os.PathLike[str]) -> ImportedScene:
     """The rigid tree of an MJCF file (or of a URDF file, as MuJoCo reads it), at its reference pose and at rest.
 
     Springs, dampers and armatures of joints are included, those of actuators at joints too, and gravity compensation.
-    Linear equality constraints between joints or of fixed tendons become couplings. Contacts, limits, dry friction,
-    forces of actuators, tendons that only measure or pull, and sensors are omitted, and the notes list them. Raises
-    ImportError without MuJoCo; ModelError for a file that MuJoCo refuses, for numbers that are not finite, which MuJoCo
-    would replace by defaults (`flexmb.interchange.mjcf_text`), and for elements that change the motion and have no
-    counterpart in a scene: other equality constraints, tendons with springs, dampers or armatures, armatures of free
-    and ball joints, nonlinear springs and dampers, fluids, flexible parts.
+    Linear equality constraints between joints or of fixed tendons become couplings, connect and weld become closures.
+    Contacts, limits, dry friction, forces of actuators, tendons that only measure or pull, and sensors are omitted, and
+    the notes list them. Raises ImportError without MuJoCo; ModelError for a file that MuJoCo refuses, for numbers that
+    are not finite, which MuJoCo would replace by defaults (`flexmb.interchange.mjcf_text`), and for what changes
+    the motion and has no counterpart in a scene: nonlinear equality constraints, tendons with springs, dampers or
+    armatures, armatures of free and ball joints, nonlinear springs and dampers, fluids, flexible parts.
     """
     try:
         import mujoco
@@ -59,6 +61,7 @@ class _Model:
         self.file, self.m = file, m
         self._refuse()
         self.couplings = MjcfCouplings(m, [self._joint_name(j) for j in range(m.njnt)], self._fail)
+        self.closures = MjcfClosures(m, self._body_name)
         self._armature, self._damping = self._along_dofs("armature"), self._along_dofs("damping")
         if self._switched_off("DAMPER"):
             self._damping[:] = 0.0
@@ -70,6 +73,7 @@ class _Model:
         for k in range(1, m.nbody):
             self._body(builder, k)
         self.couplings.couple(builder)
+        self.closures.close(builder)
         return ImportedScene(builder.scene(), tuple(self._notes()))
 
     def _body(self, builder: SceneBuilder, k: int) -> None:
@@ -154,8 +158,8 @@ class _Model:
         """ModelError for elements that change the motion and have no counterpart in a scene."""
         m = self.m
         for count, what, remedy in (
-            (int(np.sum((m.eq_type != JOINT) & (m.eq_type != TENDON))), "equality constraints between bodies",
-             "remove them, and add closures to the scene"),
+            (int(np.sum(~np.isin(m.eq_type, KNOWN_EQUALITIES))), "equality constraints of flexible parts",
+             "remove them, and add flexible bodies to the scene"),
             (getattr(m, "nflex", 0), "flexible parts", "remove them, and add flexible bodies to the scene"),
             (m.npluginstate, "plugins", "remove them"),
         ):
@@ -211,8 +215,10 @@ class _Model:
             found.append(f"limits, friction and actuators of tendons are left out: {listed(idle)}")
         if self.couplings.count:
             found.append("equality constraints of coordinates are exact here, and springs and dampers in MuJoCo")
-        if self.couplings.inactive:
-            found.append(f"inactive equality constraints are left out: {listed(self.couplings.inactive)}")
+        if self.closures.count:
+            found.append("equality constraints of bodies are exact here, and springs and dampers in MuJoCo")
+        if inactive := [*self.couplings.inactive, *self.closures.inactive]:
+            found.append(f"inactive equality constraints are left out: {listed(inactive)}")
         if m.nu:
             found.append(f"{m.nu} actuators are left out, with the forces of servos at zero control")
         if moved := [joints[j] for j in range(m.njnt) if m.jnt_type[j] > BALL and m.qpos0[m.jnt_qposadr[j]] != 0.0]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.interchange.superelement.element import LARGEST, MOTIONS, SuperElement, SuperElementError
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -77,10 +77,11 @@ def interface_of(element: SuperElement, numbers: Sequence[int], ties: Sequence[T
         beyond.append(_Block(rows, rest))
     others = np.flatnonzero(~taken)
     beyond.append(_Block(others, None))
-    whole, moved = (_side_by_side(each, len(element.K)) for each in ([*columns, *beyond], motions))
+    count = len(element.K)
+    whole, by_motion = _side_by_side([*columns, *beyond], count), _side_by_side(motions, count)
     return Interface(
         np.array(numbers, dtype=np.int64), np.array(positions), coo_array(whole[0], shape=whole[1]).tocsr(),
-        coo_array(moved[0], shape=moved[1]).tocsr().T.tocsr(),
+        coo_array(by_motion[0], shape=by_motion[1]).tocsr().T.tocsr(),
     )  # fmt: skip
 
 
@@ -92,23 +93,20 @@ class _Block:
     entries: Real | None
 
 
-_Entries = tuple[Real, tuple[NDArray[np.int64], NDArray[np.int64]]]
-
-
-def _side_by_side(blocks: list[_Block], rows: int) -> tuple[_Entries, tuple[int, int]]:
-    """The values of all blocks side by side, with their rows and columns, and the shape."""
-    values, i, j, at = list[Real](), list[NDArray[np.int64]](), list[NDArray[np.int64]](), 0
+def _side_by_side(blocks: list[_Block], rows: int) -> tuple[tuple[Real, tuple[Index, Index]], tuple[int, int]]:
+    """Entries with their rows and columns, and the shape, as sparse arrays of SciPy are made from."""
+    values, i, j, at = list[Real](), list[Index](), list[Index](), 0
     for block in blocks:
         if block.entries is None:
             values.append(np.ones(len(block.rows)))
             i.append(block.rows)
-            j.append(at + np.arange(len(block.rows), dtype=np.int64))
+            j.append(at + np.arange(len(block.rows)))
             at += len(block.rows)
             continue
         place, column = np.nonzero(block.entries)
         values.append(block.entries[place, column])
         i.append(block.rows[place])
-        j.append(at + column.astype(np.int64))
+        j.append(at + column)
         at += block.entries.shape[1]
     return (np.concatenate(values), (np.concatenate(i), np.concatenate(j))), (rows, at)
 

@@ -113,10 +113,6 @@ BAD = {
     "powers of a damper": (MJCF.replace('name="pitch"', 'name="pitch" damping="0 1"'), 'joint "pitch" has a nonlinear'),
     "powers of a spring": (MJCF.replace('stiffness="3"', 'stiffness="3 1"'), 'joint "roll" has a nonlinear'),
     "yield": (MJCF.replace('stiffness="3"', 'stiffness="3" springyield="0.1"'), 'joint "roll" has a nonlinear'),
-    "equality": (
-        MJCF.replace("</mujoco>", '<equality><weld body1="foot" body2="tail"/></equality></mujoco>'),
-        "1 equality",
-    ),
     "tendon": (
         MODELS["a tendon that measures"].replace("<fixed range", '<fixed stiffness="1" range'),
         'tendon "0" has stiffness',

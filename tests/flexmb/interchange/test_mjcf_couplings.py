@@ -75,10 +75,6 @@ def test_what_is_left_out_of_couplings_is_said(tmp_path):
 
 
 BAD = {
-    "equality": (
-        MJCF.replace("</mujoco>", '<equality><weld body1="foot" body2="tail"/></equality></mujoco>'),
-        "1 equality",
-    ),
     "tendon": (COUPLED.replace('name="strap"', 'name="strap" stiffness="2"'), 'tendon "strap" has stiffness'),
     "polynomial": (
         COUPLED.replace("0.1 -1.5 0 0 0", "0.1 -1.5 0 0.2 0"),
