@@ -28,11 +28,12 @@ from flexmb.typing import Real
 
 MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
 ONCE = {
-    "link": ("inertial",), "joint": ("parent", "child", "origin", "axis", "mimic"),
+    "link": ("inertial",), "joint": ("parent", "child", "origin", "axis", "mimic", "dynamics"),
     "inertial": ("origin", "mass", "inertia"),
 }  # fmt: skip
 """What an element has at most once: of several, no reader could tell which one is meant."""
-IGNORED = {"limit": "limits", "dynamics": "damping and friction", "safety_controller": "safety limits"}
+IGNORED = {"limit": "limits", "safety_controller": "safety limits"}
+FRICTION, DAMPING = "dry friction", "damping of floating and planar joints"
 NO_MECHANICS = ("material", "transmission", "gazebo", "sensor", "ros2_control")
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -45,8 +46,8 @@ def read_urdf(
 
     The root link is welded to the ground, or free with `free_base`; its initial frame is that of the World. Many
     published robots have inertia tensors that no body can have. They raise a SceneError, or with `repair` are changed
-    by the least amount that makes them possible, and a note lists them. Limits, damping, friction, shapes and
-    transmissions are omitted; notes list limits, damping and friction. Mimic joints become couplings, and start where
+    by the least amount that makes them possible, and a note lists them. Damping is that of the hinges. Limits,
+    friction, shapes and transmissions are omitted; notes list limits and friction. Mimic joints become couplings, and start where
     the joints that they mimic are at zero. Raises ModelError for a file that is not URDF or has no unique root;
     SceneError for impossible inertia; OSError.
     """
@@ -176,13 +177,16 @@ class _Robot:
         R, p = self._origin(place, joint)
         at: Placement = {"parent_position": p, "parent_quaternion": quaternion_of(R)}
         axis = self._axis(place, joint) if kind in ("revolute", "continuous", "prismatic", "planar") else Z
+        damping = self._losses(name, joint) if kind != "fixed" else 0.0
         match kind:
             case "fixed":
                 builder.weld(name, parent, child, **at)
             case "revolute" | "continuous":
-                builder.revolute(name, parent, child, axis=axis, angle=self.mimics.value(name), **at)
+                value = self.mimics.value(name)
+                builder.revolute(name, parent, child, axis=axis, angle=value, damping=damping, **at)
             case "prismatic":
-                builder.prismatic(name, parent, child, axis=axis, position=self.mimics.value(name), **at)
+                value = self.mimics.value(name)
+                builder.prismatic(name, parent, child, axis=axis, position=value, damping=damping, **at)
             case "floating":
                 builder.free(name, parent, child, **at)
             case "planar":  # in the plane across the axis: z of turned frames on both sides
@@ -194,6 +198,21 @@ class _Robot:
         for tag in IGNORED:
             if joint.find(tag) is not None and kind != "fixed":
                 self.ignored.setdefault(tag, []).append(name)
+
+    def _losses(self, name: str, joint: ElementTree.Element) -> float:
+        """The damping of a joint that moves; its dry friction, or damping that no coordinate has, is noted."""
+        element = joint.find("dynamics")
+        found = {"damping": 0.0, "friction": 0.0}
+        for key in found if element is not None else ():
+            assert element is not None
+            found[key] = _real(text := element.get(key, "0"))
+            if not (usable(found[key]) and found[key] >= 0.0):
+                self._fail(f'joint "{name}"', f"{key} is {text!r}", "give a number in SI units, zero or more")
+        if found["friction"]:
+            self.ignored.setdefault(FRICTION, []).append(name)
+        if found["damping"] and joint.get("type") in ("floating", "planar"):
+            self.ignored.setdefault(DAMPING, []).append(name)
+        return found["damping"]
 
     def _origin(self, place: str, element: ElementTree.Element) -> tuple[Real, Real]:
         """Rotation (3,3) and position (3,) m of a frame; the rotation is about the fixed axes x, then y, then z."""
@@ -232,6 +251,11 @@ class _Robot:
         for tag, words in IGNORED.items():
             if names := self.ignored.get(tag):
                 yield f"{words} of joints are left out: {listed(names)}"
+        if names := self.ignored.get(FRICTION):
+            remedy = "add angular_friction or linear_friction, which need a smoothing"
+            yield f"{FRICTION} of joints is left out, {remedy}: {listed(names)}"
+        if names := self.ignored.get(DAMPING):
+            yield f"{DAMPING} is left out: {listed(names)}"
         others = sorted({each.tag for each in self.robot} - {"link", "joint", *NO_MECHANICS})
         if others:
             yield f"elements that URDF does not define are left out: {listed(others)}"

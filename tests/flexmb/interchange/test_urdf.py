@@ -172,8 +172,24 @@ def test_frames_are_where_the_file_says(tmp_path):
 def test_what_is_left_out_is_said(tmp_path):
     notes = read(arm(), tmp_path).notes
     assert any(note.startswith("limits of joints are left out: axis1, axis3") for note in notes)
-    assert any(note.startswith("damping and friction") for note in notes)
+    assert not any("damping" in note or "friction" in note for note in notes)  # they are zero
     assert any("bodies without mass: base, flange" in note for note in notes)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "continuous", "prismatic"])
+def test_damping_is_that_of_the_hinge_and_friction_is_noted(kind, tmp_path):
+    robot = SINGLE.replace('type="revolute"', f'type="{kind}"')
+    damped = read(robot.replace("<axis", '<dynamics damping="0.7" friction="0.2"/><axis'), tmp_path)
+    hinge = damped.scene.hinges[-1]
+    coordinate = hinge.translation if kind == "prismatic" else hinge.rotation
+    assert (coordinate.damping_Ns_m if kind == "prismatic" else coordinate.damping_Nms_rad) == 0.7
+    assert any(note.startswith("dry friction of joints is left out, add") for note in damped.notes)
+
+
+@pytest.mark.parametrize("losses", ['damping="-1"', 'damping="x"', 'friction="nan"'])
+def test_losses_that_are_no_losses_are_refused(losses, tmp_path):
+    with pytest.raises(ModelError, match="give a number in SI units, zero or more"):
+        read(SINGLE.replace("<axis", f"<dynamics {losses}/><axis"), tmp_path)
 
 
 def test_prefixes_of_extensions_need_no_declaration(tmp_path):
