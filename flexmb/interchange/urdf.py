@@ -47,9 +47,9 @@ def read_urdf(
     The root link is welded to the ground, or free with `free_base`; its initial frame is that of the World. Many
     published robots have inertia tensors that no body can have. They raise a SceneError, or with `repair` are changed
     by the least amount that makes them possible, and a note lists them. Damping is that of the hinges. Limits,
-    friction, shapes and transmissions are omitted; notes list limits and friction. Mimic joints become couplings, and start where
-    the joints that they mimic are at zero. Raises ModelError for a file that is not URDF or has no unique root;
-    SceneError for impossible inertia; OSError.
+    friction, shapes and transmissions are omitted; notes list limits and friction. Mimic joints become couplings, and
+    start where the joints that they mimic are at zero. Raises ModelError for a file that is not URDF or has no unique
+    root; SceneError for impossible inertia; OSError.
     """
     with naming(str(path)):
         return _Robot(str(path), _parsed(Path(path)), repair).scene(gravity, free_base)
