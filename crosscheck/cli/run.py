@@ -115,10 +115,10 @@ def run(
     from crosscheck.records.session import last_session
     from crosscheck.report import write_all
 
-    chosen = common.claimed(chosen, expect, goal, efforts, asked)
+    chosen = common.claimed(tuple(replace(case, envelopes=envelope) for case in chosen), expect, goal, efforts, asked)
     before = None if baseline is None else read_baseline(baseline, out)
     with common.sole_writer(out, strict):
-        _run(chosen, asked, records, shown, fresh, envelope, Limits(jobs, time_limit), scheduler_at(scheduler))
+        _run(chosen, asked, records, shown, fresh, Limits(jobs, time_limit), scheduler_at(scheduler))
         done = not accept or _accept(chosen, records, partial=bool(asked))
         outcome, page = write_all(records, out, strict, last_session, single_file)
         held = None if before is None else hold_against(before, outcome, out)
@@ -199,8 +199,8 @@ def _chosen(cases: list[str], engines: list[str] | None, alone: bool) -> tuple[C
 
 
 def _run(
-    cases: tuple[Case, ...], engines: tuple[str, ...], records: Path, shown: Verbosity, fresh: bool, envelopes: bool,
-    limits: Limits, scheduler: Scheduler,
+    cases: tuple[Case, ...], engines: tuple[str, ...], records: Path, shown: Verbosity, fresh: bool, limits: Limits,
+    scheduler: Scheduler,
 ) -> None:  # fmt: skip
     """Run the cases; until they are judged the outputs say that the session is unfinished."""
     from crosscheck.report import mark_unfinished
@@ -209,10 +209,7 @@ def _run(
 
     mark_unfinished(records, records.parent)
     with LiveProgress(common.console, shown) as live:
-        sweep(
-            cases, engines, records, fresh=fresh, envelopes=envelopes, limits=limits, scheduler=scheduler,
-            listener=live.hear,
-        )  # fmt: skip
+        sweep(cases, engines, records, fresh=fresh, limits=limits, scheduler=scheduler, listener=live.hear)
 
 
 def _alone(cases: tuple[Case, ...]) -> tuple[Case, ...]:

@@ -27,7 +27,8 @@ T = TypeVar("T")
 class Case:
     """A case folder that was read and checked. `name` is "<family>/<case>".
 
-    `alone`: engines are compared with the stored reference only, and no partners run. `claims` are those of
+    `alone`: engines are compared with the stored reference only, and no partners run. `envelopes`: the library's own
+    engines follow each run once more, for its peaks over all steps. `claims` are those of
     `crosscheck.library.expect_file` on the engines.
     """
 
@@ -38,6 +39,7 @@ class Case:
     readme: str
     accepted: Accepted = field(default_factory=dict)
     alone: bool = False
+    envelopes: bool = False
     claims: Claims = field(default_factory=Claims)
 
     def scene(self, variant: Variant) -> Scene:

@@ -37,13 +37,11 @@ from flexmb.typing import Real
 
 
 def plan(
-    case: Case, asked: tuple[str, ...], provider: str, time_limit_s: float | None = None, films: bool = False,
-    envelopes: bool = False,
-) -> tuple[CaseRecord, list[Job]]:  # fmt: skip
+    case: Case, asked: tuple[str, ...], provider: str, time_limit_s: float | None = None, films: bool = False
+) -> tuple[CaseRecord, list[Job]]:
     """The record of a case, reduced to the engines asked for, and its jobs; `time_limit_s` replaces the case's own.
 
-    With `films` every variant has another run, from which its animation is made; with `envelopes` the library's own
-    engines have one from which their peaks are known.
+    With `films` every variant has another run, from which its animation is made.
     """
     run = (alone if case.alone else select)(case.run, asked)
     engines = {engine for variant in run.variants for engine in variant.engines}
@@ -55,7 +53,7 @@ def plan(
         scene, error = _attempt(case, variant)
         infos[variant.name] = _info(case, variant, scene, error)
         jobs += [_job(case, run, variant, MAIN, engine, scene, error, provider) for engine in variant.engines]
-        if envelopes:
+        if case.envelopes:
             own = (engine for engine in variant.engines if engine in OWN_CODE)
             followed = (_job(case, run, variant, ENVELOPE, engine, scene, error, provider) for engine in own)
             jobs += [replace(job, linear=(), kept=(), lean=True) for job in followed]

@@ -32,20 +32,19 @@ def sweep(
     records: Path,
     *,
     fresh: bool = False,
-    envelopes: bool = False,
     provider: str = PROVIDER,
     limits: Limits = BY_DEFAULT,
     scheduler: Scheduler = run_jobs,
     listener: Listener = lambda jobs, event: None,
 ) -> None:
-    """Run cases, with the runs for their animations and, if asked for, `envelopes`; append to the file `records`.
+    """Run cases, with the runs for their animations, and append to the file `records`.
 
     Recorded runs with the same scene, effort and `made_by` are confirmed and not repeated, unless `fresh`. `asked` are
     the engines (none: all). An engine that exceeds one of the `limits` on a scene is stopped; a case may have its own
     time limit. `listener` is called with the list of jobs and every event. After Ctrl-C or an error of the scheduler
     the records are valid, and the next call continues from there.
     """
-    plans = [plan(case, asked, provider, limits.time_s, films=True, envelopes=envelopes) for case in cases]
+    plans = [plan(case, asked, provider, limits.time_s, films=True) for case in cases]
     run_planned(plans, asked, records, fresh=fresh, limits=limits, scheduler=scheduler, listener=listener)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +47,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def session(folder: Path, envelopes: bool) -> Path:
     case = folder / "pendulum" / "single"
     case = case if case.exists() else copy_case(folder, RUN)
-    sweep_here([load_case(case)], (), folder / "records.jsonl", envelopes=envelopes)
+    sweep_here([replace(load_case(case), envelopes=envelopes)], (), folder / "records.jsonl")
     outcome, page = write_all(folder / "records.jsonl", folder, chosen=last_session)
     assert outcome.ok
     return page.parent / "pendulum" / "single.html"
