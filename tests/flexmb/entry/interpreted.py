@@ -52,15 +52,17 @@ def mass_matrix(c: Constants, w: DerivativeWorkspace, term: Term | None = None) 
 
 def _run(kernel: Any, term: Term | None, c: Constants, w: DerivativeWorkspace, *further: Any) -> Any:
     """The tables of the derivatives after a call; the constants say which features the scene has, and no more."""
-    tables = checked(_tables(w.tables))
+    arguments = [constants(c), _counting(w.sweeps, float), _tables(w.tables)]
+    if term is None:  # to leave a term out changes no index
+        arguments = [checked(each) for each in arguments]
     with np.errstate(all="ignore"):
-        _Without(term)(kernel)(constants(c), checked(_counting(w.sweeps, float)), tables, *further)
-    return tables
+        _Without(term)(kernel)(*arguments, *further)
+    return arguments[2]
 
 
 def constants(c: Constants) -> Any:
     """The constants of a scene with Python's numbers and with its own features."""
-    found = checked(_counting(c, float))
+    found = _counting(c, float)
     object.__setattr__(found, "_numba_type_", SimpleNamespace(features=contained(c)))
     return found
 

@@ -70,7 +70,8 @@ def moving(of_beam: dict[str, Any], directions: int = LANES) -> Body:
         row, place = (e.body[0].velocity, n) if n < 3 else ((e.eta[0], e.etad[0])[(n - 3) // nm], (n - 3) % nm)
         row[place] = interpreted._seeded(row[place], lane)
     A = tuple(map(tuple, rng.normal(size=(2, 3)).tolist()))
-    return Body(interpreted.constants(system.constants), interpreted.checked(_counting(w, float)), e, A)
+    c = interpreted.checked(interpreted.constants(system.constants))
+    return Body(c, interpreted.checked(_counting(w, float)), e, A)
 
 
 def rates(body: Body) -> np.ndarray:
