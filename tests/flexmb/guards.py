@@ -31,7 +31,7 @@ class Guarded:
 
     def written(self) -> list[str]:
         """Names of the arrays beyond which something was written."""
-        return [name for name, *both in self.guards if any(np.any(each != self.word) for each in both)]
+        return [name for name, *around in self.guards if np.any(np.concatenate(around) != self.word)]
 
 
 def guarded(bundle: Any, word: np.uint64 = SIGNALLING, name: str = "") -> Guarded:
@@ -40,8 +40,8 @@ def guarded(bundle: Any, word: np.uint64 = SIGNALLING, name: str = "") -> Guarde
     for field in fields(bundle):
         value, own = getattr(bundle, field.name), f"{name}.{field.name}".removeprefix(".")
         if isinstance(value, np.ndarray):
-            parts[field.name], *both = _between(value, word)
-            guards.append((own, *both))
+            parts[field.name], before, after = _between(value, word)
+            guards.append((own, before, after))
         else:
             inner = guarded(value, word, own)
             parts[field.name] = inner.bundle
