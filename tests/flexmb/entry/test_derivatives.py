@@ -97,6 +97,16 @@ def test_random_trees_against_dual_numbers(recipe):
     assert sum([agree(trees.random_scene(seed, RECIPES[recipe])) for seed in range(6)]) >= 4
 
 
+def test_a_write_beyond_an_array_is_noticed():
+    """Of a table that has a row too few."""
+    system = flexmb.compile(flexible_chain(2, 3, "ruthless"))
+    c, y = system.constants, np.concatenate([system.initial_state.q, system.initial_state.u, [0.0]])
+    w = derivatives.derivative_workspace(c, system.nq, system.nu)
+    space = guarded(replace(w, tables=replace(w.tables, local=np.zeros((5, 3)))))
+    assert derivatives.jacobian(T, y, np.full((len(y), len(y)), np.nan), c, space.bundle) == Status.OK
+    assert space.written() == ["tables.local"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("recipe", RECIPES)
 def test_many_random_trees_against_dual_numbers(recipe):
