@@ -37,6 +37,8 @@ class Functions:
         self._apart = apart
         self._number: dict[s.Function, int] = {}
         self._all: list[s.Function] = []
+        self.shared = False
+        """Whether two have a number in common."""
 
     def number(self, function: s.Function | None) -> int:
         if function is None:
@@ -44,6 +46,8 @@ class Functions:
         if self._apart or function not in self._number:
             self._number[function] = len(self._all)
             self._all.append(function)
+        else:
+            self.shared = True
         return self._number[function]
 
     def all(self) -> list[s.Function]:
@@ -58,6 +62,7 @@ class Assembled:
     markers: dict[str, tuple[int, int]]  # by name
     closures: list[tuple[int, int]]  # sides A and B of the first, of the second ...
     signals: dict[int, s.ControlSignal]  # the functions that controllers drive, by their numbers
+    shares: bool  # whether equal functions of time share a number
 
 
 def assemble(
@@ -123,7 +128,7 @@ def assemble(
         **sections,
     )
     signals = {number: each for number, each in enumerate(functions.all()) if isinstance(each, s.ControlSignal)}
-    return Assembled(constants, at.markers, at.closures, signals)
+    return Assembled(constants, at.markers, at.closures, signals, functions.shared)
 
 
 def _by_body(items: tuple[Item, ...], index: dict[str, int]) -> list[Item]:

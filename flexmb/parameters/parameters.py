@@ -79,7 +79,7 @@ class Parameters:
             )
         self.names, self.values = tuple(each.name for each in chosen), np.array([each.value for each in chosen])
         self.values.flags.writeable = False
-        self.plant = plant.with_numbers(plant.scene)
+        self.plant = plant if plant.is_smooth and plant.closures is None else plant.with_numbers(plant.scene)
         """The same system, with equal functions of time kept apart: numbers of one may change without the other's."""
         found = _Differentiation(self.plant, starts)
         held = None if like is None else found.kept(like, chosen)

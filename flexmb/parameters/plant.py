@@ -30,6 +30,7 @@ class Plant(Protocol):
     layout: Layout
     nq: int
     nu: int
+    is_smooth: bool
 
     @property
     def initial_state(self) -> State: ...

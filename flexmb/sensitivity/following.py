@@ -86,9 +86,10 @@ class Following:
                 variation.put(float(times[-1]), states[-1])  # controllers act at the end of the run
             loops.replay()
         signals = any(name.startswith("signal.") for name in self._outputs.names)
-        for sample in range(wanted.start, wanted.stop):
-            t = float(self._trajectory.t[sample])
-            state = states[int(np.searchsorted(times, t))]
+        instants = self._trajectory.t[wanted]
+        places = np.searchsorted(times, instants)
+        for sample, t, place in zip(range(wanted.start, wanted.stop), instants.tolist(), places.tolist(), strict=True):
+            state = states[place]
             observed = of_signals = None
             if self._outputs.observed:
                 variation.put(t, state)

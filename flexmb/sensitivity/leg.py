@@ -58,7 +58,9 @@ class Variation:
 
     def joined(self, at: Course) -> Real:
         """z of a state with its derivatives."""
-        return np.column_stack([at.y, at.Y]).ravel()
+        z = np.empty((len(at.y), 1 + at.Y.shape[1]))
+        z[:, 0], z[:, 1:] = at.y, at.Y
+        return z.ravel()
 
     def parted(self, z: Real) -> Course:
         """The inverse of `joined`."""

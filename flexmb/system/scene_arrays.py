@@ -42,6 +42,10 @@ class SceneArrays:
         assembled = assemble(scene, self.links, numbering, like=like)
         self.constants, self.markers, self.closure_ports = assembled.constants, assembled.markers, assembled.closures
         self._elimination = elimination
+        follows = assembled.shares or bool(assembled.signals) or any(link.mode_count for link in self.links)
+        self.is_smooth = not follows
+        """Whether tables of slightly other numbers are smooth functions of these around the present ones: there are no
+        modes to follow others, no equal functions of time to keep apart, and none that a run sets."""
         if like is None:
             self.recursion_constants  # noqa: B018 - raises for an elimination that does not apply
         self.signals = assembled.signals
