@@ -10,7 +10,7 @@ import pytest
 
 import flexmb as fm
 from flexmb.scene.schema import Scene
-from tests.flexmb.closure.loops import RATIOS, lighter
+from tests.flexmb.closure.loops import LIGHT, RATIOS, light_loops, lighter
 from tests.flexmb.entry.test_tangent import extrapolated
 from tests.flexmb.sensitivity.differences import differences, relative_error
 
@@ -54,3 +54,24 @@ def test_accelerations_at_a_state_agree_with_differences(ratio):
     evaluator(state.t, state.q, state.u)
     np.testing.assert_allclose(evaluator.by_speed @ along, expected, rtol=0.0, atol=allowed)
     assert np.max(np.abs(expected)) > 10.0 * allowed, "a slope of nothing would be noticed"
+
+
+@pytest.mark.filterwarnings("ignore::flexmb.SceneWarning")  # of what random scenes are like
+def test_a_run_of_a_random_loop_agrees_with_differences():
+    """By the place of the light body's mass, and by gravity, of all rates."""
+    seed, ratio = 44, 1e-6
+    scene = light_loops(seed, ratio)
+    by = [f"bodies.{LIGHT[seed]}.com_m.0", "gravity_m_s2.0"]
+    system = fm.compile(scene)
+    known = {name for name, _, _ in fm.simulate(system, 1e-4, samples=2).columns()}
+    of = [name for name, _ in system.state_names[1] if name in known][:8]
+    found = fm.sensitivities(scene, 0.02, by, of, samples=2, rtol=1e-11, atol=1e-13)
+    size = np.max(np.abs(found.derivatives[-1]))
+    for k, name in enumerate(by):
+        expected = differences(scene, 0.02, name, of, 1e-3, samples=2)
+        allowed = 30.0 * expected.error[-1] + 1e-8 * size
+        assert np.all(np.abs(found.derivatives[-1, :, k] - expected.outputs[-1]) < allowed)
+        assert np.max(np.abs(expected.outputs[-1]) - 100.0 * allowed) > 0.0, "a wrong sign would be noticed"
+    of_last = int(np.argmax(np.abs(found.derivatives[-1, :, 0])))
+    gradient = fm.gradient(scene, 0.02, by, fm.FinalValue(of[of_last]), rtol=1e-11, atol=1e-13).derivatives
+    np.testing.assert_allclose(gradient, found.derivatives[-1, of_last], rtol=0.0, atol=1e-7 * size)
