@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from flexmb.integrate.problem import Problem, StiffProblem
+from flexmb.integrate.watch import Watch
 from flexmb.jit.bundle import AnyBundle, bundle
 from flexmb.jit.direct import nothing_at, real_at, status_at
 from flexmb.jit.kernel import helper, kernel
@@ -20,7 +21,7 @@ from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID, WHOLE, pointer
 from flexmb.typing import Index, Real
 
 # Indices in `RecordedSteps.address` and, the first four, in that of `flexmb.sensitivity.adjoint.stages.Stages`.
-RHS, PROJECT, CONSTANTS, WORKSPACE, BACK, LEAP, MOVE, RESOLVE = range(8)
+RHS, PROJECT, CONSTANTS, WORKSPACE, BACK, LEAP, MOVE, RESOLVE, LOOK = range(9)
 ADDRESSES = 4
 """How many of them a problem without leaps, and without Jacobian, has."""
 
@@ -140,6 +141,19 @@ def resolve(y, u, x, how, s):
     nothing_at(s.address[RESOLVE], (y, u, x, how, s.address[CONSTANTS]))
 
 
+@kernel
+def look(t, y, signal, s):
+    """See `flexmb.integrate.watch.Watch`."""
+    return status_at(s.address[LOOK], (t, y, signal, s.address[CONSTANTS]))
+
+
+def watching(record: RecordedSteps, watch: Watch) -> Watch:
+    """A watch that sees the signals of the motion by its constants, for the recorded problem, whose constants are the
+    record."""
+    record.address[LOOK] = watch.look[0]
+    return watch.seeing(len(watch.signal), look, record)
+
+
 def fastest_states(entries: Sequence[int], slow: float, count: int, numbers: int) -> FastestStates:
     """Room for so many states, of so many first numbers of y each, whose sum of these speeds exceeds `slow`."""
     entry, states = np.array(entries, np.int64), np.full((count, 1 + numbers), np.nan)
@@ -159,8 +173,10 @@ def recorded(
     tables = posed.constants.kernel_address, posed.workspace.kernel_address
     on_group = [posed.move, posed.resolve] if isinstance(posed, StiffProblem) else []
     moving = [each.__wrapper_address__() for each in on_group]
+    address = np.zeros(LOOK + 1, np.int64)
+    address[: LEAP + 1 + len(moving)] = *kernels[:2], *tables, *kernels[2:], *moving
     record = RecordedSteps(
-        address=np.array([*kernels[:2], *tables, *kernels[2:], *moving]), every=np.array([room + 1]),
+        address=address, every=np.array([room + 1]),
         count=np.zeros(1, np.int64), time=np.zeros(room), state=np.zeros((1, 0)),
         fastest=fastest or nothing_fast(),
     )  # fmt: skip

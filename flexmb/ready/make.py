@@ -17,6 +17,8 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
@@ -101,18 +103,31 @@ def _refuse_failures(used: Iterable[Used]) -> None:
 def _run(names: Sequence[str], processes: int, made: Path) -> tuple[list[Used], dict[str, object]]:
     """What the uses of these names have taken, and what their processes compile for; kernels come into `made`."""
     start, used, before = perf_counter(), list[Used](), _kernels(made)
-    with multiprocessing.get_context("spawn").Pool(processes) as pool:
-        results = pool.imap_unordered(_use, names)
-        while len(used) < len(names):
-            try:
-                used.append(results.next(timeout=SILENCE))
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        left = {pool.submit(_use, name): name for name in names}
+        while left:
+            done = wait(left, SILENCE, FIRST_COMPLETED).done
+            for each in done:
+                used.append(_result(each, left.pop(each)))
                 name, seconds, trouble, _ = used[-1]
-                line = f"{len(used):3d} of {len(names)}  {seconds:6.1f} s  {name}{trouble}"
-            except multiprocessing.TimeoutError:
-                done, kernels = len(used), _kernels(made) - before
-                line = f"{done:3d} of {len(names)}  compiling, {kernels} kernels after {perf_counter() - start:.0f} s"
-            print(line, file=sys.stderr, flush=True)
-        return used, pool.apply(description)
+                _say(f"{len(used):3d} of {len(names)}  {seconds:6.1f} s  {name}{trouble}")
+            if not done:
+                kernels, spent = _kernels(made) - before, perf_counter() - start
+                _say(f"{len(used):3d} of {len(names)}  compiling, {kernels} kernels after {spent:.0f} s")
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        return used, pool.submit(description).result()
+
+
+def _result(done: Future[Used], name: str) -> Used:
+    """What a use has given; a process that dies takes all uses with it that were not done."""
+    try:
+        return done.result()
+    except BrokenProcessPool as error:
+        return Used(name, 0.0, f"\n{error}", {})
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
 
 
 def _kernels(folder: Path) -> int:

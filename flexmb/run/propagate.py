@@ -15,7 +15,7 @@ from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import Memory, memory
 from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, problem, stiff_problem
-from flexmb.integrate.recorded import RecordedSteps, fastest_states, recorded
+from flexmb.integrate.recorded import RecordedSteps, fastest_states, recorded, watching
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import CROSSED, Watch, nothing_watched
 from flexmb.jit.direct import undispatched
@@ -119,6 +119,12 @@ class Integration:
         """Integrate: (y, clock, accuracy, out, counts, memory, watch) of `Integrator`, all arrays in C order."""
         self.compile(*given)
         return self._enter(self._posed, *given)
+
+    def watching(self, watch: Watch) -> Watch:
+        """The same watch with access to the signals of a run that has begun."""
+        assert self.feedback is not None  # events watch signals
+        seen = self.feedback.watching(watch)
+        return seen if self._record is None else watching(self._record, seen)
 
     def _recording(self) -> tuple[Any, RecordedSteps | None]:
         """The problem; if bodies may turn too fast for their levels it keeps its fastest states."""
@@ -241,8 +247,7 @@ def integrate(
         refuse_other_division(begin.memory, clock.times, float(clock.segment_ends[0]), accuracy.step)
     out = np.empty((len(times), len(y)))
     if watch is not None and np.any(watch.entry < 0):
-        assert solve.feedback is not None  # events watch signals
-        watch = solve.feedback.watching(watch)
+        watch = solve.watching(watch)
     given = y, clock, accuracy, out, counts, memory, nothing_watched() if watch is None else watch
     start = perf_counter()
     solve.compile(*given)

@@ -1,6 +1,7 @@
 """Whatever turns a flexible body faster than its level describes says so, with the level to take."""
 
 import warnings
+from functools import partial
 from typing import get_args
 
 import numpy as np
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 import flexmb as fm
 from flexmb.cli import app
 from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.ready import scenes
 from flexmb.scene.bodies import Level, Modes
 from flexmb.scene.files import save_scene
 from flexmb.scene.shapes import beam_section
@@ -87,6 +89,16 @@ def test_a_turn_between_output_times_is_noticed(method):
         looked, waived = (fm.simulate(each, TURN_S, method, **given) for each in (turned().scene(), plain))
     assert np.array_equal(looked.q, waived.q) and np.array_equal(looked.loads["hub"], waived.loads["hub"])
     assert fm.simulate(turned(0.6).scene(), TURN_S, method, **given).message.startswith("finished")  # 0.36 FIRST
+
+
+@pytest.mark.parametrize("make", [scenes.looped_at_rest_shape, partial(scenes.panelled, 2, "full")])
+def test_signals_are_watched_while_turns_are(make):
+    """The integrator's constants are then those of the record, by which no signal is found."""
+    scene = scenes.with_events(make(), "pivot.rotation")
+    looked = fm.simulate(scene, 2e-3, "rk4", samples=3, step=2e-4)
+    waived = fm.simulate(replace(scene, allow=("level_range",)), 2e-3, "rk4", samples=3, step=2e-4)
+    assert np.array_equal(looked.q, waived.q) and {"is held", "is free"} < {each.name for each in looked.events}
+    assert [(each.name, each.t) for each in looked.events] == [(each.name, each.t) for each in waived.events]
 
 
 def test_linear_models_and_campbell_diagrams_warn_once():
