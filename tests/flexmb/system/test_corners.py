@@ -110,7 +110,20 @@ def some(w: Cornered) -> Calls:
 
 @pytest.mark.parametrize("calls", [some, pytest.param(public_calls.calls, marks=pytest.mark.slow)])
 def test_what_jumps_is_refused_at_the_corner(calls):
+    examine(Cornered(), calls)
+
+
+def test_what_answers_on_one_side_is_noticed():
+    """Negative control: a derivative that does not look for corners."""
     w = Cornered()
+    slope = Calls()
+    slope.add("System.slope", lambda state: np.array([float(state.q[w.tree.coordinate("elbow")][0] > AT)]),
+              {"state": w.state}, state=())  # fmt: skip
+    with pytest.raises(AssertionError, match="answered on one side"):
+        examine(w, lambda _: slope)
+
+
+def examine(w: Cornered, calls: Any) -> None:
     jumping, refused = set[str](), set[str]()
     for name, call in calls(w).items():
         if name.split(",")[0] in {*public_calls.LONG, *NO_DERIVATIVES}:
