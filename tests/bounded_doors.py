@@ -160,7 +160,7 @@ NO_SIZE = {
 """Numbers of public functions that are a state, a time or a scale: they set no size."""
 LAYERS = (
     "FinalValue.probes", "Misfit.probes", "TimeIntegral.probes", "System.observe", "System.check", "System.fault",
-    "System.evaluate", "Batch.constants",
+    "System.evaluate", "System.refuse", "Batch.constants",
 )  # fmt: skip
 """Methods for the library's own modules, whose arguments come from it."""
 

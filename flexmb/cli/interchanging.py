@@ -134,7 +134,7 @@ def reduce(
         from flexmb.cli.numbers_of_nodes import numbers_of, tie_of
         from flexmb.interchange.models import SID, held
         from flexmb.interchange.sid import sid_of, write_sid
-        from flexmb.interchange.superelement import compared, read_super_element, reduced
+        from flexmb.interchange.superelement import compared, interface_of, read_super_element, reduced
 
         check_folder(out.parent)
         if out.suffix.lower() not in (*SID, ".toml"):
@@ -143,8 +143,8 @@ def reduce(
         ties = [*(tie_of("rigid", word) for word in rigid or ()), *(tie_of("mean", word) for word in mean or ())]
         structure = read_super_element(stiffness, mass, nodes)
         made = reduced(
-            structure, chosen, modes, name=out.stem, boundary="free-free" if free else "clamped-free",
-            damping_ratio=damping, ties=ties, attached=further,
+            structure, interface_of(structure, chosen, ties), modes, name=out.stem,
+            boundary="free-free" if free else "clamped-free", damping_ratio=damping, attached=further,
         )  # fmt: skip
         centre, moments = (" ".join(f"{each:.6g}" for each in row) for row in (made.centre, np.diag(made.inertia)))
         console.print(f"mass {made.mass:.6g} kg, centre {centre} m, moments of inertia {moments} kg m²")

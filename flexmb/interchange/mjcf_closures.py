@@ -21,7 +21,7 @@ OF_SITES = 6  # mjtObj
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-class Side(NamedTuple):
+class JoinedSide(NamedTuple):
     """A frame on a body: its number, position (3,) m and quaternion."""
 
     body: int
@@ -34,7 +34,7 @@ class MjcfClosures:
 
     def __init__(self, m: Any, body_name: Callable[[int], str]) -> None:
         self._name = body_name
-        self._closures: list[tuple[str, ClosureKind, Side, Side]] = []
+        self._closures: list[tuple[str, ClosureKind, JoinedSide, JoinedSide]] = []
         self.inactive: list[str] = []
         taken = {str(m.equality(i).name) for i in range(m.neq)}
         for i in np.flatnonzero(np.isin(m.eq_type, (CONNECT, WELD))):
@@ -61,14 +61,15 @@ class MjcfClosures:
             )  # fmt: skip
 
 
-def _sides(m: Any, i: int) -> tuple[Side, Side]:
+def _sides(m: Any, i: int) -> tuple[JoinedSide, JoinedSide]:
     one, other, data = int(m.eq_obj1id[i]), int(m.eq_obj2id[i]), np.array(m.eq_data[i])
     if m.eq_objtype[i] == OF_SITES:
         first, second = (
-            Side(int(m.site_bodyid[k]), np.array(m.site_pos[k]), np.array(m.site_quat[k])) for k in (one, other)
+            JoinedSide(int(m.site_bodyid[k]), np.array(m.site_pos[k]), np.array(m.site_quat[k])) for k in (one, other)
         )
     elif m.eq_type[i] == CONNECT:
-        first, second = Side(one, data[:3], UPRIGHT), Side(other, data[3:6], UPRIGHT)
+        first, second = JoinedSide(one, data[:3], UPRIGHT), JoinedSide(other, data[3:6], UPRIGHT)
     else:
-        first, second = Side(one, data[3:6], data[6:10] / np.linalg.norm(data[6:10])), Side(other, data[:3], UPRIGHT)
+        turned = data[6:10] / np.linalg.norm(data[6:10])
+        first, second = JoinedSide(one, data[3:6], turned), JoinedSide(other, data[:3], UPRIGHT)
     return first, second

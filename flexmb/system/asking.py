@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,9 @@ from flexmb.building.links import BodyLink
 from flexmb.closure.asked import AskedFor, Value, Wishes
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.hinges import Free, Spherical
+from flexmb.system.labels import names_of_states
+from flexmb.system.scene_arrays import SceneArrays
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.system.tree_system import System
 
 Given = Literal["guess", "scene", "state"] | NDArray[np.bool_]
 """Which values of a state must be kept: none, those that the scene gives, all, or those that are named (nq+nu+1,)."""
@@ -31,7 +30,7 @@ class _Item(NamedTuple):
     rest: tuple[float, ...] | None = None
 
 
-def asked(system: System, y: Real, named: NDArray[np.bool_] | None = None) -> AskedFor:
+def asked(system: SceneArrays, y: Real, named: NDArray[np.bool_] | None = None) -> AskedFor:
     """The values of y = [q, u, work] that the scene gives, or those that a run has `named` (nq+nu+1,)."""
     items = list(_items(system))
     known = named if named is not None else np.zeros(len(y), bool)
@@ -47,16 +46,16 @@ def asked(system: System, y: Real, named: NDArray[np.bool_] | None = None) -> As
         ]
         return Wishes(tuple(given), tuple(insisted))
 
-    names = tuple(name for names in system.state_names for name, _ in names)
+    names = tuple(name for names in names_of_states(system) for name, _ in names)
     return AskedFor(
         wishes(coordinates), wishes(speeds), system.nq, tuple(_modes(system)), prescribed, names,
         is_marked=named is None,
     )  # fmt: skip
 
 
-def everything(system: System) -> AskedFor:
+def everything(system: SceneArrays) -> AskedFor:
     """All values, for a state that was given as a whole."""
-    names = tuple(name for names in system.state_names for name, _ in names)
+    names = tuple(name for names in names_of_states(system) for name, _ in names)
     return AskedFor(
         Wishes(tuple(((i,), ()) for i in range(system.nq))),
         Wishes(tuple(((system.nq + j,), (j,)) for j in range(system.nu))),
@@ -69,7 +68,7 @@ def _is_given(y: Real, value: Value, item: _Item, nq: int) -> bool:
     return any(y[place] != default for place, default in zip(value[0], rest, strict=True))
 
 
-def _items(system: System) -> Iterator[_Item]:
+def _items(system: SceneArrays) -> Iterator[_Item]:
     for link in system.links:
         name = link.hinge.name
         yield from _of_hinge(link, system.coordinate(name).start, system.speed(name).start)
@@ -79,7 +78,7 @@ def _items(system: System) -> Iterator[_Item]:
         yield _Item(_all(system.coordinate(wheel.name)), _all(system.speed(wheel.name)))
 
 
-def _modes(system: System) -> Iterator[Value]:
+def _modes(system: SceneArrays) -> Iterator[Value]:
     for link in system.links:
         q, u = (_all(place(f"{link.name}.modes")) for place in (system.coordinate, system.speed))
         yield (*q, *(system.nq + j for j in u)), u

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
@@ -26,11 +26,11 @@ from flexmb.jit.bundle import broaden
 from flexmb.jit.direct import ADDRESS, address, addresses, settled
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import INDEX, MATRIX, STATUS, VECTOR, VOID, WHOLE
-from flexmb.system.tree_system import System
+from flexmb.system.mechanics import Mechanics
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
 from flexmb.tables.lane_tables import LaneWorkspace, lane_constants, lane_workspace, structural_difference
-from flexmb.tables.state import DynamicsError
+from flexmb.tables.state import DynamicsError, State
 from flexmb.tables.status import NONFINITE, OK, Status
 from flexmb.typing import Index, Real
 
@@ -73,6 +73,13 @@ class BatchAccelerations(NamedTuple):
         return np.flatnonzero(self.status != OK)
 
 
+class OneSystem(Protocol):
+    """What a copy is asked alone: `System`, which makes batches of itself."""
+
+    def state(self, q: Real, u: Real, t: float = 0.0) -> State: ...
+    def accelerations(self, state: State) -> Real: ...
+
+
 class Batch:
     """Copies of equal structure (hinges, levels, modes, places of loads), whose physical parameters may differ.
 
@@ -82,10 +89,10 @@ class Batch:
     has another structure than the first.
     """
 
-    def __init__(self, systems: Sequence[System]) -> None:
+    def __init__(self, systems: Sequence[Mechanics]) -> None:
         self.systems = listed("systems", systems)
         for i, system in enumerate(self.systems):
-            if not isinstance(system, System):
+            if not isinstance(system, Mechanics):
                 raise TypeError(f"systems[{i}] is a {type(system).__name__}: compile_batch makes a batch of scenes")
             _refuse_other_structure(i, system, self.systems[0])
         self.shares_constants = len(self.systems) == 1
@@ -104,7 +111,7 @@ class Batch:
         """Copies and pickles hold the systems, which are made anew from their scenes."""
         return Batch, (self.systems,)
 
-    def system(self, copy: int) -> System:
+    def system(self, copy: int) -> Mechanics:
         """The system of a copy; ValueError or TypeError if there is no copy of this number."""
         place = arguments.index("copy", copy, sys.maxsize if self.shares_constants else len(self.systems))
         return self.systems[0 if self.shares_constants else place]
@@ -203,7 +210,7 @@ class Batch:
 
     def _alone(self, copies: Copies, copy: int) -> None:
         """Evaluate a copy by its own system, where the lanes gave no reliable result."""
-        system, found = self.system(copy), copies.accelerations[copy]
+        system, found = cast(OneSystem, self.system(copy)), copies.accelerations[copy]
         try:
             t = copies.t[min(copy, len(copies.t) - 1)]
             alone = system.accelerations(system.state(copies.q[copy], copies.u[copy], t))
@@ -234,7 +241,7 @@ def listed(name: str, given: Iterable[Any]) -> tuple[Any, ...]:
     return found
 
 
-def _refuse_other_structure(i: int, system: System, first: System) -> None:
+def _refuse_other_structure(i: int, system: Mechanics, first: Mechanics) -> None:
     if system.layout != first.layout:
         one, other = first.layout.q, system.layout.q
         strange = sorted(name for name in {**one, **other} if one.get(name) != other.get(name))

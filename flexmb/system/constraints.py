@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import fields
 from functools import partial
-from typing import TYPE_CHECKING, Any, assert_never
+from typing import Any, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,15 +34,13 @@ from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.asking import Given, asked, everything
 from flexmb.system.derivative_evaluator import DerivativeRoute
 from flexmb.system.load_axes import Axes
+from flexmb.system.mechanics import Mechanics
 from flexmb.system.observables import Evaluation
 from flexmb.system.section_loads import AllLoads
 from flexmb.tables import arguments
 from flexmb.tables.per_thread import Own, per_thread
 from flexmb.tables.state import DynamicsError, State, finite_result, pack
 from flexmb.typing import Index, Real, Record
-
-if TYPE_CHECKING:
-    from flexmb.system.tree_system import System
 
 # Largest gap of a closure, relative to its size, that a given state may have. At a distance of d sizes from a crossing
 # of branches their gaps differ by d^2: with this gap the nearest branch is unique from a tenth of the size on.
@@ -52,7 +50,7 @@ LARGEST_INITIAL_GAP = 1e-2
 class Constraints:
     """The closures of one system, and what its motion is under their loads."""
 
-    def __init__(self, system: System, like: s.Scene | None) -> None:
+    def __init__(self, system: Mechanics, like: s.Scene | None) -> None:
         """like: see `SceneArrays`."""
         self._system, self.own, scene = system, Own(), system.scene
         self.tables: ClosureConstants = closure_constants(
@@ -234,7 +232,11 @@ class Constraints:
     @property
     def derivative_route(self) -> DerivativeRoute:
         """The kernel of evaluators."""
-        return DerivativeRoute("derivatives of closed chains", lambda: differentiate_chain, _fresh)
+
+        def fresh(system: Mechanics) -> tuple[Closed, ChainDerivativeCall]:
+            return chain_derivative_call(self.closures, system.nq, system.nu)
+
+        return DerivativeRoute("derivatives of closed chains", lambda: differentiate_chain, fresh)
 
     def require_rows(self, what: str) -> None:
         """Have the independent rows counted, without which no position is seen to be singular; NotImplementedError for
@@ -292,11 +294,6 @@ class Constraints:
                 f"{names} leave none of the {self._system.nu} free speeds: the mechanism is locked. Free a "
                 "hinge, or let bodies deform"
             )
-
-
-def _fresh(system: System) -> tuple[Closed, ChainDerivativeCall]:
-    assert system.closures is not None  # it has constraints
-    return chain_derivative_call(system.closures, system.nq, system.nu)
 
 
 def _remembered(chain: Closed) -> list[Record | Real | Index]:

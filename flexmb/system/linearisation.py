@@ -31,6 +31,7 @@ from flexmb.system.derivative_records import (
 from flexmb.system.evaluator import Refusal
 from flexmb.system.kinks import has_corners, refuse_kinks
 from flexmb.system.load_axes import Axes, referred
+from flexmb.system.mechanics import Mechanics
 from flexmb.system.pushforward import Directions, GivenMotion, Pushforward, pushforward
 from flexmb.system.section_loads import SectionBalance
 from flexmb.tables.per_thread import per_thread
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
     from flexmb.closure.tables import ClosureConstants
     from flexmb.closure.variation import ChainVariation
     from flexmb.system.constraints import Constraints
-    from flexmb.system.tree_system import System
 
 _Four = TypeVar("_Four", OfFreeMotion, OfGivenMotion)
 INSTEAD = "have the controllers chained through by flexmb.ControlledMotion(scene)"
@@ -54,7 +54,7 @@ class Linearisation:
     a law has a corner, and DynamicsError, ValueError and TypeError as the methods do that give the values.
     """
 
-    def __init__(self, system: System, constraints: Constraints | None) -> None:
+    def __init__(self, system: Mechanics, constraints: Constraints | None) -> None:
         self._system, self._constraints = system, constraints
 
     def of_accelerations(self, state: State, forces: Real | None) -> AccelerationDerivatives:
@@ -111,7 +111,7 @@ class Linearisation:
         names = *observation.names.hinges, *observation.names.closures
         found = dict(zip(names, finite_result(change, t).reshape(len(names), 6, -1), strict=True))
         if self._constraints is not None:
-            for name, load in self._system.hinge_loads(state, axes=axes, about=about).items():
+            for name, load in self._constraints.hinge_loads(state, None, axes, about).items():
                 found[name][np.isnan(load)] = np.nan
         return {name: _split(self._system.nu, OfFreeMotion, each) for name, each in found.items()}
 
@@ -123,7 +123,7 @@ class Linearisation:
         change = push.derivatives(motion, directions, partial(section_row, balance, push, self._system.observation))
         found = finite_result(change, t).reshape(len(balance.x), 6, change.shape[-1])
         if self._constraints is not None:
-            found[np.isnan(balance.at(self._system.all_loads(state)))] = np.nan
+            found[np.isnan(balance.at(self._constraints.all_loads(t, y)))] = np.nan
         return _split(self._system.nu, OfFreeMotion, found)
 
     # The motion, and what changes with it
@@ -227,7 +227,8 @@ class Linearisation:
         motion, directions = self._freely(t, y)
         row, change = self._row_along(motion, directions)
         self._relieve_drives(change)
-        change[self._system.undetermined(t, y)] = np.nan
+        if self._constraints is not None:
+            change[np.isnan(self._constraints.row(t, y))] = np.nan
         return FreeRow(row, change, directions.state[: self._system.nq, : self._system.nu])
 
     def _row_along(self, motion: GivenMotion, directions: Directions) -> tuple[Real, Real]:

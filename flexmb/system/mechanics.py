@@ -24,6 +24,7 @@ from flexmb.kept import kept
 from flexmb.scene import schema as s
 from flexmb.scene.sizes import refuse_large_matrix
 from flexmb.system.factors import MassMatrixFactors
+from flexmb.system.load_axes import Axes, referred
 from flexmb.system.observables import Observation
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables import arguments
@@ -92,6 +93,11 @@ class Mechanics(SceneArrays):
         super().__init__(scene, elimination, like)
         self.own = Own()
         self._nested: dict[Set[Erratum], NestedSystem] = {}
+
+    @property
+    def initial_state(self) -> State:
+        """The scene's state at t = 0, of the tree alone; prescribed coordinates have their functions' values."""
+        return self.scene_state(0.0)
 
     def nested_system(self, errata: Set[Erratum]) -> NestedSystem:
         """Frisch's equations of this scene with these defects of the print, built at the first call.
@@ -208,6 +214,17 @@ class Mechanics(SceneArrays):
         tau, loads = np.zeros(self.nu), np.zeros((len(self.constants.body), 6))
         self._invert(t, y, rates, tau, loads)
         return tau, loads
+
+    def in_axes(
+        self, state: State, loads: dict[str, Real], axes: Axes, about: tuple[str, str] | None
+    ) -> dict[str, Real]:
+        """These loads, World axes, in other axes about a node, whatever they are."""
+        t, y = self.layout.entering(state)
+        self.inverse_at(t, y, np.zeros(self.nu))  # for the poses in the workspace, those of the equations of motion
+        return referred(self, self.own_workspace, loads, axes, about)
+
+    def by_hinge(self, loads: Real) -> dict[str, Real]:
+        return {link.hinge.name: loads[k] for k, link in enumerate(self.links)}
 
     def _follow_recursion(self, t: float, y: Real) -> None:
         """The recursion at one state, with its errors and warnings; its results stay in its workspace."""

@@ -43,7 +43,7 @@ from flexmb.tables import arguments
 from flexmb.tables.features import Kernels, asking
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
-from flexmb.typing import Flags, Real
+from flexmb.typing import Real
 
 if TYPE_CHECKING:
     from flexmb.closure.closures import Closures
@@ -158,9 +158,7 @@ class System(Mechanics):
         `SceneWarning` lists the changes, or a ClosureError is raised for values that are marked as given, and where no
         state closes all closures.
         """
-        if self.constraints is not None:
-            return self.constraints.initial_state
-        return self.scene_state(0.0)
+        return super().initial_state if self.constraints is None else self.constraints.initial_state
 
     def admissible(self, state: State, given: Given = "guess") -> State:
         """The state with prescribed motions at their values for its time, and for closed chains with closed closures.
@@ -420,14 +418,6 @@ class System(Mechanics):
             return self.constraints.loads_across(state, axes, about)
         return self.in_axes(state, loads, axes, about)
 
-    def in_axes(
-        self, state: State, loads: dict[str, Real], axes: Axes, about: tuple[str, str] | None
-    ) -> dict[str, Real]:
-        """These loads, World axes, in other axes about a node, whatever they are."""
-        t, y = self.layout.entering(state)
-        self.inverse_at(t, y, np.zeros(self.nu))  # for the poses in the workspace, those of the equations of motion
-        return referred(self, self.own_workspace, loads, axes, about)
-
     def section_loads(self, state: State, body: str, x: Any) -> SectionLoads:
         """Axial force, shear, bending and torsion across the sections of a beam at x (X,) m, of the free motion.
 
@@ -465,9 +455,6 @@ class System(Mechanics):
         if any(link.level.at_rest for link in self.links):
             self.inverse_at(t, y, rates)  # for the poses in the workspace, which have ruthless bodies undeformed
         return mass_properties(self, self.own_workspace, inertias, body)
-
-    def by_hinge(self, loads: Real) -> dict[str, Real]:
-        return {link.hinge.name: loads[k] for k, link in enumerate(self.links)}
 
     def energy(self, state: State) -> dict[str, float]:
         """Kinetic, strain, spring and gravity energy (J)."""
@@ -514,12 +501,6 @@ class System(Mechanics):
             return
         self._observe(t, y, algorithm)
         row[:] = self.observation.row(t, _NO_CLOSURES)
-
-    def undetermined(self, t: float, y: Real) -> Flags:
-        """Which entries of such a row (E,) the free motion does not determine."""
-        if self.constraints is None:
-            return np.zeros(self.observation.width, bool)
-        return np.isnan(self.constraints.row(t, y))
 
 
 def copied(kernels: Kernels, scene: s.Scene, elimination: Elimination, closed: bool) -> System:

@@ -7,5 +7,6 @@ from flexmb.interchange.superelement.element import SuperElementError as SuperEl
 from flexmb.interchange.superelement.element import super_element as super_element
 from flexmb.interchange.superelement.files import read_super_element as read_super_element
 from flexmb.interchange.superelement.interface import Tie as Tie
+from flexmb.interchange.superelement.interface import interface_of as interface_of
 from flexmb.interchange.superelement.reduction import ReducedBody as ReducedBody
 from flexmb.interchange.superelement.reduction import reduced as reduced

@@ -19,7 +19,7 @@ from flexmb.interchange.imported import listed
 from flexmb.interchange.near_points import FARTHEST, RigidBlock, points_with
 from flexmb.interchange.superelement.element import ALIKE, DUST, MOTIONS, SuperElement, SuperElementError
 from flexmb.interchange.superelement.inertia import carried_sums
-from flexmb.interchange.superelement.interface import Interface, Tie, interface_of
+from flexmb.interchange.superelement.interface import Interface, interface_of
 from flexmb.scene.bodies import Level, ModalBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
@@ -57,21 +57,22 @@ class ReducedBody:
 
 
 def reduced(
-    element: SuperElement, interface: Sequence[int], modes: int, *, name: str = "body",
+    element: SuperElement, interface: Sequence[int] | Interface, modes: int, *, name: str = "body",
     boundary: Boundary = "clamped-free", damping_ratio: float = 0.0, level: Level = "full",
-    ties: Sequence[Tie] = (), attached: Sequence[int] = (),
+    attached: Sequence[int] = (),
 ) -> ReducedBody:  # fmt: skip
     """A flexible body whose nodes are the `interface` nodes, named by their numbers, and those of `attached`.
 
     `modes`: the number of fixed-interface modes, in addition to the 6 constraint modes of each interface node, less the
-    six rigid-body motions. `ties` tie surfaces to interface nodes of their own. `attached` nodes of the structure get
-    static modes for a force along each axis, and torques if they turn, while the interface is held: loads there have
-    their exact static response. `damping_ratio` applies to every mode. Raises SuperElementError for interface nodes
-    without rotations, an impossible number of modes, mechanisms, and a mass matrix that is not positive semidefinite.
+    six rigid-body motions. `interface_of` makes an interface with nodes to which surfaces are tied. `attached` nodes of
+    the structure get static modes for a force along each axis, and torques if they turn, while the interface is held:
+    loads there have their exact static response. `damping_ratio` applies to every mode. Raises SuperElementError for
+    interface nodes without rotations, an impossible number of modes, mechanisms, and a mass matrix that is not positive
+    semidefinite.
     """
     if not 0.0 <= damping_ratio < 1.0:
         raise SuperElementError(f"the damping ratio is {damping_ratio:g}: give a number from 0 to 1, such as 0.005")
-    face = interface_of(element, interface, ties)
+    face = interface if isinstance(interface, Interface) else interface_of(element, interface)
     extra = [element.node(number) for number in dict.fromkeys(attached) if number not in face.ids]
     held = len(face.motion.indptr) - 1
     _refuse_loose(element, np.unique(face.T[:, :held].nonzero()[0]))

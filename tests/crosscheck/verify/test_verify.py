@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from crosscheck.engines.contract import Run
 from crosscheck.library.find import load_case
 from crosscheck.verify.against_case import verify_csv
 from crosscheck.verify.causes import possible_causes
@@ -236,7 +237,7 @@ def test_a_reference_at_rest_gives_no_guess(seed: int) -> None:
 def test_the_command_shows_a_table_with_the_cause(tmp_path: Path) -> None:
     case = load_case(CASE)
     times = np.linspace(0.0, 4.0, 81)
-    run = Pendulum(case.scene(case.run.variants[0])).simulate(type("Run", (), {"times": times})(), TOLERANCES[3])
+    run = Pendulum(case.scene(case.run.variants[0])).simulate(Run(times), TOLERANCES[3])
     columns = np.column_stack([times, 1e3 * run.markers["tip"].position, run.loads["pivot"][:, 3:]])
     head = ",".join(["t", *(f"tip.p{c}" for c in "xyz"), *(f"pivot.f{c}" for c in "xyz")])
     np.savetxt(tmp_path / "my.csv", columns, "%.17g", ",", header=head, comments="")

@@ -10,7 +10,15 @@ from scipy.linalg import eigh
 
 import flexmb as fm
 from flexmb.interchange.sid import imported_sid, sid_of
-from flexmb.interchange.superelement import SuperElementError, Tie, compared, reduced, reduction, super_element
+from flexmb.interchange.superelement import (
+    SuperElementError,
+    Tie,
+    compared,
+    interface_of,
+    reduced,
+    reduction,
+    super_element,
+)
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.integrals import modal_integrals
 from tests.bounds import relative
@@ -204,14 +212,19 @@ def constrained(kind: str, modes: int) -> np.ndarray:
     return np.sqrt(eigh(T.T @ SOLID_K @ T, T.T @ SOLID_M @ T, eigvals_only=True)) / (2.0 * np.pi)
 
 
+def tied(element, numbers, ties, modes, **more):
+    """Reduced to these interface nodes, to some of which surfaces are tied."""
+    return reduced(element, interface_of(element, numbers, ties), modes, **more)
+
+
 @pytest.mark.parametrize("kind", ["rigid", "mean"])
 def test_tied_surfaces_have_the_frequencies_of_craig_and_bampton(kind):
     """And the free body those of a free-free one that is held at the same node in a scene."""
     exact = constrained(kind, 5)
-    made = reduced(SOLID, [900, 901], 5, ties=surfaces(kind))
+    made = tied(SOLID, [900, 901], surfaces(kind), 5)
     assert relative(made.frequencies / exact, np.ones(11)) < 1e-9
     assert [node.name for node in made.body.nodes] == ["900", "901"]
-    free = reduced(SOLID, [900, 901], 5, ties=surfaces(kind), boundary="free-free").body
+    free = tied(SOLID, [900, 901], surfaces(kind), 5, boundary="free-free").body
     held = fm.SceneBuilder("held").add(free).weld("root", "ground", "body", child_node="900").scene()
     found = np.sort(np.abs(np.linalg.eigvals(fm.linearize(fm.compile(held)).A)))[::2] / (2.0 * np.pi)
     assert relative(found / exact, np.ones(11)) < 1e-9
@@ -220,7 +233,7 @@ def test_tied_surfaces_have_the_frequencies_of_craig_and_bampton(kind):
 def test_a_rigid_tie_is_the_elimination_of_its_surface():
     K, M, position, dofs = solids.tied(SOLID_K, SOLID_M, SOLID_AT, [np.array(each) - 1 for each in SURFACES])
     eliminated = reduced(super_element(K, M, position, dofs=dofs), [1, 2], 4)
-    assert relative(reduced(SOLID, [900, 901], 4, ties=surfaces("rigid")).frequencies, eliminated.frequencies) < 1e-9
+    assert relative(tied(SOLID, [900, 901], surfaces("rigid"), 4).frequencies, eliminated.frequencies) < 1e-9
 
 
 def test_a_tie_may_sit_beside_its_surface():
@@ -229,7 +242,7 @@ def test_a_tie_may_sit_beside_its_surface():
     moved = [replace(tie, position=tuple(p + [0.1, 0.2, 0.0])) for tie, p in zip(surfaces("mean"), at, strict=True)]
     named = [replace(tie, position=tuple(p)) for tie, p in zip(surfaces("mean"), at, strict=True)]
     plain, same, other = (
-        reduced(SOLID, [900, 901], 5, ties=ties, boundary="free-free") for ties in (surfaces("mean"), named, moved)
+        tied(SOLID, [900, 901], ties, 5, boundary="free-free") for ties in (surfaces("mean"), named, moved)
     )
     assert np.array_equal(plain.frequencies, same.frequencies)
     assert relative(plain.frequencies / other.frequencies, np.ones(11)) < 1e-9
@@ -240,9 +253,9 @@ def test_a_tie_may_sit_beside_its_surface():
 def test_an_attached_node_has_the_exact_static_response_to_loads(modes):
     """With all fixed-interface modes the attachment adds nothing."""
     if modes > 4:
-        modes = reduced(SOLID, [900, 901], 0, ties=surfaces("rigid")).interface.T.shape[1] - 12
+        modes = tied(SOLID, [900, 901], surfaces("rigid"), 0).interface.T.shape[1] - 12
     ties = surfaces("rigid")
-    made, bare = (reduced(SOLID, [900, 901], modes, ties=ties, attached=nodes) for nodes in ([INNER], []))
+    made, bare = (tied(SOLID, [900, 901], ties, modes, attached=nodes) for nodes in ([INNER], []))
     node = made.body.nodes[-1]
     assert node.name == str(INNER) and "nodes without rotations" in made.notes[-1]
     assert len(made.frequencies) == 6 + modes + (3 if modes <= 4 else 0)
@@ -260,9 +273,9 @@ def test_an_attached_node_has_the_exact_static_response_to_loads(modes):
 @pytest.mark.parametrize("boundary", ["clamped-free", "free-free"])
 def test_frequencies_and_shapes_stand_beside_those_of_the_structure(boundary):
     """Rayleigh and Ritz: never lower. With all modes they are the structure's, and MAC is 1, for pairs of modes too."""
-    few = compared(SOLID, reduced(SOLID, [900, 901], 8, ties=surfaces("mean"), boundary=boundary), 5)
+    few = compared(SOLID, tied(SOLID, [900, 901], surfaces("mean"), 8, boundary=boundary), 5)
     assert np.all(few.reduced >= few.given * (1.0 - 1e-9)) and np.all(few.mac > 0.99)
-    poor = compared(SOLID, reduced(SOLID, [900, 901], 0, ties=surfaces("mean"), boundary=boundary), 6)
+    poor = compared(SOLID, tied(SOLID, [900, 901], surfaces("mean"), 0, boundary=boundary), 6)
     assert np.min(poor.mac) < 0.99 and np.max(poor.reduced / poor.given) > 1.01
     every = compared(BEAM, reduced(BEAM, [1, TIP], len(BEAM.K) - 12, boundary=boundary), 12)
     assert relative(every.reduced / every.given, np.ones(12)) < 1e-6
@@ -427,17 +440,17 @@ BAD = {
 
 BAD |= {
     "on a line": (
-        lambda: reduced(SOLID, [900], 2, ties=[Tie(900, SURFACES[0][:4])]), "node 900 does not show all six motions"
+        lambda: tied(SOLID, [900], [Tie(900, SURFACES[0][:4])], 2), "node 900 does not show all six motions"
     ),
-    "its number is taken": (lambda: reduced(SOLID, [1], 2, ties=[Tie(1, SURFACES[0])]), "node 1 is there already"),
-    "no interface of it": (lambda: reduced(BEAM, [1], 2, ties=[Tie(900, (2, 3))]), "900, which is no interface node"),
-    "a node twice": (lambda: reduced(SOLID, [900], 2, ties=[Tie(900, (1, 1, 2, 7))]), "lists a node twice"),
+    "its number is taken": (lambda: tied(SOLID, [1], [Tie(1, SURFACES[0])], 2), "node 1 is there already"),
+    "no interface of it": (lambda: tied(BEAM, [1], [Tie(900, (2, 3))], 2), "900, which is no interface node"),
+    "a node twice": (lambda: tied(SOLID, [900], [Tie(900, (1, 1, 2, 7))], 2), "lists a node twice"),
     "shared": (
-        lambda: reduced(SOLID, [900, 901], 2, ties=[Tie(900, SURFACES[0]), Tie(901, SURFACES[0])]),
+        lambda: tied(SOLID, [900, 901], [Tie(900, SURFACES[0]), Tie(901, SURFACES[0])], 2),
         "node 901 shares displacements",
     ),
     "far tie": (
-        lambda: reduced(SOLID, [900], 2, ties=[Tie(900, SURFACES[0], position=(0.0, 0.0, float("nan")))]),
+        lambda: tied(SOLID, [900], [Tie(900, SURFACES[0], position=(0.0, 0.0, float("nan")))], 2),
         "the position of node 900 is not finite",
     ),
     "no node to attach": (lambda: reduced(BEAM, [1], 2, attached=[77]), "there is no node 77"),

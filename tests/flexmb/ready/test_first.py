@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import multiprocessing
 import os
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
+from time import sleep
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
@@ -80,42 +81,27 @@ def test_a_folder_that_says_nothing_of_it_is_not_whole(tmp_path: Path, monkeypat
 
 
 def test_silence_is_broken_by_how_far_it_is(tmp_path: Path, monkeypatch, capsys) -> None:
-    """And a use that fails says why, and is refused by its name."""
-    answers = [None, make.Used("one", 7.0, "", {}), None, make.Used("two", 8.0, "\nwhy", {})]
-    pool = SimpleNamespace(imap_unordered=lambda use, names: SimpleNamespace(next=answer), apply=lambda call: {})
+    """And a use that fails, or whose process dies, says why and is refused by its name."""
 
-    def answer(timeout: float) -> Any:
-        (tmp_path / "some-00.kernel").touch()
-        assert timeout == make.SILENCE <= 5.0
-        found = answers.pop(0)
-        if found is None:
-            raise multiprocessing.TimeoutError
-        return found
+    def use(name: str) -> make.Used:
+        sleep(0.1)
+        (tmp_path / f"{name}-00.kernel").touch()
+        sleep(0.1)
+        if name == "three":
+            raise BrokenProcessPool("a process died")
+        return make.Used(name, 7.0, "" if name == "one" else "\nwhy", {})
 
-    monkeypatch.setattr(Pooled, "pool", pool, raising=False)
-    monkeypatch.setattr(make.multiprocessing, "get_context", lambda kind: SimpleNamespace(Pool=Pooled))
+    monkeypatch.setattr(make, "_use", use)
+    monkeypatch.setattr(make, "SILENCE", 0.15)
+    monkeypatch.setattr(make, "ProcessPoolExecutor", lambda processes, context: ThreadPoolExecutor(1))
     (tmp_path / "old-00.kernel").touch()
-    used, _ = make._run(["one", "two"], 1, tmp_path)
+    used, _ = make._run(["one", "two", "three"], 1, tmp_path)
     lines = capsys.readouterr().err.splitlines()
-    assert [line[:8] for line in lines] == ["  0 of 2", "  1 of 2", "  1 of 2", "  2 of 2", "why"]
-    assert "compiling, 1 kernels after 0 s" in lines[0]
-    with pytest.raises(RuntimeError, match="whose kernels may be missing: two$"):
+    told = [line for line in lines if "compiling" not in line]
+    assert [line[:8] for line in told] == ["  1 of 3", "  2 of 3", "why", "  3 of 3", "a proces"]
+    assert "  0 of 3  compiling, 1 kernels after 0 s" in lines
+    with pytest.raises(RuntimeError, match="whose kernels may be missing: two; three$"):
         make._refuse_failures(used)
-
-
-class Pooled:
-    """In place of processes."""
-
-    pool: Any
-
-    def __init__(self, processes: int) -> None:
-        assert processes == 1
-
-    def __enter__(self) -> Any:
-        return self.pool
-
-    def __exit__(self, *error: object) -> None:
-        pass
 
 
 @whole

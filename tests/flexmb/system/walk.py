@@ -20,7 +20,7 @@ from tests.flexmb.system import public_calls
 INSIDE = {  # of the mechanics, for numbers that have been examined
     "nested_system", "precision_if_doubtful", "observe_recursion", "observe_rates", "observe_motion", "observe_row",
     "check_status", "check_precision", "all_loads", "referred_loads", "with_numbers", "fault_name", "turns",
-    "refuse_corners", "inverse_at", "by_hinge", "undetermined", "in_axes",
+    "refuse_corners", "inverse_at", "by_hinge", "in_axes",
 }  # fmt: skip
 UNTRIED = {  # what users may ask all the same: docs/threads.md
     **{f"System.{name}": "makes a new workspace, which is for one thread"
