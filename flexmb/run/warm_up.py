@@ -91,7 +91,8 @@ def _compile(scene: Scene, kind: Kind, methods: Sequence[Method], algorithms: Se
         for method in methods:
             if _runs(kind, algorithm, method):
                 step = 1e-3 if INTEGRATORS[method].fixed else None
-                simulate(system, 1e-3, method, samples=2, step=step, algorithm=algorithm)
+                run = simulate(system, 1e-3, method, samples=2, step=step, algorithm=algorithm)
+                _ = run.envelope  # by recorded steps, as runs of flexible bodies are
     _pointwise(system)
     return system
 
