@@ -52,7 +52,7 @@ INNER = {  # classes of the mechanics and of runs, which users meet only behind 
     "Closures", "ClosureConstants", "NestedConstants", "DualConstants", "Constants", "Layout", "Timing", "Integration",
     "BodyLink", "FlexibleNode", "HingeKind", "Models", "Observation", "Settings", "Integrator",
     "Steady", "_Differentiation",  # of parameters
-    "Equations", "ClosedEquations",  # of what derivatives are taken of
+    "Equations", "ClosedEquations", "Pushforward",  # of what derivatives are taken of
     "RunMethod",  # of the advisor's
     "FinalValue",  # data
     "Restart",  # its files: tests/flexmb/run/test_damaged_restarts.py
