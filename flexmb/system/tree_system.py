@@ -185,6 +185,8 @@ class System(Mechanics):
         try:
             evaluator = self.own._evaluators[algorithm]  # without the property, which costs as much as the evaluation
         except (AttributeError, KeyError):
+            evaluator = None
+        if evaluator is None:  # not while the exception is handled, which makes what follows slower
             if self.constraints is not None:
                 return self.constraints.accelerations(state, algorithm)
             evaluator = self._evaluator(algorithms.chosen(algorithm))
