@@ -180,15 +180,13 @@ class System(Mechanics):
         Raises DynamicsError where an inertia is not positive definite, closures are singular, or numbers are so large
         that they overflow. States of a closed chain must close its closures.
         """
+        if self.constraints is not None:
+            return self.constraints.accelerations(state, algorithm)
         if type(state) is not State or state.layout is not self.layout:
             state = self.layout.owning(state)
         try:
             evaluator = self.own._evaluators[algorithm]  # without the property, which costs as much as the evaluation
         except (AttributeError, KeyError):
-            evaluator = None
-        if evaluator is None:  # not while the exception is handled, which makes what follows slower
-            if self.constraints is not None:
-                return self.constraints.accelerations(state, algorithm)
             evaluator = self._evaluator(algorithms.chosen(algorithm))
         return evaluator(state.t, state.kernel_q, state.kernel_u).copy()
 
