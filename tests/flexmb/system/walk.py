@@ -96,7 +96,7 @@ def _follow(thing: Any, found: set[type], depth: int) -> None:
     if kind in found or inside or not kind.__module__.startswith("flexmb") or depth > DEEP:
         return
     found.add(kind)
-    for name in {*dir(kind), *getattr(thing, "__dict__", ())}:
+    for name in sorted({*dir(kind), *getattr(thing, "__dict__", ())}):  # in one order, for depth ends the walk
         if not name.startswith("_") and not inspect.isroutine(getattr(kind, name, None)):
             try:
                 part = getattr(thing, name)
