@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-THREADS = 4
+THREADS = 8
 WHOLE = "whole"
 
 
