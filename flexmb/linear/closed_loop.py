@@ -102,6 +102,7 @@ class ClosedLoop:
         A = np.block([[of_motion.A + pushed @ G @ C, pushed @ G_x], [L @ (C + said @ G @ C), L_x + L @ said @ G_x]])
         outputs = np.hstack([of_motion.C, np.zeros((len(of_motion.C), states))])
         outputs[rows] += said @ np.hstack([G @ C, G_x])
+        outputs[np.isnan(of_motion.C).any(axis=1)] = np.nan  # what is undetermined is so by all states
         return AtState(A, np.vstack([of_motion.B, L @ E]), outputs, laws.values[drives:], of_motion)
 
 

@@ -86,9 +86,6 @@ class Stability:
         return f"{self.verdict}: {found}"
 
 
-_OUTPUTS = ("C", "D")  # what may be NaN
-
-
 @dataclass(frozen=True, eq=False)
 class LinearModel:
     """x' = A x + B f, y = C x + D f about `state`, x = [xi; du]: displacements (n,) and changes of the speeds (n,).
@@ -96,7 +93,8 @@ class LinearModel:
     Names and units: `states` (2n), `inputs` (loads of hinges and wheels along their free speeds), `outputs` (the
     states, then displacement and rotation vector of every marker, World axes, then what sensors say). mass (n,n): mass
     matrix. motion (nq,n): dq = motion xi. rates (n,): udot at `state`, zero in an equilibrium; drift (n,): its explicit
-    derivative by time. Rows of C and D are NaN where a sensor reads a load that redundant closures leave undetermined.
+    derivative by time. A row of C and D is NaN, as a whole, where a sensor reads a load that redundant closures leave
+    undetermined.
 
     For a closed chain the states are the independent coordinates and their speeds. The dependent ones follow the states
     among the outputs, and `motion` includes both.
@@ -121,9 +119,11 @@ class LinearModel:
 
     def __post_init__(self) -> None:
         self._refuse_torn()
+        # The row of an undetermined output is NaN as a whole: a NaN beside numbers is a fault.
+        determined = ~np.all(np.isnan(np.column_stack([np.asarray(getattr(self, name), float) for name in "CD"])), 1)
         for name in self._shapes:
             own = np.array(getattr(self, name), float)
-            arguments.finite(name, np.where(np.isnan(own), 0.0, own) if name in _OUTPUTS else own)
+            arguments.finite(name, np.where(determined[:, None], own, 0.0) if name in "CD" else own)
             own.flags.writeable = False
             object.__setattr__(self, name, own)
 

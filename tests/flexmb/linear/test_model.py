@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -55,6 +56,17 @@ def test_names_that_do_not_exist(model):
         model.frequency_response("elbow", 1.0)
     with pytest.raises(KeyError, match="end.x"):
         model.frequency_response("pivot.rotation", 1.0, ("tip.x",))
+
+
+def test_a_row_is_undetermined_as_a_whole_or_not_at_all(model):
+    """One NaN beside numbers, or a row of C beside numbers of D, is no undetermined load but a fault."""
+    C, D = model.C.copy(), model.D.copy()
+    C[-1], D[-1] = np.nan, np.nan
+    assert np.isnan(replace(model, C=C, D=D).C[-1]).all()
+    columns = np.where(np.arange(C.shape[1]) == 0, np.nan, model.C)
+    for changes in ({"C": C}, {"D": D}, {"C": np.full_like(C, np.nan)}, {"C": columns}):
+        with pytest.raises(ValueError, match="is nan: give finite numbers"):
+            replace(model, **changes)
 
 
 def test_undamped_resonance_has_no_response():
