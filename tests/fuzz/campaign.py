@@ -9,6 +9,7 @@ import sys
 import tempfile
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -51,15 +52,14 @@ def _work(folder: Path, seed: int, keep: Path, asked: list[tuple[str, int]]) -> 
         answer = _ask(worker, f"{name} {number}\n")
         if not answer:
             worker.kill()
-            worker.wait()
+            _end(worker)
             worker = None
             died = f"no answer: mutant {number} of {name}, seed {seed}, which `tests.fuzz.worker.content` makes again"
             print(died, flush=True)
             answer = json.dumps({"kind": name, "number": number, "done": "", "outcome": "died", "detail": died})
         found.append(json.loads(answer))
     if worker is not None:
-        worker.stdin.close()
-        worker.wait()
+        _end(worker)
     return found
 
 
@@ -72,6 +72,12 @@ def _start(folder: Path, seed: int, keep: Path) -> Any:
     if not _wait(worker, START_S):
         raise RuntimeError("the worker does not start: run python -m tests.fuzz.worker to see why")
     return worker
+
+
+def _end(worker: Any) -> None:
+    """Close its pipes, at which it ends, and wait until it has."""
+    with suppress(BrokenPipeError), worker:
+        pass
 
 
 def _ask(worker: Any, line: str) -> str:

@@ -39,6 +39,7 @@ from flexmb.scene.check import check_scene
 from flexmb.scene.files import dumps, load_scene, loads
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import SceneError
+from flexmb.scene.rounding import ROUNDING
 from tests.crosscheck.sessions import CASE, PROVIDER
 from tests.flexmb.scene.bad_scenes import satellite
 from tests.fuzz import mutate
@@ -290,6 +291,7 @@ def _differs(data: Any, value: Any, place: str = "$") -> str | None:
     if place.endswith(".file"):
         return None  # made absolute
     if isinstance(data, dict) and isinstance(value, dict):
+        data = _with_ends(data)
         return next(
             (wrong for key in data if (wrong := f"{place}.{key} was dropped" if key not in value
                                        else _differs(data[key], value[key], f"{place}.{key}"))), None
@@ -303,6 +305,18 @@ def _differs(data: Any, value: Any, place: str = "$") -> str | None:
     alike = type(data) is type(value) or (number and isinstance(data, bool) == isinstance(value, bool))
     equal = alike and (data == value or (number and float(data) == float(value)))
     return None if equal else f"{place}: {data!r:.60} was taken as {value!r:.60}"
+
+
+def _with_ends(data: dict[str, Any]) -> dict[str, Any]:
+    """A beam whose places within rounding of an end are that end, as scenes take them."""
+    length, lists = data.get("length_m"), [key for key in ("stations", "tip_masses", "nodes") if key in data]
+
+    def at_end(place: Any) -> Any:
+        x = place.get("x_m")
+        ends = [end for end in (0.0, length) if isinstance(x, float) and 0.0 < abs(x - end) <= ROUNDING * length]
+        return {**place, "x_m": ends[0]} if ends else place
+
+    return {**data, **{key: [at_end(each) for each in data[key]] for key in lists}} if length and lists else data
 
 
 def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:

@@ -23,10 +23,12 @@ from tests.fuzz import kinds as subject
 from tests.fuzz.campaign import campaign, table
 from tests.fuzz.worker import BAD, content, read
 
-MUTANTS = 650  # some twenty of each kind
+MUTANTS = 650  # some ten of most kinds
 BY_LINES = {"records", "map records"}  # a broken line is set aside, and a file hardly ever refused
-SELDOM, ENOUGH, FEW = {"section matrices", "exported modes"}, 40, 20
-"""Of so few mutants, fewer still of other kinds, none may be accepted."""
+SELDOM, ENOUGH = {
+    "coordinate", "couplings", "expectations", "exported modes", "map verdicts", "nodes", "section matrices",
+}, 40  # fmt: skip
+"""Kinds of which no mutant may be accepted among so few; of all others some are, by the pinned seed."""
 BOTH = {"refused", "accepted"}
 
 
@@ -39,7 +41,7 @@ def test_no_mutant_is_bad(tmp_path: Path, times: int) -> None:
     assert len(results) == times * MUTANTS
     for kind in {result["kind"] for result in results}:  # a kind whose mutants all come out alike is not tested
         found = [result["outcome"] for result in results if result["kind"] == kind]
-        outcomes, rare = set(found), kind in SELDOM and len(found) < ENOUGH or len(found) < FEW
+        outcomes, rare = set(found), kind in SELDOM and len(found) < ENOUGH
         assert outcomes >= ({"accepted"} if kind in BY_LINES else {"refused"} if rare else BOTH), kind
 
 

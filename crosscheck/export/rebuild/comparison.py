@@ -35,7 +35,7 @@ def reference(folder):
         found[channel][name.removeprefix(channel)] = values
     for channel, parts in found.items():
         if not parts or list(parts) != sorted(parts, key=lambda part: "wxyz".find(part[1:])):
-            raise SystemExit(f'{file}: "{channel}" has no columns, or not in the order w, x, y, z')
+            raise SystemExit(f'{file}: "{channel}" of {other.name} has no columns, or not in the order w, x, y, z')
     stored = {channel: np.column_stack(list(parts.values())) for channel, parts in found.items()}
     return times, stored, dict(zip(bars["channel"], bars["uncertainty"], strict=True))
 
