@@ -76,6 +76,9 @@ def parse_toml(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
+        if text.lstrip().startswith("<"):
+            remedy = "a robot (URDF, MJCF) becomes a scene by `flexmb import`"
+            raise Unreadable("XML, and a scene is TOML", remedy) from None
         raise Unreadable(f"not TOML: {error}", "correct the syntax there") from None
     except RecursionError:
         raise Unreadable("arrays or tables are nested too deeply", "correct the brackets") from None

@@ -43,3 +43,9 @@ def test_dots_in_numbers_texts_and_times_are_no_dots_in_keys() -> None:
     prose += """z = \"\"\"a.b \"a.b\n# a.b\n\\\\\"\"\"\nw = \'\'\'a.b\n\'a.b\'\'\'\n"""
     assert len(parse_toml(f"[[b]]\n{prose}" * 20_000)["b"]) == 20_000
     assert len(parse_toml("x = [" + "1.5," * (MOST_DOTS + 1) + "]")["x"]) == MOST_DOTS + 1
+
+
+def test_a_robot_is_told_from_a_scene_with_a_slip() -> None:
+    with pytest.raises(Unreadable, match="^XML, and a scene is TOML: ") as error:
+        parse_toml('\n<robot name="r"/>')
+    assert "flexmb import" in error.value.remedy
