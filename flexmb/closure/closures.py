@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -80,12 +80,18 @@ class ClosedMotion(NamedTuple):
     spread: Spread | None = None
 
 
-class _Counted(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Counted:
     """Number of independent rows of each group in a closed configuration, -1 before it is known, and the size of all
     rows' ports there. Immutable: a new count replaces the whole object, so that threads read a consistent one."""
 
     ranks: Index
     size: Real
+
+    @kept
+    def rank(self) -> int:
+        """Of all groups; -1 before it is known."""
+        return int(np.sum(self.ranks)) if np.all(self.ranks >= 0) else -1
 
 
 class Closures:
@@ -163,7 +169,8 @@ class Closures:
         c, cc = self.constants
         w, route = self._tree(), self._route(algorithm)
         own = workspace(cc, c, len(w.q))
-        (own.rank[:], own.size[:]), own.gain[:] = self._counted[0], (2.0 * rate, rate * rate)
+        counted = self._counted[0]
+        own.rank[:], own.size[:], own.gain[:] = counted.ranks, counted.size, (2.0 * rate, rate * rate)
         own.notices[0] = GAPS if rate > 0.0 else UNRECORDED
         return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)
 
@@ -178,7 +185,7 @@ class Closures:
             return matrices(c)
         return response(c) if self.at_rest else Recursion()
 
-    @property
+    @kept
     def at_rest(self) -> list[int]:
         """Bodies whose inertia is that of the undeformed shape, while closures act on the deformed one."""
         body = self.constants[0].body
@@ -369,14 +376,13 @@ class Closures:
     @property
     def rank(self) -> int:
         """Number of independent rows in a closed configuration; -1 before it is known."""
-        ranks = self._counted[0].ranks
-        return int(np.sum(ranks)) if np.all(ranks >= 0) else -1
+        return self._counted[0].rank
 
     @property
     def counted(self) -> tuple[bytes, bytes]:
         """The counts and sizes that chains are built from, as a key that changes with a new count."""
-        ranks, size = self._counted[0]
-        return ranks.tobytes(), size.tobytes()
+        counted = self._counted[0]
+        return counted.ranks.tobytes(), counted.size.tobytes()
 
     @property
     def independent(self) -> int:

@@ -32,7 +32,9 @@ def blocks(cc: ClosureConstants, cw: ClosureWorkspace) -> Iterator[GroupResponse
 
 def null_loads(cc: ClosureConstants, cw: ClosureWorkspace) -> list[tuple[slice, Real]]:
     """Slice of the rows and orthonormal null loads (rows,k), for each group that has null loads."""
-    found = []
+    found: list[tuple[slice, Real]] = []
+    if np.array_equal(cw.rank, cc.group["row_stop"] - cc.group["row_start"]):
+        return found
     for (rows, _, whole, own), rank in zip(blocks(cc, cw), cw.rank.tolist(), strict=True):
         half = whole[:, :own]
         if rank < len(half):
