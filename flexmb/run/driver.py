@@ -81,6 +81,8 @@ class Driver:
         self._sides = Sides(self._agenda)
         self._segments = Segments(self._sides, times)
         self._chattering = Chattering(times[0], times[-1], settings.atol)
+        self._systems: list[tuple[float, System]] = []
+        """The systems that parts of the run are of, with the times (s) of their first outputs."""
         self._happened: list[EventRecord] = []
         self._whole: Trajectory | None = None
         self._cut: Restart | None = None
@@ -256,7 +258,7 @@ class Driver:
             self._whole,
             events=tuple(self._happened[shown:]),
             restart=self._restart_of(raw, raw.memory, ends, anew) if can_go_on else None,
-            made_by=self._made_by,
+            made_by=None if self._made_by is None else replace(self._made_by, altered=tuple(self._systems)),
         )
 
     def _restart_of(self, raw: Raw, memory: Memory, ends: bool, anew: bool) -> Restart:
@@ -281,4 +283,8 @@ class Driver:
             self._cut = self._restart(raw, raw.memory, anew=False)
 
     def _join(self, part: Trajectory) -> None:
+        """Append outputs of the present system."""
+        before = self._systems[-1][1] if self._systems else None
+        if len(part.t) and self._situation.system is not before:
+            self._systems.append((float(part.t[0]), self._situation.system))
         self._whole = part if self._whole is None else joined(self._whole, part)

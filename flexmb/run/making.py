@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -19,26 +20,44 @@ HALF = 4.0 / 3.0  # error over its change when the step is halved, for a method 
 
 @dataclass(frozen=True)
 class Making:
-    """The system of a run, its output times (T,) s and settings, and a function that repeats it with other settings."""
+    """The system of a run, its output times (T,) s and settings, and a function that repeats it with other settings.
+
+    altered: systems that events have made of it, each with the time (s) of its first output.
+    """
 
     system: System
     times: Real
     settings: Settings
     again: Callable[[Settings], RunArrays]
+    altered: tuple[tuple[float, System], ...] = ()
+
+    def system_at(self, t: float) -> System:
+        """The system that the output at a time (s) is of."""
+        later = bisect_right(self.altered, t, key=lambda each: each[0])
+        return self.altered[later - 1][1] if later else self.system
+
+    def has_made(self, run: RunArrays) -> bool:
+        """Whether the run is the one; an event may have ended it between two output times, with one more output."""
+        last = max(len(run.t) - 1, 0)
+        is_its = np.array_equal(run.t[:last], self.times[:last]) and np.all(run.t[last:] <= self.times[last])
+        return bool(is_its) and (run.q_names, run.u_names) == self.system.state_names
 
 
 def error_estimate(trajectory: RunArrays, made_by: Making) -> dict[str, Real]:
     """Estimated error (T,) of every channel, from a second run with rtol and atol / 100, or with half the step.
 
-    NaN after the end of a second run that stops earlier. ValueError if the settings cannot be made tighter.
+    NaN after the end of a second run that stops earlier, and where that has no such channel, as a drive of a coordinate
+    that an event holds in the first run only. ValueError if the settings cannot be made tighter.
     """
     settings, share = _tighter(made_by.settings)
-    other = channels_of(made_by.again(settings))
+    second = made_by.again(settings)
+    other, together = channels_of(second), min(len(trajectory.t), len(second.t))
+    common = int(np.sum(trajectory.t[:together] == second.t[:together]))  # an event may end the runs at other times
     found = {}
     for name, values in channels_of(trajectory).items():
-        common = min(len(values), len(other[name]))
         apart = np.full(len(values), np.nan)
-        apart[:common] = share * distance(name, values[:common], other[name][:common])
+        if name in other and other[name].shape[1:] == values.shape[1:]:
+            apart[:common] = share * distance(name, values[:common], other[name][:common])
         found[name] = apart
     return found
 

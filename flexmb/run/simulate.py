@@ -195,7 +195,7 @@ def _run(
         with integration(system, algorithm, stabilise, settings.integrator) as solve:
             return _Made(observed(system, times, raw, algorithm, solve), [], False, [])
     again = partial(_again, stage, state, algorithm, stabilise)
-    made_by = None if system.scene.events else Making(system, times, settings, again)
+    made_by = Making(system, times, settings, again)
     driver = Driver(system, times, settings, algorithm, stabilise, begin.events, made_by)
     driver.course = course
     trajectory = driver(begin)

@@ -50,7 +50,7 @@ class Trajectory(RunArrays):
     """
 
     made_by: Making | None = field(default=None, repr=False, compare=False)
-    """The system and the settings of the run; None for a trajectory that is not one run of `simulate`."""
+    """The system and the settings of the run; None for a trajectory that `simulate` has not made."""
 
     def __repr__(self) -> str:
         """How the run ended and the size of its results, for an interactive prompt."""
@@ -98,9 +98,10 @@ class Trajectory(RunArrays):
 
         Components that the motion does not determine in these axes are NaN. See `System.hinge_loads`.
         """
-        system, found = self._making("a hinge's frame").system, {name: load.copy() for name, load in self.loads.items()}
+        made_by, found = self._making("a hinge's frame"), {name: load.copy() for name, load in self.loads.items()}
         for i, state in enumerate(map(State, self.q, self.u, self.t.tolist())):
-            at = system.referred_loads(state, {name: load[i] for name, load in self.loads.items()}, axes, about)
+            now = {name: load[i] for name, load in self.loads.items()}
+            at = made_by.system_at(state.t).referred_loads(state, now, axes, about)
             for name, load in at.items():
                 found[name][i] = load
         return found
@@ -111,22 +112,21 @@ class Trajectory(RunArrays):
         See `System.section_loads`. Raises DynamicsError if a state has no accelerations, NotImplementedError for a
         scene with controllers, whose loads do not follow from the state alone.
         """
-        system = self._making("a section's load").system
-        refuse_feedback(system.scene, "a section's load")
-        balance = SectionBalance(system, body, x)
+        made_by = self._making("a section's load")
+        refuse_feedback(made_by.system.scene, "a section's load")
+        system, balance = made_by.system, SectionBalance(made_by.system, body, x)
         loads = np.zeros((len(self.t), len(balance.x), 6))
         for i, state in enumerate(map(State, self.q, self.u, self.t.tolist())):
+            if made_by.system_at(state.t) is not system:
+                system = made_by.system_at(state.t)
+                balance = SectionBalance(system, body, x)
             loads[i] = balance.at(system.all_loads(state))
         return balance.loads(loads)
 
     def _making(self, wanted: str) -> Making:
         refuse_torn(self)
         made_by = self.made_by
-        if (
-            not isinstance(made_by, Making)
-            or not np.array_equal(self.t, made_by.times[: len(self.t)])
-            or (self.q_names, self.u_names) != made_by.system.state_names
-        ):
+        if not isinstance(made_by, Making) or not made_by.has_made(self):
             raise ValueError(
                 f"{wanted} needs a trajectory that is one run as simulate made it: use the trajectory of each run"
             )

@@ -1,0 +1,59 @@
+"""Loads in other frames, loads across sections and error estimates of runs in which events alter the scene."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexmb as fm
+from flexmb.run.channels import channels_of, distance
+from flexmb.scene.shapes import beam_section
+
+SECTION = beam_section(E=7e10, G=2.7e10, A=4e-4, Iy=5e-9, Iz=5e-9, rho=2700.0)
+
+
+def boom(*actions: fm.Action) -> fm.Scene:
+    """A beam that swings about an axis askew to it, and is held, made heavier or let go at an angle."""
+    return (
+        fm.SceneBuilder("boom", gravity=(0, 0, -9.81))
+        .beam("boom", length=1.0, section=SECTION, elements=6, modes=fm.Modes(count=2, families=("bending_z",)))
+        .rigid_body("tip", mass=0.5, com=(0.1, 0.0, 0.0), inertia=(0.01, 0.01, 0.01))
+        .revolute("root", "ground", "boom", axis=(0.0, 1.0, 0.0), angle=-0.4)
+        .revolute("wrist", "boom", "tip", axis=(0.0, 1.0, 0.0), parent_node="tip", damping=0.1)
+        .event("reached", "root.rotation", 0.3, *actions)
+        .scene()
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("action", [
+    fm.Latch(coordinate="root.rotation"), fm.Change(path="tip.mass_kg", value=2.0),
+], ids=["held", "heavier"])  # fmt: skip
+def test_loads_are_those_of_the_scene_as_it_is_then(action: fm.Action) -> None:
+    """The load of the root's hinge in its own axes is that across the first section of the beam."""
+    run = fm.simulate(boom(action), 0.8, samples=41)
+    assert len(run.events) == 1 and 0.0 < run.events[0].t < 0.8
+    found, across = run.loads_in("outboard")["root"], run.section_loads("boom", [0.0]).load[:, 0]
+    np.testing.assert_allclose(across, found, atol=1e-9 * np.max(np.abs(found)))
+    by_first = fm.compile(boom(action)).section_loads(run.last_state, "boom", [0.0]).load[0]
+    assert np.max(np.abs(by_first - across[-1])) > 1e-3 * np.max(np.abs(found))  # the scene before the event is wrong
+
+
+@pytest.mark.parametrize("action", [fm.Latch(coordinate="root.rotation"), fm.EndRun()], ids=["held", "over"])
+def test_errors_are_those_of_both_parts(action: fm.Action) -> None:
+    """Where an event ends the run, the two runs end at times of their own, and the last outputs are not compared."""
+    run, truth = (fm.simulate(boom(action), 0.8, samples=41, rtol=r, atol=r / 100) for r in (1e-6, 1e-13))
+    estimate, true = run.error_estimate(), channels_of(truth)
+    common = len(run.t) - isinstance(action, fm.EndRun)
+    assert common > 10 and not np.any(run.t[:common] != truth.t[:common])
+    for name, values in channels_of(run).items():
+        error = np.max(distance(name, values[:common], true[name][:common]))
+        assert np.all(np.isfinite(estimate[name][:common])) and np.all(np.isnan(estimate[name][common:]))
+        assert 0.9 * error <= np.max(estimate[name][:common]) <= 1.1 * error or error < 1e-9, name
+
+
+def test_what_is_joined_of_runs_has_no_error_estimate() -> None:
+    scene = boom(fm.Latch(coordinate="root.rotation"))
+    first = fm.simulate(scene, 0.1, samples=5)
+    both = first.then(fm.simulate(scene, 0.2, state=first.restart, samples=5))
+    with pytest.raises(ValueError, match="use the trajectory of each run"):
+        both.error_estimate()
