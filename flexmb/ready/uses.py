@@ -43,10 +43,10 @@ LOOPS = {"loop": scenes.looped, "loop at rest shape": scenes.looped_at_rest_shap
 FIRST = (
     "linear models", "radau5, tree, articulated", "single states of a loop", "dop853, loop, composite",
     "generalised_alpha, tree, articulated", "single states", "dop853, loop at rest shape", "dop853, loop, articulated",
-    "rk4, tree, frisch", "dop853, tree, composite",
+    "single states of a rigid tree", "rk4, tree, frisch", "dop853, tree, composite",
 )  # fmt: skip
 """Those that the canonical cases and README's first examples need, the dearest first: an installation of a checkout
-does these. They were found by what each loads: all but 26 of their 119 kernels are needed."""
+does these. They were found by what each loads: all but 26 of their 127 kernels are needed."""
 T_END, STEP = 1e-3, 2.5e-4  # s
 BATCHED: tuple[Method, ...] = ("rk4", "dop853")
 
@@ -71,9 +71,11 @@ def _uses() -> Iterator[tuple[str, Use]]:
     yield "derivatives of runs, loop", partial(_derivatives, scenes.looped)
     yield "derivatives by numbers, loop", partial(_numbers, scenes.looped)
     yield "laws that a scene may name", _laws
-    yield "batches", _batches
+    yield "batches", partial(_batches, scenes.panelled(2, "full").scene())
+    yield "batches of rigid trees", partial(_batches, scenes.pendulum().scene())
     between = iter((
         ("single states", partial(_single_states, *BODIES[:1])),
+        ("single states of a rigid tree", _single_states_of_a_rigid_tree),
         ("single states, reduced bodies", _single_states_of_reduced_bodies),
         ("single states of a loop at rest shape", partial(_single_states_of_a_loop, scenes.looped_at_rest_shape)),
         ("derivatives of runs, tree", partial(_derivatives, scenes.pendulum)),
@@ -161,6 +163,19 @@ def _single_states_of_reduced_bodies() -> None:
     nested.relative_motion(0.0, y)
 
 
+def _single_states_of_a_rigid_tree() -> None:
+    """What has kernels of its own for these; the trees of runs are rigid, too."""
+    system = compile(scenes.pendulum().scene())
+    state = system.initial_state
+    system.accelerations(state)
+    system.evaluate(state.t, state.q, state.u)
+    system.hinge_loads(state)
+    evaluator = system.evaluator()
+    evaluator(state.t, state.q, state.u)
+    evaluator(state.t, state.q.tolist(), state.u.tolist())
+    _run(scenes.pendulum().scene(), "dop853")
+
+
 def _single_states(*bodies: tuple[int, Level, Elimination]) -> None:
     for modes, level, elimination in bodies:
         system = compile(scenes.panelled(modes, level).scene(), elimination)
@@ -222,8 +237,7 @@ def _single_states_of_a_loop(builder: Callable[[], SceneBuilder]) -> None:
         system.evaluation_derivatives(state)
 
 
-def _batches() -> None:
-    scene = scenes.panelled(2, "full").scene()
+def _batches(scene: Scene) -> None:
     batch = compile_batch([scene] * 9)
     system = compile(scene)
     state = system.initial_state

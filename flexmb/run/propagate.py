@@ -73,7 +73,8 @@ class Integration:
     """An integrator with its own problem and workspace, ready to be called."""
 
     def __init__(self, system: System, algorithm: DynamicsAlgorithm, route: Route, integrator: Integrator) -> None:
-        constants, self._workspace = route.tables()
+        tables = route.tables if integrator.linearises else route.explicit or route.tables
+        constants, self._workspace = tables()
         self.system, self._integrator = system, integrator
         self.feedback: Feedback | None = None
         """The closed loop of a scene with controllers, or with events that watch signals."""

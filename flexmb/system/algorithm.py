@@ -25,7 +25,8 @@ class Route(NamedTuple):
     onto the manifold of the states. leaping: how a run continues where a step fails at a singular position, None if it
     cannot. linear: the linearisation that implicit methods need, from these tables. remembered: the arrays of used
     tables that hold the history of a motion, which a new run must reset. beginning: what the tables depend on and may
-    change between runs; tables are shared between runs in which it is equal.
+    change between runs; tables are shared between runs in which it is equal. explicit: other tables for methods that
+    take the right-hand side only, None if they are the same.
     """
 
     tables: Callable[[], tuple[Any, Any]]
@@ -35,6 +36,7 @@ class Route(NamedTuple):
     linear: Callable[[Any, Any], Linear] | None = None
     remembered: Callable[[Any], Sequence[Real | Index | Record]] = lambda _: ()
     beginning: Hashable = None
+    explicit: Callable[[], tuple[Any, Any]] | None = None
 
 
 @dataclass(frozen=True)

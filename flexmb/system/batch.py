@@ -99,12 +99,11 @@ class Batch:
         first = self.systems[0]
         self.layout, self.nq, self.nu = first.layout, first.nq, first.nu
         self.in_lanes = not first.scene.constraints
-        self._constants: list[Constants] = [first.constants]
+        self._constants: list[Constants] = [first.constants.of_rigid_tree()]
         self._spare: list[LaneTables] = []
         if self.in_lanes and not self.shares_constants:
-            self._constants = [
-                lane_constants([system.constants for system in block]) for block in blocks_of(self.systems)
-            ]
+            blocks = blocks_of(self.systems)
+            self._constants = [lane_constants([each.constants.of_rigid_tree() for each in block]) for block in blocks]
             broaden(self._constants)
 
     def __reduce__(self) -> tuple[Any, ...]:

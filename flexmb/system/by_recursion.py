@@ -17,6 +17,10 @@ MANY_SPEEDS = 40
 
 
 def _fresh(system: Mechanics) -> tuple[Any, Any]:
+    return system.explicit_constants, system.recursion_workspace()
+
+
+def _in_full(system: Mechanics) -> tuple[Any, Any]:
     return system.recursion_constants, system.recursion_workspace()
 
 
@@ -38,14 +42,17 @@ def _stiff(system: Mechanics) -> StiffKernels | None:
 
 
 def _route(system: Mechanics) -> Route:
-    return Route(lambda: _fresh(system), articulated.rhs, coordinates.project, linear=lambda *_: _linear(system))
+    return Route(
+        lambda: _in_full(system), articulated.rhs, coordinates.project, explicit=lambda: _fresh(system),
+        linear=lambda *_: _linear(system),
+    )  # fmt: skip
 
 
 ALGORITHM = DynamicsAlgorithm(
     "articulated",
     "the O(N) recursion",
     lambda: articulated.accelerations,
-    lambda system: (system.recursion_constants, system.own_recursion_workspace),
+    lambda system: (system.explicit_constants, system.own_recursion_workspace),
     _fresh,
     Mechanics.observe_recursion,
     route=_route,

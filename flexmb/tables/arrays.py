@@ -12,6 +12,8 @@ A *port* is a frame fixed to a point of a body that may deform: where a hinge, w
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from flexmb.jit.bundle import bundle
@@ -223,6 +225,11 @@ class Constants:
     def features(self) -> frozenset[str]:
         """The features that kernels for these constants contain."""
         return features.features(self)
+
+    def of_rigid_tree(self) -> Constants:
+        """The same for kernels of rigid trees, where they do in place of general ones."""
+        kernels = np.array([features.RIGID_TREES])
+        return replace(self, kernels=kernels) if features.for_rigid_tree(self) else self
 
 
 # Each reduced body has nodes i = 0..C-1, at which outboard bodies are hinged; their vectors are stacked (6C).

@@ -3,7 +3,8 @@
 A feature is a name for code that not all scenes need. A scene has it if any of its bodies does.
 
 General kernels contain all features and run every scene. They are compiled at installation, so that nothing needs to be
-compiled before the first run. Special kernels contain the features of one scene; they are faster by a tenth to a third
+compiled before the first run; so are those of rigid trees, which leave out modes and deforming nodes, for what is asked
+most often (`for_rigid_tree`). Special kernels contain the features of one scene; they are faster by a tenth to a third
 and take seconds to compile. The choice is made once, when the tables of a scene are first used, and recorded in
 `Constants.kernels`, so that all tables derived from them use the same kernels.
 """
@@ -25,7 +26,7 @@ from flexmb.typing import Flags, Index, Real, Record
 
 Kernels = Literal["auto", "general", "special"]
 _VARIABLE = "FLEXMB_KERNELS"  # environment variable with the default choice
-UNDECIDED, EVERYTHING, ITS_OWN = range(3)  # `Constants.kernels`
+UNDECIDED, EVERYTHING, ITS_OWN, RIGID_TREES = range(4)  # `Constants.kernels`
 _ASKED: ContextVar[Kernels | None] = ContextVar("kernels", default=None)
 
 HINGE = "hinge"  # "hinge 1" is the kind with number 1 in flexmb.hinges.catalogue
@@ -60,6 +61,14 @@ BALL_SPRINGS = "ball springs"
 DAMPERS = "dampers"
 ARMATURES = "armatures"
 MODAL_DAMPING = "modal damping"
+
+_KINDS = range(-1, 64)  # of hinges, axes and laws, more than there are
+OF_RIGID_TREES = frozenset({
+    SEVERAL, QUATERNIONS, WHEELS, LOADS, CONNECTORS, ONE_SIDED, ACTUATORS, FRAME_LAWS, HINGE_SPRINGS, HINGE_ACTUATORS,
+    COORDINATE_LAWS, FUNCTIONS, MOTORS, PRESCRIBED, SPRINGS, BALL_SPRINGS, DAMPERS, ARMATURES, f"{LEVEL} 0",
+    *(f"{name} {n}" for name in (HINGE, AXIS, FRAME_LAW, LAW) for n in _KINDS),
+})  # fmt: skip
+"""All that trees of rigid bodies may have: a second set of kernels that are compiled at installation."""
 
 
 class SceneTables(Protocol):
@@ -109,18 +118,25 @@ def as_asked() -> Index:
 
 
 def features(c: SceneTables) -> frozenset[str]:
-    """The features of the kernels for these tables: GENERAL alone, or those of the scene.
+    """The features of the kernels for these tables: GENERAL alone, those of rigid trees, or those of the scene.
 
     Undecided tables get general kernels if these are installed and the special ones were not compiled ahead
     (`flexmb.run.warm_up`); the decision is recorded in the tables.
     """
     if c.kernels[0] == EVERYTHING:
         return frozenset({GENERAL})
+    if c.kernels[0] == RIGID_TREES:
+        return OF_RIGID_TREES
     found = contained(c)
     if c.kernels[0] == UNDECIDED:
         c.kernels[0] = ITS_OWN if unfit() or is_warm(found) else EVERYTHING
         return features(c)
     return found
+
+
+def for_rigid_tree(c: SceneTables) -> bool:
+    """Whether the kernels of rigid trees do for these tables, in place of general ones."""
+    return GENERAL in features(c) and contained(c) <= OF_RIGID_TREES
 
 
 def contained(c: SceneTables) -> frozenset[str]:

@@ -9,11 +9,18 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.connectors.catalogue import FRAME_LAWS, LAWS
+from flexmb.hinges.catalogue import KINDS
+from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.jit.features import GENERAL
+from flexmb.levels.body import LEVELS
+from flexmb.levels.body import RIGID as RIGID_LEVEL
 from flexmb.run import situation
+from flexmb.run.propagate import integration
 from flexmb.scene.build import SceneBuilder
 from flexmb.system.compile import assembled
 from flexmb.tables import features
+from flexmb.tables.arrays import Constants
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 from tests.bounds import gamma
@@ -122,11 +129,11 @@ def test_constants_are_read_only(exact):
         fm.compile(chain().scene()).constants.speed["damping"] = 3.0
 
 
-def slope(scene: fm.System, scale: float) -> Real:
+def slope(scene: fm.System, scale: float, constants: Constants | None = None) -> Real:
     state, w = scene.initial_state, scene.recursion_workspace()
     y = np.concatenate([state.q * scale, state.u, [0.0]])
     dy = np.empty_like(y)
-    assert scene.rhs(0.1, y, dy, scene.recursion_constants, w) == OK
+    assert scene.rhs(0.1, y, dy, constants or scene.recursion_constants, w) == OK
     return dy
 
 
@@ -151,6 +158,33 @@ def test_exact_kernels_of_connectors_do_too(monkeypatch):
     compare_kernels(connected(), monkeypatch)
 
 
+def test_rigid_trees_may_have_every_hinge_and_law_but_no_level_of_flexible_bodies():
+    counts = {features.HINGE: KINDS, features.FRAME_LAW: FRAME_LAWS, features.LAW: LAWS, features.AXIS: range(3)}
+    every = {f"{name} {n}" for name, kinds in counts.items() for n in range(len(kinds))} | {f"{features.AXIS} -1"}
+    assert every <= features.OF_RIGID_TREES
+    levels = {f"{features.LEVEL} {n}" for n in range(len(LEVELS))}
+    assert levels & features.OF_RIGID_TREES == {RIGID_LEVEL}
+
+
+@pytest.mark.parametrize("scene", [random_scene(5, RIGID), chain(stiffness=2.0, damping=1.0).scene()], ids=["drawn", "sprung"])
+def test_a_rigid_tree_has_kernels_without_modes(scene, monkeypatch):
+    """Ready ones, which compute what general ones do."""
+    monkeypatch.setenv("FLEXMB_KERNELS", "general")
+    system = fm.compile(scene)
+    assert system.kernels == "general" and system.constants.features() == {GENERAL}
+    assert system.explicit_constants.features() == features.OF_RIGID_TREES
+    close(system, slope(system, 1.0), slope(system, 1.0, system.explicit_constants))
+    assert fm.compile(scene, kernels="special").explicit_constants.features() == features.contained(system.constants)
+
+
+def test_trees_with_modes_and_linearised_runs_have_general_ones(monkeypatch):
+    monkeypatch.setenv("FLEXMB_KERNELS", "general")
+    assert fm.compile(random_scene(5, EVERYTHING)).explicit_constants.features() == {GENERAL}
+    for method, found in (("dop853", features.OF_RIGID_TREES), ("rk4", features.OF_RIGID_TREES), ("radau5", {GENERAL})):
+        with integration(fm.compile(chain().scene()), "articulated", 0.0, INTEGRATORS[method]) as solve:
+            assert solve._constants.features() == found
+
+
 def test_connectors_are_compiled_kind_by_kind(exact):
     found = fm.compile(free_flying()).constants.features()
     assert {features.CONNECTORS, features.ONE_SIDED, features.FRAME_LAWS} <= found
@@ -163,6 +197,11 @@ def compare_kernels(scene, monkeypatch) -> None:
         monkeypatch.setenv("FLEXMB_KERNELS", kernels)
         found.append((fm.compile(scene), slope(fm.compile(scene), 1.0)))
     (system, general), (_, of_its_own) = found
+    close(system, general, of_its_own)
+
+
+def close(system: fm.System, general: Real, of_its_own: Real) -> None:
+    """Slopes that differ by rounding."""
     M = system.mass_matrix(system.initial_state)
     nq = system.nq
     residual = M @ (general - of_its_own)[nq:-1]
