@@ -31,16 +31,18 @@ class Making:
     again: Callable[[Settings], RunArrays]
     altered: tuple[tuple[float, System], ...] = ()
 
-    def system_at(self, t: float) -> System:
-        """The system that the output at a time (s) is of."""
-        later = bisect_right(self.altered, t, key=lambda each: each[0])
-        return self.altered[later - 1][1] if later else self.system
 
-    def has_made(self, run: RunArrays) -> bool:
-        """Whether the run is the one; an event may have ended it between two output times, with one more output."""
-        last = max(len(run.t) - 1, 0)
-        is_its = np.array_equal(run.t[:last], self.times[:last]) and np.all(run.t[last:] <= self.times[last])
-        return bool(is_its) and (run.q_names, run.u_names) == self.system.state_names
+def system_at(made_by: Making, t: float) -> System:
+    """The system that the output of a run at a time (s) is of."""
+    later = bisect_right(made_by.altered, t, key=lambda each: each[0])
+    return made_by.altered[later - 1][1] if later else made_by.system
+
+
+def has_made(made_by: Making, run: RunArrays) -> bool:
+    """Whether the run is the one; an event may have ended it between two output times, with one more output."""
+    times, last = made_by.times, max(len(run.t) - 1, 0)
+    is_its = np.array_equal(run.t[:last], times[:last]) and np.all(run.t[last:] <= times[last])
+    return bool(is_its) and (run.q_names, run.u_names) == made_by.system.state_names
 
 
 def error_estimate(trajectory: RunArrays, made_by: Making) -> dict[str, Real]:

@@ -16,7 +16,7 @@ from flexmb.output.whole import write_csv
 from flexmb.run import exports
 from flexmb.run.envelope import Envelope, envelope
 from flexmb.run.joining import joined
-from flexmb.run.making import Making, error_estimate
+from flexmb.run.making import Making, error_estimate, has_made, system_at
 from flexmb.run.peaks import part_of
 from flexmb.run.run_arrays import MarkerPath, RunArrays, Way, refuse_torn
 from flexmb.scene.open_loop import refuse_feedback
@@ -101,7 +101,7 @@ class Trajectory(RunArrays):
         made_by, found = self._making("a hinge's frame"), {name: load.copy() for name, load in self.loads.items()}
         for i, state in enumerate(map(State, self.q, self.u, self.t.tolist())):
             now = {name: load[i] for name, load in self.loads.items()}
-            at = made_by.system_at(state.t).referred_loads(state, now, axes, about)
+            at = system_at(made_by, state.t).referred_loads(state, now, axes, about)
             for name, load in at.items():
                 found[name][i] = load
         return found
@@ -117,8 +117,8 @@ class Trajectory(RunArrays):
         system, balance = made_by.system, SectionBalance(made_by.system, body, x)
         loads = np.zeros((len(self.t), len(balance.x), 6))
         for i, state in enumerate(map(State, self.q, self.u, self.t.tolist())):
-            if made_by.system_at(state.t) is not system:
-                system = made_by.system_at(state.t)
+            if system_at(made_by, state.t) is not system:
+                system = system_at(made_by, state.t)
                 balance = SectionBalance(system, body, x)
             loads[i] = balance.at(system.all_loads(state))
         return balance.loads(loads)
@@ -126,7 +126,7 @@ class Trajectory(RunArrays):
     def _making(self, wanted: str) -> Making:
         refuse_torn(self)
         made_by = self.made_by
-        if not isinstance(made_by, Making) or not made_by.has_made(self):
+        if not isinstance(made_by, Making) or not has_made(made_by, self):
             raise ValueError(
                 f"{wanted} needs a trajectory that is one run as simulate made it: use the trajectory of each run"
             )
