@@ -19,7 +19,7 @@ from flexmb.jain.response import Response, response
 from flexmb.jit.bundle import bundle
 from flexmb.jit.features import GENERAL
 from flexmb.tables.arrays import Constants, Workspace
-from flexmb.tables.features import EVERYTHING
+from flexmb.tables.features import WITH_EVERYTHING
 from flexmb.typing import Index, Real, Record
 
 ROTATION, TRANSLATION = range(2)
@@ -96,7 +96,7 @@ class ClosureConstants:
 
     def features(self) -> frozenset[str]:
         """Whether kernels for these constants contain couplings; general ones do."""
-        if self.kernels[0] == EVERYTHING:
+        if self.kernels[0] in WITH_EVERYTHING:
             return frozenset({GENERAL})
         return frozenset({COUPLINGS}) if len(self.term) else frozenset()
 

@@ -13,6 +13,7 @@ import numpy as np
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
+from flexmb.run.beside import computed
 from flexmb.run.driver import Driver, Leg
 from flexmb.run.envelope import PartialEnvelope
 from flexmb.run.followed import FollowedRun, Stretch
@@ -137,6 +138,7 @@ def run_stages(
         run, warned, was_interrupted = _looked_at(stage.system, _run(stage, start, settings, algorithm, stabilise))
         for warning in warned:
             warnings.warn(warning, stacklevel=3)
+        computed(stage.system, run.statistics.run_s)
         whole = run if whole is None else whole.then(run)
         if was_interrupted or run.status is Status.INTERRUPTED:
             raise Interrupted(whole)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from functools import partial
+from time import perf_counter
 from typing import Any, Unpack
 
 import numpy as np
@@ -14,6 +15,7 @@ from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.jit.lanes import LANES
 from flexmb.run.batch_trajectory import BatchTrajectory
+from flexmb.run.beside import computed
 from flexmb.run.interruption import interruptible
 from flexmb.run.lane_runs import BatchRun, Runs, runs
 from flexmb.run.samples import sample_times
@@ -27,6 +29,7 @@ from flexmb.system.compile import compile_batch
 from flexmb.system.tree_system import System
 from flexmb.system.watches import Said, WatchedStates, said
 from flexmb.tables import arguments
+from flexmb.tables.features import BATCHES
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 
@@ -73,10 +76,11 @@ def simulate_batch(
     _refuse_too_many(len(rows[0]), len(times), batch)
     found = runs(*rows, len(times))
     if len(rows[0]):
-        stop = found.counts.T[STOP : STOP + 1]  # stops all runs at once
+        start, stop = perf_counter(), found.counts.T[STOP : STOP + 1]  # stops all runs at once
         _, interrupted = interruptible(BatchRun(batch, times, chosen, found), (len(rows[0]), number), stop)
         if interrupted:
             raise KeyboardInterrupt
+        computed(batch.system(0), perf_counter() - start, BATCHES)
     made = _gathered(batch, times, found, len(rows[0]))
     for warning in _watched(made):
         warnings.warn(warning, SceneWarning, stacklevel=2)

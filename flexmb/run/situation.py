@@ -24,6 +24,7 @@ from flexmb.scene.tree import Coordinate, rate_name, scalar_paths
 from flexmb.scene.values import changed_at
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
+from flexmb.system.scene_arrays import kernels_of
 from flexmb.system.tree_system import System
 from flexmb.tables.features import asking
 from flexmb.tables.state import State
@@ -230,7 +231,7 @@ class Situation:
                 self.system = system
                 return
         before = self.system
-        with asking(before.kernels):  # the same kind of kernels during the whole run
+        with asking(kernels_of(before)):  # the same kind of kernels during the whole run
             self.system = assembled(scene)
         self._built.append(self.system)
         if self.system.closures is not None:
@@ -264,5 +265,5 @@ def with_stops(system: System) -> System:
     missing = [each for each in sensors if each.name not in known]
     if not missing:
         return system
-    with asking(system.kernels):
+    with asking(kernels_of(system)):
         return assembled(replace(system.scene, sensors=(*system.scene.sensors, *missing)))

@@ -13,21 +13,24 @@ from pathlib import Path
 from time import perf_counter
 from typing import Literal, get_args
 
+import numpy as np
+
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.jit.folder import cache_directory
 from flexmb.jit.warmed import note_warm
 from flexmb.run.simulate import simulate
+from flexmb.run.simulate_batch import simulate_batch
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
 from flexmb.scene.shapes import beam_section
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ON_CHAINS, RUNNING, WITH_JACOBIAN
-from flexmb.system.compile import compile
+from flexmb.system.compile import compile, compile_batch
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
-from flexmb.tables.features import asking, contained
+from flexmb.tables.features import BATCHES, asking, contained
 
 Kind = Literal["tree", "condensed", "closed"]
 
@@ -95,6 +98,29 @@ def _compile(scene: Scene, kind: Kind, methods: Sequence[Method], algorithms: Se
                 _ = run.envelope  # by recorded steps, as runs of flexible bodies are
     _pointwise(system)
     return system
+
+
+def warm_beside(scene: Scene, what: str) -> None:
+    """Compile what systems of such trees take for RECURSION or BATCHES (`flexmb.tables.features`), and note it.
+
+    The rest of their kernels stay those that came with the installation.
+    """
+    with asking("beside"):
+        if what == BATCHES:
+            system = compile(scene)
+            state, batch = system.initial_state, compile_batch([scene, scene])
+            system.accelerations_batch(np.tile(state.q, (2, 1)), np.tile(state.u, (2, 1)))
+            for method in ("dop853", "rk4"):
+                for copies in (batch, system):
+                    simulate_batch(copies, 1e-3, method, samples=2, step=1e-3 if method == "rk4" else None)
+        else:
+            system = _compile(scene, "tree", ("dop853", "rk4"), ("articulated",))
+            state = system.initial_state
+            system.hinge_loads(state)
+            system.evaluate(state.t, state.q, state.u)
+            if not scene.controllers:
+                system.evaluator()(state.t, state.q, state.u)
+    note_warm(contained(system.constants) | {what})
 
 
 def _runs(kind: Kind, algorithm: Algorithm, method: Method) -> bool:

@@ -29,6 +29,7 @@ from flexmb.jit.pointer import INDEX, MATRIX, STATUS, VECTOR, VOID, WHOLE
 from flexmb.system.mechanics import Mechanics
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
+from flexmb.tables.features import BATCHES
 from flexmb.tables.lane_tables import LaneWorkspace, lane_constants, lane_workspace, structural_difference
 from flexmb.tables.state import DynamicsError, State
 from flexmb.tables.status import NONFINITE, OK, Status
@@ -99,11 +100,11 @@ class Batch:
         first = self.systems[0]
         self.layout, self.nq, self.nu = first.layout, first.nq, first.nu
         self.in_lanes = not first.scene.constraints
-        self._constants: list[Constants] = [first.constants.of_rigid_tree()]
+        self._constants: list[Constants] = [first.constants.fastest(BATCHES)]
         self._spare: list[LaneTables] = []
         if self.in_lanes and not self.shares_constants:
             blocks = blocks_of(self.systems)
-            self._constants = [lane_constants([each.constants.of_rigid_tree() for each in block]) for block in blocks]
+            self._constants = [lane_constants([each.constants.fastest(BATCHES) for each in block]) for block in blocks]
             broaden(self._constants)
 
     def __reduce__(self) -> tuple[Any, ...]:

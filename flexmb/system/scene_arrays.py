@@ -19,7 +19,7 @@ from flexmb.scene.connectors import AlongHinge, HingeSpring
 from flexmb.system.observables import Names
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
-from flexmb.tables.features import GENERAL
+from flexmb.tables.features import ITS_OWN, RECURSION, WITH_EVERYTHING, Choice
 from flexmb.tables.state import State
 from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
@@ -47,7 +47,7 @@ class SceneArrays:
         """Whether tables of slightly other numbers are smooth functions of these around the present ones: there are no
         modes to follow others, no equal functions of time to keep apart, and none that a run sets."""
         if like is None:
-            self.recursion_constants  # noqa: B018 - raises for an elimination that does not apply
+            self.explicit_constants  # noqa: B018 - raises for an elimination that does not apply; decides on kernels
         self.signals = assembled.signals
         self.layout = numbering.layout
         self.nq, self.nu = self.layout.nq, self.layout.nu
@@ -96,12 +96,13 @@ class SceneArrays:
     def explicit_constants(self) -> Constants:
         """`recursion_constants` for accelerations, outputs and runs by explicit methods, whose kernels are ready for
         rigid trees too: they evaluate a chain of ten 1.3 times faster than general ones."""
-        return self.recursion_constants.of_rigid_tree()
+        return self.recursion_constants.fastest(RECURSION)
 
     @property
     def kernels(self) -> Literal["general", "special"]:
-        """The kernels that run it: general ones for every scene, or special ones; see `flexmb.compile`."""
-        return "general" if GENERAL in self.constants.features() else "special"
+        """The kernels of its accelerations and of runs by explicit methods: special ones, or those that came with the
+        installation; see `flexmb.compile`."""
+        return "special" if self.explicit_constants.kernels[0] == ITS_OWN else "general"
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -151,3 +152,10 @@ def _find(places: dict[str, slice], name: str) -> slice:
     if name not in places:
         raise KeyError(f"no coordinates of that name: {name!r}; there are {', '.join(sorted(places))}")
     return places[name]
+
+
+def kernels_of(arrays: SceneArrays) -> Choice:
+    """What to ask for so that other tables are run by the same kernels."""
+    if arrays.constants.kernels[0] in WITH_EVERYTHING:
+        return "beside" if arrays.kernels == "special" else "general"
+    return "special"

@@ -38,9 +38,10 @@ from flexmb.system.load_axes import Axes, referred
 from flexmb.system.mass_properties import MassProperties, mass_properties
 from flexmb.system.mechanics import Mechanics, Precision
 from flexmb.system.observables import Evaluation
+from flexmb.system.scene_arrays import kernels_of
 from flexmb.system.section_loads import AllLoads, SectionBalance, SectionLoads
 from flexmb.tables import arguments
-from flexmb.tables.features import Kernels, asking
+from flexmb.tables.features import Choice, asking
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Real
@@ -86,7 +87,7 @@ class System(Mechanics):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles hold the scene only: addresses belong to one process, and arrays share memory."""
-        return copied, (self.kernels, self.scene, self._asked, self.constraints is not None)
+        return copied, (kernels_of(self), self.scene, self._asked, self.constraints is not None)
 
     def with_numbers(self, scene: s.Scene) -> System:
         """The system of the same scene with slightly other numbers, whose tables are smooth functions of these.
@@ -94,7 +95,7 @@ class System(Mechanics):
         Modes follow those of this scene, and equal functions of time are kept apart. The scene is not checked. Closures
         close the initial values of that scene, as those of a run of it do.
         """
-        with asking(self.kernels):
+        with asking(kernels_of(self)):
             return System(scene, self._asked, self.scene, closed=self.constraints is not None)
 
     # Closures
@@ -503,7 +504,7 @@ class System(Mechanics):
         row[:] = self.observation.row(t, _NO_CLOSURES)
 
 
-def copied(kernels: Kernels, scene: s.Scene, elimination: Elimination, closed: bool) -> System:
+def copied(kernels: Choice, scene: s.Scene, elimination: Elimination, closed: bool) -> System:
     """A pickled system again, with the same kind of kernels."""
     with asking(kernels):
         return System(scene, elimination, closed=closed)

@@ -226,10 +226,10 @@ class Constants:
         """The features that kernels for these constants contain."""
         return features.features(self)
 
-    def of_rigid_tree(self) -> Constants:
-        """The same for kernels of rigid trees, where they do in place of general ones."""
-        kernels = np.array([features.RIGID_TREES])
-        return replace(self, kernels=kernels) if features.for_rigid_tree(self) else self
+    def fastest(self, what: str) -> Constants:
+        """The same for the fastest kernels that are at hand for `flexmb.tables.features` RECURSION or BATCHES."""
+        kernels = features.fastest_at_hand(self, what)
+        return self if kernels == self.kernels[0] else replace(self, kernels=np.array([kernels]))
 
 
 # Each reduced body has nodes i = 0..C-1, at which outboard bodies are hinged; their vectors are stacked (6C).

@@ -4,7 +4,7 @@ A feature is a name for code that not all scenes need. A scene has it if any of 
 
 General kernels contain all features and run every scene. They are compiled at installation, so that nothing needs to be
 compiled before the first run; so are those of rigid trees, which leave out modes and deforming nodes, for what is asked
-most often (`for_rigid_tree`). Special kernels contain the features of one scene; they are faster by a tenth to a third
+most often (`fastest_at_hand`). Special kernels contain the features of one scene; they are faster by a tenth to a third
 and take seconds to compile. The choice is made once, when the tables of a scene are first used, and recorded in
 `Constants.kernels`, so that all tables derived from them use the same kernels.
 """
@@ -26,8 +26,14 @@ from flexmb.typing import Flags, Index, Real, Record
 
 Kernels = Literal["auto", "general", "special"]
 _VARIABLE = "FLEXMB_KERNELS"  # environment variable with the default choice
-UNDECIDED, EVERYTHING, ITS_OWN, RIGID_TREES = range(4)  # `Constants.kernels`
-_ASKED: ContextVar[Kernels | None] = ContextVar("kernels", default=None)
+Choice = Kernels | Literal["beside"]
+"""With "beside", a choice of general kernels, and of special ones for what the recursion alone does."""
+# `Constants.kernels`; BY_ITSELF are general ones where nobody asked for these
+UNDECIDED, EVERYTHING, BY_ITSELF, BESIDE, ITS_OWN, RIGID_TREES = range(6)
+WITH_EVERYTHING = EVERYTHING, BY_ITSELF, BESIDE
+RECURSION = "the recursion alone"  # accelerations, outputs and runs of explicit methods; in the note of what is warm
+BATCHES = "batches"  # likewise
+_ASKED: ContextVar[Choice | None] = ContextVar("kernels", default=None)
 
 HINGE = "hinge"  # "hinge 1" is the kind with number 1 in flexmb.hinges.catalogue
 LEVEL = "level"  # "level 1" is the level with number 1 in flexmb.levels.body
@@ -90,7 +96,7 @@ class SceneTables(Protocol):
 
 
 @contextmanager
-def asking(kernels: Kernels | None) -> Iterator[None]:
+def asking(kernels: Choice | None) -> Iterator[None]:
     """Choose the kernels of tables that this thread makes within the context; None leaves the choice as it is."""
     before = _ASKED.set(kernels or _ASKED.get())
     try:
@@ -99,11 +105,13 @@ def asking(kernels: Kernels | None) -> Iterator[None]:
         _ASKED.reset(before)
 
 
-def asked() -> Kernels:
+def asked() -> Choice:
     """The choice of this thread, or of the environment; ValueError for an unknown value of FLEXMB_KERNELS."""
     found = _ASKED.get() or os.environ.get(_VARIABLE, "auto")
     match found:
         case "auto" | "general" | "special":
+            return found
+        case "beside" if _ASKED.get():
             return found
         case "exact":  # the former name
             return "special"
@@ -114,7 +122,7 @@ def asked() -> Kernels:
 
 def as_asked() -> Index:
     """`Constants.kernels` (1,) for new tables, by the choice of this thread."""
-    return np.array([{"auto": UNDECIDED, "general": EVERYTHING, "special": ITS_OWN}[asked()]])
+    return np.array([{"auto": UNDECIDED, "general": EVERYTHING, "special": ITS_OWN, "beside": BESIDE}[asked()]])
 
 
 def features(c: SceneTables) -> frozenset[str]:
@@ -123,20 +131,27 @@ def features(c: SceneTables) -> frozenset[str]:
     Undecided tables get general kernels if these are installed and the special ones were not compiled ahead
     (`flexmb.run.warm_up`); the decision is recorded in the tables.
     """
-    if c.kernels[0] == EVERYTHING:
+    if c.kernels[0] in WITH_EVERYTHING:
         return frozenset({GENERAL})
     if c.kernels[0] == RIGID_TREES:
         return OF_RIGID_TREES
     found = contained(c)
     if c.kernels[0] == UNDECIDED:
-        c.kernels[0] = ITS_OWN if unfit() or is_warm(found) else EVERYTHING
+        c.kernels[0] = ITS_OWN if unfit() or is_warm(found) else BY_ITSELF
         return features(c)
     return found
 
 
-def for_rigid_tree(c: SceneTables) -> bool:
-    """Whether the kernels of rigid trees do for these tables, in place of general ones."""
-    return GENERAL in features(c) and contained(c) <= OF_RIGID_TREES
+def fastest_at_hand(c: SceneTables, what: str) -> int:
+    """`Constants.kernels` of tables for RECURSION or BATCHES: where others have general kernels, special ones that a
+    process beside has compiled (`flexmb.run.beside`), or else those of rigid trees."""
+    general, found = GENERAL in features(c), contained(c)
+    chosen = int(c.kernels[0])
+    if not general:
+        return chosen
+    if chosen == BESIDE or (chosen == BY_ITSELF and is_warm(found | {what})):
+        return ITS_OWN
+    return RIGID_TREES if found <= OF_RIGID_TREES else chosen
 
 
 def contained(c: SceneTables) -> frozenset[str]:
