@@ -66,23 +66,10 @@ def _start(scene: Scene, what: str) -> None:
         given.seek(0)
         try:
             process = subprocess.Popen(
-                [sys.executable, "-m", "flexmb.run.beside"], stdin=given, stdout=subprocess.DEVNULL,
+                [sys.executable, "-m", "flexmb.warmup", "--beside"], stdin=given, stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL, env=environment | {"OPENBLAS_NUM_THREADS": "1"}, start_new_session=True,
             )  # fmt: skip
         except OSError as error:
             _LOGGER.warning("they are not: %s", error)
         else:
             _started.append(process)  # it works on; one that is forgotten would be warned of
-
-
-def main() -> None:
-    """The process beside: what to compile comes from its input."""
-    from flexmb.run.warm_up import warm_beside  # imported here because it runs scenes, which imports this module
-
-    if hasattr(os, "nice"):
-        os.nice(19)
-    warm_beside(*pickle.load(sys.stdin.buffer))
-
-
-if __name__ == "__main__":
-    main()

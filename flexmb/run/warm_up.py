@@ -8,6 +8,9 @@ default the kernels for the default arguments of `simulate` are compiled; --meth
 from __future__ import annotations
 
 import argparse
+import os
+import pickle
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
@@ -155,7 +158,12 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--method", action="append", choices=tuple(INTEGRATORS), help="beside dop853 and rk4")
     parser.add_argument("--algorithm", action="append", choices=RUNNING, help="beside articulated")
     parser.add_argument("--scene", action="append", choices=get_args(Kind), help="general kernels, beside trees")
+    parser.add_argument("--beside", action="store_true", help=argparse.SUPPRESS)  # see `flexmb.run.beside`
     asked = parser.parse_args(words)
+    if asked.beside:
+        if hasattr(os, "nice"):
+            os.nice(19)
+        return warm_beside(*pickle.load(sys.stdin.buffer))
     scenes: list[Kind | Scene] = [load_scene(path) for path in asked.files] or ["tree"]
     seconds = warm_up(
         ("dop853", "rk4", *(asked.method or ())),

@@ -57,7 +57,8 @@ def test_runs_and_batches_count(started, monkeypatch):
 
 
 def test_it_is_not_started_for_what_it_does_not_serve_or_nobody_wants(started, monkeypatch):
-    law = chain().sense_time("clock").user_law("mine", ["clock"], "tests.flexmb.control.laws:proportional", outputs=1).scene()
+    mine = "tests.flexmb.control.laws:proportional"
+    law = chain().sense_time("clock").user_law("mine", ["clock"], mine, outputs=1).scene()
     for scene, kernels in ((chain().scene(), "general"), (loop(), None), (law, None)):
         beside.computed(fm.compile(scene, kernels=kernels), 2.0 * beside.ENOUGH)
     system = fm.compile(chain().scene())
