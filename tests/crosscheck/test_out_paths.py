@@ -75,6 +75,7 @@ def test_a_template_that_cannot_be_written_is_one_line(runner: CliRunner, tmp_pa
 def test_a_record_on_a_full_disk_names_the_file(tmp_path: Path) -> None:
     """/dev/full takes nothing: what was there before is as it was."""
     archive = Archive(tmp_path / "records.jsonl")
+    archive._stream.close()
     archive._stream = open("/dev/full", "ab")  # noqa: SIM115
     blank = RunRecord(case="c", variant="v", role="main", engine="e", version="1", scene="s", status="did not run")
     with pytest.raises(OSError, match="No space left.*free some space") as full:

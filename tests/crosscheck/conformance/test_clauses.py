@@ -256,7 +256,11 @@ def nothing_kept(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     yield
     while KEPT:
         found = KEPT.pop()
-        found.kill() if isinstance(found, subprocess.Popen) else found.close()
+        if isinstance(found, subprocess.Popen):
+            found.kill()
+            found.wait()
+        else:
+            found.close()
 
 
 @pytest.mark.usefixtures("nothing_kept")

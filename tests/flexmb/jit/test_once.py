@@ -89,7 +89,7 @@ def test_who_is_killed_at_it_is_followed_by_the_next(tmp_path):
     time.sleep(0.5)
     assert waiting.poll() is None
     killed.kill()
-    killed.wait()
+    killed.communicate()
     assert found(waiting) == 0
     assert kinds(tmp_path / "kernels") == {".kernel"}
     assert found(start(tmp_path, 2, 2, 0.0)) == 1
