@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from flexmb.jit.progress import spent
+from flexmb.run import beside
 from tests.benchmarks.must_hold.kept import Kept, Special, now, this_commit, this_machine
 from tests.benchmarks.must_hold.row import Measured, Row
 
@@ -21,24 +23,27 @@ def measured_row(row: Row, special: bool = False) -> Kept:
     """
     with _by(None):
         found, failure = _found(row)
-    beside = None
+    other = None
     if special and found is not None:
         before = sum(spent.values())
         with _by("special"):
-            other, failure = _found(row)
-        beside = None if other is None else Special(other, sum(spent.values()) - before)
-    return Kept(row.name, now(), this_commit(), this_machine(), found, failure, "auto", beside)
+            measured, failure = _found(row)
+        other = None if measured is None else Special(measured, sum(spent.values()) - before)
+    return Kept(row.name, now(), this_commit(), this_machine(), found, failure, "auto", other)
 
 
 @contextmanager
 def _by(kernels: str | None) -> Iterator[None]:
-    """Rows take these kernels, or those of the default, whatever this process was told."""
-    told = os.environ.pop(VARIABLE, None)
+    """Rows take these kernels, or those of the default, whatever this process was told. None are compiled beside: the
+    default is measured as it is at once, and what it becomes after a while by special kernels."""
+    told, enough = os.environ.pop(VARIABLE, None), beside.ENOUGH
+    beside.ENOUGH = math.inf
     if kernels is not None:
         os.environ[VARIABLE] = kernels
     try:
         yield
     finally:
+        beside.ENOUGH = enough
         os.environ.pop(VARIABLE, None)
         if told is not None:
             os.environ[VARIABLE] = told
