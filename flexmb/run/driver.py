@@ -25,6 +25,7 @@ from flexmb.run.making import Making
 from flexmb.run.origin import Beginning
 from flexmb.run.propagate import Raw, unmoved
 from flexmb.run.restart import Restart
+from flexmb.run.run_arrays import told
 from flexmb.run.segments import Segment, SegmentEnd, Segments
 from flexmb.run.sides import DIRECTIONS, Sides
 from flexmb.run.situation import Situation
@@ -254,7 +255,7 @@ class Driver:
         # A resumed run finds events of the step that was cut short again, at instants that differ by the error of the
         # dense output. So they are recognised by their number, not by their times.
         shown = 0 if self._taken_up is None else self._taken_up.shown
-        return replace(
+        return told(
             self._whole,
             events=tuple(self._happened[shown:]),
             restart=self._restart_of(raw, raw.memory, ends, anew) if can_go_on else None,

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from flexmb.run.run_arrays import SOME, MarkerPath, RunArrays
+from flexmb.run.run_arrays import SOME, MarkerPath, Run, RunArrays
 from flexmb.typing import Real
-
-Run = TypeVar("Run", bound=RunArrays)
 
 SAME_NAMES = (
     "q_names", "u_names", "markers", "loads", "wheel_loads", "energy", "connectors", "hinge_forces",

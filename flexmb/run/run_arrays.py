@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple, assert_never
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, NamedTuple, TypeVar, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,6 +160,7 @@ class RunArrays:
                 yield name, unit, values[:, i]
 
 
+Run = TypeVar("Run", bound=RunArrays)
 Kind = Literal[
     "q", "u", "position", "quaternion", "velocity", "acceleration", "loads", "wheel_loads", "connectors", "drives",
     "hinge_forces", "energy", "work", "momentum", "signals", "power",
@@ -224,6 +225,14 @@ def labels(run: RunArrays, kind: Kind, name: str, width: int) -> list[tuple[str,
             return [(f"power.{name}[{i}]", "W") for i in range(width)]
         case _:
             assert_never(kind)
+
+
+def told(run: Run, **words: Any) -> Run:
+    """The run with other fields that are no arrays. Unlike `dataclasses.replace` it does not examine the arrays again,
+    which takes a tenth of a millisecond."""
+    found = object.__new__(type(run))
+    found.__dict__.update({each.name: getattr(run, each.name) for each in fields(run)} | words)
+    return found
 
 
 def refuse_torn(run: RunArrays) -> None:

@@ -23,7 +23,7 @@ from flexmb.run.origin import Given, Values, origin, start_time
 from flexmb.run.outputs import observed
 from flexmb.run.propagate import integration, unmoved
 from flexmb.run.restart import Restart
-from flexmb.run.run_arrays import Way
+from flexmb.run.run_arrays import Way, told
 from flexmb.run.samples import refuse_large_run, sample_times
 from flexmb.run.switching import refuse_times
 from flexmb.run.trajectory import Trajectory
@@ -204,7 +204,7 @@ def _run(
     given, stopped = dict(state) if isinstance(state, Mapping) else state, trajectory.stopped_at
     steps = trajectory.statistics.accepted_steps
     parts = partial(_followed, stage, given, settings, algorithm, stabilise, stopped, steps)
-    trajectory = replace(trajectory, ways=(Way(parts, t, stopped, (trajectory.q_names, trajectory.u_names)),))
+    trajectory = told(trajectory, ways=(Way(parts, t, stopped, (trajectory.q_names, trajectory.u_names)),))
     warned: list[Warning] = [SceneWarning(doubt) for doubt in driver.doubts]
     if start is not None and start.is_low:
         warned.append(PrecisionWarning(start.warning))
