@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import logging
 import os
-import pickle
 import subprocess
 import sys
 import tempfile
 
+import msgspec
 import numpy as np
 
 from flexmb.jit.folder import cache_directory
@@ -62,7 +62,7 @@ def _start(scene: Scene, what: str) -> None:
     )  # fmt: skip
     environment = {name: value for name, value in os.environ.items() if name != "FLEXMB_KERNELS"}
     with tempfile.TemporaryFile() as given:
-        pickle.dump((scene, what), given)
+        given.write(msgspec.json.encode((scene, what)))
         given.seek(0)
         try:
             process = subprocess.Popen(

@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike
 from flexmb.kept import kept
 from flexmb.output.whole import write_csv
 from flexmb.run import exports
+from flexmb.run.at_outputs import systems_at
 from flexmb.run.envelope import Envelope, envelope
 from flexmb.run.joining import joined
 from flexmb.run.making import Making, error_estimate, has_made, system_at
 from flexmb.run.peaks import part_of
 from flexmb.run.run_arrays import MarkerPath, RunArrays, Way, refuse_torn
-from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes
 from flexmb.system.observables import ENERGIES, Observation
@@ -109,18 +109,16 @@ class Trajectory(RunArrays):
     def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
         """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).
 
-        See `System.section_loads`. Raises DynamicsError if a state has no accelerations, NotImplementedError for a
-        scene with controllers, whose loads do not follow from the state alone.
+        See `System.section_loads`. With controllers, drives are what their outputs were. Raises DynamicsError if a
+        state has no accelerations.
         """
         made_by = self._making("a section's load")
-        refuse_feedback(made_by.system.scene, "a section's load")
-        system, balance = made_by.system, SectionBalance(made_by.system, body, x)
+        last, balance = made_by.system, SectionBalance(made_by.system, body, x)
         loads = np.zeros((len(self.t), len(balance.x), 6))
-        for i, state in enumerate(map(State, self.q, self.u, self.t.tolist())):
-            if system_at(made_by, state.t) is not system:
-                system = system_at(made_by, state.t)
-                balance = SectionBalance(system, body, x)
-            loads[i] = balance.at(system.all_loads(state))
+        for i, system in enumerate(systems_at(self, made_by)):
+            if system is not last:
+                last, balance = system, SectionBalance(system, body, x)
+            loads[i] = balance.at(system.all_loads(self.state_at(i)))
         return balance.loads(loads)
 
     def _making(self, wanted: str) -> Making:

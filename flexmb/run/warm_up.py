@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import argparse
 import os
-import pickle
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Literal, get_args
 
+import msgspec
 import numpy as np
 
 from flexmb.integrate.catalogue import INTEGRATORS
@@ -163,7 +163,7 @@ def main(words: Sequence[str] | None = None) -> None:
     if asked.beside:
         if hasattr(os, "nice"):
             os.nice(19)
-        return warm_beside(*pickle.load(sys.stdin.buffer))
+        return warm_beside(*msgspec.json.decode(sys.stdin.buffer.read(), type=tuple[Scene, str]))
     scenes: list[Kind | Scene] = [load_scene(path) for path in asked.files] or ["tree"]
     seconds = warm_up(
         ("dop853", "rk4", *(asked.method or ())),

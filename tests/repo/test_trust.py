@@ -27,6 +27,7 @@ PLACES = {
     "flexmb/jit/linking.py": "modules of flexmb and of what it compiles with",
     "flexmb/jit/numbered.py": "text of flexmb's own",
     "flexmb/jit/stored.py": "compiled kernels",
+    "flexmb/run/beside.py": "flexmb's own warming up, for a scene without laws of users",
     "crosscheck/engines/registry.py": "built-in engines, plug-ins, and what a caller in Python names, never a file",
     "crosscheck/references/routes.py": "exact.py of a case, by crosscheck regenerate",
     "crosscheck/stability/catalogue.py": "maps of crosscheck's own",

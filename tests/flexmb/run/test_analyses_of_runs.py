@@ -1,4 +1,4 @@
-"""Loads in other frames, loads across sections and error estimates of runs in which events alter the scene."""
+"""Loads in other frames, loads across sections and error estimates of runs with events and controllers."""
 
 from __future__ import annotations
 
@@ -12,17 +12,20 @@ from flexmb.scene.shapes import beam_section
 SECTION = beam_section(E=7e10, G=2.7e10, A=4e-4, Iy=5e-9, Iz=5e-9, rho=2700.0)
 
 
-def boom(*actions: fm.Action) -> fm.Scene:
-    """A beam that swings about an axis askew to it, and is held, made heavier or let go at an angle."""
-    return (
+def boom(*actions: fm.Action, **sampling: float) -> fm.Scene:
+    """A beam that swings and is held or made heavier at an angle; with sampling, a controller drives its wrist."""
+    torque = fm.ControlSignal(source="law", gain=0.5) if sampling else None
+    builder = (
         fm.SceneBuilder("boom", gravity=(0, 0, -9.81))
         .beam("boom", length=1.0, section=SECTION, elements=6, modes=fm.Modes(count=2, families=("bending_z",)))
         .rigid_body("tip", mass=0.5, com=(0.1, 0.0, 0.0), inertia=(0.01, 0.01, 0.01))
         .revolute("root", "ground", "boom", axis=(0.0, 1.0, 0.0), angle=-0.4)
-        .revolute("wrist", "boom", "tip", axis=(0.0, 1.0, 0.0), parent_node="tip", damping=0.1)
+        .revolute("wrist", "boom", "tip", axis=(0.0, 1.0, 0.0), parent_node="tip", damping=0.1, torque=torque)
         .event("reached", "root.rotation", 0.3, *actions)
-        .scene()
     )  # fmt: skip
+    if sampling:
+        builder.sense_coordinate("angle", "wrist").pid("law", "angle", kp=3.0, ki=2.0, **sampling)
+    return builder.scene()
 
 
 @pytest.mark.parametrize("action", [
@@ -36,6 +39,14 @@ def test_loads_are_those_of_the_scene_as_it_is_then(action: fm.Action) -> None:
     np.testing.assert_allclose(across, found, atol=1e-9 * np.max(np.abs(found)))
     by_first = fm.compile(boom(action)).section_loads(run.last_state, "boom", [0.0]).load[0]
     assert np.max(np.abs(by_first - across[-1])) > 1e-3 * np.max(np.abs(found))  # the scene before the event is wrong
+
+
+@pytest.mark.parametrize("sampling", [{"setpoint": 0.1}, {"period": 0.07, "delay": 0.01}], ids=["steady", "sampled"])
+def test_loads_are_those_under_the_controllers(sampling: dict[str, float]) -> None:
+    run = fm.simulate(boom(fm.Change(path="tip.mass_kg", value=2.0), **sampling), 0.8, samples=41)
+    assert len(run.events) == 1 and np.ptp(run.signals["law"]) > 0.1
+    found, across = run.loads_in("outboard")["root"], run.section_loads("boom", [0.0]).load[:, 0]
+    np.testing.assert_allclose(across, found, atol=1e-9 * np.max(np.abs(found)))
 
 
 @pytest.mark.parametrize("action", [fm.Latch(coordinate="root.rotation"), fm.EndRun()], ids=["held", "over"])
