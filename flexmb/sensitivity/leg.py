@@ -122,8 +122,10 @@ class Variation:
         if status == Status.MAX_STEPS and most < settings.max_steps:
             raise DynamicsError(
                 f"derivatives stopped at t = {t:g} s: they would take more than {MORE_STEPS} times the steps of the "
-                "run, because they grow without bound there: a closed chain has no derivative beyond a singular "
-                "position, where branches of its motion meet; start elsewhere, or end the run before"
+                "run. Either they grow without bound there: a closed chain has no derivative beyond a singular "
+                "position, where branches of its motion meet; start elsewhere, or end the run before. Or they round "
+                f"by more than the tolerances, atol = {settings.atol:g}, as where a loop has a body that is light "
+                "beside the others: give a larger rtol and atol"
             )
         self.check(status, t)
         return [self.parted(row) for row in out[: counts[SAMPLES]]]
