@@ -88,7 +88,10 @@ def super_element(
     if not rows:
         raise SuperElementError("there is no node with a displacement: list nodes and displacements for the rows of K")
     if not len(K) == len(M) == rows:
-        raise SuperElementError(f"K has {len(K)} rows, M {len(M)}, and the nodes {rows} displacements: they must agree")
+        solid = "; a node of a solid has three: give its dofs as 123" if len(K) == len(M) == 3 * len(position) else ""
+        raise SuperElementError(
+            f"K has {len(K)} rows, M {len(M)}, and the nodes {rows} displacements: they must agree{solid}"
+        )
     element = SuperElement(K, M, numbers, position, place)
     _check_stiffness(element)
     _check_mass(element)

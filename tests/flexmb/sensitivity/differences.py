@@ -50,19 +50,23 @@ def differences(
     return Differences(found, np.abs(found - before), events)
 
 
-def scatter(scene: fm.schema.Scene, t_end: float, name: str, of: Sequence[str], step: float, slopes: Real) -> Real:
-    """(K,) What rounding of the runs adds to `differences` of three levels at the end, as a standard deviation.
+def rounding(
+    scene: fm.schema.Scene, t_end: float, apart: dict[str, float], of: Sequence[str], slopes: Real, **tolerances: float
+) -> Real:
+    """(K,) Standard deviation by which runs round at the end.
 
-    Its own estimate of the error takes the rows for smooth: where they are rounding it is by chance any fraction of it.
-    Runs whose numbers differ by next to nothing differ by rounding alone, once their `slopes` (K,) are taken off; the
-    last entry of Romberg's table, (64 d2 - 20 d1 + d0) / 45, has 4.1 of it over the step.
+    Rounding is left of runs whose numbers differ by next to nothing, by up to `apart`, once the `slopes` (K,P) by these
+    are taken off. Where differences are small, their own estimates of the error take it for smooth, and are by chance
+    any fraction of it.
     """
-    value, apart = Number(scene, name).value, 1e-4 * step * np.array([-1.0, -0.6, -0.1, 0.3, 0.7, 0.9])
-    ends = [
-        outputs(fm.simulate(scene.with_values({name: value + each}), t_end, samples=2, **TIGHT), of)[-1] - each * slopes
-        for each in apart
-    ]
-    return 4.1 * np.std(ends, axis=0, ddof=1) / step
+    value = {name: Number(scene, name).value for name in apart}
+    ends = []
+    for share in (-1.0, -0.6, -0.1, 0.3, 0.7, 0.9):
+        beside = scene.with_values({name: value[name] + share * most for name, most in apart.items()})
+        ends.append(outputs(fm.simulate(beside, t_end, samples=2, **tolerances), of)[-1])
+        ends[-1] -= share * slopes @ np.array([*apart.values()])
+    found: Real = np.std(ends, axis=0, ddof=1)
+    return found
 
 
 def _extrapolated(rows: list[Real]) -> tuple[Real, Real]:

@@ -12,7 +12,7 @@ import flexmb as fm
 from flexmb.scene.schema import Scene
 from tests.flexmb.closure.loops import LIGHT, RATIOS, light_loops, lighter
 from tests.flexmb.entry.test_tangent import extrapolated
-from tests.flexmb.sensitivity.differences import differences, relative_error, scatter
+from tests.flexmb.sensitivity.differences import TIGHT, differences, relative_error, rounding
 
 ROOT = Path(__file__).parents[3]
 NUMBER, OUTPUT = "crank.com_m.0", "drive.rotation.rate"
@@ -58,6 +58,8 @@ def test_accelerations_at_a_state_agree_with_differences(ratio):
 
 SLOW = ((29, 1e-4), (29, 1e-6), (72, 1e-6))
 """Runs of seed 29 round by 2e-12 of a rate of 1.4 at any tolerance, ten times those of the others."""
+IN_ROMBERG = 4.1
+"""Of the runs' rounding over the step, in (64 d2 - 20 d1 + d0) / 45, the last entry of Romberg's table."""
 
 
 @pytest.mark.filterwarnings("ignore::flexmb.SceneWarning")  # of what random scenes are like
@@ -75,8 +77,8 @@ def test_a_run_of_a_random_loop_agrees_with_differences(seed, ratio):
     size = np.max(np.abs(found.derivatives[-1]))
     for k, name in enumerate(by):
         expected = differences(scene, 0.02, name, of, step, samples=2)
-        rounding = scatter(scene, 0.02, name, of, step, expected.outputs[-1])
-        allowed = 3.0 * expected.error[-1] + 4.0 * rounding + 1e-8 * size
+        noise = rounding(scene, 0.02, {name: 1e-4 * step}, of, expected.outputs[-1][:, None], **TIGHT)
+        allowed = 3.0 * expected.error[-1] + 4.0 * IN_ROMBERG * noise / step + 1e-8 * size
         off = np.abs(found.derivatives[-1, :, k] - expected.outputs[-1])
         assert np.all(off < allowed)
         assert np.max(np.abs(expected.outputs[-1]) - 100.0 * allowed) > 0.0, "a wrong sign would be noticed"
