@@ -51,7 +51,7 @@ def inp_nodes(file: str, text: str) -> Nodes:
         elif inside:
             words = [word.strip() for word in line.split(",")]
             try:
-                place = [real(word) if word else 0.0 for word in (*words[1:4], "", "")][:3]
+                place = [real(word) if word else 0.0 for word in (*words[1:4], "", "", "")][:3]
                 _add(found, number_of_node(words[0]), place)
             except ValueError:
                 raise SuperElementError(f"{file}, line {number}: a node is number, x, y, z: correct it") from None

@@ -10,6 +10,7 @@ import scipy.io
 import scipy.sparse
 
 from flexmb.interchange.superelement import SuperElementError, read_super_element
+from flexmb.interchange.superelement.meshes import grid_nodes, inp_nodes
 from flexmb.interchange.superelement.nastran import dmig_matrices, op4_matrices
 from flexmb.interchange.superelement.op4_binary import binary_op4_matrices
 from tests.flexmb.interchange import frames, made_matrices
@@ -113,6 +114,11 @@ def test_nodes_of_input_files_are_those_of_the_table(kind, tmp_path):
         given = written(matrices, tmp_path)
         found, wanted = (read_super_element(*given, nodes) for nodes in (file, tmp_path / "nodes.csv"))
         assert np.array_equal(found.position, wanted.position) and np.array_equal(found.place, wanted.place)
+
+
+def test_coordinates_that_are_left_out_are_zero():
+    assert inp_nodes("m.inp", "*NODE\n4\n5, 1.0\n").position == [[0.0] * 3, [1.0, 0.0, 0.0]]
+    assert grid_nodes("m.bdf", "GRID,4\nGRID,5,,1.0\n").position == [[0.0] * 3, [1.0, 0.0, 0.0]]
 
 
 MESHES = {
