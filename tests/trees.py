@@ -226,7 +226,8 @@ def _exact_beam(scene: SceneBuilder, rng: Generator, name: str, recipe: Recipe) 
     damping = {} if recipe.conservative else {"damping_ratio": 0.01, "viscosity_s": 1e-3}
     beam: dict[str, Any] = {
         "length": length, "elements": 3, "section": [root, tip], "level": "exact", "tip_masses": lumps,
-        "nodes": [middle], "modes": msgspec.structs.replace(modes, **damping), "points": "section", "theory": theory,
+        "nodes": [middle], "modes": msgspec.structs.replace(modes, cuts=(), **damping),
+        "points": "section", "theory": theory,
     }  # fmt: skip
     scene.beam(name, **beam)
     alone = SceneBuilder("alone").beam(name, **beam).weld("clamp", "ground", name).scene()

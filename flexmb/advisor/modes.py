@@ -129,7 +129,7 @@ def _beam(beam: BeamBody, count: int, level: Level, static: bool, families: tupl
     own = beam.modes.families if beam.modes.polynomials is None else all_families(beam)
     modes = replace(
         beam.modes, count=count, static=static, families=families or own,
-        polynomials=None, pieces=1, cuts=(), points=None,
+        polynomials=None, pieces=1, cuts=None, points=None,
     )  # fmt: skip
     return _damped(replace(beam, level=level), modes)
 

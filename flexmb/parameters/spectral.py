@@ -84,8 +84,8 @@ def derivative(
             break
     if not best.error <= LARGEST:
         raise NotSmooth(
-            trouble
-            or f"it is known to {best.error:.1g} of its size only: there is a kink, frequencies nearly cross, or the "
+            trouble if best.error == np.inf
+            else f"it is known to {best.error:.1g} of its size only: there is a kink, frequencies nearly cross, or the "
             "effect of the number drowns in rounding"
         )
     return best

@@ -157,9 +157,11 @@ class Modes(SceneStruct, frozen=True, kw_only=True):
     `static` adds attachment modes (unit tip force and moment in the chosen families) to the eigenmodes; with `count` 0
     they are the only modes.
 
-    At level "exact" the strains are polynomials along each of `pieces` equal parts of the beam, or, if `cuts` names
-    nodes, of its parts between these; strains may jump from one part to the next, as they do at a node with a load, a
-    hinge or a lump, and where the section does (`flexmb.surrogate.cut_where_loaded`). There are `count` of them for
+    At level "exact" the strains are polynomials along each piece of the beam, and may jump from one to the next, as
+    they do at lumps, where the section does, and at nodes with a hinge, a closure, a connector, a load, a wheel or a
+    point mass. There the beam is cut by itself, into 8 pieces at most, unless `cuts` or `pieces` are given. `cuts`
+    names the nodes where it is cut, beside lumps and steps of the section; `cuts = []` leaves it whole. Each part
+    between cuts is divided into `pieces` equal ones. There are `count` polynomials for
     each curvature of the chosen families and for torsion, and two fewer, but one at least, for stretch beside bending
     and, in theory "timoshenko", for the shear of each plane; or as many as `polynomials` says. Attachment modes are
     contained in them. `points`: Gauss points of a piece, three more than the largest number of its polynomials if not
@@ -175,7 +177,7 @@ class Modes(SceneStruct, frozen=True, kw_only=True):
     static: bool = False
     polynomials: StrainPolynomials | None = None
     pieces: Annotated[int, whole(1, MOST_PIECES)] = 1
-    cuts: tuple[str, ...] = ()
+    cuts: tuple[str, ...] | None = None
     points: Annotated[int, whole(1, MOST_POINTS)] | None = None
     viscosity_s: Damping = 0.0
     damping_ratio: Ratio | tuple[Ratio, ...] = 0.0

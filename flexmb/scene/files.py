@@ -21,6 +21,7 @@ from flexmb.output.whole import write_whole
 from flexmb.scene.bodies import ModalBody, SidBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.loaded import remember
+from flexmb.scene.pieces import ByThemselves
 from flexmb.scene.problems import Defect, SceneError
 from flexmb.scene.reading import Unreadable, parse_toml, read_text
 from flexmb.scene.schema import Scene
@@ -107,7 +108,7 @@ def _sparse(value: Any) -> Any:
         table: dict[str, Any] = {str(config.tag_field): config.tag} if config.tag is not None else {}
         for field in msgspec.structs.fields(value):
             item = getattr(value, field.name)
-            if field.required or item != field.default:
+            if field.required or not (item == field.default or isinstance(item, ByThemselves)):  # read, they come again
                 table[field.encode_name] = _sparse(item)
         return table
     if isinstance(value, list | tuple):

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
+from msgspec import structs
 
 from flexmb.scene import connectors, couplings, hinges
 from flexmb.scene.bodies import (
@@ -59,6 +60,7 @@ from flexmb.scene.freedoms import AngularCoordinate, Freedom, LinearCoordinate, 
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import *  # noqa: F403
 from flexmb.scene.hinges import Closure, Hinge
+from flexmb.scene.pieces import cut_by_themselves
 from flexmb.scene.quantities import PURE, Damping, Lump, NotNegative, Number, Positive, unit, within
 from flexmb.scene.values import with_values
 
@@ -191,6 +193,15 @@ class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
     sensors: tuple[Sensor, ...] = ()
     controllers: tuple[Controller, ...] = ()
     events: tuple[SceneEvent, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Beams of level "exact" are cut where something is joined to them or acts on them, unless they say where."""
+        try:
+            bodies = cut_by_themselves(self)
+        except (AttributeError, TypeError):  # values of other types, which checks name with their places
+            return
+        if any(new is not body for new, body in zip(bodies, self.bodies, strict=True)):
+            structs.force_setattr(self, "bodies", bodies)
 
     @property
     def constraints(self) -> tuple[Closure | Coupling, ...]:

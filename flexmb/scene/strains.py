@@ -14,7 +14,7 @@ from typing import Literal, assert_never
 import numpy as np
 
 from flexmb.scene.bodies import FAMILIES, MOST_POINTS, BeamBody, BeamStation, Family, StrainPolynomials
-from flexmb.scene.pieces import piece_count
+from flexmb.scene.pieces import cuts, piece_count
 from flexmb.scene.rest_turn import RestTurn, follow, turns_of_pieces
 from flexmb.scene.sections import (
     ABOUT_Y,
@@ -149,6 +149,9 @@ def in_words(body: BeamBody) -> str:
     possible = _of_families(body, FAMILIES)
     if held := ", ".join(strain for strain in possible if strain not in own):
         found += f"; held: {held}"
+    if body.level == "exact" and (pieces := piece_count(body)) > 1:
+        at = ", cut at x = " + ", ".join(f"{x:g}" for x in places) + " m" if (places := cuts(body)) else ""
+        found += f"; in each of {pieces} pieces{at}"
     if borrows_inertia(body):
         values = twist_inertia(body, list(body.stations))
         size = " to ".join(dict.fromkeys(f"{value:.3g}" for value in (values.min(), values.max())))

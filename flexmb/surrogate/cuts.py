@@ -28,8 +28,8 @@ def cut_where_loaded(scene: Scene, body: str | None = None) -> Scene:
 
 
 def _cut(scene: Scene, beam: BeamBody) -> Scene:
-    nodes, cuts = list(beam.nodes), list(beam.modes.cuts)
-    for x in across(scene, beam):
+    nodes, cuts, found = list(beam.nodes), list(beam.modes.cuts or ()), across(scene, beam)
+    for x in found:
         node = next((node for node in nodes if node.x_m == x), None)
         if node is None:
             taken = {node.name for node in nodes}
@@ -37,7 +37,7 @@ def _cut(scene: Scene, beam: BeamBody) -> Scene:
             node = BeamNode(name=name, x_m=x)
             nodes.append(node)
         cuts.append(node.name)
-    if len(cuts) == len(beam.modes.cuts):
+    if not found:
         return scene
     if any(state.body == beam.name for state in scene.modal_states):
         raise ValueError(f'beam "{beam.name}": its modal state is for other strains; cut it first, or leave that out')

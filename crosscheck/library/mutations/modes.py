@@ -46,7 +46,7 @@ def _of_small_deflection(body: Body, level: Level) -> Body:
     if is_curved(body):
         raise CaseError(f'beam "{body.name}" is curved at rest, which only level "exact" can express')
     count = max(polynomials(body).values())
-    modes = replace(body.modes, count=count, polynomials=None, pieces=1, cuts=(), points=None)
+    modes = replace(body.modes, count=count, polynomials=None, pieces=1, cuts=None, points=None)
     return replace(body, level=level, modes=modes, elements=max(body.elements, 2 * count))
 
 

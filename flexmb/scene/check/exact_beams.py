@@ -8,7 +8,7 @@ from math import hypot
 from flexmb.scene.bodies import FINER, MOST_POINTS, MOST_POLYNOMIALS, BeamBody, Modes
 from flexmb.scene.check.numbers import in_range
 from flexmb.scene.convert import ROOT
-from flexmb.scene.pieces import across, piece_count
+from flexmb.scene.pieces import across, cut_itself, piece_count
 from flexmb.scene.problems import Defect, Doubt, Place, closest
 from flexmb.scene.rest_curve import MOST_TURN, is_bent, is_curved
 from flexmb.scene.rest_turn import follow, turn_at_rest, turns_of_pieces
@@ -71,7 +71,7 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
         what = f"{numbers}: one body with so many takes minutes and gigabytes to make"
         remedy = f"give {MOST_MODES} at most; several bodies that are welded together cost O(N)"
         yield Defect(str(modes.key("pieces")), what, remedy)
-    yield from damping(modes, body.modes, count)
+    yield from damping(modes, body.modes, count, or_whole(body))
 
 
 def _unfollowed(place: Place, body: BeamBody, found: dict[Strain, int]) -> Iterator[Doubt]:
@@ -114,13 +114,13 @@ def _strains(place: Place, body: BeamBody) -> Iterator[Defect]:
     if modes.polynomials is None and modes.count > MOST_POLYNOMIALS:
         yield Defect(str(place.key("count")), f"{counted(modes.count)} polynomials", FINER)
     places = {node.name: node.x_m for node in body.nodes}
-    for i, name in enumerate(modes.cuts):
+    for i, name in enumerate(modes.cuts or ()):
         spot = str(place.key("cuts", i))
         if name not in places:
             yield Defect(spot, f'the beam lists no node "{name}"', closest(name, places))
         elif not 0.0 < places[name] < body.length_m:
             yield Defect(spot, f'node "{name}" is at the end of the beam', "leave it out: the beam ends there anyway")
-        elif any(places.get(other) == places[name] for other in modes.cuts[:i]):
+        elif any(places.get(other) == places[name] for other in (modes.cuts or ())[:i]):
             yield Defect(spot, f'the beam is already cut where node "{name}" is', "leave one of them out")
 
 
@@ -133,7 +133,8 @@ def jumps(scene: Scene) -> Iterator[Doubt]:
             yield Doubt(
                 str(ROOT.key("bodies", i, "modes", "cuts").named(f'body "{body.name}"')),
                 f"strains jump at x = {x:g} m ({what}){more}, where one polynomial goes on: it converges slowly there",
-                "cut the beam there: cuts = [its node], or flexmb.surrogate.cut_where_loaded",
+                "cut the beam there: cuts = [its node] or flexmb.surrogate.cut_where_loaded, or at many places by "
+                "flexmb.surrogate.substructured",
                 "uncut_beam",
             )
 
@@ -152,9 +153,14 @@ def without_strains(place: Place, body: BeamBody) -> Iterator[Defect]:
             yield Defect(str(spot), what, 'make the level "exact", or join straight beams by welds')
 
 
-def damping(place: Place, modes: Modes, count: int) -> Iterator[Defect]:
-    """Damping ratios of a beam with `count` modes."""
+def or_whole(body: BeamBody) -> str:
+    """The other remedy where a number of modes is not that of a beam which was cut by itself."""
+    return "; cuts = [] leaves the beam in one piece" if body.level == "exact" and cut_itself(body) else ""
+
+
+def damping(place: Place, modes: Modes, count: int, whole: str = "") -> Iterator[Defect]:
+    """Damping ratios of a beam with `count` modes; `whole`: see `or_whole`."""
     ratios = modes.damping_ratio
     if isinstance(ratios, tuple) and len(ratios) != count:
         what = f"{len(ratios)} damping ratios for {count} modes"
-        yield Defect(str(place.key("damping_ratio")), what, "give one ratio for all modes, or one for each")
+        yield Defect(str(place.key("damping_ratio")), what, f"give one ratio for all modes, or one for each{whole}")

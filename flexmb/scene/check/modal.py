@@ -11,6 +11,7 @@ import numpy as np
 from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody
 from flexmb.scene.check import inertia
 from flexmb.scene.check.beams import mode_count
+from flexmb.scene.check.exact_beams import or_whole
 from flexmb.scene.check.second_order import second_order
 from flexmb.scene.check.walk import entries, sound
 from flexmb.scene.modal_data import ModalArrays, modal_arrays
@@ -58,7 +59,8 @@ def modal_states(scene: Scene) -> Iterator[Defect]:
         for key, given, required in (("coordinates", state.coordinates, True), ("rates", state.rates, False)):
             if count is not None and len(given) != count and (given or required):
                 what = f'{len(given)} modal {key} for the {count} modes of body "{body.name}"'
-                yield Defect(str(place.key(key)), what, f"give {count} values")
+                whole = or_whole(body) if isinstance(body, BeamBody) else ""
+                yield Defect(str(place.key(key)), what, f"give {count} values{whole}")
 
 
 def _count(body: BeamBody | ModalBody) -> int | None:

@@ -1,4 +1,4 @@
-"""Beams of level exact that are cut at nodes: where their strains jump, and that it is said where they are not."""
+"""Beams of level exact are cut where their strains jump, by themselves; and it is said where they are not."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from numpy.testing import assert_allclose
 
 import flexmb as fm
 from flexmb.advisor.modes import with_strains
+from flexmb.modal.exact import exact_model
+from flexmb.scene.files import dumps, loads
 from flexmb.scene.pieces import across, edges
 from flexmb.surrogate import cut_where_loaded, substructured
 from flexmb.system.watches import WAIVERS
@@ -46,6 +48,18 @@ def frame(count: int, **modes: Any) -> fm.Scene:
     )
 
 
+def stem_of(scene: fm.Scene) -> fm.BeamBody:
+    body = scene.bodies[0]
+    assert isinstance(body, fm.BeamBody)
+    return body
+
+
+def with_modes(scene: fm.Scene, **modes: Any) -> fm.Scene:
+    """The scene with other modes of its stem."""
+    own = stem_of(scene)
+    return replace(scene, bodies=(replace(own, modes=replace(own.modes, **modes)), *scene.bodies[1:]))
+
+
 def at_rest(scene: fm.Scene) -> np.ndarray:
     """Markers (3,3) at the equilibrium."""
     system = fm.compile(scene)
@@ -55,13 +69,13 @@ def at_rest(scene: fm.Scene) -> np.ndarray:
 
 
 def test_a_frame_cut_at_its_port_converges_as_fast_as_a_smooth_beam() -> None:
-    """Uncut, four polynomials leave 2.9e-2 L and ten 1.0e-2 L, and the scene says so."""
+    """It is by default. Left whole, four polynomials leave 2.9e-2 L and ten 1.0e-2 L, and the scene says so."""
     truth = at_rest(substructured(frame(9), "stem", ["port"]))
     with pytest.warns(fm.SceneWarning, match=r'strains jump at x = 0.37 m \(hinge "fork" at node "port"\)'):
-        uncut = at_rest(frame(4))
-    assert np.max(np.abs(uncut - truth)) > 1e-2
+        whole = at_rest(frame(4, cuts=()))
+    assert np.max(np.abs(whole - truth)) > 1e-2
     for count, error in ((4, 1e-6), (6, 1e-8)):
-        one = at_rest(cut_where_loaded(frame(count)))
+        one = at_rest(frame(count))
         assert_allclose(one, truth, atol=error)
         assert_allclose(at_rest(frame(count, cuts=("port",))), one, atol=1e-12)
         assert_allclose(at_rest(substructured(frame(count), "stem", [PORT])), one, atol=1e-9)
@@ -101,21 +115,80 @@ PORTS = {
 @pytest.mark.parametrize("kind", PORTS)
 def test_whatever_is_joined_to_a_node_inside_is_found_and_cut(kind: str) -> None:
     builder = stem(fm.Modes(count=2, families=PLANE))
-    assert across(builder.scene(), builder.scene().bodies[0]) == {}
+    assert across(builder.scene(), builder.scene().bodies[0]) == {} and stem_of(builder.scene()).modes.cuts is None
     scene = PORTS[kind](builder).scene()
-    assert list(across(scene, scene.bodies[0])) == [PORT]
-    cut = cut_where_loaded(scene)
-    assert cut.bodies[0].modes.cuts == ("port",)
-    assert across(cut, cut.bodies[0]) == {} and cut_where_loaded(cut) is cut
+    assert stem_of(scene).modes.cuts == ("port",)
+    assert across(scene, scene.bodies[0]) == {} and cut_where_loaded(scene) is scene
+    whole = with_modes(scene, cuts=())
+    assert list(across(whole, whole.bodies[0])) == [PORT]
+    assert cut_where_loaded(whole) == scene
+
+
+def test_a_scene_chooses_anew_where_it_is_changed() -> None:
+    """Nothing of it stays where nothing is joined any more, or the level is another; what is asked for does."""
+    scene = frame(2)
+    assert stem_of(scene).modes.cuts == ("port",) and stem_of(loads(dumps(scene))).modes.cuts == ("port",)
+    assert "cuts" not in dumps(scene) and "cuts = []" in dumps(frame(2, cuts=()))
+    alone = replace(scene, hinges=scene.hinges[:1], bodies=scene.bodies[:1], loads=(), markers=scene.markers[:2])
+    assert stem_of(alone).modes.cuts is None
+    assert stem_of(scene.with_values({"stem.level": "full"})).modes.cuts is None
+    assert stem_of(frame(2, pieces=2)).modes.cuts is None and stem_of(frame(2, cuts=("free",))).modes.cuts == ("free",)
+
+
+def test_many_places_are_told_and_not_cut() -> None:
+    """A beam of twelve pieces would cost a hundred times one of a single piece."""
+    lumps = [fm.TipMass(x_m=i / 12.0, mass_kg=0.1) for i in range(1, 12)]
+    few, many = (stem(fm.Modes(count=2, families=PLANE), tip_masses=each).scene() for each in (lumps[:7], lumps))
+    assert len(edges(few.bodies[0])) == 9 and len(edges(many.bodies[0])) == 2
+    assert [str(each.waiver) for each in (*fm.check_scene(few), *fm.check_scene(many))] == ["uncut_beam"]
 
 
 def test_lumps_and_steps_of_the_section_are_found_and_get_nodes() -> None:
-    scene = stem(fm.Modes(count=2, families=PLANE), section=STEPPED, tip_masses=[LUMP]).scene()
+    by_itself = stem_of(stem(fm.Modes(count=2, families=PLANE), section=STEPPED, tip_masses=[LUMP]).scene())
+    assert_allclose(edges(by_itself), [0.0, 0.25, 0.6, 1.0])
+    scene = stem(fm.Modes(count=2, families=PLANE, cuts=()), section=STEPPED, tip_masses=[LUMP]).scene()
     doubts = [each for each in fm.check_scene(scene) if each.waiver == "uncut_beam"]
     assert len(doubts) == 1 and "x = 0.25 m (a step of the section) and 1 more" in str(doubts[0])
     cut = cut_where_loaded(scene).bodies[0]
     assert isinstance(cut, fm.BeamBody)
     assert cut.modes.cuts == ("cut_1", "cut_2") and [node.x_m for node in cut.nodes[2:]] == [0.25, 0.6]
+
+
+@pytest.mark.parametrize(("stiffness", "is_told", "left"), [(1.5, False, 1.5e-4), (3.0, True, 1.4e-3)])
+def test_sharp_kinks_of_the_stiffness_are_told(stiffness: float, is_told: bool, left: float) -> None:
+    """Of a root as stiff as that, tapered to the middle: what 4 polynomials leave across it."""
+    section = [replace(SECTION, EIz_Nm2=stiffness), replace(SECTION, x_m=0.5), replace(SECTION, x_m=1.0)]
+    builder = stem(fm.Modes(count=4, families=PLANE), section=section)
+    scene = builder.force("f", "stem", node="tip", direction=(0, 1, 0), function=fm.Constant(value=5.0)).scene()
+    doubts = [str(each) for each in fm.check_scene(scene)]
+    assert bool(doubts) == is_told and all("x = 0.5 m (a kink of the stiffness)" in each for each in doubts)
+    assert stem_of(cut_where_loaded(scene)).modes.cuts == (("cut_1",) if is_told else None)
+    quiet = replace(scene, allow=(*scene.allow, "uncut_beam"))
+    fine = substructured(quiet, "stem", [0.5], polynomials=8)
+    assert np.max(np.abs(at_rest(quiet) - at_rest(fine))) == pytest.approx(left, rel=0.3)
+
+
+@pytest.mark.parametrize("path", ["stem.nodes.0.x_m", "stem.tip_masses.0.x_m"])
+def test_where_a_beam_is_cut_by_itself_modes_have_derivatives_by_the_place(path: str) -> None:
+    """The cut moves with what is there: differences over twice the step are off by four times as much."""
+    scene = PORTS["load"](stem(fm.Modes(count=2, families=PLANE), tip_masses=[LUMP])).scene()
+    x, like = {"stem.nodes.0.x_m": PORT, "stem.tip_masses.0.x_m": LUMP.x_m}[path], stem_of(scene)
+
+    def stiffness(shift: float) -> np.ndarray:
+        return exact_model(stem_of(scene.with_values({path: x + shift})), like).stiffness
+
+    coarse, middle, fine = ((stiffness(h) - stiffness(-h)) / (2.0 * h) for h in (4e-4, 2e-4, 1e-4))
+    assert np.max(np.abs(coarse)) > 100.0
+    assert_allclose(coarse - middle, 4.0 * (middle - fine), atol=1e-3 * np.max(np.abs(coarse - middle)))
+
+
+def test_numbers_of_coordinates_that_were_for_a_whole_beam_are_refused_with_the_remedy() -> None:
+    scene = PORTS["load"](stem(fm.Modes(count=2, families=PLANE))).scene()
+    bent = replace(scene, modal_states=(fm.ModalState(body="stem", coordinates=(0.1, 0.0)),))
+    for wrong in (bent, with_modes(scene, damping_ratio=(0.1, 0.2))):
+        with pytest.raises(fm.SceneError, match=r"cuts = \[\] leaves the beam in one piece"):
+            fm.check_scene(wrong)
+        fm.check_scene(with_modes(wrong, cuts=()))
 
 
 @pytest.mark.parametrize(("cuts", "words"), [
@@ -127,7 +200,7 @@ def test_what_cannot_be_cut_is_refused(cuts: tuple[str, ...], words: str) -> Non
 
 
 def test_refusals() -> None:
-    scene = frame(2)
+    scene = frame(2, cuts=())
     with pytest.raises(ValueError, match='cannot be cut at x = 1 m: give places inside'):
         substructured(scene, "stem", ["port", 1.0])
     with pytest.raises(ValueError, match='has no node "prot"'):
