@@ -41,13 +41,26 @@ class ByThemselves(tuple[str, ...]):
 class Joined(Protocol):
     """What may hold nodes of beams: a scene."""
 
-    bodies: Any
-    hinges: Any
-    closures: Any
-    connectors: Any
-    loads: Any
-    wheels: Any
-    point_masses: Any
+    @property
+    def bodies(self) -> tuple[Any, ...]: ...
+
+    @property
+    def hinges(self) -> tuple[Any, ...]: ...
+
+    @property
+    def closures(self) -> tuple[Any, ...]: ...
+
+    @property
+    def connectors(self) -> tuple[Any, ...]: ...
+
+    @property
+    def loads(self) -> tuple[Any, ...]: ...
+
+    @property
+    def wheels(self) -> tuple[Any, ...]: ...
+
+    @property
+    def point_masses(self) -> tuple[Any, ...]: ...
 
 
 def cut_by_themselves(scene: Joined) -> tuple[Any, ...]:
