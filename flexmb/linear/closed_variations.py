@@ -101,16 +101,18 @@ class ClosedEquations(Equations):
         observation, spread = self.system.observation, self._closures.motion(state.t, pack(state)).spread
         return observation.undetermined(spread.open_parts if spread else {})
 
-    def loads(self, state: State, at: Variations) -> Real:
+    def loads(self, state: State, at: RestForces) -> Real:
         found = self.free_variation(state)
         left = self._freedom(state, found.rows.J[:, self.free])
         return left.basis(at.chosen).T @ left.mass @ found.accelerations[self.free]
 
-    def forces(self, at: Variations) -> RestForces:
-        found, M, N = self.free_variation(at.state), self.mass(at.state), at.basis
-        rates = found.accelerations[self.free]
-        left = M @ self._among_free(found.of_accelerations.by_displacement) + self._by_inertia(at.state, rates)
-        return RestForces(N.T @ M @ rates, -N.T @ left @ N)
+    def forces(self, state: State) -> RestForces:
+        at, found, M = self.variations(state), self.free_variation(state), self.mass(state)
+        rates, N = found.accelerations[self.free], at.basis
+        left = M @ self._among_free(found.of_accelerations.by_displacement) + self._by_inertia(state, rates)
+        return RestForces(
+            state, N.T @ M @ rates, -N.T @ left @ N, at.rates, at.motion, at.mass, at.chosen, at.movable, N
+        )
 
     def variations(self, state: State) -> Variations:
         found, free = self.free_variation(state), self.free
@@ -138,7 +140,7 @@ class ClosedEquations(Equations):
             np.block([[N, np.zeros((n, f))], [T, N]]),
         )  # fmt: skip
 
-    def moved(self, at: Variations, xi: Real) -> State:
+    def moved(self, at: Variations | RestForces, xi: Real) -> State:
         """As for a tree, then projected on the closures; DynamicsError also if no closed state is near."""
         try:
             return super().moved(at, xi)

@@ -70,6 +70,5 @@ def found_equilibrium(system: System | Scene, guess: State | None) -> tuple[Equi
         return as_equilibrium(state, None), system
     equations, guess = entering(system, guess)
     held = equations.held(guess.t)
-    state = balanced(held, replace(guess, u=np.zeros_like(guess.u)))
-    at = held.variations(state)
-    return as_equilibrium(state, verdict(squares(at, held.forces(at)))), equations.system
+    found = balanced(held, replace(guess, u=np.zeros_like(guess.u)))
+    return as_equilibrium(found.state, verdict(squares(found))), equations.system

@@ -24,7 +24,7 @@ from flexmb.linear.equations import built, equations_of
 from flexmb.linear.equilibrium import Equilibrium, as_equilibrium, found_equilibrium
 from flexmb.linear.linear_model import Complex
 from flexmb.linear.newton import EquilibriumError, squares, verdict
-from flexmb.linear.variations import Equations, RestForces, Variations
+from flexmb.linear.variations import Equations, RestForces
 from flexmb.parameters.numbers import Number
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
@@ -108,20 +108,19 @@ def equilibrium_path(scene: Scene, number: str, values: Sequence[float] | Real) 
 
 
 class _Corrected(NamedTuple):
-    """What Newton's method found: p, the derivatives and forces there, and the number of corrections."""
+    """What Newton's method found: p, the forces there, and the number of corrections."""
 
     p: float
-    at: Variations
-    forces: RestForces
+    at: RestForces
     taken: int
 
 
 class _Point(NamedTuple):
-    """An equilibrium at p: its derivatives, dr/dp (f,), the tangent (n+1,) of the path over all free speeds and p, of
+    """An equilibrium at p: its forces, dr/dp (f,), the tangent (n+1,) of the path over all free speeds and p, of
     length 1, and omega^2."""
 
     p: float
-    at: Variations
+    at: RestForces
     by_number: Real
     tangent: Real
     squares: Complex
@@ -155,10 +154,10 @@ class _Family:
         """The equilibrium at the first value, with the tangent of the path that leaves it in the direction `onwards`;
         determines the unit of displacements."""
         p, equations = self._here
-        at = equations.variations(found_equilibrium(self.system, None)[0])
-        ahead = np.zeros(len(at.by_chosen) // 2 + 1)
+        at = equations.forces(found_equilibrium(self.system, None)[0])
+        ahead = np.zeros(len(at.basis) + 1)
         ahead[-1] = onwards * self.range
-        found = _Corrected(p, at, equations.forces(at), 0)
+        found = _Corrected(p, at, 0)
         tangent = self.point(found, ahead).tangent
         displaced = self.length(at, np.r_[tangent[:-1], 0.0]) * self.range / abs(float(tangent[-1]))
         self.unit = float(np.clip(displaced, LEAST_UNIT, 1.0))
@@ -174,7 +173,7 @@ class _Family:
             self._here = self._made(p, self._here[1])
         return self._here[1]
 
-    def by_number(self, p: float, at: Variations) -> Real:
+    def by_number(self, p: float, at: RestForces) -> Real:
         """dr/dp (f,) at a state."""
         if not NEAR * self.range <= abs(self._beside[0] - p) <= FAR * self.range:
             aside = float(np.copysign(0.5 * FAR * self.range, self._middle - p))
@@ -182,11 +181,11 @@ class _Family:
         other, beside = self._beside
         return (beside.loads(at.state, at) - self.equations(p).loads(at.state, at)) / (other - p)
 
-    def bordered(self, at: Variations, forces: RestForces, by_number: Real, row: Real) -> Callable[[Real, float], Real]:
+    def bordered(self, at: RestForces, by_number: Real, row: Real) -> Callable[[Real, float], Real]:
         """Solver of K xi - dr/dp dp = load, row . (xi, dp) = rest, for (xi, dp) over all free speeds (n+1,)."""
         moving = at.movable
         K = np.zeros((len(moving) + 1, len(moving) + 1))
-        K[:-1, :-1], K[:-1, -1] = forces.stiffness[np.ix_(moving, moving)], -by_number[moving]
+        K[:-1, :-1], K[:-1, -1] = at.stiffness[np.ix_(moving, moving)], -by_number[moving]
         across = self.weighed(at, row)
         K[-1, :-1], K[-1, -1] = (across[:-1] @ at.basis)[moving], across[-1]
 
@@ -197,14 +196,14 @@ class _Family:
 
         return solve
 
-    def weighed(self, at: Variations, x: Real) -> Real:
+    def weighed(self, at: RestForces, x: Real) -> Real:
         """Of (xi, dp) (n+1,), the row by which lengths are measured: x . weighed(x) is the square of one."""
         independent = x[:-1][at.chosen]
         back = np.zeros(len(x) - 1)
         back[at.chosen] = at.mass @ independent / np.trace(at.mass) / self.unit**2
         return np.r_[back, x[-1] / self.range / self.range]
 
-    def length(self, at: Variations, x: Real) -> float:
+    def length(self, at: RestForces, x: Real) -> float:
         return float(np.sqrt(self.weighed(at, x) @ x))
 
     def longest(self, point: _Point) -> float:
@@ -214,25 +213,24 @@ class _Family:
 
     def point(self, found: _Corrected, before: Real) -> _Point:
         """An equilibrium with its tangent, which goes on as the one before it (n+1,)."""
-        p, at, forces, _ = found
+        p, at, _ = found
         by_number = self.by_number(p, at)
-        solve = self.bordered(at, forces, by_number, before)
-        tangent = solve(np.zeros(len(forces.load)), 1.0)
-        return _Point(p, at, by_number, tangent / self.length(at, tangent), squares(at, forces))
+        solve = self.bordered(at, by_number, before)
+        tangent = solve(np.zeros(len(at.load)), 1.0)
+        return _Point(p, at, by_number, tangent / self.length(at, tangent), squares(at))
 
     def corrected(self, p: float, state: State, by_number: Real, row: Real, farthest: float) -> _Corrected | None:
         """The equilibrium near a state at p, across `row` (n+1,), no correction longer than `farthest`; None if not
         found."""
         for taken in range(CORRECTIONS):
             equations = self.equations(p)
-            at = equations.variations(state)
-            forces = equations.forces(at)
-            step = self.bordered(at, forces, by_number, row)(forces.load, 0.0)
+            at = equations.forces(state)
+            step = self.bordered(at, by_number, row)(at.load, 0.0)
             length = self.length(at, step)
             if not np.isfinite(step).all() or length > farthest:
                 return None
             if self.unit * length <= CONVERGED:
-                return _Corrected(p, at, forces, taken)
+                return _Corrected(p, at, taken)
             p, state = p + float(step[-1]), equations.moved(at, step[:-1][at.chosen])
         return None
 

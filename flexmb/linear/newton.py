@@ -18,7 +18,7 @@ from scipy.linalg import eigvals, solve_triangular
 
 from flexmb.linear.linear_model import Complex
 from flexmb.linear.linearize import displacement_names
-from flexmb.linear.variations import Equations, RestForces, Variations
+from flexmb.linear.variations import Equations, RestForces
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
@@ -42,14 +42,14 @@ class EquilibriumError(ArithmeticError):
     """No state without acceleration was found; the message says which acceleration remains and where."""
 
 
-def balanced(equations: Equations, guess: State) -> State:
-    """The state near the guess, with the guess's speeds, in which the free accelerations vanish."""
+def balanced(equations: Equations, guess: State) -> RestForces:
+    """The state near the guess, with the guess's speeds, in which the free accelerations vanish; its forces."""
     start = equations.on_functions(guess)
     if not equations.freedom:
-        return start
+        return equations.forces(start)
     found = _newton(equations, start)
     if found is not None and (found.settling or found.is_near):
-        return found.state
+        return found.at
     try:
         return _relaxed(equations, start)
     except EquilibriumError:
@@ -58,29 +58,29 @@ def balanced(equations: Equations, guess: State) -> State:
     except (DynamicsError, np.linalg.LinAlgError) as error:
         if found is None:
             raise EquilibriumError(f'scene "{equations.system.scene.name}": no equilibrium found: {error}') from None
-    return found.state
+    return found.at
 
 
-def _relaxed(equations: Equations, start: State) -> State:
+def _relaxed(equations: Equations, start: State) -> RestForces:
     """Overdamped motion, M xi' = load, by implicit steps tau that grow as they succeed, then Newton's method.
 
     Pseudo-transient continuation (Kelley & Keyes 1998), with steps chosen as in a trust region (Nocedal & Wright 2006,
     alg. 4.1): the loads do work in every step. Newton's method is tried only where the loads oppose every displacement,
     so that it does not converge to an unstable equilibrium.
     """
-    here = _Loads(equations, equations.variations(start))
+    here = _Loads(equations.forces(start))
     tau = FIRST * here.scale / here.size
     for _ in range(RELAXATIONS):
         if here.settling and (found := _newton(equations, here.at.state)) is not None and found.settling:
-            return found.state
+            return found.at
         further = _downhill(equations, here, tau)
         if further is None:
             break
-        here, tau = _Loads(equations, further[0]), further[1]
+        here, tau = _Loads(further[0]), further[1]
     found = _newton(equations, here.at.state)
     if found is None:
         raise EquilibriumError(_report(equations, here.at))
-    return found.state
+    return found.at
 
 
 class _Loads:
@@ -90,16 +90,16 @@ class _Loads:
     in the metric.
     """
 
-    def __init__(self, equations: Equations, at: Variations) -> None:
-        M, moving, forces = at.mass, at.movable, equations.forces(at)
+    def __init__(self, at: RestForces) -> None:
+        M, moving = at.mass, at.movable
         self.at = at
-        self.loads, self.derivative = forces.load[moving], -forces.stiffness[np.ix_(moving, moving)]
+        self.loads, self.derivative = at.load[moving], -at.stiffness[np.ix_(moving, moving)]
         self.inertia, self.size = M[np.ix_(moving, moving)], float(np.sqrt(at.rates @ M @ at.rates))
         self.scale = float(np.sqrt(np.trace(M)))
         self.settling = _is_settling(-self.derivative)
 
 
-def _downhill(equations: Equations, here: _Loads, tau: float) -> tuple[Variations, float] | None:
+def _downhill(equations: Equations, here: _Loads, tau: float) -> tuple[RestForces, float] | None:
     """The result of the longest of the steps tau, tau/4, tau/16 ... that does at least a quarter of the predicted work,
     and the next tau."""
     moving, step = here.at.movable, np.zeros(len(here.at.rates))
@@ -114,7 +114,7 @@ def _downhill(equations: Equations, here: _Loads, tau: float) -> tuple[Variation
                 left = equations.loads(there, here.at)[moving]
                 work, promised = 0.5 * s @ (here.loads + left), s @ here.loads + 0.5 * s @ here.derivative @ s
                 if work >= 0.25 * promised:
-                    return equations.variations(there), tau * (4.0 if work >= 0.75 * promised else 1.0)
+                    return equations.forces(there), tau * (4.0 if work >= 0.75 * promised else 1.0)
         except (DynamicsError, np.linalg.LinAlgError):
             pass  # too long in any case
         tau *= 0.25
@@ -130,7 +130,7 @@ def _is_settling(stiffness: Real) -> bool:
 class _Found(NamedTuple):
     """An equilibrium; is_near: undamped steps led to it, from a guess with loads that some displacement follows."""
 
-    state: State
+    at: RestForces
     settling: bool
     is_near: bool
 
@@ -140,19 +140,19 @@ def _newton(equations: Equations, state: State) -> _Found | None:
     first: _Linearised | None = None
     undamped = True
     try:
-        now = _Linearised(equations, equations.variations(state))
+        now = _Linearised(equations.forces(state))
         for _ in range(STEPS):
             first = now if first is None else first
             if now.length <= CONVERGED * now.scale:
                 removed = now.left <= RESIDUAL * first.size + ROUNDING * now.stiffness * now.scale
                 if not removed:
                     return None  # no displacement removes the rest
-                return _Found(now.at.state, now.settling, undamped and not first.settling)
+                return _Found(now.at, now.settling, undamped and not first.settling)
             moved = _damped(equations, now)
             if moved is None:
                 return None
             undamped = undamped and moved[1] == 1.0
-            now = _Linearised(equations, equations.variations(moved[0]))
+            now = _Linearised(equations.forces(moved[0]))
     except (DynamicsError, np.linalg.LinAlgError):
         return None
     return None
@@ -165,20 +165,20 @@ class _Linearised:
     of the tangent; scale: length of a displacement of all free coordinates by 1; settling: see `_is_settling`.
     """
 
-    def __init__(self, equations: Equations, at: Variations) -> None:
-        M, moving, forces = at.mass, at.movable, equations.forces(at)
+    def __init__(self, at: RestForces) -> None:
+        M, moving = at.mass, at.movable
         self.at, self._moving = at, moving
         self._root, self._own = np.linalg.cholesky(M), np.linalg.cholesky(M[np.ix_(moving, moving)])
-        half = solve_triangular(self._own, forces.stiffness[:, moving].T, lower=True).T
+        half = solve_triangular(self._own, at.stiffness[:, moving].T, lower=True).T
         U, values, Vt = np.linalg.svd(solve_triangular(self._root, half, lower=True), full_matrices=False)
         self.stiffness = float(values[0]) if len(values) else 0.0
         kept = values > RANK * self.stiffness
         self._U, self._back = U[:, kept], Vt[kept].T / values[kept]
         self.scale = float(np.sqrt(np.trace(M)))
         self.settling = _is_settling(solve_triangular(self._own, half[moving], lower=True))
-        z = solve_triangular(self._root, forces.load, lower=True)
+        z = solve_triangular(self._root, at.load, lower=True)
         self.size, self.left = float(np.linalg.norm(z)), float(np.linalg.norm(z - self._U @ (self._U.T @ z)))
-        self._along = self.correction(forces.load)
+        self._along = self.correction(at.load)
         self.length = float(np.linalg.norm(self._along))
         self.step = np.zeros(len(z))
         self.step[moving] = solve_triangular(self._own.T, self._along, lower=False)
@@ -208,10 +208,10 @@ def _damped(equations: Equations, now: _Linearised) -> tuple[State, float] | Non
     return None
 
 
-def squares(at: Variations, forces: RestForces) -> Complex:
+def squares(at: RestForces) -> Complex:
     """The eigenvalues omega^2 (rad^2/s^2) of the tangent stiffness along what closures allow, against the inertia."""
     square = np.ix_(at.movable, at.movable)
-    found: Complex = eigvals(forces.stiffness[square], at.mass[square]) if len(at.movable) else np.zeros(0, complex)
+    found: Complex = eigvals(at.stiffness[square], at.mass[square]) if len(at.movable) else np.zeros(0, complex)
     return found
 
 
@@ -227,9 +227,9 @@ def verdict(squares: Complex) -> Stability:
     return "stable" if np.all(squares.real > rounding) else "neutral"
 
 
-def _report(equations: Equations, at: Variations) -> str:
+def _report(equations: Equations, at: RestForces) -> str:
     """The error message: which acceleration remains, where, and the remedy."""
-    left, now = at.mass @ at.rates, _Linearised(equations, at)
+    left, now = at.mass @ at.rates, _Linearised(at)
     names, _ = displacement_names(equations)
     worst = int(np.argmax(np.abs(left)))
     try:

@@ -73,7 +73,7 @@ def spun(system: System | Scene, hinge: str, rate: float, guess: State | None = 
     u = np.zeros(system.nu)
     for wheel in system.scene.wheels:
         u[system.speed(wheel.name)] = guess.u[system.speed(wheel.name)]
-    state = balanced(equations, replace(guess, u=u))
+    state = balanced(equations, replace(guess, u=u)).state
     if np.any(np.abs(state.u - u)[equations.free] > DEPENDENT * abs(rate)):
         raise ValueError(
             f'"{hinge}" turns other hinges through closures, or bends what they join: that is no steady spin; '

@@ -75,10 +75,20 @@ class Variations:
 class RestForces(NamedTuple):
     """At one state: generalised loads (f,), N (N m), on the independent coordinates, and the stiffness (f,f) by which
     they fall with displacements while the loads of closures stay. They are inverse dynamics at rest with the opposite
-    sign: no derivative of the inertia enters, whatever the accelerations are."""
+    sign: no derivative of the inertia enters, whatever the accelerations are.
 
+    rates, motion, mass, chosen, movable: as of `Variations`; basis (n,f): displacements of all free speeds.
+    """
+
+    state: State
     load: Real
     stiffness: Real
+    rates: Real
+    motion: Real
+    mass: Real
+    chosen: Index
+    movable: Index
+    basis: Real
 
 
 class Equations:
@@ -197,14 +207,18 @@ class Equations:
         """Mass matrix (n,n) of the free speeds, without closures."""
         return self.system.mass_matrix(state)[np.ix_(self.free, self.free)]
 
-    def loads(self, state: State, at: Variations) -> Real:
+    def loads(self, state: State, at: RestForces) -> Real:
         """Generalised loads, N (N m), on the coordinates (f,) that are independent at another state."""
         return self.mass(state) @ self.rates(state)
 
-    def forces(self, at: Variations) -> RestForces:
-        """Loads and tangent stiffness at a state: d(M udot) = M d(udot) + dM udot."""
-        left = at.mass @ at.by_displacement + self._by_inertia(at.state, at.rates)
-        return RestForces(at.mass @ at.rates, -left)
+    def forces(self, state: State) -> RestForces:
+        """Loads and tangent stiffness at a state: d(M udot) = M d(udot) + dM udot; DynamicsError where the
+        accelerations do not exist."""
+        at = self.variations(state)
+        left = at.mass @ at.by_displacement + self._by_inertia(state, at.rates)
+        return RestForces(
+            state, at.mass @ at.rates, -left, at.rates, at.motion, at.mass, at.chosen, at.movable, at.basis
+        )
 
     def _by_inertia(self, state: State, rates: Real) -> Real:
         """Derivative (n,n) of M udot by displacements, at accelerations (n,) of the free speeds that do not change."""
@@ -232,7 +246,7 @@ class Equations:
             self.movable(everything), np.eye(2 * n),
         )  # fmt: skip
 
-    def moved(self, at: Variations, xi: Real) -> State:
+    def moved(self, at: Variations | RestForces, xi: Real) -> State:
         """The state displaced by xi (n,) to first order, quaternions normalised again; raises DynamicsError."""
         q = at.state.q + at.motion @ xi
         if not np.isfinite(q).all():

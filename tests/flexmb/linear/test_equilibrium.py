@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 import flexmb as fm
+from flexmb.linear.variations import Equations
 from flexmb.scene.shapes import beam_section
 from tests import trees
 from tests.bounds import UNIT_ROUNDOFF
@@ -76,6 +77,15 @@ def test_random_trees_come_to_rest(seed):
     assert model.stability.verdict == "neutral"  # an undamped one that is stable
     wheel = system.coordinate("w0")
     assert found.q[wheel] == system.initial_state.q[wheel]
+
+
+def test_an_equilibrium_is_differentiated_once(monkeypatch):
+    """Its stability is told from what Newton's method found there: one beam of many strains spends all its time so."""
+    system = fm.compile(pendulum(0.3))
+    state, calls, forces = fm.equilibrium(system), [], Equations.forces
+    monkeypatch.setattr(Equations, "forces", lambda self, at: calls.append(at) or forces(self, at))
+    assert fm.equilibrium(system, state).stability == state.stability
+    assert len(calls) == 1
 
 
 def test_what_falls_is_refused():
