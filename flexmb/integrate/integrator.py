@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from flexmb.integrate.memory import Memory
@@ -45,8 +45,39 @@ class Integrator:
     algebra: tuple[float, float] = (0.0, 0.0)
     """Operations of its linear algebra: factors of n^3 for each factorisation and of n^2 for each evaluation."""
 
+    def entered(self, *given: Any) -> Callable[..., tuple[int, float]]:
+        """`run`, compiled for arguments of the types of these. It checks no types: see `undispatched`.
+
+        numba takes 1 ms to describe a problem, longer than many a run, so that it describes each kind once.
+        """
+        from flexmb.jit.direct import undispatched  # imported here as below
+
+        key = self.run, *map(_kind, given)
+        if key not in _ENTERED:
+            _ENTERED[key] = undispatched(self.run, *given)
+        return _ENTERED[key]
+
     def memory(self, n: int) -> Memory:
         """The memory of a new run whose state has n entries."""
         from flexmb.integrate.memory import memory  # imported here so that command lines need not load the compiler
 
         return memory(n, n + 3 if self.keeps_jacobian else 0)
+
+
+_ENTERED: dict[Any, Callable[..., tuple[int, float]]] = {}
+
+
+def _kind(argument: Any) -> Any:
+    """What the type of an argument follows from."""
+    import numpy as np
+    from numba import typeof
+
+    from flexmb.jit.pointer import Pointer
+
+    if isinstance(argument, tuple):
+        return type(argument), *map(_kind, argument)
+    if isinstance(argument, np.ndarray):
+        return argument.dtype, argument.ndim, argument.flags.num
+    if isinstance(argument, Pointer):
+        return argument
+    return float if type(argument) is float else typeof(argument)

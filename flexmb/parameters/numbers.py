@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from flexmb.kept import kept
 from flexmb.scene.schema import Scene
 from flexmb.scene.values import PathError, changed_at, with_values
 
@@ -53,7 +54,7 @@ class Number:
         """A value that is a little larger."""
         return self.value + NEARBY * self.scale
 
-    @property
+    @kept
     def nearby(self) -> Scene:
         """The scene with this value: what differs in it depends on the number."""
         return self.scene_at(self.nearby_value)

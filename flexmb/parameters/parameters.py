@@ -36,6 +36,7 @@ from flexmb.parameters.tables import (
     moments,
     numbers_of,
     parts,
+    put,
     structure,
     wholes,
 )
@@ -102,14 +103,26 @@ class Parameters:
         """The tables in dual numbers."""
         return blocks(self._found.tables, self._found.diagonal, self.names, self._of_tables)
 
-    def arranged(self, places: Sequence[int], scales: Real) -> tuple[ParameterBlock, ...]:
+    def arranged(
+        self, places: Sequence[int], scales: Real, spare: tuple[Parameters, tuple[ParameterBlock, ...]] | None = None
+    ) -> tuple[ParameterBlock, ...]:
         """The tables in dual numbers along other directions (D,), to each of which belongs a change by its scale of the
-        parameter that has this place, or of none."""
+        parameter that has this place, or of none.
+
+        spare: the same parameters at other values, and what they were arranged to in the same way, which nobody needs
+        any more: where that does, the tables are put into these, which are returned themselves.
+        """
         rates = np.zeros((len(self._of_tables), len(scales)))
         rates[:, list(places)] = self._of_tables * scales[list(places)]
+        tables, is_diagonal = self._found.tables, self._found.diagonal
+        if spare is not None and spare[0]._found._structure == self._found._structure and all(
+            put(each, spare[0]._found.tables, tables, is_diagonal, rates[:, LANES * b : LANES * (b + 1)])
+            for b, each in enumerate(spare[1])
+        ):
+            return spare[1]
         names = np.full(len(scales), "", object)
         names[list(places)] = self.names
-        return blocks(self._found.tables, self._found.diagonal, names.tolist(), rates)
+        return blocks(tables, is_diagonal, names.tolist(), rates)
 
     @property
     def differentiation(self) -> _Differentiation:

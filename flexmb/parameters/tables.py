@@ -26,6 +26,8 @@ from flexmb.typing import Index, Real
 _STEADY = {"moves", "doubtful", "weight", "length"}
 # Integers that say that a matrix is diagonal. Where it is not for other numbers, kernels use all of its elements.
 _DIAGONAL = {"orthogonal", "uncoupled"}
+# What workspaces have copies of, and what follows from derivatives along all directions.
+_COPIED = {"gravity", "port", "product", "moves"}
 
 
 @bundle
@@ -182,19 +184,64 @@ def blocks(tables: Tables, is_diagonal: Real, names: Sequence[str], rates: Real)
 def _block(tables: Tables, names: tuple[str, ...], rates: Real) -> ParameterBlock:
     """Dual tables for the derivatives (n,k) by k parameters."""
     duals = {kind: _duals(table) for kind, table in (("tree", tables.tree), ("closures", tables.closures))}
-    start = 0
-    for column in columns(tables):
-        stop = start + column.values.size
+    for column, own in _with_rates(tables, rates):
         kind, _, table = column.table.partition(".")
-        if kind != "start":
-            wide = duals[kind][table] if column.field is None else duals[kind][table][column.field]
-            wide[..., 1 : 1 + rates.shape[1]] = rates[start:stop].reshape(*column.values.shape, rates.shape[1])
-        start = stop
+        wide = duals[kind][table] if column.field is None else duals[kind][table][column.field]
+        wide[..., 1 : 1 + rates.shape[1]] = own
     tree = duals["tree"]
     moving = moving_columns(np.max(np.abs(tree["product"]), axis=-1))
     tree["moves"][..., 0] = np.maximum(tree["moves"][..., 0], moving)
     closures = None if tables.closures is None else DualClosureConstants(**duals["closures"])
     return ParameterBlock(names, DualConstants(**tree), closures)
+
+
+def put(block: ParameterBlock, before: Tables, now: Tables, is_diagonal: Real, rates: Real) -> bool:
+    """Put other numbers of a tree into its dual tables in place: those of `now` for those of `before`, which have the
+    same structure, and their derivatives (n,k).
+
+    False where this does not do: what workspaces have copies of must stay, and the features of the kernels suffice.
+    """
+    old, new, wide = before.tree, now.tree, block.constants
+    changed = [each.name for each in fields(new)
+               if getattr(new, each.name).tobytes() != getattr(old, each.name).tobytes()]  # fmt: skip
+    lanes = [(column.table.removeprefix("tree."), column.field, each) for column, each in _with_rates(now, rates)]
+    own = slice(1, 1 + rates.shape[1])
+    if not (
+        now.closures is None
+        and _COPIED.isdisjoint(changed)
+        and all(np.array_equal(_of(wide, name, field)[..., own], each)
+                for name, field, each in lanes if name in _COPIED)
+        and all(np.array_equal(wide.body[field], each)
+                for field, each in zip(sorted(_DIAGONAL), is_diagonal, strict=True))
+    ):  # fmt: skip
+        return False
+    for each in fields(new):
+        getattr(wide, each.name).setflags(write=True)
+    for name in changed:
+        for field in getattr(new, name).dtype.names or (None,):
+            if _of(new, name, field).dtype == np.float64:
+                _of(wide, name, field)[..., 0] = _of(new, name, field)
+    for name, field, each in lanes:
+        _of(wide, name, field)[..., own] = each
+    for each in fields(new):
+        getattr(wide, each.name).setflags(write=False)
+    return wide.features() <= wide._numba_type_.features
+
+
+def _of(table: Constants, name: str, field: str | None) -> Any:
+    """An array of a table, or a field of its records."""
+    array = getattr(table, name)
+    return array if field is None else array[field]
+
+
+def _with_rates(tables: Tables, rates: Real) -> Iterator[tuple[TableFloats, Real]]:
+    """All `columns` but the initial state, with their part (...,k) of derivatives (n,k) of `numbers_of` the tables."""
+    start = 0
+    for column in columns(tables):
+        stop = start + column.values.size
+        if column.table != "start":
+            yield column, rates[start:stop].reshape(*column.values.shape, rates.shape[1])
+        start = stop
 
 
 def _duals(table: Constants | ClosureConstants | None) -> dict[str, Any]:

@@ -19,7 +19,6 @@ from flexmb.control.schedule import slack
 from flexmb.integrate.control import COUNTS, STOP
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import nothing_watched
-from flexmb.jit.direct import undispatched
 from flexmb.run.envelope import PartialEnvelope
 from flexmb.run.interruption import interruptible
 from flexmb.run.joining import joined
@@ -98,7 +97,7 @@ class FollowedRun:
             posed, record = solve.recorded(room)
             out = np.empty((len(times), len(y)))
             given = y, clock, accuracy, out, counts, method.memory(len(y)), nothing_watched()
-            run = undispatched(method.run, posed, *given)
+            run = method.entered(posed, *given)
             (status, t), interrupted = interruptible(
                 lambda *given, run=run, posed=posed: run(posed, *given), given, counts[STOP : STOP + 1]
             )

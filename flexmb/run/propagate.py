@@ -18,7 +18,6 @@ from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, problem, 
 from flexmb.integrate.recorded import RecordedSteps, fastest_states, recorded, watching
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import CROSSED, Watch, nothing_watched
-from flexmb.jit.direct import undispatched
 from flexmb.motion import coordinates
 from flexmb.run.interruption import interruptible
 from flexmb.run.observing import Sampler, batch
@@ -149,7 +148,7 @@ class Integration:
     def compile(self, *given: Any) -> None:
         """Compile for a call with these arguments, unless that has been done."""
         if self._enter is None:
-            self._enter = undispatched(self._integrator.run, self._posed, *given)
+            self._enter = self._integrator.entered(self._posed, *given)
 
     def begin(self, begin: Beginning, clock: Clock, accuracy: Accuracy, counts: Index) -> tuple[Real, Clock, Accuracy]:
         """State, clock and accuracy of a run; for a scene with controllers, those of the closed loop."""

@@ -31,7 +31,7 @@ class DualTables(NamedTuple):
 
 
 class ObservedRates(NamedTuple):
-    """Everything observable, laid out as `Observation.columns`: values (m,), derivatives (m,P)."""
+    """Everything observable, laid out as `Observation.columns`: values (...,m), derivatives (...,m,P)."""
 
     row: Real
     rates: Real
@@ -119,6 +119,14 @@ class Blocks:
 
     def observe(self) -> ObservedRates:
         """Everything observable where the motion of all blocks was just evaluated."""
+        return self.observed(self.rows())
+
+    def observed(self, rows: Sequence[Real]) -> ObservedRates:
+        """The same from `rows`, (...,m,9) of each block."""
+        return ObservedRates(rows[0][..., 0].copy(), self.joined(rows))
+
+    def rows(self) -> list[Real]:
+        """The same as duals (m,9) of each block."""
         rows = []
         for b, (block, out) in enumerate(zip(self.tables, self.outputs, strict=True)):
             self._kind.observing(block, out)
@@ -127,7 +135,7 @@ class Blocks:
                 chain.closure_loads(block, self._loads[b])
                 parts.append(self._loads[b].every.reshape(-1, DualType.width))
             rows.append(np.concatenate(parts))
-        return ObservedRates(rows[0][:, 0].copy(), self.joined(rows))
+        return rows
 
     def inertia_forces(self, t: float, rates: Real) -> tuple[Real, Real]:
         """M rates (nu,) for given rates (nu,) at the coordinates of the blocks' states, and its derivatives (nu,P)."""

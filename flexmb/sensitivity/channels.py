@@ -20,8 +20,8 @@ from flexmb.typing import Real
 
 
 class Seen(NamedTuple):
-    """What is known at one output time: Y (n,P) of the state [q, u, ..., work], everything observable, and signals'
-    derivatives (S,P)."""
+    """What is known at one output time, or at several, in arrays (...,n,P): Y (n,P) of the state [q, u, ..., work],
+    everything observable, and signals' derivatives (S,P)."""
 
     Y: Real
     observed: ObservedRates | None
@@ -29,7 +29,7 @@ class Seen(NamedTuple):
 
 
 Channel = Callable[[Seen], Real]
-"""The derivatives (P,) of one channel."""
+"""The derivatives (...,P) of one channel."""
 
 
 class Chosen(NamedTuple):
@@ -149,13 +149,13 @@ def _each(name: str, axes: str, first: int) -> Iterator[tuple[str, Channel]]:
 
 
 def _state(i: int) -> Channel:
-    return lambda seen: seen.Y[i]
+    return lambda seen: seen.Y[..., i, :]
 
 
 def _row(i: int) -> Channel:
     def rates(seen: Seen) -> Real:
         assert seen.observed is not None
-        return seen.observed.rates[i]
+        return seen.observed.rates[..., i, :]
 
     return rates
 
@@ -163,7 +163,7 @@ def _row(i: int) -> Channel:
 def _sum(place: slice) -> Channel:
     def rates(seen: Seen) -> Real:
         assert seen.observed is not None
-        return np.sum(seen.observed.rates[place], axis=0)
+        return np.sum(seen.observed.rates[..., place, :], axis=-2)
 
     return rates
 
@@ -171,7 +171,7 @@ def _sum(place: slice) -> Channel:
 def _signal(i: int) -> Channel:
     def rates(seen: Seen) -> Real:
         assert seen.signals is not None
-        return seen.signals[i]
+        return seen.signals[..., i, :]
 
     return rates
 
@@ -181,12 +181,14 @@ def _quaternion(first: int, k: int) -> Channel:
 
     def rates(seen: Seen) -> Real:
         assert seen.observed is not None
-        R = seen.observed.row[first : first + 9].reshape(3, 3)
-        dR = seen.observed.rates[first : first + 9].reshape(3, 3, -1)
-        turn = np.einsum("ijk,lj->ilk", dR, R)  # R' = turn R
-        w = np.stack([turn[2, 1], turn[0, 2], turn[1, 0]])
-        q = Rotation.from_matrix(R).as_quat(canonical=True, scalar_first=True)
-        whole = 0.5 * np.vstack([-q[1:] @ w, q[0] * w + np.cross(w.T, q[1:]).T])
-        return np.asarray(whole[k], float)
+        R, dR = seen.observed.row[..., first : first + 9], seen.observed.rates[..., first : first + 9, :]
+        several = R.shape[:-1]
+        R, dR = R.reshape(*several, 3, 3), dR.reshape(*several, 3, 3, -1)
+        turn = np.einsum("...ijk,...lj->...ilk", dR, R)  # R' = turn R
+        w = np.stack([turn[..., 2, 1, :], turn[..., 0, 2, :], turn[..., 1, 0, :]])
+        q = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+        s, v = q[:, 0].reshape(*several, 1), q[:, 1:].T.reshape(3, *several, 1)
+        i, j = k % 3, (k + 1) % 3
+        return 0.5 * (s * w[k - 1] + w[i] * v[j] - w[j] * v[i] if k else -np.sum(v * w, axis=0))
 
     return rates

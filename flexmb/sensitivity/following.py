@@ -19,6 +19,7 @@ from flexmb.typing import Real
 # Derivatives are integrated as changes by this part of each number. The error of a step is held below rtol times them
 # plus atol, so that what changes by less than atol if a number changes by 3 % does not shorten steps.
 SHARE = 0.03
+TOGETHER = 256  # samples whose observables are kept until channels are taken from all of them
 
 EventTimes = list[tuple[str, float, Real]]
 """Name, time (s), derivatives (P,) of the time of each event."""
@@ -49,10 +50,10 @@ class Following:
                 loops = self._passage.loops(solve, loops, is_last and bool(i) and leg.begin.state.t == stop)
                 variation = Variation(leg, blocks, loops)
                 at = self._passage.begun(variation, y)
-                states = (
-                    variation.integrate(at, clock.times, clock, self._settings) if stop > leg.begin.state.t else [at]
-                )
-                before = Course(leg.raw.y, states[-1].Y)
+                states = variation.joined(at)[None]
+                if stop > leg.begin.state.t:
+                    states = variation.integrate(at, clock.times, clock, self._settings)
+                before = Course(leg.raw.y, variation.parted(states[-1]).Y)
                 self._see(variation, solve, clock.times, states, times, is_last)
                 found = self._passage.ended(variation, before)
                 self._events += [(each.event.name, stop, each.dt) for each in found.crossings]
@@ -73,33 +74,39 @@ class Following:
         variation: Variation,
         solve: Integration,
         times: Real,
-        states: Sequence[Course],
+        states: Real,
         wanted: slice,
         is_last: bool,
     ) -> None:
-        """Derivatives of the outputs at the output times of a part of the run."""
+        """Derivatives of the outputs at the output times of a part of the run, from its states (T,.) at `times`."""
         loops, system = variation.loops, variation.blocks.system
         names = {} if solve.feedback is None else solve.feedback.names
         known = channels(system, names)
         if loops is not None:
             if is_last:
-                variation.put(float(times[-1]), states[-1])  # controllers act at the end of the run
+                variation.put_joined(float(times[-1]), states[-1])  # controllers act at the end of the run
             loops.replay()
-        signals = any(name.startswith("signal.") for name in self._outputs.names)
-        instants = self._trajectory.t[wanted]
-        places = np.searchsorted(times, instants)
-        for sample, t, place in zip(range(wanted.start, wanted.stop), instants.tolist(), places.tolist(), strict=True):
-            state = states[place]
-            observed = of_signals = None
-            if self._outputs.observed:
-                variation.put(t, state)
-                observed = variation.blocks.observe()
-            if signals and loops is not None:
-                variation.take(state)
-                of_signals = loops.look(t)[1]
-            seen = Seen(state.Y, observed, of_signals)
+        places = np.searchsorted(times, self._trajectory.t[wanted])
+        for first in range(0, len(places), TOGETHER):
+            own = slice(first, first + TOGETHER)
+            seen = self._seen(variation, times[places[own]].tolist(), states[places[own]])
+            samples = slice(wanted.start + first, min(wanted.start + first + TOGETHER, wanted.stop))
             for k, name in enumerate(self._outputs.names):
                 if name in known:
-                    self._derivatives[sample, k] = known[name](seen)
+                    self._derivatives[samples, k] = known[name](seen)
                 elif ".drive[" in name:  # of a coordinate that is free here
-                    self._derivatives[sample, k] = 0.0
+                    self._derivatives[samples, k] = 0.0
+
+    def _seen(self, variation: Variation, times: list[float], states: Real) -> Seen:
+        """What is known at states (T,.) that are joined with their derivatives."""
+        loops, rows, signals = variation.loops, list[list[Real]](), list[Real]()
+        has_signals = loops is not None and any(name.startswith("signal.") for name in self._outputs.names)
+        for t, z in zip(times, states, strict=True):
+            if self._outputs.observed:
+                variation.put_joined(t, z)
+                rows.append(variation.blocks.rows())
+            if has_signals and loops is not None:
+                variation.take(variation.parted(z))
+                signals.append(loops.look(t)[1])
+        observed = variation.blocks.observed([np.array(each) for each in zip(*rows, strict=True)]) if rows else None
+        return Seen(variation.parted(states).Y, observed, np.array(signals) if signals else None)

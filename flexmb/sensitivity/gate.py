@@ -16,17 +16,19 @@ from flexmb.scene.schema import Scene
 from flexmb.sensitivity.law_rates import reaches_event, reaches_laws
 from flexmb.sensitivity.part_scene import PartNumber, PartScene, all_changes, changed, differ_in_mechanics
 from flexmb.sensitivity.refusals import refuse_measured_loads, refuse_moving_instants, refuse_opened_closures
+from flexmb.sensitivity.systems import HandedOver
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
 
 
 class Admitted(NamedTuple):
     """A system whose run may be differentiated by all of these numbers, of which the tables of its own scene depend on
-    those of `tables`."""
+    those of `tables`. handed: what a run takes over from one at other values, and leaves for the next."""
 
     system: System
     numbers: tuple[Number, ...]
     tables: Parameters
+    handed: HandedOver
 
 
 def admitted(scene: Scene, names: Sequence[str]) -> Admitted:
@@ -66,15 +68,16 @@ def admitted_to(system: System, names: Sequence[str]) -> Admitted:
                 "motion or the initial state nor a controller or an event (initial values of prescribed coordinates, "
                 "for example, come from their functions): leave it out"
             )
-    return Admitted(system, found, tables)
+    return Admitted(system, found, tables, HandedOver())
 
 
 def again(before: Admitted, system: System) -> Admitted:
     """The same numbers of a prepared system that differs in their values only: what admits them does not depend on
-    these, and steady derivatives are kept."""
+    these, and steady derivatives are kept. Blocks are taken over, so that `before` must not be followed any more."""
     found = numbers(system.scene, [each.name for each in before.numbers])
     acting = [each for each in found if each.name in before.tables.names]
-    return Admitted(system, found, Parameters(system, acting, like=before.tables))
+    handed = HandedOver(None if system.scene.controllers else before.handed.left)  # controllers write into the tables
+    return Admitted(system, found, Parameters(system, acting, like=before.tables), handed)
 
 
 def _reaches_change(scene: Scene, number: Number) -> bool:

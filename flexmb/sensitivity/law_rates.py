@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,9 +42,11 @@ def law_rates(system: System, numbers: Sequence[Number | None], scales: Real) ->
     """Of a system's controllers by these numbers; None for one on which nothing depends."""
     wiring = wired(system)
     found = np.zeros((len(_of_laws(system, system.scene, are_driven=False)), len(numbers)))
+    concerned = _concerned(numbers, system.scene)
     for are_driven in (False, True):
-        chosen = [each if _concerns_laws(each, system.scene, are_driven) else None for each in numbers]
-        found += _by_numbers(partial(_of_laws, system, are_driven=are_driven), system.scene, chosen, scales)
+        chosen = [each if own is are_driven else None for each, own in zip(numbers, concerned, strict=True)]
+        if any(chosen):
+            found += _by_numbers(partial(_of_laws, system, are_driven=are_driven), system.scene, chosen, scales)
     shapes = wiring.number.shape, wiring.initial.shape, wiring.drive.shape, (len(wiring.course), 4), wiring.piece.shape
     stops = np.cumsum([np.prod(shape, dtype=int) for shape in shapes])
     parts = np.split(found, stops[:-1])
@@ -53,12 +55,9 @@ def law_rates(system: System, numbers: Sequence[Number | None], scales: Real) ->
 
 def reaches_laws(system: System, number: Number) -> bool:
     """Whether the numbers of controllers, or of what they drive, differ with a number of the system's scene."""
-    return any(
-        _concerns_laws(number, system.scene, are_driven)
-        and not np.array_equal(
-            _of_laws(system, system.scene, are_driven), _of_laws(system, number.nearby, are_driven)
-        )
-        for are_driven in (False, True)
+    [are_driven] = _concerned([number], system.scene)
+    return are_driven is not None and not np.array_equal(
+        _of_laws(system, system.scene, are_driven), _of_laws(system, number.nearby, are_driven)
     )
 
 
@@ -74,7 +73,7 @@ def _of_laws(system: System, scene: Scene, are_driven: bool) -> Real:
 def event_rates(scene: Scene, numbers: Sequence[Number | None], scales: Real) -> dict[str, EventRates]:
     """Of all events of a scene, by name."""
     found = dict[str, EventRates]()
-    numbers = [each if _changes(each, scene, lambda of: of.events) else None for each in numbers]
+    numbers = [each if each is not None and each.nearby.events != scene.events else None for each in numbers]
     for event in scene.events:
         impacts = [i for i, action in enumerate(event.actions) if isinstance(action, Impact)]
         rates = _by_numbers(partial(_of_event, name=event.name), scene, numbers, scales)
@@ -93,16 +92,14 @@ def _of_event(scene: Scene, name: str) -> Real:
     return np.array([event.level, *(each.restitution for each in event.actions if isinstance(each, Impact))])
 
 
-def _changes(number: Number | None, scene: Scene, part: Callable[[Scene], Any]) -> bool:
-    """Whether a part of a scene depends on a number."""
-    return number is not None and part(number.nearby) != part(scene)
-
-
-def _concerns_laws(number: Number | None, scene: Scene, are_driven: bool) -> bool:
-    """Whether the gains of what signals drive, or else the tables of controllers, depend on a number."""
-    if _changes(number, scene, _driven_gains):
-        return are_driven
-    return not are_driven and _changes(number, scene, lambda of: (of.controllers, of.sensors))
+def _concerned(numbers: Sequence[Number | None], scene: Scene) -> list[bool | None]:
+    """Whether the gains of what signals drive depend on each number, or else the tables of controllers (False)."""
+    gains, found = _driven_gains(scene), list[bool | None]()
+    for number in numbers:
+        other = scene if number is None else number.nearby
+        is_law = (other.controllers, other.sensors) != (scene.controllers, scene.sensors)
+        found.append(True if other is not scene and _driven_gains(other) != gains else False if is_law else None)
+    return found
 
 
 def _driven_gains(scene: Scene) -> list[float]:

@@ -10,7 +10,6 @@ from flexmb.integrate.control import ACCEPTED, COUNTS, REJECTED, SAMPLES, STOP
 from flexmb.integrate.problem import Accuracy, Clock, problem
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import nothing_watched
-from flexmb.jit.direct import undispatched
 from flexmb.jit.lanes import LANES
 from flexmb.run.driver import Leg
 from flexmb.run.interruption import interruptible
@@ -63,9 +62,9 @@ class Variation:
         return z.ravel()
 
     def parted(self, z: Real) -> Course:
-        """The inverse of `joined`."""
-        rows = z.reshape(self._width, -1)
-        return Course(rows[:, 0].copy(), rows[:, 1:].copy())
+        """The inverse of `joined`, of one state or of several, (T,n) and (T,n,P)."""
+        rows = z.reshape(*z.shape[:-1], self._width, -1)
+        return Course(rows[..., 0].copy(), rows[..., 1:].copy())
 
     def slope(self, t: float, at: Course) -> Course:
         """The rates of a state and of its derivatives; DynamicsError where they do not exist."""
@@ -76,7 +75,10 @@ class Variation:
 
     def put(self, t: float, at: Course) -> None:
         """Evaluate all blocks at a state, for their outputs."""
-        z = self.joined(at)
+        self.put_joined(t, self.joined(at))
+
+    def put_joined(self, t: float, z: Real) -> None:
+        """The same of a state that is `joined` with its derivatives."""
         for b in range(len(self.blocks)):
             self.check(flow.evaluate_at(t, z, b, self.flow), t)
 
@@ -105,8 +107,8 @@ class Variation:
             error.status = Status(status)
             raise error
 
-    def integrate(self, start: Course, times: Real, clock: Clock, settings: Settings) -> list[Course]:
-        """The state with its derivatives at these times (T,) s, from the first to the last."""
+    def integrate(self, start: Course, times: Real, clock: Clock, settings: Settings) -> Real:
+        """The state with its derivatives, `joined`, at these times (T,) s, from the first to the last."""
         z, P = self.joined(start), self.blocks.directions
         plain = settings.accuracy(self.blocks.system.nq, self.blocks.system.nu)
         steps = self.leg.raw.counts[ACCEPTED] + self.leg.raw.counts[REJECTED]
@@ -115,7 +117,7 @@ class Variation:
         posed = problem(flow.rhs, flow.project, self.flow, self.flow)
         method, counts, out = settings.integrator, np.zeros(COUNTS, np.int64), np.empty((len(times), len(z)))
         given = z, clock._replace(times=times), accuracy, out, counts, method.memory(len(z)), nothing_watched()
-        run = undispatched(method.run, posed, *given)
+        run = method.entered(posed, *given)
         (status, t), interrupted = interruptible(lambda *given: run(posed, *given), given, counts[STOP : STOP + 1])
         if interrupted:
             raise KeyboardInterrupt
@@ -128,7 +130,7 @@ class Variation:
                 "beside the others: give a larger rtol and atol"
             )
         self.check(status, t)
-        return [self.parted(row) for row in out[: counts[SAMPLES]]]
+        return out[: counts[SAMPLES]]
 
 
 def clock_of_leg(solve: Integration, leg: Leg, times: Real, settings: Settings) -> tuple[Real, Clock]:

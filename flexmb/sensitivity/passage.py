@@ -37,7 +37,7 @@ class Passage:
         """numbers (P,): those that are admitted, in any order, and None for other directions; length (s) of the run."""
         self._admitted, self._numbers, self._scales, self._settings = admitted, numbers, scales, settings
         self._scene, self._length = admitted.system.scene, length
-        self._systems = Systems(scales)
+        self._systems = Systems(scales, admitted.handed)
         self._levels = event_rates(self._scene, numbers, scales)
         self._changes: list[ChangeOfValue] = []
         self._of_part: list[PartNumber | None] = []

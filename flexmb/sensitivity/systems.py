@@ -17,7 +17,7 @@ from flexmb.jit.bundle import broaden
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.parameters.numbers import Number
 from flexmb.parameters.parameters import Parameters
-from flexmb.parameters.tables import DualClosureConstants, DualConstants
+from flexmb.parameters.tables import DualClosureConstants, DualConstants, ParameterBlock
 from flexmb.scene.tree import rate_name, scalar_paths
 from flexmb.sensitivity.blocks import Blocks, DualTables, set_lanes
 from flexmb.system.tree_system import System
@@ -38,11 +38,27 @@ class KnownTables(NamedTuple):
     duals: list[DualTables]
 
 
+class Start(NamedTuple):
+    """The blocks at the start of a run, their tables, and the parameters of which these are."""
+
+    blocks: Blocks
+    tables: tuple[ParameterBlock, ...]
+    parameters: Parameters
+
+
+class HandedOver:
+    """What a run takes over, once, from another one in which only values of its numbers differ, and what it leaves."""
+
+    def __init__(self, before: Start | None = None) -> None:
+        self.before = before
+        self.left: Start | None = None
+
+
 class Systems:
     """Makes the blocks of one part of a run after the other; scales (P,)."""
 
-    def __init__(self, scales: Real) -> None:
-        self._scales = scales
+    def __init__(self, scales: Real, handed: HandedOver) -> None:
+        self._scales, self._handed = scales, handed
         self._known: KnownTables | None = None
         self._chosen: list[int] = []
 
@@ -51,8 +67,16 @@ class Systems:
         derivatives (nq+nu+1,P) of its initial state."""
         start = np.zeros((known.plant.nq + known.plant.nu + 1, len(self._scales)))
         start[:, list(chosen)] = known.initial_state * self._scales[list(chosen)]
-        self._known, self._chosen = self._arranged(known, chosen), list(chosen)
-        return self._blocks(self._known, {}), start
+        before, self._handed.before = self._handed.before, None
+        tables = known.arranged(chosen, self._scales, before and (before.parameters, before.tables))
+        self._known, self._chosen = _known(known, tables), list(chosen)
+        if before is not None and tables is before.tables:
+            blocks = before.blocks
+            blocks.system = self._known.system
+        else:
+            blocks = self._blocks(self._known, {})
+        self._handed.left = Start(blocks, tables, known)
+        return blocks, start
 
     def then(
         self, system: System, state: State, numbers: Sequence[Number | None], held: Mapping[str, Real], anew: bool
@@ -70,18 +94,11 @@ class Systems:
             _alike(found.duals)
         else:
             parameters = Parameters(system, [each for each in numbers if each is not None], starts=False)
-            found = self._arranged(parameters, chosen)
+            found = _known(parameters, parameters.arranged(chosen, self._scales))
         self._known, self._chosen = found, chosen
         if found.system.closures is not None:  # the rows that are independent here
             found.system.closures.begin_at(state.t, pack(state))
         return self._blocks(found, held)
-
-    def _arranged(self, parameters: Parameters, chosen: Sequence[int]) -> KnownTables:
-        """The tables of a system by those of the directions that are chosen."""
-        plant = parameters.plant
-        assert isinstance(plant, System)  # it is the same one with its functions of time kept apart
-        found = parameters.arranged(chosen, self._scales)
-        return KnownTables(plant, [DualTables(each.constants, each.closures) for each in found])
 
     def _blocks(self, known: KnownTables, held: Mapping[str, Real]) -> Blocks:
         """The blocks with derivatives of what is held, which those that are taken over do not have."""
@@ -95,6 +112,13 @@ class Systems:
             found.append(each._replace(constants=replace(each.constants, function=functions)))
         _alike(found)
         return Blocks(known.system, found, len(self._scales))
+
+
+def _known(parameters: Parameters, tables: Sequence[ParameterBlock]) -> KnownTables:
+    """The tables of a system that are arranged along directions."""
+    plant = parameters.plant
+    assert isinstance(plant, System)  # it is the same one with its functions of time kept apart
+    return KnownTables(plant, [DualTables(each.constants, each.closures) for each in tables])
 
 
 def _alike(duals: Sequence[DualTables]) -> None:

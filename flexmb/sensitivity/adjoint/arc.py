@@ -13,7 +13,7 @@ from flexmb.integrate.dop853_tableau import STAGES, A, C
 from flexmb.integrate.problem import Clock, problem
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import nothing_watched
-from flexmb.jit.direct import addresses, undispatched
+from flexmb.jit.direct import addresses
 from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID
 from flexmb.run.interruption import interruptible
 from flexmb.run.outputs import ending
@@ -140,7 +140,7 @@ class Arc:
             posed = problem(recorded.rhs, recorded.project, record, record)
             counts, out = np.zeros(COUNTS, np.int64), np.empty((len(clock.times), len(y)))
             given = y.copy(), clock, accuracy, out, counts, method.memory(len(y)), nothing_watched()
-            run = undispatched(method.run, posed, *given)
+            run = method.entered(posed, *given)
             (status, t), interrupted = interruptible(
                 lambda *given, run=run, posed=posed: run(posed, *given), given, counts[STOP : STOP + 1]
             )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -90,3 +92,21 @@ def test_others_than_the_same_numbers_keep_nothing():
     first = Parameters(system, numbers(system.scene, BY[:2]))
     other = Parameters(system, numbers(system.scene, BY[4:6]), like=first)
     assert set(other.steady.rates) == set(BY[4:6])
+
+
+@pytest.mark.parametrize("names", [BY[:2], [BY[0], BY[2], BY[4]], [BY[1], BY[6]], [BY[0], BY[7]]], ids=" ".join)
+def test_tables_that_are_put_in_place_are_those_made_anew(names):
+    """Also along other directions; what workspaces have copies of is not put in place."""
+    system = arm()
+    first = Parameters(system, numbers(system.scene, names))
+    places, scales = [2, *range(len(names) - 1)], np.linspace(0.1, 0.2, len(names) + 2)
+    old = first.arranged(places, scales)
+    other = {name: 1.3 * value for name, value in zip(names, first.values.tolist(), strict=True)}
+    moved = fm.compile(system.scene.with_values(other))
+    now = Parameters(moved, numbers(moved.scene, names), like=first)
+    anew, again = now.arranged(places, 3.0 * scales), now.arranged(places, 3.0 * scales, (first, old))
+    assert (again is old) == ("gravity_m_s2.1" not in names)
+    for field in fields(type(anew[0].constants)):
+        one, two = (getattr(each[0].constants, field.name) for each in (anew, again))
+        assert one.tobytes() == two.tobytes(), field.name
+        assert not two.flags.writeable
