@@ -186,6 +186,11 @@ SURFACES = [tuple(1 + np.flatnonzero(SOLID_AT[:, 0] == x)) for x in FACES]
 INNER = 1 + int(np.flatnonzero((SOLID_AT[:, 0] == 0.5) & (SOLID_AT[:, 1] > 0.0))[0])
 
 
+def test_matrices_of_solids_without_their_dofs_are_refused_with_the_remedy():
+    with pytest.raises(SuperElementError, match="K has 120 rows, M 120, .* 240 displacements.*give its dofs as 123"):
+        super_element(SOLID_K, SOLID_M, SOLID_AT)
+
+
 def surfaces(kind: str) -> list[Tie]:
     return [Tie(900 + i, nodes, kind) for i, nodes in enumerate(SURFACES)]  # type: ignore[arg-type]
 
