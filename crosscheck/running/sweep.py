@@ -101,17 +101,20 @@ def _time_limit(job: Job) -> float:
 def _done(known: Sequence[Record], job: Job) -> frozenset[Done]:
     """Recorded outcomes of the job's efforts for the same scene.
 
-    A later record without an effort (missing engine, crash) invalidates the earlier ones.
+    A later record without an effort (missing engine, crash) invalidates the earlier ones, and one of the same effort
+    replaces it, as where it is judged: it may be another rung of another ladder.
     """
-    done: set[Done] = set()
+    done: dict[str, Done] = {}
     for record in known:
         if not isinstance(record, RunRecord) or record.key[:4] != (job.case, job.variant, job.role, job.engine):
             continue
         if not record.effort:
             done.clear()
-        elif record.status in ("finished", "diverged") and record.scene == job.scene_id:
-            done.add(Done(record.effort, record.made_by, record.rung, record.rungs))
-    return frozenset(done)
+            continue
+        done.pop(record.effort, None)
+        if record.status in ("finished", "diverged") and record.scene == job.scene_id:
+            done[record.effort] = Done(record.effort, record.made_by, record.rung, record.rungs)
+    return frozenset(done.values())
 
 
 def _cut_short(job: Job, event: Event) -> RunRecord:

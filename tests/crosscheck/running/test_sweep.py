@@ -205,9 +205,11 @@ goals = { "marker:tip.position" = 1e-4 }
 """
     folder, records = copy_case(tmp_path, ladder), tmp_path / "records.jsonl"
     assert run_case(folder, records).ok
-    longer = (folder / "run.toml").read_text(encoding="utf-8").replace("0.00625]", "0.00625, 0.003125]")
-    (folder / "run.toml").write_text(longer, encoding="utf-8")
-    assert run_case(folder, records).ok
+    short = (folder / "run.toml").read_text(encoding="utf-8")
+    longer, coarser = short.replace("0.00625]", "0.00625, 0.003125]"), short.replace("0.0125, 0.00625", "0.025, 0.0125")
+    for text in (longer, coarser, short):
+        (folder / "run.toml").write_text(text, encoding="utf-8")
+        assert run_case(folder, records).ok  # an effort that was another rung in between is run again
 
 
 def test_a_missing_library_withdraws_earlier_results_and_comes_back(tmp_path) -> None:
