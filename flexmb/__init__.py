@@ -52,7 +52,7 @@ _HOME = {
     "flexmb.system.kinks": "NotDifferentiableError",
     "flexmb.system.observables": "Evaluation",
     "flexmb.system.starting": "check_scene",
-    "flexmb.system.tree_system": "System",
+    "flexmb.system.system": "System",
     "flexmb.tables.state": "DynamicsError PrecisionWarning State",
     "flexmb.tables.status": "Status",
 }
@@ -124,7 +124,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.system.kinks import NotDifferentiableError as NotDifferentiableError
     from flexmb.system.observables import Evaluation as Evaluation
     from flexmb.system.starting import check_scene as check_scene
-    from flexmb.system.tree_system import System as System
+    from flexmb.system.system import System as System
     from flexmb.tables.state import DynamicsError as DynamicsError
     from flexmb.tables.state import PrecisionWarning as PrecisionWarning
     from flexmb.tables.state import State as State

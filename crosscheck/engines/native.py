@@ -48,7 +48,7 @@ from flexmb.scene.schema import BeamBody, ModalBody, Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.compile import compile
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.system.watches import WAIVERS
 from flexmb.typing import Real
 

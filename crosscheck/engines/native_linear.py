@@ -20,7 +20,7 @@ from flexmb.linear.variations import Equations, Variations
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.evaluator import Evaluator
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import State
 from flexmb.typing import Real
 

@@ -23,7 +23,7 @@ from flexmb.scene.schema import Scene
 from flexmb.scene.stops import leaving
 from flexmb.scene.tree import coordinates
 from flexmb.system.compile import compile
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.system.watches import WAIVERS
 from flexmb.tables.features import asking
 from flexmb.tables.state import State

@@ -16,7 +16,7 @@ from flexmb.integrate.memory import memory
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.integrate.watch import nothing_watched
 from flexmb.run.propagate import recursion
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import pack
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Real

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexmb.entry.derivatives import jacobian
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import pack
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Real

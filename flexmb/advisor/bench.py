@@ -23,7 +23,7 @@ from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.compile import compile
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import pack
 
 SAMPLES = 401

@@ -15,7 +15,7 @@ from flexmb.run.run_arrays import Statistics
 from flexmb.run.simulate import run_of_many
 from flexmb.run.trajectory import Trajectory
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.status import Status
 
 ABSOLUTE = 1e-2

@@ -37,7 +37,7 @@ from flexmb.scene.schema import Load, Marker, Scene
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.surrogate import rigidify
 from flexmb.system.compile import compile
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.typing import Real
 
 MODES = 12

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.scene.open_loop import refuse_feedback
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from flexmb.bridges.functions import Accelerations, Function, InverseDynamics
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 
 try:
     import jax

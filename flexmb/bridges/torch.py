@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from flexmb.bridges.functions import Accelerations, Function, InverseDynamics
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 
 try:
     import torch

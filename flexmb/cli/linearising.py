@@ -14,7 +14,7 @@ from flexmb.output.writing import check_folder
 
 if TYPE_CHECKING:
     from flexmb.linear.linear_model import LinearModel
-    from flexmb.system.tree_system import System
+    from flexmb.system.system import System
     from flexmb.typing import Real
 
 

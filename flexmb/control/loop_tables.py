@@ -16,7 +16,7 @@ from flexmb.jit.direct import address, addresses
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID, WHOLE
 from flexmb.scene.control import Controller
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Index, Real
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.entry.observation import outputs, sense_markers, shapes
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.arrays import FORCE, NODE_AXES, ON_GROUND
 from flexmb.typing import Index, Real, Record
 

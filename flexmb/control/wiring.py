@@ -34,7 +34,7 @@ from flexmb.scene.functions import Function
 from flexmb.scene.loaded import called
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import rate_name, scalar_paths
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.functions import pack
 from flexmb.typing import Index, Real, Record
 

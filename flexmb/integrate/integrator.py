@@ -70,7 +70,6 @@ _ENTERED: dict[Any, Callable[..., tuple[int, float]]] = {}
 def _kind(argument: Any) -> Any:
     """What the type of an argument follows from."""
     import numpy as np
-    from numba import typeof
 
     from flexmb.jit.pointer import Pointer
 
@@ -80,4 +79,4 @@ def _kind(argument: Any) -> Any:
         return argument.dtype, argument.ndim, argument.flags.num
     if isinstance(argument, Pointer):
         return argument
-    return float if type(argument) is float else typeof(argument)
+    return getattr(argument, "_numba_type_", type(argument))  # of bundles; whole and real numbers are of one type each

@@ -17,7 +17,7 @@ from flexmb.linear.spin import spun
 from flexmb.linear.variations import Equations
 from flexmb.output.whole import whole_file
 from flexmb.scene.schema import Scene
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.system.watches import warn
 from flexmb.tables import arguments
 from flexmb.tables.state import State

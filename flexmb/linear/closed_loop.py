@@ -30,7 +30,7 @@ from flexmb.linear.sensed import ChangedRow, readable, sensed
 from flexmb.linear.variations import Equations
 from flexmb.scene.functions import Constant
 from flexmb.system import algorithms
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import State
 from flexmb.typing import Real
 

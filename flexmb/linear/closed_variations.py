@@ -27,7 +27,7 @@ from flexmb.closure.tables import ClosureConstants
 from flexmb.closure.variation import ChainVariation
 from flexmb.linear.variations import Equations, RestForces, Variations, same_structure
 from flexmb.system.pushforward import GivenMotion
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, pack

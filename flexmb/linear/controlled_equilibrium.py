@@ -17,7 +17,7 @@ from flexmb.linear.equations import equations_of
 from flexmb.linear.linearize import held_model
 from flexmb.linear.newton import LONGEST, SMALLEST, STEPS, EquilibriumError
 from flexmb.linear.variations import Equations
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 

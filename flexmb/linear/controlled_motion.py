@@ -27,7 +27,7 @@ from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.derivative_records import EvaluationDerivatives, OfControlledMotion, by_names
 from flexmb.system.linearisation import FreeRow
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.arguments import finite, vector
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result

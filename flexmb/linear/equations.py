@@ -11,7 +11,7 @@ from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_large_matrix
 from flexmb.system.compile import compile
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import State
 
 MATRICES = 3  # over the states: A, C, and A as it is made

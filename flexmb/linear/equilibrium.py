@@ -10,7 +10,7 @@ import numpy as np
 from flexmb.linear.equations import built, entering
 from flexmb.linear.newton import Stability, balanced, squares, verdict
 from flexmb.scene.schema import Scene
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.system.watches import of_states, warn
 from flexmb.tables.state import State
 

@@ -11,7 +11,7 @@ from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, Variations
 from flexmb.scene.schema import Scene
 from flexmb.system.pushforward import Directions
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.system.watches import WatchedStates, of_states, warn
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real

@@ -22,7 +22,7 @@ from flexmb.scene.control import (
     TimeSensor,
 )
 from flexmb.system.kinks import NotDifferentiableError
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Flags, Real
 

@@ -14,7 +14,7 @@ from flexmb.linear.variations import Equations
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.problems import closest
 from flexmb.scene.schema import Revolute, Scene
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.system.watches import warn
 from flexmb.tables import arguments
 from flexmb.tables.state import State

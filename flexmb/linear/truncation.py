@@ -26,7 +26,7 @@ from flexmb.scene.pieces import piece_count
 from flexmb.scene.schema import ModalState, Scene
 from flexmb.scene.strains import polynomials
 from flexmb.system.compile import compile
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.typing import Real
 
 MORE = 2  # times the modes, and the elements that they need

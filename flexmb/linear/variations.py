@@ -26,7 +26,7 @@ from flexmb.entry.tangent import TangentWorkspace, tangent_workspace
 from flexmb.entry.variation import FreeVariation, TreeVariation
 from flexmb.scene.functions import Constant, Function, Ramp
 from flexmb.system.pushforward import GivenMotion, Pushforward, pushforward
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.functions import pack as pack_functions
 from flexmb.tables.per_thread import per_thread

@@ -8,7 +8,7 @@ from copy import copy
 from flexmb.run.making import Making, system_at
 from flexmb.run.run_arrays import RunArrays
 from flexmb.scene.check.control import named
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 
 
 def systems_at(run: RunArrays, made_by: Making) -> Iterator[System]:

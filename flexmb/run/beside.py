@@ -22,7 +22,7 @@ from flexmb.jit.folder import cache_directory
 from flexmb.jit.warmed import is_warm
 from flexmb.scene.control import UserLaw
 from flexmb.scene.schema import Scene
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.features import BY_ITSELF, RECURSION, contained
 
 ENOUGH = 10.0  # s

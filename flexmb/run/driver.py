@@ -34,7 +34,7 @@ from flexmb.run.trajectory import Trajectory
 from flexmb.scene.events import EndRun
 from flexmb.scene.schema import SceneEvent
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 

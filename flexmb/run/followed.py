@@ -30,7 +30,7 @@ from flexmb.run.samples import sample_bytes
 from flexmb.run.switching import clock_of
 from flexmb.run.trajectory import Trajectory
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Flags, Index, Real

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from flexmb.closure.factor import DEPENDENT
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError, State, pack
 from flexmb.typing import Real
 

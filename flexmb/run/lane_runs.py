@@ -24,7 +24,7 @@ from flexmb.run.propagate import Integration, recursion
 from flexmb.run.switching import segment_ends
 from flexmb.system import algorithms
 from flexmb.system.batch import Batch, LaneTables, in_threads
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import INTERRUPTED, MAX_STEPS, NONFINITE, NOT_POSITIVE_DEFINITE, OK
 from flexmb.typing import Index, Real

@@ -11,7 +11,7 @@ import numpy as np
 from flexmb.integrate.settings import FINEST_RTOL, Settings
 from flexmb.run.channels import channels_of, distance
 from flexmb.run.run_arrays import RunArrays
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.typing import Real
 
 TIGHTER = 100.0  # factor on rtol and atol: the error of the second run is a hundredth of the first run's

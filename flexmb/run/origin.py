@@ -13,7 +13,7 @@ from flexmb.run.event_memory import EventMemory
 from flexmb.run.restart import Restart
 from flexmb.run.taking_up import fitting
 from flexmb.scene.problems import closest
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import State, pack
 from flexmb.typing import Real

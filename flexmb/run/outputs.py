@@ -10,7 +10,7 @@ from flexmb.run.propagate import Integration, Raw
 from flexmb.run.run_arrays import Statistics
 from flexmb.run.trajectory import Trajectory, gathered
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError, NotFiniteError
 from flexmb.tables.status import Status
 from flexmb.typing import Real

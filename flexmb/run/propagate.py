@@ -27,7 +27,7 @@ from flexmb.run.taking_up import refuse_other_division
 from flexmb.scene.tree import watches_signals
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Index, Real

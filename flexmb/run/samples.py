@@ -12,7 +12,7 @@ from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes, refuse_large_matrix
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables import arguments
 from flexmb.typing import Real
 

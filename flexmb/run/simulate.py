@@ -33,7 +33,7 @@ from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.system.watches import WatchedStates, said
 from flexmb.tables import arguments
 from flexmb.tables.state import PrecisionWarning, State

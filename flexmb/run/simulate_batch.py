@@ -26,7 +26,7 @@ from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes
 from flexmb.system.batch import Batch, number_of_threads
 from flexmb.system.compile import compile_batch
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.system.watches import Said, WatchedStates, said
 from flexmb.tables import arguments
 from flexmb.tables.features import BATCHES

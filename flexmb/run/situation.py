@@ -25,7 +25,7 @@ from flexmb.scene.values import changed_at
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
 from flexmb.system.scene_arrays import kernels_of
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.features import asking
 from flexmb.tables.state import State
 from flexmb.tables.status import Status

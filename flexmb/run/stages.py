@@ -16,7 +16,7 @@ from flexmb.scene.check import check_and_warn, check_run
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables import arguments
 from flexmb.typing import Real
 

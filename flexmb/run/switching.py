@@ -14,7 +14,7 @@ from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import watches_signals
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.typing import Real
 
 MOST_TURNS = 1_000_000  # extremes of a sine in a run; for more, a step for each would exceed max_steps

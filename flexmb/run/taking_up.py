@@ -11,7 +11,7 @@ from flexmb.integrate.control import stretch
 from flexmb.integrate.memory import DONE, STRETCH, TIME, Memory
 from flexmb.run.restart import Restart
 from flexmb.scene.tree import watches_signals
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.typing import Real
 
 REMEDY = "; to start from its last state instead, give the state `last_state` of its trajectory"

@@ -31,7 +31,7 @@ from flexmb.scene.shapes import beam_section
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ON_CHAINS, RUNNING, WITH_JACOBIAN
 from flexmb.system.compile import compile, compile_batch
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables import arguments
 from flexmb.tables.features import BATCHES, asking, contained
 

@@ -14,7 +14,7 @@ from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import Watch, watch
 from flexmb.run.propagate import Raw, integrate
 from flexmb.run.situation import Situation
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 

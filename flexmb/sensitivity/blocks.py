@@ -18,7 +18,7 @@ from flexmb.jit.wide_arrays import as_duals, wide_zeros
 from flexmb.parameters.kernels import chain_rates, parameter_workspace
 from flexmb.parameters.tables import DualClosureConstants, DualConstants
 from flexmb.sensitivity import chain, tree
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 

@@ -14,7 +14,7 @@ from flexmb.scene.problems import closest
 from flexmb.scene.tree import watches_signals
 from flexmb.sensitivity.blocks import ObservedRates
 from flexmb.system.observables import ENERGIES
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 

@@ -32,7 +32,7 @@ from flexmb.sensitivity.gate import Admitted, admitted_to, again, prepared
 from flexmb.sensitivity.measurements import Measurements, measurements
 from flexmb.sensitivity.rows import aligned
 from flexmb.sensitivity.sensitivities import of_run
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real

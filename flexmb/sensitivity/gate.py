@@ -18,7 +18,7 @@ from flexmb.sensitivity.part_scene import PartNumber, PartScene, all_changes, ch
 from flexmb.sensitivity.refusals import refuse_measured_loads, refuse_moving_instants, refuse_opened_closures
 from flexmb.sensitivity.systems import HandedOver
 from flexmb.system.compile import assembled
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 
 
 class Admitted(NamedTuple):

@@ -16,7 +16,7 @@ from flexmb.scene.convert import ROOT
 from flexmb.scene.events import Impact
 from flexmb.scene.functions import ControlSignal
 from flexmb.scene.schema import Scene
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.typing import Real
 
 

@@ -15,7 +15,7 @@ from flexmb.scene.schema import DriveSensor, LoadSensor, Scene
 from flexmb.scene.tree import watches_signals
 from flexmb.sensitivity.part_scene import all_changes, changed
 from flexmb.system.compile import assembled
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 
 _SCHEDULE = "period_s", "offset_s", "delay_s"
 _CLOSED = 1e-9  # m and rad, to which starts are closed with room for rounding

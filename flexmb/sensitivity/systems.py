@@ -20,7 +20,7 @@ from flexmb.parameters.parameters import Parameters
 from flexmb.parameters.tables import DualClosureConstants, DualConstants, ParameterBlock
 from flexmb.scene.tree import rate_name, scalar_paths
 from flexmb.sensitivity.blocks import Blocks, DualTables, set_lanes
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import State, pack
 from flexmb.typing import Real
 

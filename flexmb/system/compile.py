@@ -15,7 +15,7 @@ from flexmb.scene.garbage import collector_paused
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import Scene
 from flexmb.scene.strains import points_of_piece
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables import arguments
 from flexmb.tables.features import Kernels, asking
 

@@ -19,7 +19,7 @@ from flexmb.scene.sections import EXTENSION, mass_per_length, stiffness_on_axis
 from flexmb.scene.strains import strains
 from flexmb.system.level_range import of_hinges
 from flexmb.system.section_loads import SectionBalance
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 

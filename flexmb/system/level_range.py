@@ -16,7 +16,7 @@ import numpy as np
 from flexmb.building.links import BodyLink
 from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import BeamBody
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.typing import Flags, Real
 
 UNPULLED = ("ruthless", "linear", "full")

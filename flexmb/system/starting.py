@@ -14,7 +14,7 @@ from flexmb.scene.problems import Doubt
 from flexmb.scene.schema import Scene
 
 if TYPE_CHECKING:
-    from flexmb.system.tree_system import System
+    from flexmb.system.system import System
     from flexmb.tables.state import State
 
 

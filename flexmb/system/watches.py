@@ -16,7 +16,7 @@ import numpy as np
 
 from flexmb.scene.problems import Doubt, Place, SceneWarning
 from flexmb.scene.schema import Waiver
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import State
 from flexmb.typing import Real
 

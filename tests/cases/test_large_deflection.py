@@ -27,7 +27,7 @@ from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import BeamBody, Level, Scene
 from flexmb.surrogate import substructured
 from flexmb.system.compile import compile
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 
 FAMILY = Path(__file__).parents[2] / "cases" / "large_deflection"
 

@@ -13,7 +13,7 @@ from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.typing import Real
 
 CRANK, COUPLER, ROCKER, GROUND = 0.3, 0.8, 0.7, 1.0  # m

@@ -19,7 +19,7 @@ from flexmb.run.interruption import interruptible
 from flexmb.run.outputs import ending
 from flexmb.sensitivity.adjoint import stages
 from flexmb.sensitivity.adjoint.transposes import Transposes
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Index, Real

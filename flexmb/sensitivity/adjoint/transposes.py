@@ -21,7 +21,7 @@ from flexmb.parameters.tables import DualClosureConstants, DualConstants
 from flexmb.sensitivity.adjoint import transposed
 from flexmb.sensitivity.adjoint.sampling import DrivenFunctions
 from flexmb.sensitivity.blocks import Blocks, DualTables, array_parts, dual_parts
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.arrays import Constants
 from flexmb.typing import Flags, Index, Real
 

@@ -22,7 +22,7 @@ from flexmb.scene.freedoms import ScalarFreedom
 from flexmb.scene.hinges import Z_AXIS, _Hinge
 from flexmb.scene.tree import coordinates
 from flexmb.spatial.rotation import rotation_z
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z
 from flexmb.tables.features import HINGE
 from tests import trees

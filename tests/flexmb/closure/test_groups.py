@@ -14,7 +14,7 @@ from flexmb.scene.functions import Sine
 from flexmb.scene.schema import Scene
 from flexmb.scene.shapes import beam_section
 from flexmb.system.compile import compile as compiled
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from tests.bounds import algebra, relative
 from tests.flexmb.closure.least import least_loads
 from tests.flexmb.closure.mechanisms import FourBar

@@ -17,7 +17,7 @@ from flexmb.dense import DenseSystem
 from flexmb.dense.function_jets import profile
 from flexmb.scene import schema as s
 from flexmb.system.observables import Evaluation
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from tests import trees
 from tests.bounds import algebra, observed_order
 from tests.flexmb import spectral

@@ -13,7 +13,7 @@ import pytest
 import flexmb
 from flexmb.dense import DenseSystem
 from flexmb.scene.build import SceneBuilder
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError
 from tests import trees
 from tests.bounds import algebra, backward_error, gamma

@@ -14,7 +14,7 @@ from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.mechanics import Mechanics
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError, PrecisionWarning, State
 from tests.bounds import gamma
 from tests.flexmb import extended

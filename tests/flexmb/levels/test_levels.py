@@ -12,7 +12,7 @@ import flexmb
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError
 from tests import trees
 from tests.bounds import algebra, gamma, observed_order, relative

@@ -15,7 +15,7 @@ import flexmb
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Sine
-from flexmb.system.tree_system import System
+from flexmb.system.system import System
 from tests import trees
 from tests.bounds import algebra, relative
 
