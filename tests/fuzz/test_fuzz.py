@@ -159,6 +159,7 @@ NOT_OF_USERS = {
     "flexmb/jit/": "kernels and their sources",
     "flexmb/output/readers.py:write": "writes",
     "flexmb/output/whole.py:_settle": "writes",
+    "flexmb/run/warm_up.py:main": "what the process that started it has written",
     "flexmb/scene/values.py": "words of an option",
 }
 """Where functions call one of these without being tried here, and why that is right."""

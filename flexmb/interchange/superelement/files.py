@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import os
+from inspect import signature
 from pathlib import Path
 
 import numpy as np
@@ -122,8 +123,9 @@ def _harwell_boeing(path: Path) -> Real:
 
     if regular_size(path) > LIMIT:
         raise SuperElementError(f"{path} has more than {LIMIT // MIB} MiB: reduce the structure in its own program")
+    kind = {"spmatrix": False} if "spmatrix" in signature(hb_read).parameters else {}  # SciPy changes what it gives
     try:
-        found = hb_read(path)
+        found = hb_read(path, **kind)
     except (ValueError, IndexError, OverflowError, MemoryError, TypeError) as error:
         raise SuperElementError(f"{path} is not a Harwell-Boeing file ({error}): write it again") from None
     refuse_large(str(path), *found.shape)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import hypot
+from typing import assert_never
 
-from flexmb.scene.bodies import FINER, MOST_POINTS, MOST_POLYNOMIALS, BeamBody, Modes
+from flexmb.scene.bodies import FINER, MOST_POINTS, MOST_POLYNOMIALS, BeamBody, ModalBody, Modes
 from flexmb.scene.check.numbers import in_range
 from flexmb.scene.convert import ROOT
 from flexmb.scene.pieces import across, cut_itself, piece_count
@@ -153,9 +154,15 @@ def without_strains(place: Place, body: BeamBody) -> Iterator[Defect]:
             yield Defect(str(spot), what, 'make the level "exact", or join straight beams by welds')
 
 
-def or_whole(body: BeamBody) -> str:
+def or_whole(body: BeamBody | ModalBody) -> str:
     """The other remedy where a number of modes is not that of a beam which was cut by itself."""
-    return "; cuts = [] leaves the beam in one piece" if body.level == "exact" and cut_itself(body) else ""
+    match body:
+        case BeamBody():
+            return "; cuts = [] leaves the beam in one piece" if body.level == "exact" and cut_itself(body) else ""
+        case ModalBody():
+            return ""
+        case _:
+            assert_never(body)
 
 
 def damping(place: Place, modes: Modes, count: int, whole: str = "") -> Iterator[Defect]:

@@ -59,8 +59,7 @@ def modal_states(scene: Scene) -> Iterator[Defect]:
         for key, given, required in (("coordinates", state.coordinates, True), ("rates", state.rates, False)):
             if count is not None and len(given) != count and (given or required):
                 what = f'{len(given)} modal {key} for the {count} modes of body "{body.name}"'
-                whole = or_whole(body) if isinstance(body, BeamBody) else ""
-                yield Defect(str(place.key(key)), what, f"give {count} values{whole}")
+                yield Defect(str(place.key(key)), what, f"give {count} values{or_whole(body)}")
 
 
 def _count(body: BeamBody | ModalBody) -> int | None:

@@ -12,7 +12,7 @@ import pytest
 import flexmb as fm
 from tests.flexmb.closure import mechanisms as m
 from tests.flexmb.closure.test_jacobian import LIGHT, NAMES, SCENES, Linearised
-from tests.flexmb.entry.test_tangent import extrapolated
+from tests.flexmb.entry.test_tangent import extrapolated, rounding_of_limit
 from tests.flexmb.system import test_section_loads as sections
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
@@ -100,7 +100,8 @@ def test_along_what_the_closures_allow(name: str) -> None:
         size = max(1.0, float(np.nanmax(slopes[key], initial=0.0)))
         known = ~np.isnan(values(system, state)[key])
         np.testing.assert_array_equal(np.isnan(now), ~known)
-        allowed = 30.0 * np.max(unsure[known], initial=0.0) + (CLOSED + rounding(system, state)) * size / (step / 2**5)
+        noise = rounding_of_limit() * (CLOSED + rounding(system, state)) * size / (step / 2**5)
+        allowed = 30.0 * np.max(unsure[known], initial=0.0) + noise
         assert np.max(np.abs(now - wanted)[known], initial=0.0) <= allowed, key
         planted.append(float(np.max(np.abs(1.001 * now - wanted)[known], initial=0.0) - allowed))
         start = stop

@@ -109,6 +109,9 @@ def test_accelerations_against_the_dense_route(recipe, seed):
     assert np.max(backward_errors(found, dense)) > 10.0 * bound
 
 
+STEPS = 0.5 ** np.arange(20)
+
+
 def extrapolated(f, h: float, levels: int = 6) -> tuple[np.ndarray, np.ndarray]:
     """Richardson's limit of (f(h) - f(-h)) / 2h, and how far it is from the last but one."""
     table = [[(f(h / 2**i) - f(-h / 2**i)) / (2.0 * h / 2**i)] for i in range(levels)]
@@ -116,6 +119,12 @@ def extrapolated(f, h: float, levels: int = 6) -> tuple[np.ndarray, np.ndarray]:
         for k in range(1, i + 1):
             table[i].append(table[i][k - 1] + (table[i][k - 1] - table[i - 1][k - 1]) / (4.0**k - 1.0))
     return table[-1][-1], np.abs(table[-1][-1] - table[-1][-2])
+
+
+def rounding_of_limit(levels: int = 6) -> float:
+    """The most by which rounding of f moves the limit, in units of that over the smallest step, h / 2^(levels - 1)."""
+    return float(np.sum(np.abs(extrapolated(lambda h: np.where(STEPS[:levels] == abs(h), h, 0.0), 1.0, levels)[0]
+                               / STEPS[:levels] * STEPS[levels - 1])))  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -66,5 +66,7 @@ def test_stiffness_of_each_plane_and_length(name, key):
         for h in (STEP, STEP / 2.0, STEP / 4.0)
     )
     best, beside = two + (two - one) / 3.0, three + (three - two) / 3.0
-    allowed = CLOSE * np.max(np.abs(best)) + 3.0 * np.max(np.abs(best - beside))
+    tiny = [at(number.value * (1.0 + k * STEP * 2.0**-30)) for k in range(4)]  # smooth parts have no third differences
+    rounding = np.max(np.abs(tiny[3] - 3.0 * tiny[2] + 3.0 * tiny[1] - tiny[0])) / (number.value * STEP / 4.0)
+    allowed = CLOSE * np.max(np.abs(best)) + 3.0 * np.max(np.abs(best - beside)) + rounding
     assert np.max(np.abs(found - best)) <= allowed < 1e-4 * np.max(np.abs(best))

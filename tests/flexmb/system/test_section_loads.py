@@ -400,17 +400,6 @@ def test_what_is_no_beam_and_not_on_it_is_refused() -> None:
             system.section_loads(state, "beam", wrong)
 
 
-def test_a_run_with_controllers_is_refused() -> None:
-    """Their loads are known to the run alone: a state by itself has an open loop, and other loads."""
-    strip = fm.SceneBuilder("fed back").beam("beam", length=LENGTH, elements=2, section=SECTION, modes=1)
-    strip.revolute("pivot", "ground", "beam", angle=0.1, torque=fm.ControlSignal(source="hold"))
-    strip.add(fm.CoordinateSensor(name="angle", of="pivot"))
-    strip.add(fm.Pid(name="hold", inputs=("angle",), kp=1.0))
-    run = fm.simulate(strip.scene(), 0.01, samples=2, rtol=1e-6, atol=1e-8)
-    with pytest.raises(NotImplementedError, match="controllers"):
-        run.section_loads("beam", 0.0)
-
-
 @pytest.mark.parametrize("elements", [5, 10])
 def test_lumped_masses_step_at_nodes_by_what_the_warning_says(elements: int) -> None:
     """A level beam under its weight: half an element's weight just beside a node, nothing half-way between two."""

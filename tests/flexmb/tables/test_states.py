@@ -32,6 +32,7 @@ def test_a_state_is_as_long_as_its_layout_says(system):
         dataclasses.replace(state, t=np.nan)
 
 
+@pytest.mark.filterwarnings("ignore:Setting the .* on a NumPy array has been deprecated")
 def test_what_is_done_to_its_arrays_is_not_done_to_the_state(system):
     """NumPy changes shape, type and strides in place; a state's own array has none of it."""
     state = system.initial_state
