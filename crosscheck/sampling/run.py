@@ -138,16 +138,17 @@ def _jobs(
     asked = _digest(msgspec.json.encode(sweep.quantities), made_by((), REDUCING))
     what = [(parameter.paths, parameter.relative) for parameter in sweep.parameters]
     base = _digest(scene_identity(subject.base, subject.times), msgspec.json.encode(subject.variant), what)
+    kept = tuple(quantity.channel for quantity in sweep.quantities)
+    engines = [(engine, home(engine), _effort(sweep, engine)) for engine in sweep.engines]  # plug-ins are looked for
     found = []
     for sample, row in enumerate(values):
         scene_id = _digest(base, row.tolist())
-        for engine in sweep.engines:
+        for engine, maker, efforts in engines:
             done = known.get((engine, scene_id, asked))
             job = Job(
                 case=sweep.title, variant=subject.variant.name, role=MAIN, engine=engine, scene=None, scene_id=scene_id,
-                times=subject.times, provider=provider, maker=home(engine), efforts=_effort(sweep, engine),
-                finest_only=True, kept=tuple(quantity.channel for quantity in sweep.quantities), done=_done(done),
-                time_limit_s=time_limit_s, lean=True,
+                times=subject.times, provider=provider, maker=maker, efforts=efforts, finest_only=True, kept=kept,
+                done=_done(done), time_limit_s=time_limit_s, lean=True,
             )  # fmt: skip
             found.append(SampleJob(job, sample, tuple(row.tolist()), sweep, subject.base, subject.variant, asked))
     return found

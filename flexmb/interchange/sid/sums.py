@@ -126,8 +126,11 @@ class Sums:
         way first, then Ct, then Cr, and a note says by how much. The rest of the modal masses moves along x.
         """
         sid = self.sid
-        if self.m and not np.min(np.linalg.eigvalsh(symmetric(sid.Me.zero))) > 0.0:
-            raise SidError("Me is not positive definite, and no distribution of mass has such modal masses: correct it")
+        try:
+            np.linalg.cholesky(symmetric(sid.Me.zero))  # an eigenvalue of rounding may be above zero
+        except np.linalg.LinAlgError:
+            what = "Me is not positive definite, and no distribution of mass has such modal masses: correct it"
+            raise SidError(what) from None
         moments = np.block([[np.array([[sid.mass]]), sid.mdCM.zero.T], [sid.mdCM.zero, second_moment(sid.J.zero)]])
         size = np.repeat(np.sqrt([sid.mass, max(np.trace(moments[1:, 1:]), np.finfo(float).tiny)]), (1, 3))
         inverse = np.linalg.pinv(moments / np.outer(size, size), rcond=PRINTED, hermitian=True) / np.outer(size, size)

@@ -200,8 +200,15 @@ def negated(block: str):
     return lambda sid: replace(sid, **{block: Taylor(-getattr(sid, block).zero, getattr(sid, block).first)})
 
 
+def doubled(sid):
+    """Two modes that are one: the least eigenvalue is rounding, above zero or below."""
+    places = [0, 0, *range(2, len(sid.Me.zero))]
+    return replace(sid, Me=Taylor(sid.Me.zero[np.ix_(places, places)]))
+
+
 IMPOSSIBLE = {
     "masses": (negated("Me"), "Me is not positive definite"),
+    "one mode twice": (doubled, "Me is not positive definite"),
     "inertia": (negated("J"), "no distribution of mass"),
     "stress": (lambda sid: replace(sid, ksigma=Taylor(np.ones((5, 1)))), "ksigma has an M0"),
     "stiffness": (lambda sid: replace(sid, Ke=Taylor(sid.Ke.zero, np.ones((5, 5, 5)))), "Ke has an M1"),
