@@ -138,7 +138,8 @@ def run_stages(
         run, warned, was_interrupted = _looked_at(stage.system, _run(stage, start, settings, algorithm, stabilise))
         for warning in warned:
             warnings.warn(warning, stacklevel=3)
-        computed(stage.system, run.statistics.run_s)
+        if algorithm == "articulated" and not settings.integrator.linearises:  # others have no special kernels beside
+            computed(stage.system, run.statistics.run_s)
         whole = run if whole is None else whole.then(run)
         if was_interrupted or run.status is Status.INTERRUPTED:
             raise Interrupted(whole)

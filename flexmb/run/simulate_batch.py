@@ -80,7 +80,8 @@ def simulate_batch(
         _, interrupted = interruptible(BatchRun(batch, times, chosen, found), (len(rows[0]), number), stop)
         if interrupted:
             raise KeyboardInterrupt
-        computed(batch.system(0), perf_counter() - start, BATCHES)
+        if batch.in_lanes and not chosen.integrator.linearises and not batch.system(0).scene.controllers:
+            computed(batch.system(0), perf_counter() - start, BATCHES)
     made = _gathered(batch, times, found, len(rows[0]))
     for warning in _watched(made):
         warnings.warn(warning, SceneWarning, stacklevel=2)

@@ -51,6 +51,10 @@ def test_it_is_started_once_for_scenes_of_a_kind_that_have_computed_for_long(sta
 def test_runs_and_batches_count(started, monkeypatch):
     monkeypatch.setattr(beside, "ENOUGH", 1e-9)
     system = fm.compile(chain().scene())
+    fm.simulate(system, 0.01, "radau5", samples=2)
+    fm.simulate(system, 0.01, algorithm="composite", samples=2)
+    fm.simulate_batch(system, 0.01, "radau5", samples=2)
+    assert started == []
     fm.simulate(system, 0.01, samples=2)
     fm.simulate_batch(system, 0.01, samples=2)
     assert started == [f"chain: {RECURSION}", f"chain: {BATCHES}"]
