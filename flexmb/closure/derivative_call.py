@@ -21,7 +21,9 @@ from flexmb.closure.forces import accelerate, choose, free_tree, is_delicate, re
 from flexmb.closure.jacobian import ChainJacobian, chain_jacobian, factors, hold_rows, put_rows
 from flexmb.closure.sizes import measure_ports
 from flexmb.closure.tables import Closed
+from flexmb.entry.derivatives import copy_third
 from flexmb.jain.derivatives.solve import solve
+from flexmb.jain.derivatives.sweeps import stop
 from flexmb.jit.bundle import bundle
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel, sweep
@@ -89,6 +91,26 @@ def differentiate_chain(t, y, s, x):
     _respond_to_forces(s, x, count)
     finite = _is_finite(x.by_displacement) and _is_finite(x.by_speed) and _is_finite(x.by_force)
     return OK if finite else NONFINITE
+
+
+@kernel
+def chain_stiffness(t, y, rates, stiffness, mass, s, x):
+    """udot (nu,) at y = [q, u, work], the tangent stiffness (nu,nu) and M, and J in `chain.changes`; a status code.
+
+    As `flexmb.entry.derivatives.stiffness_and_mass`; the loads of the rows act and stay.
+    """
+    status = _motion(t, y, s)
+    if status == OK:
+        status = factors(s.route, t, y, s, x.chain.tree.sweeps)
+    if status == OK:
+        w, d = x.chain.tree.sweeps, x.chain.tree.tables
+        for j in range(rates.shape[0]):
+            rates[j] = w.speed[j].acceleration
+        stop(s.c, w)
+        differentiate(s.c, w, d, s.cc, s.cw, x.chain.changes, True, False)
+        copy_third(d, 0, stiffness)
+        copy_third(d, 2, mass)
+    return status
 
 
 @helper
@@ -159,15 +181,11 @@ def _stop_column(s, x, place, again):
 @helper
 def _copy(c, d, third, out):
     """One third of the columns of `matrix` to out (nu,nu), in the order of u; columns of what is prescribed vanish."""
-    nu = out.shape[0]
-    for i in range(nu):
-        row = d.matrix[d.place[i]]
-        for j in range(nu):
-            out[i, j] = row[third * nu + d.place[j]]
+    copy_third(d, third, out)
     if has(c, PRESCRIBED):
-        for j in range(nu):
+        for j in range(out.shape[0]):
             if c.speed[j].prescribed >= 0:
-                for i in range(nu):
+                for i in range(out.shape[0]):
                     out[i, j] = 0.0
 
 

@@ -15,13 +15,19 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.closure.closures import Closures
-from flexmb.closure.derivative_call import ChainDerivativeCall, chain_derivative_call, differentiate_chain
+from flexmb.closure.derivative_call import (
+    ChainDerivativeCall,
+    chain_derivative_call,
+    chain_stiffness,
+    differentiate_chain,
+)
 from flexmb.closure.tables import Closed
 from flexmb.closure.tangent import ClosureTangentWorkspace, change_by_time, closure_tangent_workspace
 from flexmb.entry.tangent import TangentWorkspace
-from flexmb.entry.variation import ByAllDirections, CoordinateMotion, FreeVariation, RowChanges
-from flexmb.jit.direct import direct
-from flexmb.jit.pointer import REAL, STATUS, VECTOR
+from flexmb.entry.variation import ByAllDirections, CoordinateMotion, FreeVariation, RowChanges, Stiffness
+from flexmb.jit.direct import Direct, direct
+from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
+from flexmb.kept import kept
 from flexmb.typing import Index, Real
 
 
@@ -70,6 +76,19 @@ class ChainVariation:
         of_rates = ByAllDirections(x.by_displacement.copy(), x.by_speed.copy(), x.by_force.copy(), np.zeros(nu))
         found = FreeVariation(rates, of_rates, self.motion.at(t, y), rows)
         return self._with_time(t, y, found) if len(s.c.function) else found
+
+    @kept
+    def _stiffen(self) -> Direct:
+        return direct(chain_stiffness, STATUS, REAL, VECTOR, VECTOR, MATRIX, MATRIX, self._chain, self._x)
+
+    def stiffness(self, t: float, y: Real) -> Stiffness:
+        """At y = [q, u, work], as `at`."""
+        x, nu = self._x, len(self._x.speed)
+        rates, stiffness, mass = np.empty(nu), np.empty((nu, nu)), np.empty((nu, nu))
+        self._closures.expect_rows(self._chain)
+        self._closures.check(self._stiffen(t, y, rates, stiffness, mass), int(x.fault[0]))
+        J = x.chain.changes.jacobian[:, x.chain.tree.tables.place]
+        return Stiffness(rates, stiffness, mass, J, self.motion.at(t, y))
 
     def _with_time(self, t: float, y: Real, found: FreeVariation) -> FreeVariation:
         """The same with derivatives by time."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from flexmb.hinges import catalogue
 from flexmb.jain.derivatives import sweeps
+from flexmb.jain.derivatives.applied import subtract_applied
 from flexmb.jain.derivatives.tables import ALIKE, IN_ORDER, Derivatives, derivatives
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.sweeps import forward_dynamics
@@ -62,9 +63,9 @@ def acceleration_derivatives(t, y, by_displacement, by_speed, by_force, c, w):
     if status != OK:
         return status
     sweeps.accelerations(c, w.sweeps, w.tables)
-    _copy(w.tables, 0, by_displacement)
-    _copy(w.tables, 1, by_speed)
-    _copy(w.tables, 2, by_force)
+    copy_third(w.tables, 0, by_displacement)
+    copy_third(w.tables, 1, by_speed)
+    copy_third(w.tables, 2, by_force)
     if has(c, PRESCRIBED):
         for j in range(c.speed.shape[0]):
             if c.speed[j].prescribed >= 0:
@@ -86,13 +87,33 @@ def inverse_dynamics_derivatives(t, y, rates, by_displacement, by_speed, by_acce
     if has(c, CONNECTORS):
         pose_sweep(c, w.sweeps)
     sweeps.inverse_dynamics(c, w.sweeps, w.tables, True)
-    _copy(w.tables, 0, by_displacement)
-    _copy(w.tables, 1, by_speed)
-    _copy(w.tables, 2, by_acceleration)
+    copy_third(w.tables, 0, by_displacement)
+    copy_third(w.tables, 1, by_speed)
+    copy_third(w.tables, 2, by_acceleration)
+
+
+@kernel
+def stiffness_and_mass(t, y, rates, stiffness, mass, c, w):
+    """udot (nu,) at y = [q, u, work], the tangent stiffness (nu,nu) and M; returns a status code.
+
+    The stiffness is how b - T changes by displacements while only what is prescribed accelerates. Rows and columns of
+    what is prescribed are as of `inverse_dynamics_derivatives`.
+    """
+    load_state(t, y, c, w.sweeps)
+    status = forward_dynamics(c, w.sweeps)
+    if status == OK:
+        for j in range(rates.shape[0]):
+            rates[j] = w.sweeps.speed[j].acceleration
+        sweeps.stop(c, w.sweeps)
+        sweeps.inverse_dynamics(c, w.sweeps, w.tables, True)
+        subtract_applied(c, w.sweeps, w.tables)
+        copy_third(w.tables, 0, stiffness)
+        copy_third(w.tables, 2, mass)
+    return status
 
 
 @helper
-def _copy(d, third, out):
+def copy_third(d, third, out):
     """One third of the columns of `matrix` to out (nu,nu), in the order of u."""
     nu = out.shape[0]
     if d.shape[IN_ORDER]:

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.entry.derivatives import DerivativeWorkspace, acceleration_derivatives
+from flexmb.entry.derivatives import DerivativeWorkspace, acceleration_derivatives, stiffness_and_mass
 from flexmb.entry.tangent import TangentWorkspace, time_derivative
-from flexmb.jit.direct import direct
+from flexmb.jit.direct import Direct, direct
 from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.kept import kept
@@ -80,6 +80,17 @@ class FreeVariation(NamedTuple):
     rows: RowChanges
 
 
+class Stiffness(NamedTuple):
+    """The accelerations (nu,), the tangent stiffness (nu,nu) under constant loads of the rows of closures, M (nu,nu),
+    and J (G,nu) and N (nq,nu) as of `RowChanges` and `FreeVariation`."""
+
+    accelerations: Real
+    stiffness: Real
+    mass: Real
+    J: Real
+    motion: Real
+
+
 Check = Callable[[int, int], None]  # raises unless a status is OK; the second number is the body or closure at fault
 
 
@@ -116,6 +127,7 @@ class TreeVariation:
         self._is_driven, n = bool(len(c.function)), len(c.speed)
         self._differentiate = direct(acceleration_derivatives, STATUS, REAL, VECTOR, MATRIX, MATRIX, MATRIX, c, w)
         self._differentiate_by_time = direct(time_derivative, STATUS, REAL, VECTOR, VECTOR, c, dual)
+        self._constants = c
         none, loads = np.zeros((0, n)), np.zeros(0)
         of_loads = ByAllDirections(none, none, none, loads)
         self._no_rows = RowChanges(loads, of_loads, np.zeros(0, np.int64), none.T, none, none, loads)
@@ -137,6 +149,19 @@ class TreeVariation:
             by_time = drift[-1 - nu : -1]
         of_rates = ByAllDirections(*by_state_and_force, by_time)
         return FreeVariation(rates, of_rates, self.motion.at(t, y), self._no_rows)
+
+
+    @kept
+    def _stiffen(self) -> Direct:
+        tables = self._constants, self._w
+        return direct(stiffness_and_mass, STATUS, REAL, VECTOR, VECTOR, MATRIX, MATRIX, *tables)
+
+    def stiffness(self, t: float, y: Real) -> Stiffness:
+        """At y = [q, u, work]; DynamicsError where the accelerations do not exist."""
+        nu = len(self._w.sweeps.u)
+        rates, stiffness, mass = np.empty(nu), np.empty((nu, nu)), np.empty((nu, nu))
+        self._check(self._stiffen(t, y, rates, stiffness, mass), int(self._w.fault[0]))
+        return Stiffness(rates, stiffness, mass, self._no_rows.J, self.motion.at(t, y))
 
 
 @kernel

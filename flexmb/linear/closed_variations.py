@@ -103,23 +103,20 @@ class ClosedEquations(Equations):
 
     def loads(self, state: State, at: RestForces) -> Real:
         found = self.free_variation(state)
-        left = self._freedom(state, found.rows.J[:, self.free])
+        left = self._freedom(self.mass(state), found.rows.J[:, self.free])
         return left.basis(at.chosen).T @ left.mass @ found.accelerations[self.free]
 
-    def forces(self, state: State) -> RestForces:
-        at, found, M = self.variations(state), self.free_variation(state), self.mass(state)
-        rates, N = found.accelerations[self.free], at.basis
-        left = M @ self._among_free(found.of_accelerations.by_displacement) + self._by_inertia(state, rates)
-        return RestForces(
-            state, N.T @ M @ rates, -N.T @ left @ N, at.rates, at.motion, at.mass, at.chosen, at.movable, N
-        )
+    def _independent(self, mass: Real, J: Real) -> tuple[Index, Real]:
+        left = self._freedom(mass, J)
+        chosen = left.independent()
+        return chosen, left.basis(chosen)
 
     def variations(self, state: State) -> Variations:
         found, free = self.free_variation(state), self.free
         of_rates, by_displacement = found.of_accelerations, self._among_free(found.of_accelerations.by_displacement)
         J, rates_by_displacement = found.rows.J[:, free], found.rows.rates_by_displacement[:, free]
         P = found.rows.lever[free]
-        left = self._freedom(state, J)
+        left = self._freedom(self.mass(state), J)
         chosen = left.independent()
         N, f, n = left.basis(chosen), self.freedom, len(free)
 
@@ -156,9 +153,9 @@ class ClosedEquations(Equations):
         """Rows and columns (n,n) of the free speeds."""
         return of_all[np.ix_(self.free, self.free)]
 
-    def _freedom(self, state: State, J: Real) -> _Freedom:
+    def _freedom(self, mass: Real, J: Real) -> _Freedom:
         """DynamicsError at a singular position."""
-        mass, rank = self.mass(state), self.rank
+        rank = self.rank
         weight = self._closures.constants[1].weight  # of rotations against translations
         root = np.linalg.cholesky(mass)
         _, S, Vt = np.linalg.svd(weight[:, None] * solve_triangular(root, J.T, lower=True).T)

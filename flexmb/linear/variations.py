@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from flexmb.entry import articulated
-from flexmb.entry.derivatives import DerivativeWorkspace, derivative_workspace, inverse_dynamics_derivatives
+from flexmb.entry.derivatives import DerivativeWorkspace, derivative_workspace
 from flexmb.entry.tangent import TangentWorkspace, tangent_workspace
 from flexmb.entry.variation import FreeVariation, TreeVariation
 from flexmb.scene.functions import Constant, Function, Ramp
@@ -153,9 +153,13 @@ class Equations:
     def free_variation(self, state: State) -> FreeVariation:
         """How all accelerations change; DynamicsError where these do not exist."""
         found = self._free.at(state.t, pack(state))
-        if self._free.doubt[0]:
-            self.system.digits_left(state)  # raises if pivots are at rounding level
+        self._examine(state)
         return found
+
+    def _examine(self, state: State) -> None:
+        """DynamicsError if pivots of the last motion, which was at this state, are at rounding level."""
+        if self._free.doubt[0]:
+            self.system.digits_left(state)
 
     def motion(self, state: State) -> GivenMotion:
         """The motion with its accelerations, and the loads of rows; DynamicsError where these do not exist."""
@@ -212,25 +216,20 @@ class Equations:
         return self.mass(state) @ self.rates(state)
 
     def forces(self, state: State) -> RestForces:
-        """Loads and tangent stiffness at a state: d(M udot) = M d(udot) + dM udot; DynamicsError where the
-        accelerations do not exist."""
-        at = self.variations(state)
-        left = at.mass @ at.by_displacement + self._by_inertia(state, at.rates)
+        """Loads and tangent stiffness at a state; DynamicsError where the accelerations do not exist."""
+        found, free = self._free.stiffness(state.t, pack(state)), self.free
+        self._examine(state)
+        both, rates = np.ix_(free, free), found.accelerations[free]
+        mass = found.mass[both]
+        chosen, N = self._independent(mass, found.J[:, free])
         return RestForces(
-            state, at.mass @ at.rates, -left, at.rates, at.motion, at.mass, at.chosen, at.movable, at.basis
-        )
+            state, N.T @ mass @ rates, N.T @ found.stiffness[both] @ N, rates[chosen], found.motion[:, free] @ N,
+            N.T @ mass @ N, chosen, self.movable(chosen), N,
+        )  # fmt: skip
 
-    def _by_inertia(self, state: State, rates: Real) -> Real:
-        """Derivative (n,n) of M udot by displacements, at accelerations (n,) of the free speeds that do not change."""
-        nu, y, found = self.system.nu, pack(state), []
-        unused = np.empty((nu, nu)), np.empty((nu, nu))
-        for size in (1.0, 0.0):  # all terms but the inertia's are the same at zero accelerations
-            given, by_displacement = np.zeros(nu), np.empty((nu, nu))
-            given[self.free] = size * rates
-            tables = self.constants, self._derivatives
-            inverse_dynamics_derivatives(state.t, y, given, by_displacement, *unused, *tables)
-            found.append(by_displacement)
-        return np.asarray((found[0] - found[1])[np.ix_(self.free, self.free)])
+    def _independent(self, mass: Real, J: Real) -> tuple[Index, Real]:
+        """Indices (f,) of the independent coordinates and N (n,f); mass (n,n) and J (G,n) of the free speeds."""
+        return np.arange(len(mass)), np.eye(len(mass))
 
     def movable(self, chosen: Index) -> Index:
         """Indices among these free speeds of those whose coordinate is not cyclic: all but wheels without springs."""

@@ -44,6 +44,14 @@ def clear_matrix(c, d, masses):
 
 
 @helper
+def stop(c, w):
+    """No accelerations but prescribed ones, as the tangent stiffness has them."""
+    for j in range(w.u.shape[0]):
+        if c.speed[j].prescribed < 0:
+            w.speed[j].acceleration = 0.0
+
+
+@helper
 def _copy_functions(c, w, d):
     """The functions of time."""
     for f in range(c.function.shape[0]):

@@ -9,12 +9,16 @@ import pytest
 from scipy.optimize import brentq
 
 import flexmb as fm
+from flexmb.linear.equations import entering
 from flexmb.linear.variations import Equations
+from flexmb.scene.files import load_scene
 from flexmb.scene.shapes import beam_section
 from tests import trees
 from tests.bounds import UNIT_ROUNDOFF
+from tests.repo.project import ROOT
 
 ROUNDING = 2.0**10 * UNIT_ROUNDOFF
+LOOPS = ROOT / "cases" / "closed_chains"
 G = 9.81
 
 
@@ -77,6 +81,26 @@ def test_random_trees_come_to_rest(seed):
     assert model.stability.verdict == "neutral"  # an undamped one that is stable
     wheel = system.coordinate("w0")
     assert found.q[wheel] == system.initial_state.q[wheel]
+
+
+@pytest.mark.parametrize("case", ["tree", "four_bar", "flexible_four_bar"])
+def test_tangent_stiffness_is_that_of_accelerations(case):
+    """K = -(M d(udot) + dM udot), at constant loads of closures: by what no equilibrium needs."""
+    scene = trees.random_scene(0, trees.CONSERVATIVE) if case == "tree" else load_scene(LOOPS / case / "scene.toml")
+    equations, state = entering(fm.compile(scene), None)
+    equations = equations.held(state.t)
+    found, at, free = equations.forces(state), equations.variations(state), equations.free_variation(state)
+    own, given, M = equations.free, free.accelerations.copy(), equations.mass(state)
+    given[[j for j in range(len(given)) if j not in own]] = 0.0
+    by_inertia = [
+        equations.system.inverse_dynamics_derivatives(state, rates).by_displacement for rates in (given, 0.0 * given)
+    ]
+    left = M @ free.of_accelerations.by_displacement[np.ix_(own, own)] + np.subtract(*by_inertia)[np.ix_(own, own)]
+    expected = -at.basis.T @ left @ at.basis
+    assert np.max(np.abs(found.stiffness - expected)) < 1e-11 * np.max(np.abs(expected))
+    load = at.basis.T @ M @ free.accelerations[own]
+    assert np.max(np.abs(found.load - load)) < 1e-11 * np.max(np.abs(load))
+    np.testing.assert_allclose(found.mass, at.mass, rtol=0.0, atol=1e-12 * np.max(np.abs(at.mass)))
 
 
 def test_an_equilibrium_is_differentiated_once(monkeypatch):
