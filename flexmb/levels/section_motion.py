@@ -61,17 +61,6 @@ def move_sections(c, w, k):
 
 
 @helper
-def move_section(c, w, k, j):
-    """Section j of body k as `move_sections` moves it, at less cost: the others turn, but get no place."""
-    for i in range(c.body[k].section_start, c.body[k].section_stop):
-        if has(c, BENT_IN_PLANE) and c.body[k].planar:
-            _turn_about_axis(c, w, k, i)
-        elif has(c, BENT_IN_SPACE):
-            _turn(c, w, k, i)
-    _place(c, w, k, j)
-
-
-@helper
 def _turn(c, w, k, j):
     """R, w, alpha and W of section j from those of the section before."""
     i = c.section[j].before

@@ -7,6 +7,7 @@ the origin of the body frame.
 
 from flexmb.jain.derivatives import affine
 from flexmb.jain.derivatives.hinges import force_to_world
+from flexmb.jain.derivatives.modes import in_body_axes
 from flexmb.jain.derivatives.ports import seed_mode
 from flexmb.jain.derivatives.strained import strained_force
 from flexmb.jain.derivatives.strips_of import put_strips, strips_of
@@ -21,9 +22,20 @@ from flexmb.levels.body import LEVELS, body_inertia, is_at_rest
 from flexmb.levels.section_motion import move_sections
 from flexmb.spatial.inertia import inertia_times, load_inertia, rotate_inertia, shift_inertia, store_inertia
 from flexmb.spatial.rows import column3, put3, store_column3, strips3
-from flexmb.spatial.spatial_vector import ZERO6, axpy6, plus6, shift_motion, store6, times6_t, vec6
+from flexmb.spatial.spatial_vector import (
+    ZERO6,
+    add6,
+    axpy6,
+    plus6,
+    scale6,
+    shift_motion,
+    store6,
+    sum6,
+    times6_t,
+    vec6,
+)
 from flexmb.spatial.vector import add, cross, mat3, scale, times, vec3
-from flexmb.tables.features import LEVEL, SECTIONS
+from flexmb.tables.features import LEVEL, OUTBOARD_NODES, SECTIONS
 
 FULL_NUMBER = LEVELS.index(full.LEVEL)
 FULL = f"{LEVEL} {FULL_NUMBER}"
@@ -42,7 +54,7 @@ def flexible_force(c, w, d, k):
         _elastic_rows(c, d, d.plain, k)
     elif has(c, EXACT) and c.body[k].level == EXACT_NUMBER:
         _in_floats(c, w, d, k, V, A)
-        _by_duals(c, w, d, k, V, A)
+        _exact_by_rates(c, w, d, k, V, A)
         _with_the_motion(d.plain, d, c.body[k].modes, k, V)
         _to_world(c, d, d.plain, k, R)
         _elastic_rows(c, d, d.plain, k)
@@ -70,25 +82,98 @@ def _in_floats(c, w, d, k, V, A):
 @sweep
 def _by_duals(c, w, d, k, V, A):
     """The derivatives of the force and of the rows of the modes, along one direction in each lane."""
-    e, nm = d.duals, c.body[k].modes
-    store6(e.body[k].velocity, 0, V)
-    for n in range(nm):
-        e.eta[k, n], e.etad[k, n] = w.eta[k, n], w.etad[k, n]
-        e.etadd[k, n] = w.speed[c.body[k].etad_index + n].acceleration
-    last = 3 if is_at_rest(c.body[k].level) else 3 + 2 * nm
+    nm = c.body[k].modes
+    _enter(c, w, d.duals, k, V)
     if is_at_rest(c.body[k].level):
         _no_rows(d, k, nm)
-    for first in range(0, last, LANES):
-        count = min(LANES, last - first)
+    _along(c, w, d, k, A, 0, 3 if is_at_rest(c.body[k].level) else 3 + 2 * nm)
+
+
+@helper
+def _enter(c, w, e, k, V):
+    """The state of body k to the workspace of duals."""
+    store6(e.body[k].velocity, 0, V)
+    for n in range(c.body[k].modes):
+        e.eta[k, n], e.etad[k, n] = w.eta[k, n], w.etad[k, n]
+        e.etadd[k, n] = w.speed[c.body[k].etad_index + n].acceleration
+
+
+@sweep
+def _along(c, w, d, k, A, start, stop):
+    """The same along the directions start .. stop, at level exact of one kind."""
+    e, nm = d.duals, c.body[k].modes
+    for first in range(start, stop, LANES):
+        count = min(LANES, stop - first)
         for lane in range(count):
             _seed(e, k, nm, first + lane, lane)
         if has(c, EXACT) and c.body[k].level == EXACT_NUMBER:
-            strained_force(c, e, k, A)
+            mode = first - 3 if first < 3 + nm else first - 3 - nm
+            strained_force(c, e, k, A, (max(mode, 0), mode + count if first >= 3 else 0))
         else:
             body_inertia(c, e, k)
             _force(c, w, e, k, A)
         for lane in range(count):
             _keep(c, w, d, k, first + lane, lane)
+
+
+@sweep
+def _exact_by_rates(c, w, d, k, V, A):
+    """At level exact, outward: by angular velocity and speeds. By displacements see `bend`."""
+    nm, first, nu = c.body[k].modes, d.places[k].modes, d.speed.shape[0]
+    moves = V[0][0] != 0.0 or V[0][1] != 0.0 or V[0][2] != 0.0
+    for n in range(nm):
+        moves = moves or w.etad[k, n] != 0.0
+    if moves:
+        _enter(c, w, d.duals, k, V)
+        _along(c, w, d, k, A, 0, 3)
+        _along(c, w, d, k, A, 3 + nm, 3 + 2 * nm)
+        return
+    for i in range(6):  # the force is quadratic in all rates
+        for n in range(3):
+            d.local[i, n] = 0.0
+        for n in range(nm):
+            d.mode[k, MODE_FORCE + 6 + i, n] = 0.0
+    for i in range(nm):
+        for n in range(3):
+            d.mode[k, MODE_BY_RATE + n, i] = 0.0
+        for n in range(nm):
+            d.matrix[first + i, nu + first + n] = 0.0
+
+
+@helper
+def bend(c, w, d, k):
+    """At level exact, inward, before the answers of the ports of body k: what its displacements change."""
+    if has(c, EXACT) and c.body[k].level == EXACT_NUMBER and c.body[k].modes > 0:
+        _exact_by_displacements(c, w, d, k)
+
+
+@sweep
+def _exact_by_displacements(c, w, d, k):
+    """The rows and the force by displacements, of the rows also what the ports carry."""
+    R, origin, A = mat3(d.body[k].rotation, 0), vec3(d.body[k].origin, 0), _acceleration(d, k)
+    e, nm, first, whole = d.duals, c.body[k].modes, d.places[k].modes, vec6(d.body[k].force, 0)
+    _enter(c, w, e, k, vec6(w.body[k].velocity, 0))
+    for j in range(c.body[k].section_start, c.body[k].section_stop):
+        store6(e.at_section[j].held, 0, ZERO6)
+    for i in range(c.body[k].port_start, c.body[k].port_stop):
+        if d.port[i].used:
+            whole = sum6(whole, vec6(d.port[i].force, 0))
+            _hold(c, e, i, in_body_axes(R, origin, vec6(d.port[i].force, 0)))
+    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
+        _hold(c, e, c.body[k].outboard_port, in_body_axes(R, origin, scale6(-1.0, whole)))
+    _along(c, w, d, k, A, 3, 3 + nm)
+    for n in range(0, nm, width(d)):
+        put_strips(d, d.mode[k], MODE_FORCE, n, force_to_world(R, origin, strips_of(d, d.mode[k], MODE_FORCE, n)))
+    for i in range(nm):
+        for n in range(nm):
+            d.matrix[first + i, first + n] += c.stiffness[k, i, n]
+
+
+@helper
+def _hold(c, e, i, F):
+    """Let a force (6) about the body origin act at the section of port i; the modes do not move other ports."""
+    if c.port[i].section >= 0:
+        add6(e.at_section[c.port[i].section].held, 0, F)
 
 
 @helper

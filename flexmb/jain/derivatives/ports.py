@@ -12,6 +12,7 @@ only their accelerations act.
 """
 
 from flexmb.jain.derivatives.hinges import to_world
+from flexmb.jain.derivatives.strained import place_section, turn_sections
 from flexmb.jain.derivatives.strips_of import put3_until, put_strips, put_strips_until, strips_of
 from flexmb.jain.derivatives.tables import (
     BY_ACCELERATION,
@@ -29,7 +30,6 @@ from flexmb.jit.kernel import helper, sweep
 from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import width
 from flexmb.levels.body import is_at_rest
-from flexmb.levels.section_motion import move_section
 from flexmb.spatial.cross6 import motion_cross
 from flexmb.spatial.rows import column6, strips6
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, scale6, shift_motion, store6, sub6, sum6, vec6
@@ -173,6 +173,9 @@ def _change(c, w, d, k, i):
     for n in range(nm):
         e.eta[k, n] = w.eta[k, n]
         e.etad[k, n] = w.etad[k, n]
+    if has(c, SECTIONS) and c.port[i].section >= 0:
+        _change_at_section(c, w, d, k, i)
+        return
     for first in range(0, nm + 1, LANES):
         count = min(LANES, nm + 1 - first)
         for lane in range(count):
@@ -180,8 +183,6 @@ def _change(c, w, d, k, i):
                 seed_mode(e, k, nm, first + lane, lane)
             else:
                 _seed_along_speeds(w, e, k, nm, lane)
-        if has(c, SECTIONS) and c.port[i].section >= 0:
-            move_section(c, e, k, c.port[i].section)
         move_port(c, e, k, i)
         _store_relative(c, w, d, k, i)
         for lane in range(count):
@@ -191,6 +192,47 @@ def _change(c, w, d, k, i):
                 _keep_speeds(d, i, nm, lane)
         for n in range(nm):
             e.eta[k, n] = w.eta[k, n]
+
+
+@sweep
+def _change_at_section(c, w, d, k, i):
+    """The same where a section of level exact carries port i; of its motions, `flexmb.jain.derivatives.flexible.bend`
+    finds what displacements do to the rows."""
+    e, nm, moves = d.duals, c.body[k].modes, False
+    for n in range(nm):
+        e.etadd[k, n] = w.speed[c.body[k].etad_index + n].acceleration
+        moves = moves or w.etad[k, n] != 0.0
+        for row in range(6):
+            d.change[12 + row, n] = 0.0  # A_r is quadratic in the speeds
+    for first in range(0, 2 * nm if moves else nm, nm):
+        for start in range(0, nm, LANES):
+            count = min(LANES, nm - start)
+            for lane in range(count):
+                seed_mode(e, k, nm, first + start + lane, lane)
+            _move_at_section(c, e, k, i, (start, start + count))
+            for lane in range(count):
+                if first == 0:
+                    _keep_change(d, k, i, start + lane, lane)
+                    e.eta[k, start + lane] = w.eta[k, start + lane]
+                else:
+                    for row in range(6):
+                        d.change[12 + row, start + lane] = rate(e.body[k].accel[row], lane)
+                    e.etad[k, start + lane] = w.etad[k, start + lane]
+
+
+@helper
+def _move_at_section(c, e, k, i, seeds):
+    """Position and V_r of port i, and A_r as `_store_relative` stores it, with the modal accelerations."""
+    at = e.section[c.port[i].section]
+    turn_sections(c, e, k, seeds)
+    place_section(c, e, k, c.port[i].section)
+    omega, alpha, arm = vec3(at.omega, 0), vec3(at.alpha, 0), times(mat3(at.R, 0), vec3(c.port[i].offset, 0))
+    swing = cross(omega, arm)
+    v = add(vec3(at.v, 0), swing)
+    a = add(vec3(at.a, 0), add(cross(alpha, arm), cross(omega, swing)))
+    store3(e.port[i].r, 0, add(vec3(at.r, 0), arm))
+    store6(e.port[i].v, 0, (omega, v))
+    store6(e.body[k].accel, 0, (alpha, sub(a, cross(omega, v))))
 
 
 @helper
@@ -236,8 +278,8 @@ def _store_relative(c, w, d, k, i):
 
 
 @helper
-def _keep_displacement(c, d, k, i, n, lane):
-    """The derivatives along one lane as spatial vectors about the port's point as it is now."""
+def _keep_change(d, k, i, n, lane):
+    """Those of V_r and A_r by displacement n, as spatial vectors about the port's point as it is now."""
     e = d.duals
     moved = (rate(e.port[i].r[0], lane), rate(e.port[i].r[1], lane), rate(e.port[i].r[2], lane))
     for row in range(3):
@@ -249,6 +291,14 @@ def _keep_displacement(c, d, k, i, n, lane):
     for row in range(3):
         d.change[3 + row, n] = rate(e.port[i].v[3 + row], lane) + v[row]
         d.change[9 + row, n] = rate(e.body[k].accel[3 + row], lane) + a[row]
+
+
+@helper
+def _keep_displacement(c, d, k, i, n, lane):
+    """The derivatives along one lane as spatial vectors about the port's point as it is now."""
+    e = d.duals
+    _keep_change(d, k, i, n, lane)
+    moved = (rate(e.port[i].r[0], lane), rate(e.port[i].r[1], lane), rate(e.port[i].r[2], lane))
     for j in range(c.body[k].modes):
         mode = (e.port_mode[i, 0, j].real, e.port_mode[i, 1, j].real, e.port_mode[i, 2, j].real)
         v = cross(moved, mode)

@@ -12,6 +12,7 @@ the terms of these sums one by one.
 """
 
 from flexmb.jain.derivatives.attached import wheel_axis
+from flexmb.jain.derivatives.flexible import bend
 from flexmb.jain.derivatives.hinges import force_to_world, outboard_rotation, to_world
 from flexmb.jain.derivatives.modes import in_body_axes
 from flexmb.jain.derivatives.pull_tables import G0, G1, G2, W_HINGE, W
@@ -69,6 +70,7 @@ def pull(c, w, d, p):
     if has(c, CONNECTORS):
         _pull_connectors(c, d, p)
     for k in range(c.body.shape[0] - 1, -1, -1):
+        bend(c, w, d, k)
         _own(c, d, p, k)
         if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):
             _ports(c, w, d, p, k)

@@ -7,6 +7,10 @@ inward, forces at sections become forces F on the tangents at the Gauss points, 
 t x F on the sections, which each passes to the one before it. No velocity of a single mode is needed. Points at the
 root sit on no section: they move with the body frame, and no mode moves them.
 
+Only a few modes have derivatives at a time, the `seeds` (first, stop): sums over all others are of floats. What acts at
+ports of the body, of known constant forces in body axes, may be `held` at their sections: the rows change with the
+motion that the modes give these places, too.
+
 Modal masses beside the points, from a matrix that was added, are constant, as is their share of the rows, which is left
 out. Only the derivatives of the rows are right.
 """
@@ -25,7 +29,7 @@ from flexmb.spatial.rotation import (
 )
 from flexmb.spatial.rows import column3
 from flexmb.spatial.scalar import sincos
-from flexmb.spatial.spatial_vector import ZERO6, store6, sum6
+from flexmb.spatial.spatial_vector import ZERO6, store6, sum6, vec6
 from flexmb.spatial.vector import (
     add,
     add3,
@@ -49,20 +53,16 @@ from flexmb.tables.features import BENT_IN_PLANE, BENT_IN_SPACE
 
 
 @sweep
-def strained_force(c, e, k, A):
+def strained_force(c, e, k, A, seeds):
     """The force of body k, body axes, to e.body.hinge_force, and the rows of its modes to e.zf.
 
     Its modal displacements, speeds and accelerations are in e.eta, e.etad and e.etadd, the velocity of its frame in
     e.body; A is the acceleration of the frame.
     """
     first, stop = c.body[k].section_start, c.body[k].section_stop
+    turn_sections(c, e, k, seeds)
     for j in range(first, stop):
-        if has(c, BENT_IN_PLANE) and c.body[k].planar:
-            _turn_about_axis(c, e, k, j)
-        elif has(c, BENT_IN_SPACE):
-            _turn(c, e, k, j)
-    for j in range(first, stop):
-        _place(c, e, k, j)
+        place_section(c, e, k, j)
     F = ZERO6
     for j in range(c.body[k].point_start, c.body[k].point_stop):
         F = sum6(F, _load_of_point(c, e, k, j, A))
@@ -80,33 +80,46 @@ def strained_force(c, e, k, A):
             _pass_torque(c, e, k, j)
 
 
+@sweep
+def turn_sections(c, e, k, seeds):
+    """R, w, alpha and the tangents of all sections of body k."""
+    for j in range(c.body[k].section_start, c.body[k].section_stop):
+        if has(c, BENT_IN_PLANE) and c.body[k].planar:
+            _turn_about_axis(c, e, k, j, seeds)
+        elif has(c, BENT_IN_SPACE):
+            _turn(c, e, k, j, seeds)
+
+
 @helper
-def _sum(c, k, j, row, x):
+def _sum(c, k, j, row, x, seeds):
     """Three rows of section j times one number x (m,) of each mode."""
-    found = ZERO3
+    found, change = ZERO3, ZERO3
     for n in range(c.body[k].modes):
-        found = axpy(x[n], column3(c.section_rows[j], row, n), found)
-    return found
+        found = axpy(x[n].real, column3(c.section_rows[j], row, n), found)
+    for n in range(seeds[0], seeds[1]):
+        change = axpy(x[n] - x[n].real, column3(c.section_rows[j], row, n), change)
+    return add(found, change)
 
 
 @sweep
-def _integrals(c, k, j, x):
+def _integrals(c, k, j, x, seeds):
     """Those of the three integrals of the curvature."""
-    return _sum(c, k, j, WHOLE, x), _sum(c, k, j, LINEAR, x), _sum(c, k, j, SQUARE, x)
+    whole, linear = _sum(c, k, j, WHOLE, x, seeds), _sum(c, k, j, LINEAR, x, seeds)
+    return whole, linear, _sum(c, k, j, SQUARE, x, seeds)
 
 
 @sweep
-def _turn(c, e, k, j):
+def _turn(c, e, k, j, seeds):
     """R, w and alpha of section j from those of the section before."""
     i, own = c.section[j].before, e.at_section[j]
-    whole, linear, square = _integrals(c, k, j, e.eta[k])
+    whole, linear, square = _integrals(c, k, j, e.eta[k], seeds)
     store3(own.whole, 0, whole)
     store3(own.linear, 0, linear)
     store3(own.square, 0, square)
     turn, at = magnus(whole, linear, square)
-    whole, linear, square = _integrals(c, k, j, e.etad[k])
+    whole, linear, square = _integrals(c, k, j, e.etad[k], seeds)
     rate, bent = magnus_change(at, whole, linear, square), magnus_bend(at, whole, linear, square)
-    whole, linear, square = _integrals(c, k, j, e.etadd[k])
+    whole, linear, square = _integrals(c, k, j, e.etadd[k], seeds)
     bent = add(bent, magnus_change(at, whole, linear, square))
     p = exponential_coefficients(dot(turn, turn))
     R, omega, alpha = IDENTITY, ZERO3, ZERO3
@@ -115,11 +128,11 @@ def _turn(c, e, k, j):
     more = times(R, left_jacobian_times(turn, p, rate))
     bent = times(R, add(left_jacobian_rate(turn, p, rate), left_jacobian_times(turn, p, bent)))
     alpha = add(alpha, add(cross(omega, more), bent))
-    _bend(c, e, k, j, matmul(R, exponential(turn, p)), add(omega, more), alpha)
+    _bend(c, e, k, j, matmul(R, exponential(turn, p)), add(omega, more), alpha, seeds)
 
 
 @sweep
-def _turn_about_axis(c, e, k, j):
+def _turn_about_axis(c, e, k, j, seeds):
     """The same where all sections turn about one axis."""
     axis = vec3(c.body[k].bending_axis, 0)
     angle, rate, bent = 0.0, 0.0, 0.0
@@ -129,11 +142,11 @@ def _turn_about_axis(c, e, k, j):
         rate = e.etad[k, n] * slope + rate
         bent = e.etadd[k, n] * slope + bent
     sine, cosine = sincos(angle)
-    _bend(c, e, k, j, in_powers(axis, sine, 1.0 - cosine), scale(rate, axis), scale(bent, axis))
+    _bend(c, e, k, j, in_powers(axis, sine, 1.0 - cosine), scale(rate, axis), scale(bent, axis), seeds)
 
 
 @sweep
-def _bend(c, e, k, j, R, omega, alpha):
+def _bend(c, e, k, j, R, omega, alpha, seeds):
     """Store the turn of section j, and at Gauss points the change of the tangent, its rate and its acceleration."""
     store9(e.section[j].R, 0, R)
     store3(e.section[j].omega, 0, omega)
@@ -144,9 +157,9 @@ def _bend(c, e, k, j, R, omega, alpha):
     at_rest = vec3(c.section[j].tangent, 0)
     stretched, rate, faster = at_rest, ZERO3, ZERO3
     if c.body[k].stretching:
-        stretched = add(at_rest, _sum(c, k, j, STRETCH, e.eta[k]))
-        rate = times(R, _sum(c, k, j, STRETCH, e.etad[k]))
-        faster = times(R, _sum(c, k, j, STRETCH, e.etadd[k]))
+        stretched = add(at_rest, _sum(c, k, j, STRETCH, e.eta[k], seeds))
+        rate = times(R, _sum(c, k, j, STRETCH, e.etad[k], seeds))
+        faster = times(R, _sum(c, k, j, STRETCH, e.etadd[k], seeds))
     tangent = times(R, stretched)
     store3(e.tangent[g].change, 0, sub(tangent, at_rest))
     turning = cross(omega, tangent)
@@ -156,12 +169,12 @@ def _bend(c, e, k, j, R, omega, alpha):
 
 
 @helper
-def _place(c, e, k, j):
-    """Position of section j, its velocity and acceleration; no load yet."""
+def place_section(c, e, k, j):
+    """Position of section j, its velocity and acceleration; no load yet but what is held there."""
     r, v, a = vec3(c.section[j].position, 0), ZERO3, ZERO3
     for i in range(c.body[k].section_start, c.body[k].section_stop):
         g = c.section[i].gauss
-        if g >= 0:
+        if g >= 0 and c.section_weight[j, g] != 0.0:  # none beyond
             weight = c.section_weight[j, g]
             r = axpy(weight, vec3(e.tangent[g].change, 0), r)
             v = axpy(weight, vec3(e.at_section[i].rate, 0), v)
@@ -169,8 +182,9 @@ def _place(c, e, k, j):
     store3(e.section[j].r, 0, r)
     store3(e.section[j].v, 0, v)
     store3(e.section[j].a, 0, a)
-    store3(e.at_section[j].force, 0, ZERO3)
-    store3(e.at_section[j].torque, 0, ZERO3)
+    torque, force = vec6(e.at_section[j].held, 0)
+    store3(e.at_section[j].force, 0, force)
+    store3(e.at_section[j].torque, 0, sub(torque, cross(r, force)))
 
 
 @sweep
@@ -204,7 +218,8 @@ def _take_tangent(c, e, k, j):
         return
     force = ZERO3
     for i in range(c.body[k].section_start, c.body[k].section_stop):
-        force = axpy(c.section_weight[i, g], vec3(e.at_section[i].force, 0), force)
+        if c.section_weight[i, g] != 0.0:
+            force = axpy(c.section_weight[i, g], vec3(e.at_section[i].force, 0), force)
     tangent = add(vec3(c.section[j].tangent, 0), vec3(e.tangent[g].change, 0))
     add3(e.at_section[j].torque, 0, cross(tangent, force))
     if c.body[k].stretching:

@@ -4,6 +4,7 @@ from flexmb.jain.derivatives.applied import subtract_applied
 from flexmb.jain.derivatives.attached import attach, wheel_rows
 from flexmb.jain.derivatives.bodies import own_force
 from flexmb.jain.derivatives.connected import attach_connectors, link
+from flexmb.jain.derivatives.flexible import bend
 from flexmb.jain.derivatives.modes import mode_rows
 from flexmb.jain.derivatives.motion import move
 from flexmb.jain.derivatives.ports import clear_ports, move_ports
@@ -80,6 +81,7 @@ def forces_of_bodies(c, w, d):
 def rows_of_speeds(c, w, d, masses):
     """Inward, after `forces_of_bodies` and what else acts on the bodies: the matrix, from what they answer."""
     for k in range(c.body.shape[0] - 1, -1, -1):
+        bend(c, w, d, k)
         if has(c, MODES) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):
             _answer_of_ports(c, d, k)
         if has(c, MODES) and c.body[k].modes > 0:

@@ -124,6 +124,7 @@ AT_SECTION = np.dtype(  # of a beam of level exact
         ("rate", _F, (3,)),  # of its tangent, at a Gauss point
         ("force", _F, (3,)),  # on the section, body axes
         ("torque", _F, (3,)),  # on it and on what turns with it
+        ("held", _F, (6,)),  # force of what is attached to its ports, with the sign of inertia, about the body origin
     ],
     align=True,
 )
@@ -168,7 +169,9 @@ class Derivatives:
     frame_mode: Real  # (N,MOVED_ROWS,m) to the body frame relative to O; zero unless they move O in the body
     mode: Real  # (N,MODE_ROWS,m)
     answer: Real  # (m,12) l2, l1 and l0 of the modes of one body
-    bent: Real  # (P,m,6,m) derivatives of the motion of a port at unit speed of mode j by displacement n: [j, ., n]
+    # (P,m,6,m) derivatives of the motion of a port at unit speed of mode j by displacement n: [j, ., n]; zero where a
+    # section carries it
+    bent: Real
     change: Real  # (18,m) of one port: of its V_r and A_r by displacements, of A_r by speeds, in body axes
     end: Real  # (2,END_ROWS,nu) what all sources do to the two ends of a connector
     # (C,13,24) derivatives of the forces on the bodies of A and B, and of the power, by s0 and s1 of A, then of B

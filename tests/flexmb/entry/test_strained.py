@@ -84,7 +84,7 @@ def applied(name: str, term: Term | None = None) -> Body:
     """A beam with the force by applied masses, without a term of it."""
     body = moving(BEAMS[name])
     with np.errstate(all="ignore"):
-        interpreted._Without(term)(strained_force)(body.c, body.e, 0, body.A)
+        interpreted._Without(term)(strained_force)(body.c, body.e, 0, body.A, (0, body.modes))
     return body
 
 
@@ -116,7 +116,7 @@ def test_twice_the_pieces_cost_a_direction_little_more_than_twice(monkeypatch: p
         with monkeypatch.context() as patch:
             times = interpreted.Dual.__mul__
             patch.setattr(interpreted.Dual, "__mul__", lambda a, b, met=met, times=times: met.append(1) or times(a, b))
-            interpreted._Without(None)(strained_force)(body.c, body.e, 0, body.A)
+            interpreted._Without(None)(strained_force)(body.c, body.e, 0, body.A, (0, body.modes))
         products.append(len(met))
     assert products[1] < 2.6 * products[0]
 
