@@ -27,12 +27,9 @@ from flexmb.scene.events import Latch
 from flexmb.scene.schema import BeamBody, Scene
 
 GIVES_NONE = {
-    "exudyn": ("work", "derivatives"),
-    "exudyn-beam": ("work", "derivatives"),
-    "mujoco": ("work",),
-    "native-frisch": ("derivatives.by_force",),
-    "native-frisch-as-printed": ("derivatives.by_force",),
-}
+    "exudyn": ("work", "derivatives"), "exudyn-beam": ("work", "derivatives"), "mujoco": ("work",),
+    "native-frisch": ("derivatives.by_force",), "native-frisch-as-printed": ("derivatives.by_force",),
+}  # fmt: skip
 """What an engine never offers. Should it begin to, strict sessions are red until a case judges it or leaves it open."""
 PARTS = {kind.name: [part.name for part in kind.parts] for kind in KINDS}
 
@@ -67,13 +64,11 @@ def offered(scene: Scene, variant: Variant, engine: str) -> list[str]:
     apart = scene.bodies if variant.transform in TAKES_APART else ()
     joints += [f"{body.name}.between" for body in apart if isinstance(body, BeamBody)]
     items = {
-        "marker": [item.name for item in scene.markers],
-        "load": joints,
-        "wheel_load": [item.name for item in scene.wheels],
-        "drive": list(_driven(scene)),
+        "marker": [item.name for item in scene.markers], "load": joints,
+        "wheel_load": [item.name for item in scene.wheels], "drive": list(_driven(scene)),
         "connector": [item.name for item in scene.connectors if isinstance(item, BetweenNodes)],
         "hinge_force": [item.name for item in scene.connectors if not isinstance(item, BetweenNodes)],
-    }
+    }  # fmt: skip
     found = [
         f"{kind}:{name}" + (f".{part}" if part else "")
         for kind, names in items.items()
@@ -140,12 +135,7 @@ def left(case: Case) -> Iterator[Left]:
         for engine in variant.engines:
             channels = offered(scene, variant, engine)
             patterns, known = judged(run, variant.name, engine), by_reference(case, variant.name, engine)
-            opened = [
-                pattern
-                for item in run.open
-                if item.concerns(variant.name, engine)
-                for pattern in item.channels
-            ]
+            opened = [pattern for item in run.open if item.concerns(variant.name, engine) for pattern in item.channels]
             otherwise = expected_otherwise(run, variant.name, engine) is not None
             for channel in channels:
                 if channel not in known and most_specific(patterns, channel) is None:

@@ -59,9 +59,7 @@ def test_an_end_moment_rolls_a_strip_up_twice(points: int, bound: float) -> None
     assert np.abs(scenes.tip_at_rest(scene.scene(), *(whole * k / 16.0 for k in range(1, 17)))).max() < bound
 
 
-@pytest.mark.parametrize(
-    ("force", "published"), [(300.0, (58.84, 22.33, 40.08)), (600.0, (47.23, 15.79, 53.37))]
-)
+@pytest.mark.parametrize(("force", "published"), [(300.0, (58.84, 22.33, 40.08)), (600.0, (47.23, 15.79, 53.37))])
 def test_the_45_degree_bend_is_where_it_was_published(force: float, published: tuple[float, float, float]) -> None:
     """Eight linear elements of Simo and Vu-Quoc (1986, example 7.5) are 0.25 % off, each number by 0.7 % at most."""
     found = scenes.tip_at_rest(scenes.bend_45(4, 3), *(force * k / 4.0 for k in range(1, 5)))

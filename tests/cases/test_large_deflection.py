@@ -174,9 +174,7 @@ def exact_in_space(exu: Any, bar: BeamBody, angle: float, force: float, elements
                 nodeNumbers=list(pair), length=bar.length_m / elements, sectionData=section
             )
         )
-    ground = mbs.AddMarker(
-        items.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(items.NodePointGround()), coordinate=0)
-    )
+    ground = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(items.NodePointGround()), coordinate=0))
     for coordinate in range(6):
         held = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=nodes[0], coordinate=coordinate))
         mbs.AddObject(items.CoordinateConstraint(markerNumbers=[ground, held]))
@@ -229,10 +227,7 @@ class InMotion:
         return np.linspace(0.0, self.duration, 41)
 
 
-IN_MOTION = {
-    "elastica": InMotion(4.0, 0, (8, 16), "radau5"),
-    "flying_spaghetti": InMotion(2.5, 2, (16, 32), "dop853"),
-}
+IN_MOTION = {"elastica": InMotion(4.0, 0, (8, 16), "radau5"), "flying_spaghetti": InMotion(2.5, 2, (16, 32), "dop853")}
 
 
 @cache

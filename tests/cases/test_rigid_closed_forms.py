@@ -173,13 +173,9 @@ def test_the_gyrostat() -> None:
     across, rotor = m.ACROSS + m.TRANSVERSE, m.AXIAL * (m.RATE_ALONG + m.SPEED)
     lean = np.arctan2(across * m.RATE_ACROSS, m.ALONG * m.RATE_ALONG + rotor)
     attitudes = turning(
-        np.array([across, across, m.ALONG]),
-        np.array([0.0, 0.0, rotor]),
-        np.zeros(3),
-        Rotation.from_euler("XZ", [lean, 0.5 * np.pi]),
-        np.array([m.RATE_ACROSS, 0.0, m.RATE_ALONG]),
-        times,
-    )
+        np.array([across, across, m.ALONG]), np.array([0.0, 0.0, rotor]), np.zeros(3),
+        Rotation.from_euler("XZ", [lean, 0.5 * np.pi]), np.array([m.RATE_ACROSS, 0.0, m.RATE_ALONG]), times,
+    )  # fmt: skip
     assert off(m.exact(times)["marker:sensor.position"], attitudes.apply(m.SENSOR)) < WITHIN
 
 

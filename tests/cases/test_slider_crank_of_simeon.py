@@ -56,10 +56,7 @@ def accelerations(t: float, angle: float, q: Real, rate: float, dq: Real) -> Rea
     A[0, 2:6] = A[2:6, 0] = FIRST_ACROSS + q @ CROSSED
     A[1, 1], A[2:6, 2:6] = SLIDER, SQUARE
     G = np.array(
-        [
-            [length * np.cos(angle), 0, 0, 0, 0, np.sin(angle)],
-            [length * np.sin(angle), 1, 0, 0, 0, -np.cos(angle)],
-        ]
+        [[length * np.cos(angle), 0, 0, 0, 0, np.sin(angle)], [length * np.sin(angle), 1, 0, 0, 0, -np.cos(angle)]]
     )
     A[6:, :6], A[:6, 6:] = G, G.T
     pull = CRANK_LENGTH * CRANK_RATE**2

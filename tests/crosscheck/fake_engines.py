@@ -23,7 +23,7 @@ from crosscheck.engines.contract import (
     Snapshot,
     Support,
     Trajectory,
-)
+)  # fmt: skip
 from crosscheck.engines.extremes import has_extremes, of_samples
 from flexmb.run.channels import channels_of
 from flexmb.scene.schema import Scene
@@ -230,16 +230,8 @@ def engines() -> dict[str, Fake]:
     return {
         engine.name: engine
         for engine in (
-            Fake("fine"),
-            Fake("stepper", STEPS),
-            Fake("sloppy", COARSE),
-            Fake("second"),
-            Fake("biased", gravity_factor=1.001),
-            Absent("absent"),
-            Refuser("refuser"),
-            Crasher("crasher"),
-            Raiser("raiser"),
-            Diverger("diverger"),
-            Diarist("diarist"),
-        )
+            Fake("fine"), Fake("stepper", STEPS), Fake("sloppy", COARSE), Fake("second"),
+            Fake("biased", gravity_factor=1.001), Absent("absent"), Refuser("refuser"), Crasher("crasher"),
+            Raiser("raiser"), Diverger("diverger"), Diarist("diarist"),
+        )  # fmt: skip
     }

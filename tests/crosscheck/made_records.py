@@ -51,23 +51,11 @@ def ladder(
     """Three tolerances of an engine that converge to the signals: off by 100, 10 and 1 times `spread` of them."""
     return [
         RunRecord(
-            case="made/made",
-            variant=variant,
-            role=role,
-            engine=engine,
-            version="1",
-            scene="s",
-            status="finished",
-            effort=f"rtol={rung}",
-            effort_kind="tolerance",
-            effort_method="m",
-            effort_value=10.0 ** -(rung + 6),
-            rung=rung,
-            rungs=3,
-            evaluations=100 * (rung + 1),
-            times=pack(TIMES),
+            case="made/made", variant=variant, role=role, engine=engine, version="1", scene="s", status="finished",
+            effort=f"rtol={rung}", effort_kind="tolerance", effort_method="m", effort_value=10.0 ** -(rung + 6),
+            rung=rung, rungs=3, evaluations=100 * (rung + 1), times=pack(TIMES),
             channels={name: pack(values * (1.0 + spread * 10.0 ** (2 - rung))) for name, values in signals.items()},
-        )
+        )  # fmt: skip
         for rung in range(3)
     ]
 
@@ -78,13 +66,8 @@ def ended(run: RunRecord, status: str, message: str = "for a reason", **changes:
 
 
 def judged(
-    text: str,
-    runs: Iterable[RunRecord],
-    accepted: Accepted | None = None,
-    strict: bool = False,
-    asked: tuple[str, ...] = (),
-    basis: str = "",
-    undetermined: tuple[str, ...] | msgspec.UnsetType = (),
+    text: str, runs: Iterable[RunRecord], accepted: Accepted | None = None, strict: bool = False,
+    asked: tuple[str, ...] = (), basis: str = "", undetermined: tuple[str, ...] | msgspec.UnsetType = (),
     **others: object,
 ) -> SessionOutcome:
     """The outcome of a session that left these runs; `others` are more of its case's record, `basis` its scenes',

@@ -137,11 +137,9 @@ def hostile(tmp_path_factory: pytest.TempPathFactory) -> Path:
     record, _ = plan(case, (), PROVIDER)
     one, other = ComparisonSide(variant=evil, engine=evil), ComparisonSide(variant=evil, engine=evil + "2")
     run = msgspec.structs.replace(
-        record.run,
-        title=evil,
+        record.run, title=evil,
         variants=(msgspec.structs.replace(record.run.variants[0], name=evil, engines=(evil, evil + "2"), note=evil),),
-        comparisons=(Comparison(name=evil, a=one, b=other, goals={"marker:tip": 1e-6}),),
-        controls=(), conservations=(),
+        comparisons=(Comparison(name=evil, a=one, b=other, goals={"marker:tip": 1e-6}),), controls=(), conservations=(),
         charts=(msgspec.structs.replace(record.run.charts[0], title=evil, variants=(evil,), reference=evil),),
     )  # fmt: skip
     record = msgspec.structs.replace(

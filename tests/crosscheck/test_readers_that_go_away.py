@@ -17,16 +17,10 @@ from tests.crosscheck.sessions import CASE, copy_case, sweep_here
 from tests.repo.project import ROOT
 
 COMMANDS = {
-    "crosscheck list": 0,
-    "crosscheck engines --json": 0,
-    "crosscheck report GREEN --out OUT --verbose": 0,
-    "crosscheck report RED --out OUT --verbose": 1,
-    "crosscheck report no-such-file": 2,
-    "flexmb schema": 0,
-    "flexmb check SCENE": 0,
-    "flexmb check no-such-file": 2,
-    "flexmb": 2,
-}
+    "crosscheck list": 0, "crosscheck engines --json": 0, "crosscheck report GREEN --out OUT --verbose": 0,
+    "crosscheck report RED --out OUT --verbose": 1, "crosscheck report no-such-file": 2, "flexmb schema": 0,
+    "flexmb check SCENE": 0, "flexmb check no-such-file": 2, "flexmb": 2,
+}  # fmt: skip
 ALIKE = ("crosscheck engines --json", "crosscheck report no-such-file", "flexmb schema", "flexmb check no-such-file")
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"}
 

@@ -85,12 +85,9 @@ def kinds(folder: Path) -> dict[str, Kind]:
         "npz": Kind("panel.npz", _npz(), archive, (SceneError,), _modal, 'body "panel"'),
         "records": Kind("records.jsonl", (_records(),), records, (ValueError,), _session),
         "map records": Kind("map.jsonl", (_map(),), jsonl, (ValueError,), _cells),
-        "map verdicts": Kind("maps.json", (_verdicts(),), jsonl, (ValueError,), _maps),
-        **of_sessions(folder),
-        **of_imports(folder),
-        **of_exports(folder),
-        **of_tables(_scene),
-    }
+        "map verdicts": Kind("maps.json", (_verdicts(),), jsonl, (ValueError,), _maps), **of_sessions(folder),
+        **of_imports(folder), **of_exports(folder), **of_tables(_scene),
+    }  # fmt: skip
 
 
 def _prepare(folder: Path) -> None:

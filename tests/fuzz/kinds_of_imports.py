@@ -99,9 +99,7 @@ def of_imports(folder: Path) -> dict[str, Kind]:
                 path.with_suffix(".matrix"), path.with_name("M.matrix"), path.with_name("nodes.csv"), path
             ),
         ),
-        "op4 binary": Kind(
-            "packed.op4", tuple(forms), mutate.BYTES, matrices, lambda path: _structure(path, path)
-        ),
+        "op4 binary": Kind("packed.op4", tuple(forms), mutate.BYTES, matrices, lambda path: _structure(path, path)),
         "inp": Kind("mesh.inp", (inp.encode(),), lines, matrices, lambda path: _nodes(path, mass)),
         "grid": Kind("mesh.bdf", (grids.encode(),), lines, matrices, lambda path: _nodes(path, mass)),
         "nodes": Kind("nodes.csv", (NODES.encode(),), lines, matrices, lambda path: _nodes(path, mass)),

@@ -135,8 +135,7 @@ NOT_OF_USERS = {
     "crosscheck/cli/stability.py:stability": "shows what it has just written",
     "crosscheck/export/archive.py:_read": "files of the package",
     "crosscheck/export/archive.py:archive": "files of the package",
-    "crosscheck/export/pages.py:collection_page": "files of the package",
-    "crosscheck/library/digests.py": "digests",
+    "crosscheck/export/pages.py:collection_page": "files of the package", "crosscheck/library/digests.py": "digests",
     "crosscheck/library/find.py:shipped_tags": "tags of the shipped cases",
     "crosscheck/library/reference.py:scene_digest": "a digest of a scene that is read before",
     "crosscheck/pytest_plugin/runs.py": "what this very session has written, under a lock",
@@ -144,24 +143,21 @@ NOT_OF_USERS = {
     "crosscheck/records/archive.py:_set_broken_lines_aside": "bytes of records, after `read`",
     "crosscheck/records/contracts.py:_read": "an outcome that cannot be read is none",
     "crosscheck/records/lock.py:_who": "words for a message",
-    "crosscheck/records/machine.py": "the kernel's words on the processor",
-    "crosscheck/records/made_by.py": "digests",
+    "crosscheck/records/machine.py": "the kernel's words on the processor", "crosscheck/records/made_by.py": "digests",
     "crosscheck/records/sources.py": "installed packages and their sources",
     "crosscheck/references/files.py:write_both": "compares stored files with new ones byte by byte",
     "crosscheck/references/regenerate.py:_provenance": "a digest",
     "crosscheck/report/ci.py:add_differences": "adds to a page of its own",
     "crosscheck/report/site.py": "a listing of its own pages, and scripts of the package",
-    "crosscheck/library/own_files.py": "a digest",
-    "crosscheck/running/plan.py:scene_identity": "a digest",
+    "crosscheck/library/own_files.py": "a digest", "crosscheck/running/plan.py:scene_identity": "a digest",
     "crosscheck/running/processes.py:memory_limit": "the kernel's words on memory",
     "crosscheck/running/worker.py:_serve": "a log, and nothing",
     "flexmb/control/lookup.py": "sources of users' functions, which are run anyhow",
-    "flexmb/jit/": "kernels and their sources",
-    "flexmb/output/readers.py:write": "writes",
+    "flexmb/jit/": "kernels and their sources", "flexmb/output/readers.py:write": "writes",
     "flexmb/output/whole.py:_settle": "writes",
     "flexmb/run/warm_up.py:main": "what the process that started it has written",
     "flexmb/scene/values.py": "words of an option",
-}
+}  # fmt: skip
 """Where functions call one of these without being tried here, and why that is right."""
 
 

@@ -29,19 +29,12 @@ PICTURE = ROOT / "docs" / "pictures" / "speed.svg"
 PLACES = {"docs/tour.md": "pictures/speed.svg"}  # where it is shown
 EXPONENTS = range(-1, -13, -1)
 COLOURS = {
-    "native": "#0072b2",
-    "pinocchio": "#d55e00",
-    "mujoco": "#009e73",
-    "exudyn": "#b07a00",
-    "exudyn-beam": "#b8609a",
-}
+    "native": "#0072b2", "pinocchio": "#d55e00", "mujoco": "#009e73", "exudyn": "#b07a00", "exudyn-beam": "#b8609a",
+}  # fmt: skip
 NAMES = {
-    "native": "flexmb",
-    "pinocchio": "Pinocchio",
-    "mujoco": "MuJoCo",
-    "exudyn": "Exudyn",
+    "native": "flexmb", "pinocchio": "Pinocchio", "mujoco": "MuJoCo", "exudyn": "Exudyn",
     "exudyn-beam": "Exudyn's beams",
-}
+}  # fmt: skip
 WIDTH, HEIGHT = 760, 420
 LEFT, RIGHT, TOP, BOTTOM = 70, 90, 44, 54  # margins
 

@@ -14,31 +14,17 @@ from flexmb.scene import schema
 from tests.repo.project import ROOT
 
 FUNCTIONS = {
-    "load_scene": ["path"],
-    "compile": ["scene"],
-    "linearize": ["system", "state"],
-    "equilibrium": ["system", "guess"],
-    "equilibrium_path": ["scene", "number", "values"],
-    "steady_spin": ["system", "hinge", "rate"],
-    "campbell": ["system", "hinge", "rates"],
-    "advise": ["scene", "tolerance", "quantity", "t_end"],
+    "load_scene": ["path"], "compile": ["scene"], "linearize": ["system", "state"], "equilibrium": ["system", "guess"],
+    "equilibrium_path": ["scene", "number", "values"], "steady_spin": ["system", "hinge", "rate"],
+    "campbell": ["system", "hinge", "rates"], "advise": ["scene", "tolerance", "quantity", "t_end"],
     "simulate": ["scene", "t_end", "method", "rtol", "atol", "algorithm"],
-    "simulate_batch": ["copies", "t_end", "method", "q", "u", "threads", "rtol"],
-    "compile_batch": ["scenes"],
-}
+    "simulate_batch": ["copies", "t_end", "method", "q", "u", "threads", "rtol"], "compile_batch": ["scenes"],
+}  # fmt: skip
 SYSTEM = {
-    "coordinate": ["name"],
-    "speed": ["name"],
-    "state": ["q", "u"],
-    "accelerations": ["state", "algorithm"],
-    "partitions": ["state", "algorithm"],
-    "mass_matrix": ["state"],
-    "bias": ["state"],
-    "inverse_dynamics": ["state"],
-    "hinge_loads": ["state"],
-    "energy": ["state"],
-    "momentum": ["state"],
-}
+    "coordinate": ["name"], "speed": ["name"], "state": ["q", "u"], "accelerations": ["state", "algorithm"],
+    "partitions": ["state", "algorithm"], "mass_matrix": ["state"], "bias": ["state"], "inverse_dynamics": ["state"],
+    "hinge_loads": ["state"], "energy": ["state"], "momentum": ["state"],
+}  # fmt: skip
 TRAJECTORY = ("t", "q", "u", "markers", "loads", "energy", "to_csv")
 
 

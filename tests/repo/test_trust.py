@@ -21,12 +21,10 @@ UNPICKLES = {"pickle", "cloudpickle", "marshal", "shelve", "joblib"}
 STARTS = {"subprocess", "runpy", "urllib.request", "http", "socket", "requests"}
 
 PLACES = {
-    "flexmb/__init__.py": "names of flexmb itself",
-    "flexmb/control/user.py": "laws that a scene names",
+    "flexmb/__init__.py": "names of flexmb itself", "flexmb/control/user.py": "laws that a scene names",
     "flexmb/jit/direct.py": "text of flexmb's own",
     "flexmb/jit/linking.py": "modules of flexmb and of what it compiles with",
-    "flexmb/jit/numbered.py": "text of flexmb's own",
-    "flexmb/jit/stored.py": "compiled kernels",
+    "flexmb/jit/numbered.py": "text of flexmb's own", "flexmb/jit/stored.py": "compiled kernels",
     "flexmb/run/beside.py": "flexmb's own warming up, for a scene without laws of users",
     "crosscheck/engines/registry.py": "built-in engines, plug-ins, and what a caller in Python names, never a file",
     "crosscheck/references/routes.py": "exact.py of a case, by crosscheck regenerate",
@@ -59,10 +57,7 @@ def test_code_is_run_where_the_page_says_and_nowhere_else() -> None:
 @pytest.mark.parametrize(
     "line",
     [
-        "exec(text)",
-        "import pickle",
-        "from subprocess import run",
-        "from urllib import request",
+        "exec(text)", "import pickle", "from subprocess import run", "from urllib import request",
         "spec.loader.exec_module(m)",
     ],
 )

@@ -55,14 +55,10 @@ def page() -> str:
     ]
     untried = [f"| `{name}` | {why} |" for name, why in sorted(UNTRIED.items())]
     parts = [
-        INTRODUCTION,
-        "## Shared",
-        "\n".join(["| object | asked by threads at once |", "|---|---|", *rows]),
-        f"Functions and constructors, of one scene, system or list: {_listed(functions)}.\n",
-        FOR_ONE,
-        "## Not tried",
+        INTRODUCTION, "## Shared", "\n".join(["| object | asked by threads at once |", "|---|---|", *rows]),
+        f"Functions and constructors, of one scene, system or list: {_listed(functions)}.\n", FOR_ONE, "## Not tried",
         "\n".join(["| call | why |", "|---|---|", *untried]) + "\n",
-    ]
+    ]  # fmt: skip
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 

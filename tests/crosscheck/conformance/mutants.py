@@ -34,9 +34,7 @@ class Mutant(NamedTuple):
 
 
 MUTANTS = [Mutant(name, **texts) for name, texts in tomllib.loads(TABLE.read_text(encoding="utf-8")).items()]
-EQUIVALENT = {
-    "the inertia transposed": "an inertia is symmetric: the transpose is the same tensor",
-}
+EQUIVALENT = {"the inertia transposed": "an inertia is symmetric: the transpose is the same tensor"}
 
 
 def mutated(mutant: Mutant) -> Engine:

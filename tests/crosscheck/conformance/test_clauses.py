@@ -183,9 +183,7 @@ FAULTS = {
     "quaternions with the scalar last": (
         markers(quaternion=lambda q: np.roll(q, -1)), {}, "quaternions-are-scalar-first"
     ),
-    "velocities with the linear part first": (
-        markers(velocity=swapped), {}, "free-velocities-are-in-outboard-axes"
-    ),
+    "velocities with the linear part first": (markers(velocity=swapped), {}, "free-velocities-are-in-outboard-axes"),
     "proper accelerations": (
         markers(acceleration=lambda a: a + np.array([0, 0, 0, 0, 0, 9.81])), {}, "gravity-accelerates-along-its-vector"
     ),
@@ -193,12 +191,8 @@ FAULTS = {
         lambda found: replace(found, momentum=found.momentum + [0.1, 0, 0, 0, 0, 0]), {},
         "momentum-is-about-the-world-origin",
     ),
-    "drive loads with the other sign": (
-        each("drives", np.negative), {}, "prescribed-hinge-reports-its-drive-load"
-    ),
-    "wheel loads on the body": (
-        each("wheel_loads", np.negative), {}, "spinning-wheel-needs-a-gyroscopic-torque"
-    ),
+    "drive loads with the other sign": (each("drives", np.negative), {}, "prescribed-hinge-reports-its-drive-load"),
+    "wheel loads on the body": (each("wheel_loads", np.negative), {}, "spinning-wheel-needs-a-gyroscopic-torque"),
     "work done by the arm": (lambda found: found, lambda run: replace(run, work=-run.work), "work-balances-energy"),
     "energy without its springs": (
         lambda found: found, lambda run: replace(run, energy=run.energy | {"spring": 0.0 * run.energy["spring"]}),

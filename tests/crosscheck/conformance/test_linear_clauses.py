@@ -150,10 +150,7 @@ WRONGS: dict[str, tuple[str, Callable[..., Trajectory]]] = {
         frequencies(lambda each: np.hstack([each[:, ::2], 0.0 * each[:, ::2]])),
     ),
     "undamped": ("frequency-of-a-damped-pendulum", frequencies(lambda each: np.hypot(each, 0.9))),
-    "moduli": (
-        "frequencies-of-what-does-not-oscillate",
-        frequencies(lambda each: each + np.array([0.0, 1.2, 0.0])),
-    ),
+    "moduli": ("frequencies-of-what-does-not-oscillate", frequencies(lambda each: each + np.array([0.0, 1.2, 0.0]))),
 }
 
 

@@ -203,9 +203,7 @@ def _gallery() -> tuple[dict[str, Bad], dict[str, Bad]]:
         "momentum_of_three": (
             "momentum has shape (21, 3)", answers(lambda done: replace(done, momentum=done.momentum[:, :3])), {}
         ),
-        "work_of_a_column": (
-            "work has shape (21, 1)", answers(lambda done: replace(done, work=np.zeros((21, 1)))), {}
-        ),
+        "work_of_a_column": ("work has shape (21, 1)", answers(lambda done: replace(done, work=np.zeros((21, 1)))), {}),
         "unknown_marker": (
             "markers has 'top'", answers(lambda done: replace(done, markers={"top": done.markers["tip"]})), {}
         ),

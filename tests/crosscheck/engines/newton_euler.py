@@ -26,7 +26,7 @@ from flexmb.scene.schema import (
     Spherical,
     Universal,
     Weld,
-)
+)  # fmt: skip
 
 
 def with_markers(scene: Scene) -> Scene:

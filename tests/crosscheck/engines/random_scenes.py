@@ -65,9 +65,7 @@ def random_scene(
     return randomise(builder.scene(), rng)
 
 
-def _hinge(
-    rng: Generator, kind: str, name: str, parent: str, child: str, driven: bool, nodes: bool
-) -> Hinge:
+def _hinge(rng: Generator, kind: str, name: str, parent: str, child: str, driven: bool, nodes: bool) -> Hinge:
     """A hinge of the kind with springs at a random place; `driven` prescribes its first coordinate."""
     values = {
         "name": name, "parent": parent, "child": child,

@@ -21,7 +21,7 @@ from flexmb.scene.schema import (
     Spherical,
     Vector,
     Wheel,
-)
+)  # fmt: skip
 from flexmb.scene.strains import families
 from flexmb.scene.tree import Coordinate, coordinates, with_coordinates
 
@@ -37,12 +37,10 @@ def randomise(scene: Scene, rng: Generator) -> Scene:
     flexible = [body for body in scene.bodies if isinstance(body, BeamBody | ModalBody) and body.level != "rigid"]
     states = tuple(_modal_state(body, rng) for body in flexible)
     return replace(
-        scene,
-        hinges=tuple(_hinge(hinge, rng) for hinge in scene.hinges),
+        scene, hinges=tuple(_hinge(hinge, rng) for hinge in scene.hinges),
         wheels=tuple(_wheel(wheel, rng) for wheel in scene.wheels),
-        point_masses=tuple(_point_mass(point, rng) for point in scene.point_masses),
-        modal_states=states,
-    )
+        point_masses=tuple(_point_mass(point, rng) for point in scene.point_masses), modal_states=states,
+    )  # fmt: skip
 
 
 def _hinge(hinge: Hinge, rng: Generator) -> Hinge:

@@ -16,7 +16,7 @@ from crosscheck.engines.answers import (
     checked_support,
     checked_version,
     clean,
-)
+)  # fmt: skip
 from crosscheck.engines.contract import Effort, MarkerPath, Run, Support, Trajectory
 from crosscheck.library.find import load_case
 from flexmb.run.channels import channels_of

@@ -20,7 +20,7 @@ from crosscheck.engines.answers import (
     checked_support,
     checked_version,
     clean,
-)
+)  # fmt: skip
 from crosscheck.engines.contract import Effort, MarkerPath, Support, Trajectory
 from flexmb.run.channels import channels_of
 from flexmb.scene.schema import Scene
@@ -45,20 +45,12 @@ def numbers(*width: int) -> np.ndarray:
 TURNS = numbers(4) / np.linalg.norm(numbers(4), axis=1, keepdims=True)
 TIP = MarkerPath(numbers(3), TURNS, numbers(6))
 GOOD = Trajectory(
-    status="finished",
-    message="fine",
-    times=TIMES,
-    markers={"tip": TIP},
-    loads={"pivot": numbers(6), "loop": -numbers(6), "bob": 2.0 * numbers(6)},
-    wheel_loads={"wheel": 3.0 * numbers(6)},
-    drives={"pivot": numbers(2), "wheel": numbers(1)},
-    hinge_forces={"spring": 4.0 * numbers(1)},
+    status="finished", message="fine", times=TIMES, markers={"tip": TIP},
+    loads={"pivot": numbers(6), "loop": -numbers(6), "bob": 2.0 * numbers(6)}, wheel_loads={"wheel": 3.0 * numbers(6)},
+    drives={"pivot": numbers(2), "wheel": numbers(1)}, hinge_forces={"spring": 4.0 * numbers(1)},
     energy={kind: place + numbers() for place, kind in enumerate(("kinetic", "strain", "spring", "gravity"))},
-    momentum=5.0 * numbers(6),
-    work=7.0 * numbers(),
-    wall_s=0.25,
-    evaluations=123,
-)
+    momentum=5.0 * numbers(6), work=7.0 * numbers(), wall_s=0.25, evaluations=123,
+)  # fmt: skip
 
 
 def arrays(run: Trajectory) -> dict[str, np.ndarray]:

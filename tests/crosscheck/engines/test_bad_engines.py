@@ -25,7 +25,7 @@ from tests.crosscheck.engines.bad_engines import (
     MODULES,
     TIDY,
     UNTIDY,
-)
+)  # fmt: skip
 from tests.crosscheck.sessions import copy_case, here
 
 SOUND = ("fine", "stepper")
@@ -102,23 +102,17 @@ def mild(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) ->
 
 
 @pytest.fixture(scope="module")
-def hard(
-    tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> Ran:
+def hard(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Ran:
     return Ran(tmp_path_factory.mktemp("hard"), asked(HARD, request), patch)
 
 
 @pytest.fixture(scope="module")
-def late(
-    tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> Ran:
+def late(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Ran:
     return Ran(tmp_path_factory.mktemp("late"), asked(LATE, request), patch, Limits(workers=2, time_s=LIMIT_S))
 
 
 @pytest.fixture(scope="module")
-def hungry(
-    tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> Ran:
+def hungry(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Ran:
     names, limits = asked(tuple(HUNGRY), request), Limits(workers=2, memory_bytes=LIMIT_BYTES)
     return Ran(tmp_path_factory.mktemp("hungry"), names, patch, limits)
 

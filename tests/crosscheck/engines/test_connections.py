@@ -76,9 +76,7 @@ def wheel_and_slug() -> Scene:
             "elbow", "hub", "arm", parent_position=(0.5, 0.0, 0.1),
             first=angular(angle=0.3, rate=-0.8), second=angular(angle=0.6, rate=0.7),
         )
-        .wheel(
-            "wheel", "hub", axis=(0.0, 0.6, 0.8), mass=0.5, axial_inertia=0.04, transverse_inertia=0.025, speed=10.0
-        )
+        .wheel("wheel", "hub", axis=(0.0, 0.6, 0.8), mass=0.5, axial_inertia=0.04, transverse_inertia=0.025, speed=10.0)
         .point_mass("slug", "arm", mass=0.4, directions=[(0.0, 1.0, 0.0)], coordinates=[linear(position=0.1)])
         .angular_friction("bearing", "wheel", sliding=0.3, smoothing=0.01)
         .angular_spring("inner", "elbow", coordinate="first", stiffness=3.0, stiffening=(0.0, 20.0),

@@ -17,7 +17,7 @@ from crosscheck.engines.conventions import (
     scalar_first,
     scalar_last,
     shift_wrench,
-)
+)  # fmt: skip
 
 EPS = np.finfo(float).eps
 CASES = [*np.random.default_rng(0).normal(size=(20, 4)), np.eye(4)[0], np.eye(4)[1], np.eye(4)[2], np.eye(4)[3]]

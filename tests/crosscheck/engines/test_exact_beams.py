@@ -48,10 +48,7 @@ def test_engines_of_rigid_bodies_and_of_modes_refuse_it_with_the_remedy(name: st
 
 @pytest.mark.parametrize(
     ("scene", "what"),
-    [
-        (strip(viscosity_s=1e-3), "rate of strain"),
-        (strip(damping_ratio=0.01), "modal damping"),
-    ],
+    [(strip(viscosity_s=1e-3), "rate of strain"), (strip(damping_ratio=0.01), "modal damping")],
 )
 def test_exudyns_beams_refuse_what_they_have_not(scene: s.Scene, what: str) -> None:
     check_scene(scene)

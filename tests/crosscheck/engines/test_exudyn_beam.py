@@ -143,13 +143,10 @@ def test_what_is_out_of_the_plane_goes_to_the_elements_in_space():
                   function=s.Constant(value=1.0))  # fmt: skip
     sprung = s.Planar(name="hub", parent="ground", child="beam", x=s.LinearCoordinate(stiffness_N_m=1.0))
     for changed in (
-        replace(scene, loads=(push,)),
-        replace(scene, loads=(replace(push, type="torque", direction=(1.0, 0.0, 0.0)),)),
+        replace(scene, loads=(push,)), replace(scene, loads=(replace(push, type="torque", direction=(1.0, 0.0, 0.0)),)),
         replace(scene, loads=(replace(push, direction=(0.0, 1.0, 0.0), frame="node"),)),
-        replace(scene, hinges=(sprung,)),
-        replace(scene, gravity_m_s2=(0.0, 0.0, -9.8)),
-        replace(scene, bodies=(every_family,)),
-        replace(scene, hinges=(tilted,)),
+        replace(scene, hinges=(sprung,)), replace(scene, gravity_m_s2=(0.0, 0.0, -9.8)),
+        replace(scene, bodies=(every_family,)), replace(scene, hinges=(tilted,)),
     ):
         support = engine.supports(changed)
         assert support.kind == "surrogate" and "instead of modes; beam: shear" in support.reason

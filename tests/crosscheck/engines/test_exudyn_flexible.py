@@ -183,14 +183,9 @@ def test_spin_up_above_the_critical_speed_ends_as_diverged_with_its_good_part():
     assert np.all(np.isfinite(run.loads["hub"]))
 
 
-@pytest.mark.parametrize(
-    ("change", "word"),
-    [({"level": "ruthless"}, "level"), ({"level": "stiffened"}, "level")],
-)
+@pytest.mark.parametrize(("change", "word"), [({"level": "ruthless"}, "level"), ({"level": "stiffened"}, "level")])
 def test_other_levels_are_refused(change, word):
-    scene = modal_points(s.Scene(
-        name="b", bodies=(beam(),), hinges=(s.Weld(name="w", parent="ground", child="beam"),)
-    ))  # fmt: skip
+    scene = modal_points(s.Scene(name="b", bodies=(beam(),), hinges=(s.Weld(name="w", parent="ground", child="beam"),)))
     changed = replace(scene, bodies=(replace(scene.bodies[0], **change),))
     support = ExudynEngine().supports(changed)
     assert support.kind == "no" and word in support.reason

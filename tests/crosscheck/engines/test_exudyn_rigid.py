@@ -136,9 +136,7 @@ def test_prescribed_wheel_passes_many_turns():
 
 
 def test_samples_must_be_uniform():
-    scene = s.Scene(
-        name="p", bodies=(rigid("b"),), hinges=(s.Revolute(name="h", parent="ground", child="b"),)
-    )
+    scene = s.Scene(name="p", bodies=(rigid("b"),), hinges=(s.Revolute(name="h", parent="ground", child="b"),))
     with pytest.raises(ValueError, match="uniform"):
         ExudynEngine().compile(scene).simulate(Run(np.array([0.0, 0.1, 0.3])), Effort("step", 0.01, "GeneralizedAlpha"))
 

@@ -29,9 +29,7 @@ TORQUE, AXIS = 8.0, np.array([0.48, 0.6, 0.64])
 
 def beam_of(station: s.BeamStation, elements: int = 8, **changes: object) -> s.BeamBody:
     given = {"level": "exact", "modes": s.Modes(count=0, polynomials=STRAINS)} | changes
-    return s.BeamBody(
-        name="rod", length_m=L, elements=elements, stations=(station, replace(station, x_m=L)), **given
-    )
+    return s.BeamBody(name="rod", length_m=L, elements=elements, stations=(station, replace(station, x_m=L)), **given)
 
 
 def clamped(beam: s.BeamBody, **more: object) -> s.Scene:

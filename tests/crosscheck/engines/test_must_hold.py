@@ -36,11 +36,7 @@ def _comparable(path: Path) -> bool:
     return moves and not scene.closures and not scene.couplings and len(scene.bodies) <= MOST_BODIES
 
 
-CASES = sorted(
-    path
-    for path in (Path(__file__).parents[3] / "cases").glob("*/*/scene.toml")
-    if _comparable(path)
-)
+CASES = sorted(path for path in (Path(__file__).parents[3] / "cases").glob("*/*/scene.toml") if _comparable(path))
 RANDOM = [(name, seed) for name in ("grounded", "free-flying") for seed in range(60, 63)]
 ACCELERATION = 1e-10
 LOAD = 1e-9

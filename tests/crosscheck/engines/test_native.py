@@ -23,11 +23,9 @@ RECURSION, FRISCH, PRINT = "native", "native-frisch", "native-frisch-as-printed"
 LINEAR = replace(trees.LINEAR, bodies=6, deformation=0.03)
 CLAMPED = replace(LINEAR, carriers=("rigid", "modal", "beam"))
 SAME = {
-    "rigid": replace(trees.RIGID, bodies=6),
-    "ruthless": replace(trees.RUTHLESS, bodies=6),
-    "linear": LINEAR,
+    "rigid": replace(trees.RIGID, bodies=6), "ruthless": replace(trees.RUTHLESS, bodies=6), "linear": LINEAR,
     "free-flying": replace(LINEAR, grounded=False, prescribed=False),
-}
+}  # fmt: skip
 
 
 def gaps(ours: Snapshot, theirs: Snapshot) -> dict[str, float]:

@@ -127,14 +127,11 @@ def test_what_is_not_as_expected_is_not_called_worse(own: None) -> None:
 
 # What a figure stands on: what is another than it was accepted with, and how that is told.
 OTHER = {
-    "the same": ({}, ""),
-    "efforts": ({"effort_value": 1e-9}, "other efforts"),
-    "version": ({"version": "2"}, "another version of an engine"),
-    "scene": ({}, "another scene, times or scale"),
-    "scale": ({}, "another scene, times or scale"),
-    "rule": ({}, "another rule for E and U"),
+    "the same": ({}, ""), "efforts": ({"effort_value": 1e-9}, "other efforts"),
+    "version": ({"version": "2"}, "another version of an engine"), "scene": ({}, "another scene, times or scale"),
+    "scale": ({}, "another scene, times or scale"), "rule": ({}, "another rule for E and U"),
     "our own code": ({"made_by": "edited"}, ""),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", OTHER)

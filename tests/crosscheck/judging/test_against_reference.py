@@ -109,9 +109,7 @@ def test_an_engine_alone_needs_no_partner(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("engine", "status"), [("biased", "differ"), ("second", "agree")])
-def test_an_engine_that_the_case_does_not_know_is_held(
-    folder: Path, tmp_path: Path, engine: str, status: str
-) -> None:
+def test_an_engine_that_the_case_does_not_know_is_held(folder: Path, tmp_path: Path, engine: str, status: str) -> None:
     other = copy_of(folder, tmp_path / "case")
     text = (other / "run.toml").read_text(encoding="utf-8")
     head, _, rest = text.partition("\n[[comparison]]\nname = \"a biased one\"")

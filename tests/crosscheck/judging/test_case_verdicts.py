@@ -81,11 +81,9 @@ def test_a_momentum_that_strays_at_one_sample_is_not_conserved(quantity: str, sa
 def test_an_energy_less_its_work_that_strays_at_one_sample_is_not_conserved(strays: str, sample: int) -> None:
     swing = np.linspace(1.0, 3.0, len(TIMES))[:, None]
     signals = {
-        "energy.kinetic": swing,
-        "energy.gravity": -np.ones_like(swing),
-        "energy.total": swing - 1.0,
+        "energy.kinetic": swing, "energy.gravity": -np.ones_like(swing), "energy.total": swing - 1.0,
         "work": swing + 7.0,
-    }
+    }  # fmt: skip
     text = CONSERVED.replace("QUANTITY", "energy")
     assert single(judged(text, ladder("one", signals, spread=0.0))).status == "agree"
     signals[strays] = signals[strays].copy()

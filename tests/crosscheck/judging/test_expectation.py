@@ -138,11 +138,7 @@ def test_what_is_outside_is_named_with_its_figures() -> None:
             Finding("unresolved", "so"),
             "there is no figure for U, expected is 1 to 2",
         ),
-        (
-            expecting("diverged", diverged_s=(1.0, 2.0)),
-            late,
-            "the time reached (s) = 7 is outside the expected 1 to 2",
-        ),
+        (expecting("diverged", diverged_s=(1.0, 2.0)), late, "the time reached (s) = 7 is outside the expected 1 to 2"),
         (
             expecting("diverged", diverged_s=(1.0, 2.0)),
             untimed,

@@ -28,11 +28,9 @@ from tests.crosscheck.sessions import run_here
 
 MINE = "mine"
 SPOILED: dict[str, Callable[[Real], Real]] = {
-    "reversed": lambda values: -values,
-    "zero": np.zeros_like,
-    "doubled": lambda values: 2.0 * values,
+    "reversed": lambda values: -values, "zero": np.zeros_like, "doubled": lambda values: 2.0 * values,
     "off by one": lambda values: values + 1.0,
-}
+}  # fmt: skip
 LINEARISED = tuple(sorted(f"linearised/{folder.name}" for folder in (shipped_folder() / "linearised").iterdir()))
 ROUNDING = 1e-9  # SI: a channel that is zero up to it cannot be told from its negative
 OTHERS = ("pendulums/compound", "tops/sleeping")

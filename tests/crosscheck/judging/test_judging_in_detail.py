@@ -69,9 +69,7 @@ def test_a_control_says_all_of_itself() -> None:
     assert plain(control) == {
         "case": "made/made", "comparison": "fault", "kind": "control", "channel": TIP, "variant_a": "rigid",
         "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid", "status": "differ",
-        "expected": "differ", "goal": 1e-3, "outside": "", "accepted": None, "worse": "",
-        "stale": "",
-        **NO_CLAIMS,
+        "expected": "differ", "goal": 1e-3, "outside": "", "accepted": None, "worse": "", "stale": "", **NO_CLAIMS,
         "expected_reason": "negative control (mass of rod): the fault must be noticed",
     }  # fmt: skip
     assert (control.ok, control.scale) == (True, 4.0)
@@ -109,9 +107,7 @@ def test_a_comparison_says_all_of_itself() -> None:
         "case": "made/made", "comparison": "both", "kind": "comparison", "channel": TIP, "variant_a": "rigid",
         "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid", "status": "agree",
         "expected": "agree", "goal": 1e-3, "outside": "", "accepted": {"E": 0.0, "U": 1.8e-5, "of": ""}, "worse": "",
-        "stale": "",
-        **NO_CLAIMS,
-        "expected_reason": "",
+        "stale": "", **NO_CLAIMS, "expected_reason": "",
     }  # fmt: skip
     assert verdict.reason == "0 of the range apart, within the uncertainty 5.4e-05"
     other = single(judged(ONE_PAIR + 'reason = "why"\n', [*runs[:3], *ladder("two", {TIP: way(2.0)})]))
@@ -166,26 +162,14 @@ def values(*given: float, doubt: float = 0.0, sizes: tuple[float, ...] = ()) -> 
         (values(), values(), None, "failed", "the results hold no values at all"),
         (values(np.nan), values(1.0), None, "failed", "a result holds values that are not numbers"),
         (values(1.0), values(np.inf), None, "failed", "a result holds values that are not numbers"),
-        (
-            values(1e308),
-            values(-1e308),
-            None,
-            "failed",
-            "the results are so large that their distance is not finite",
-        ),
+        (values(1e308), values(-1e308), None, "failed", "the results are so large that their distance is not finite"),
         (values(0.0, doubt=1e-9), values(0.0), None, "unresolved", f"the signal's size is 0{UNSIZED}"),
         (
-            values(1e308, -1e308, doubt=1.0),
-            values(1e308, -1e308),
-            None,
-            "unresolved",
+            values(1e308, -1e308, doubt=1.0), values(1e308, -1e308), None, "unresolved",
             f"the signal's size is inf{UNSIZED}",
         ),
         (
-            values(1e300),
-            values(0.0),
-            1e-300,
-            "unresolved",
+            values(1e300), values(0.0), 1e-300, "unresolved",
             "the distance 1e+300 is beyond measure in units of the scale 1e-300",
         ),
     ],
@@ -378,9 +362,7 @@ def test_an_unused_pattern_says_all_of_itself() -> None:
         "case": "made/made", "comparison": "both", "kind": "comparison", "channel": "marker:top.position",
         "variant_a": "rigid", "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid",
         "status": "unresolved", "expected": "agree", "goal": 0.0, "outside": said, "accepted": None, "worse": "",
-        "stale": "",
-        **NO_CLAIMS,
-        "expected_reason": "why",
+        "stale": "", **NO_CLAIMS, "expected_reason": "why",
     }  # fmt: skip
     assert unused.reason == said
     assert single(judged(text, runs[:3])).status == "did not run"
@@ -420,11 +402,7 @@ def test_bounds_are_held_against_what_was_expected_alone() -> None:
 
 @pytest.mark.parametrize(
     ("level", "status", "beyond"),
-    [
-        (0.5, "differ", ""),
-        (0.95, "differ", "E = 0.05 is outside the expected 0.1 to 1"),
-        (1.0, "agree", ""),
-    ],
+    [(0.5, "differ", ""), (0.95, "differ", "E = 0.05 is outside the expected 0.1 to 1"), (1.0, "agree", "")],
 )
 def test_the_band_of_a_drift(level: float, status: str, beyond: str) -> None:
     momentum = np.ones((len(TIMES), 3))

@@ -88,9 +88,7 @@ def test_a_record_without_an_effort_has_no_runs() -> None:
         ({"status": "diverged", "message": "why"}, "diverged", "diverged at t = 1 s: why", 1.0),
         ({"status": "diverged", "message": "why", "times": None}, "diverged", "diverged at t = 0 s: why", 0.0),
         (
-            {"status": "diverged", "message": "why", "times": pack(TIMES[:0])},
-            "diverged",
-            "diverged at t = 0 s: why",
+            {"status": "diverged", "message": "why", "times": pack(TIMES[:0])}, "diverged", "diverged at t = 0 s: why",
             0.0,
         ),
     ],

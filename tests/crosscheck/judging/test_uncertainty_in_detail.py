@@ -199,9 +199,7 @@ def counted(*evaluations: float) -> list[RungSignal]:
         ("step", [level(0.1, 1.0), level(0.0, 1.0)], 0.0, "the efforts 0.1, 0 do not fall to a positive number"),
         ("step", [level(0.1, 1.0), level(0.1, 1.0)], 0.0, "the efforts 0.1, 0.1 do not fall to a positive number"),
         (
-            "step",
-            [level(0.2, 1.0, 2.0), level(0.1, 1.0)],
-            0.0,
+            "step", [level(0.2, 1.0, 2.0), level(0.1, 1.0)], 0.0,
             "the efforts have results of different shapes, or empty ones",
         ),
         ("step", [level(0.2), level(0.1)], 0.0, "the efforts have results of different shapes, or empty ones"),

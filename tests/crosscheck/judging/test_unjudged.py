@@ -145,12 +145,9 @@ def test_what_a_guest_offers_as_others_do_is_excused() -> None:
 
 
 @pytest.mark.parametrize("values", [
-    pytest.param(-way(axis=1), id="reversed"),
-    pytest.param(REST, id="zero"),
-    pytest.param(2.0 * way(axis=1), id="doubled"),
-    pytest.param(np.nan * way(axis=1), id="no numbers"),
-    pytest.param(np.inf + way(axis=1), id="endless"),
-    pytest.param(way(axis=1)[:, :1], id="of another shape"),
+    pytest.param(-way(axis=1), id="reversed"), pytest.param(REST, id="zero"),
+    pytest.param(2.0 * way(axis=1), id="doubled"), pytest.param(np.nan * way(axis=1), id="no numbers"),
+    pytest.param(np.inf + way(axis=1), id="endless"), pytest.param(way(axis=1)[:, :1], id="of another shape"),
 ])  # fmt: skip
 def test_what_a_guest_offers_otherwise_fails_a_strict_session_only(values: Real, tmp_path: Path) -> None:
     outcome = session(values, strict=True)

@@ -70,21 +70,8 @@ def test_drift_against_its_limit() -> None:
 @pytest.mark.parametrize("expected", ["agree", "differ", "refused", "failed", "did not run"])
 def test_what_did_not_run_is_never_as_expected(expected: str) -> None:
     verdict = Verdict(
-        case="a/b",
-        comparison="c",
-        kind="comparison",
-        channel=CHANNEL,
-        variant_a="v",
-        engine_a="one",
-        variant_b="v",
-        engine_b="two",
-        level="rigid",
-        status="did not run",
-        expected=expected,
-        E=None,
-        U=None,
-        goal=1e-6,
-        scale=None,
+        case="a/b", comparison="c", kind="comparison", channel=CHANNEL, variant_a="v", engine_a="one", variant_b="v",
+        engine_b="two", level="rigid", status="did not run", expected=expected, E=None, U=None, goal=1e-6, scale=None,
         reason="",
-    )
+    )  # fmt: skip
     assert not verdict.ok

@@ -20,7 +20,7 @@ from crosscheck.library.case import (
     Refined,
     RunFile,
     Variant,
-)
+)  # fmt: skip
 from crosscheck.library.check import check_run_file
 from crosscheck.library.find import load_case, resolve
 from crosscheck.library.selection import select

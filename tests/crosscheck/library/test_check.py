@@ -162,17 +162,12 @@ def test_types_and_unknown_keys_name_place_and_remedy(tmp_path: Any, old: str, n
 
 
 EVERYTHING = Trajectory(
-    status="finished",
-    message="",
-    times=np.arange(2.0),
-    markers={"tip": MarkerPath(np.ones((2, 3)), np.ones((2, 4)), np.ones((2, 6)))},
-    loads={"tip": np.ones((2, 6))},
-    wheel_loads={"tip": np.ones((2, 6))},
-    drives={"tip": np.ones((2, 1))},
-    energy={kind: np.ones(2) for kind in ("kinetic", "strain", "spring", "gravity")},
-    momentum=np.ones((2, 6)),
+    status="finished", message="", times=np.arange(2.0),
+    markers={"tip": MarkerPath(np.ones((2, 3)), np.ones((2, 4)), np.ones((2, 6)))}, loads={"tip": np.ones((2, 6))},
+    wheel_loads={"tip": np.ones((2, 6))}, drives={"tip": np.ones((2, 1))},
+    energy={kind: np.ones(2) for kind in ("kinetic", "strain", "spring", "gravity")}, momentum=np.ones((2, 6)),
     work=np.ones(2),
-)
+)  # fmt: skip
 
 
 def test_the_kinds_of_patterns_are_the_kinds_of_channels() -> None:

@@ -31,18 +31,12 @@ SCENE = Scene(
     gravity_m_s2=(0.0, 0.0, -9.81),
     bodies=(
         RigidBody(
-            name="hub",
-            mass_kg=4.0,
-            com_m=(0.1, 0.0, 0.0),
-            inertia_kg_m2=INERTIA,
+            name="hub", mass_kg=4.0, com_m=(0.1, 0.0, 0.0), inertia_kg_m2=INERTIA,
             nodes=(Node(name="port", quaternion=TURNED),),
         ),
         BeamBody(
-            name="boom",
-            length_m=1.0,
-            elements=4,
-            stations=(BeamStation(x_m=0.0, **STATION), BeamStation(x_m=1.0, **STATION)),
-            modes=Modes(count=2),
+            name="boom", length_m=1.0, elements=4,
+            stations=(BeamStation(x_m=0.0, **STATION), BeamStation(x_m=1.0, **STATION)), modes=Modes(count=2),
             level="stiffened",
         ),
         RigidBody(name="tip", mass_kg=1.0, inertia_kg_m2=INERTIA),
@@ -54,11 +48,7 @@ SCENE = Scene(
     ),
     wheels=(
         Wheel(
-            name="wheel",
-            body="hub",
-            axis=(0.0, 0.0, 1.0),
-            mass_kg=1.0,
-            axial_inertia_kg_m2=0.1,
+            name="wheel", body="hub", axis=(0.0, 0.0, 1.0), mass_kg=1.0, axial_inertia_kg_m2=0.1,
             transverse_inertia_kg_m2=0.05,
         ),
     ),

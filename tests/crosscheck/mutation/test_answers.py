@@ -58,22 +58,17 @@ def answer() -> Trajectory:
     quaternion = rng.normal(size=(5, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
     return Trajectory(
-        status="finished",
-        message="",
-        times=TIMES,
+        status="finished", message="", times=TIMES,
         markers={"tip": MarkerPath(rng.normal(size=(5, 3)), quaternion, rng.normal(size=(5, 6)))},
-        loads={"pivot": rng.normal(size=(5, 6))},
-        wheel_loads={"wheel": rng.normal(size=(5, 6))},
-        drives={"pivot": rng.normal(size=(5, 1))},
-        connectors={"cable": rng.normal(size=(5, 6))},
+        loads={"pivot": rng.normal(size=(5, 6))}, wheel_loads={"wheel": rng.normal(size=(5, 6))},
+        drives={"pivot": rng.normal(size=(5, 1))}, connectors={"cable": rng.normal(size=(5, 6))},
         hinge_forces={"coil": rng.normal(size=(5, 1))},
         energy={kind: rng.normal(size=5) for kind in ("kinetic", "strain", "spring", "gravity")},
-        momentum=rng.normal(size=(5, 6)),
-        work=rng.normal(size=5),
+        momentum=rng.normal(size=(5, 6)), work=rng.normal(size=5),
         derivatives={name: rng.normal(size=(5, 4)) for name in DERIVATIVES},
         frequencies=np.sort(rng.uniform(size=(5, 2)), axis=1),
         known_to=dict.fromkeys((*DERIVATIVES, FREQUENCIES), np.full(5, 1e-12)),
-    )
+    )  # fmt: skip
 
 
 def channels(run: Trajectory) -> dict[str, Real]:

@@ -66,11 +66,8 @@ def test_the_scores_are_in_a_file_and_the_records_serve_again(seeing: MutationSc
     assert stored["format"] == 1
     assert stored["cases"][0]["score"] == seeing.score
     assert {each["outcome"] for each in stored["cases"][0]["mutants"]} <= {
-        "noticed",
-        "missed",
-        "no mutant",
-        "not judged",
-    }
+        "noticed", "missed", "no mutant", "not judged",
+    }  # fmt: skip
     runs = (out / RECORDS).read_text(encoding="utf-8").count('"record":"run"')
     assert campaign(load_case(CASE), out) == seeing
     assert (out / RECORDS).read_text(encoding="utf-8").count('"record":"run"') == runs

@@ -154,9 +154,7 @@ def driven_masses() -> Scene:
     builder.revolute("elbow", "hub", "arm", parent_position=(0.0, 0.3, 0.0), stiffness=5.0)  # loads to measure by
     for count, which in ((1, [moved]), (2, [free, moved]), (3, [moved, free, moved])):
         offset = (0.5, 0.1 * count, 0.3)
-        builder.point_mass(
-            f"mass {count}", "hub", mass=0.4, offset=offset, directions=ways[:count], coordinates=which
-        )
+        builder.point_mass(f"mass {count}", "hub", mass=0.4, offset=offset, directions=ways[:count], coordinates=which)
     return builder.scene()
 
 

@@ -74,9 +74,7 @@ def active() -> Scene:
         hinges=(Revolute(name="pivot", parent="ground", child="arm", axis=Y, rotation=motor),),
         loads=(Load(name="push", body="arm", type="torque", direction=Y, function=Constant(value=0.0)),),
         sensors=(CoordinateSensor(name="angle", of="pivot"), ProfileSensor(name="course", function=course)),
-        controllers=(
-            Pid(name="servo", inputs=("angle", "course[0]"), kp=3.0, kd=0.5, period_s=0.1, delay_s=0.03),
-        ),
+        controllers=(Pid(name="servo", inputs=("angle", "course[0]"), kp=3.0, kd=0.5, period_s=0.1, delay_s=0.03),),
         events=(
             SceneEvent(
                 name="switch", watch="time", level=0.47,

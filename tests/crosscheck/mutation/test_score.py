@@ -55,23 +55,16 @@ def test_beyond_a_goal_is_more_than_it(E: float | None, beyond: bool) -> None:
 
 def mutant(name: str, what: Outcome, **channels: Status) -> Mutant:
     return Mutant(
-        mutation=name,
-        target="",
-        of="scene",
-        outcome=what,
-        beyond_goal=False,
-        reason="",
+        mutation=name, target="", of="scene", outcome=what, beyond_goal=False, reason="",
         channels={key: shown(status) for key, status in channels.items()},
-    )
+    )  # fmt: skip
 
 
 def test_only_what_was_judged_counts() -> None:
     mutants = [
-        mutant("one", "noticed", a="differ", b="agree"),
-        mutant("two", "missed", a="agree", b="agree"),
-        mutant("three", "not judged", a="crashed"),
-        mutant("four", "no mutant", a="refused"),
-    ]
+        mutant("one", "noticed", a="differ", b="agree"), mutant("two", "missed", a="agree", b="agree"),
+        mutant("three", "not judged", a="crashed"), mutant("four", "no mutant", a="refused"),
+    ]  # fmt: skip
     found = mutation_score("case", "variant", "engine", mutants, [PassedOver(mutation="five", target="", reason="why")])
     assert (found.score, found.score_at_goals) == (0.5, 0.0)
     assert {name: (each.noticed, each.mutants) for name, each in found.channels.items()} == {"a": (1, 2), "b": (0, 2)}

@@ -34,14 +34,12 @@ from tests.crosscheck.sessions import CASE, copy_case
 WITHOUT_PART = {
     "crosscheck.engines.registry": "finds engines and loads them",
     "crosscheck.engines.pinocchio": "another engine, which the registry can load",
-    "crosscheck.engines.mujoco": "another engine",
-    "crosscheck.engines.exudyn": "another engine",
+    "crosscheck.engines.mujoco": "another engine", "crosscheck.engines.exudyn": "another engine",
     "crosscheck.library": "reads cases and makes scenes, as plan",
     "crosscheck.running.plan": "makes the scene, which is in the record's own key",
     "crosscheck.running.job": "says what is in the record's own key: scene, sample times, effort",
     "crosscheck.running.ladder": "says which efforts are run, and in the record's own key are effort, place and number",
-    "crosscheck.records.machine": "tells the reader of a report about the machine",
-    "crosscheck.drawing.draw": "draws",
+    "crosscheck.records.machine": "tells the reader of a report about the machine", "crosscheck.drawing.draw": "draws",
     "crosscheck.drawing.film": "makes a scene too",
     "crosscheck.engines.functions_of_time": "says to the drawing how a wheel starts; native evaluates functions itself",
     "crosscheck.records.drawing": "holds what was drawn",
@@ -49,18 +47,13 @@ WITHOUT_PART = {
     "crosscheck.pytest_plugin": "finds our modules inside pytest, as Python would",
     "crosscheck.running.reference_record": "holds the stored reference, which is made of other runs",
     "flexmb.output.writing": "says what is wrong with a folder",
-    "crosscheck.running.scheduler": "says what a scheduler is",
-    "crosscheck.running.processes": "ends processes",
-    "crosscheck.records.made_by": "makes the key",
-    "crosscheck.records.sources": "makes the key",
-    "flexmb.surrogate": "makes scenes, as plan",
-    "flexmb.scene.check": "refuses scenes, and changes none",
-    "flexmb.scene.build": "makes scenes",
-    "flexmb.scene.collecting": "makes scenes",
-    "flexmb.scene.methods": "makes scenes",
-    "flexmb.scene.options": "makes scenes",
+    "crosscheck.running.scheduler": "says what a scheduler is", "crosscheck.running.processes": "ends processes",
+    "crosscheck.records.made_by": "makes the key", "crosscheck.records.sources": "makes the key",
+    "flexmb.surrogate": "makes scenes, as plan", "flexmb.scene.check": "refuses scenes, and changes none",
+    "flexmb.scene.build": "makes scenes", "flexmb.scene.collecting": "makes scenes",
+    "flexmb.scene.methods": "makes scenes", "flexmb.scene.options": "makes scenes",
     "flexmb.scene.files": "reads scenes",
-}
+}  # fmt: skip
 PLUG_IN = """
 from pathlib import Path
 from helper import FACTOR
@@ -254,13 +247,9 @@ def test_names_in_strings_and_relative_imports_are_followed(tmp_path: Path, monk
     package = tmp_path / "plugged"
     package.mkdir()
     texts = {
-        "__init__": "from . import fourth",
-        "first": "def f():\n    from .second import x",
-        "second": "LATER = 'plugged.third:make'",
-        "third": "import numpy, not_there",
-        "fourth": "",
-        "fifth": "",
-    }
+        "__init__": "from . import fourth", "first": "def f():\n    from .second import x",
+        "second": "LATER = 'plugged.third:make'", "third": "import numpy, not_there", "fourth": "", "fifth": "",
+    }  # fmt: skip
     for name, text in texts.items():
         (package / f"{name}.py").write_text(text, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)

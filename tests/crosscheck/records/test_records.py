@@ -28,17 +28,9 @@ from crosscheck.records.packing import Packed, pack, unpack
 def record(effort: str) -> RunRecord:
     values = np.random.default_rng(1).normal(size=(7, 3))
     return RunRecord(
-        case="a/b",
-        variant="v",
-        role="main",
-        engine="e",
-        version="1",
-        scene="s",
-        status="finished",
-        effort=effort,
-        times=pack(np.arange(7.0)),
-        channels={"marker:tip.position": pack(values)},
-    )
+        case="a/b", variant="v", role="main", engine="e", version="1", scene="s", status="finished", effort=effort,
+        times=pack(np.arange(7.0)), channels={"marker:tip.position": pack(values)},
+    )  # fmt: skip
 
 
 def test_packing_is_exact() -> None:

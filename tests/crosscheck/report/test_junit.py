@@ -28,11 +28,9 @@ ATTRIBUTES = {
     "system-out": (set(), set()),
 }
 CHILDREN = {
-    "testsuites": {"testsuite"},
-    "testsuite": {"properties", "testcase"},
-    "properties": {"property"},
+    "testsuites": {"testsuite"}, "testsuite": {"properties", "testcase"}, "properties": {"property"},
     "testcase": {"failure", "skipped", "system-out"},
-}
+}  # fmt: skip
 TIME = re.compile(r"(([0-9]{0,3},)*[0-9]{3}|[0-9]{0,3})*(\.[0-9]*)?")
 MIXED = """
 [[variant]]

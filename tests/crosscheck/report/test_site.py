@@ -162,15 +162,10 @@ def test_mutation_scores_are_shown(tmp_path: Path) -> None:
 
 def mutant(name: str, outcome: Outcome, **channels: Status) -> Mutant:
     return Mutant(
-        mutation=name,
-        target="arm",
-        of="scene",
-        outcome=outcome,
-        beyond_goal=False,
-        reason="too small to be seen",
+        mutation=name, target="arm", of="scene", outcome=outcome, beyond_goal=False, reason="too small to be seen",
         channels={key: ShownIn(status=status, E=0.0, U=1e-9, goal=1e-6) for key, status in channels.items()},
         by_reference="noticed" if outcome == "noticed" else None,
-    )
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

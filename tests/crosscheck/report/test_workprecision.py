@@ -84,13 +84,10 @@ def with_stored(records: list[Record], uncertainty: float, shift: float = 0.0, *
         (each for each in records if isinstance(each, RunRecord) and each.engine == "fine"), key=lambda run: run.rung
     )
     stored = RecordedReference(
-        variant="rigid",
-        asked={"fine": ReferenceGoals(goals={"marker": 1e-6})},
-        times=pack(unpack(fine.times)[::2]),
-        channels={TIP: pack(unpack(fine.channels[TIP])[::2] + shift)},
-        uncertainties={TIP: uncertainty},
+        variant="rigid", asked={"fine": ReferenceGoals(goals={"marker": 1e-6})}, times=pack(unpack(fine.times)[::2]),
+        channels={TIP: pack(unpack(fine.channels[TIP])[::2] + shift)}, uncertainties={TIP: uncertainty},
         routes=("exact.py, a closed form", "fine, rk4 h=0.1, rk4 h=0.05"),
-    )
+    )  # fmt: skip
     stored = replace(stored, **changes)
     return [replace(each, reference=stored) if isinstance(each, CaseRecord) else each for each in records]
 

@@ -314,9 +314,7 @@ def test_the_key_holds_all_that_the_result_depends_on(
 
 def test_what_is_done_is_confirmed_and_not_run_again() -> None:
     key = key_of(Actor())
-    confirmed = Confirmed(
-        case="made/made", variant="rigid", role="main", engine="actor", scene="id", made_by=key
-    )  # fmt: skip
+    confirmed = Confirmed(case="made/made", variant="rigid", role="main", engine="actor", scene="id", made_by=key)
     done = frozenset(Done(label, key, rung, 5) for rung, label in enumerate(LABELS))
     actor = Actor()
     assert emitted(actor, done=done) == [confirmed]

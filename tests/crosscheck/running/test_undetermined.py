@@ -25,12 +25,9 @@ def latched(scene: s.Scene) -> s.Scene:
 
 DETERMINED = load_scene(Path(__file__).parents[3] / "cases" / "closed_chains" / "four_bar" / "scene.toml")
 SCENES = {
-    "plane": mechanisms.four_bar(),
-    "determined": DETERMINED,
-    "flexible": mechanisms.four_bar(modes=2),
-    "driven": pendulum("weld", driven=s.Constant(value=0.0)),
-    "latched": latched(DETERMINED),
-}
+    "plane": mechanisms.four_bar(), "determined": DETERMINED, "flexible": mechanisms.four_bar(modes=2),
+    "driven": pendulum("weld", driven=s.Constant(value=0.0)), "latched": latched(DETERMINED),
+}  # fmt: skip
 
 
 def by_run(scene: s.Scene) -> set[str]:

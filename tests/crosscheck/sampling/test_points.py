@@ -20,12 +20,10 @@ from flexmb.scene.shapes import beam_section
 
 QUANTITY = SweptQuantity(name="x", channel="marker:tip.position", value="final")
 ALL = (
-    Uniform(path="a", low=-1.0, high=3.0),
-    Normal(path="b", mean=2.0, sd=0.5),
-    LogNormal(path="c", median=2.0, sigma=0.25),
-    Triangular(path="d", low=0.0, mode=1.0, high=4.0),
+    Uniform(path="a", low=-1.0, high=3.0), Normal(path="b", mean=2.0, sd=0.5),
+    LogNormal(path="c", median=2.0, sigma=0.25), Triangular(path="d", low=0.0, mode=1.0, high=4.0),
     Values(path="e", values=(1.0, 2.0, 6.0)),
-)
+)  # fmt: skip
 MEANS = (1.0, 2.0, 2.0 * math.exp(0.25**2 / 2), 5.0 / 3.0, 3.0)
 
 

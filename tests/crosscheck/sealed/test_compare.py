@@ -18,11 +18,9 @@ REPLACE = msgspec.structs.replace
 def made(verdict: SealedVerdict | None = SOUND, run: SealedRun | None = None, **changes: Any) -> SealedResults:
     """A session with one verdict and one run."""
     case = SealedCase(
-        files={"run.toml": "a"},
-        scenes={"rigid": "b"},
-        verdicts={"all": {} if verdict is None else {PLACE: verdict}},
+        files={"run.toml": "a"}, scenes={"rigid": "b"}, verdicts={"all": {} if verdict is None else {PLACE: verdict}},
         runs={"rigid | mine | main": run or SealedRun(status="finished", effort="rk4 h=0.1", wall_s=1.0)},
-    )
+    )  # fmt: skip
     found = SealedResults(
         format=FORMAT, version=VERSION, exit_code=0, headline="", made=Origin(), records="", cases={"a/b": case}
     )

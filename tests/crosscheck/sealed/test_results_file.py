@@ -72,11 +72,8 @@ def test_every_changed_byte_is_noticed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("change", [
-    lambda data: b"\xef\xbb\xbf" + data,
-    lambda data: data.replace(b"\n", b"\r\n"),
-    lambda data: data + b"\n",
-    lambda data: data.rstrip(b"\n"),
-    lambda data: data.decode().encode("utf-16"),
+    lambda data: b"\xef\xbb\xbf" + data, lambda data: data.replace(b"\n", b"\r\n"), lambda data: data + b"\n",
+    lambda data: data.rstrip(b"\n"), lambda data: data.decode().encode("utf-16"),
     lambda data: data.replace(b'"made"', b'"\\u006dade"'),
 ])  # fmt: skip
 def test_bytes_that_change_no_word_are_noticed_too(tmp_path: Path, change) -> None:

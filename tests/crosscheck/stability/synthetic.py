@@ -82,12 +82,9 @@ def maps() -> dict[str, StabilityMap]:
     across = msgspec.structs.replace(quarter, name="y")
     corner = replace(CIRCLE, name="corner", measure=with_bad_corner, x=quarter, y=across, depth=1)
     found = (
-        CIRCLE,
-        corner,
-        replace(corner, name="slow", measure=with_slow_place, depth=0),
+        CIRCLE, corner, replace(corner, name="slow", measure=with_slow_place, depth=0),
         replace(CIRCLE, name="silent", measure=without_end, depth=0, skips=True),
         replace(CIRCLE, name="absent", measure=without_library, depth=1),
-        replace(CIRCLE, name="wrong", overlay=shifted(0.05)),
-        replace(CIRCLE, name="close", overlay=shifted(0.015)),
-    )
+        replace(CIRCLE, name="wrong", overlay=shifted(0.05)), replace(CIRCLE, name="close", overlay=shifted(0.015)),
+    )  # fmt: skip
     return {what.name: what for what in found}

@@ -59,19 +59,15 @@ def dear(folder: Path) -> list[list[str]]:
     sweep = folder / "spread.toml"
     sweep.write_text(SWEEP, encoding="utf-8")
     return [
-        ["crosscheck", "engines"],
-        ["flexmb", "mass", scene],
-        ["flexmb", "linearize", scene, "--at", "initial"],
+        ["crosscheck", "engines"], ["flexmb", "mass", scene], ["flexmb", "linearize", scene, "--at", "initial"],
         ["flexmb", "campbell", scene, "shaft", "--rates", "0:4:3", "--picture", str(folder / "campbell.png")],
         ["flexmb", "simulate", scene, "--t-end", "0.1", "--error-estimate", "--no-plots", "--out", str(folder / "out")],
         ["crosscheck", "run", case, "-e", "native", "--verbose", "--fresh", "--out", out],
-        ["crosscheck", "verify", case, str(csv)],
-        ["crosscheck", "bench", case, "-e", "native", "--rounds", "1"],
-        ["crosscheck", "mutate", case, "--out", out],
-        ["crosscheck", "invariance", case, "--out", out],
+        ["crosscheck", "verify", case, str(csv)], ["crosscheck", "bench", case, "-e", "native", "--rounds", "1"],
+        ["crosscheck", "mutate", case, "--out", out], ["crosscheck", "invariance", case, "--out", out],
         ["crosscheck", "sweep", str(sweep), "--out", out],
         ["flexmb", "advise", str(spinner(folder)), "--t-end", "0.1", "--out", str(folder / "advised.toml")],
-    ]
+    ]  # fmt: skip
 
 
 SWEEP = """

@@ -111,14 +111,8 @@ def _fixed_step(random: np.random.Generator, stored: Real) -> Real:
 Resampling = Callable[[np.random.Generator, Real], Real]
 RESAMPLINGS: tuple[Resampling, ...] = (_uniform, _random, _subset, _finer, _fixed_step)
 STRANGERS = (
-    Stranger("pendulums/double"),
-    Stranger("tops/lagrange"),
-    Stranger("tops/kovalevskaya"),
-    Stranger("wheel_gyrostat/torque_driven"),
-    Stranger("closed_chains/four_bar"),
-    Stranger("sliders/crane"),
-    Stranger("deploying_boom/latching"),
-    Stranger("control/servos"),
-    Stranger("spinning_beam/beam_s_subcritical"),
+    Stranger("pendulums/double"), Stranger("tops/lagrange"), Stranger("tops/kovalevskaya"),
+    Stranger("wheel_gyrostat/torque_driven"), Stranger("closed_chains/four_bar"), Stranger("sliders/crane"),
+    Stranger("deploying_boom/latching"), Stranger("control/servos"), Stranger("spinning_beam/beam_s_subcritical"),
     Stranger("connectors/one_at_a_time"),
-)
+)  # fmt: skip
