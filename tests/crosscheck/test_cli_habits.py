@@ -131,8 +131,3 @@ def test_run_writes_what_can_be_compared(runner: CliRunner, tmp_path: Path, monk
     assert (result.exit_code, result.stdout) == (0, "All 15 verdicts are as expected\n")
     assert read_results(tmp_path / "results.json").exit_code == 0
     assert {"badge.svg", "badge.json"} <= {file.name for file in tmp_path.iterdir()}
-
-
-def test_the_contract_of_an_unknown_engine_is_no_request(runner: CliRunner) -> None:
-    result = runner.invoke(cli.app, ["contract", "pinochio"])
-    assert (result.exit_code, 'did you mean "pinocchio"' in result.stderr) == (2, True), result.output

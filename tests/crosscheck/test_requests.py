@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -13,13 +12,10 @@ from typer.core import TyperGroup
 from typer.main import get_command
 from typer.testing import CliRunner
 
-import crosscheck
 import flexmb.cli
 from crosscheck import cli
-from crosscheck.engines.registry import BUILT_IN, OWN_CODE
 from crosscheck.library.find import shipped_folder
 from flexmb.scene.problems import LISTED, closest
-from tests.repo.project import ROOT
 
 resource = pytest.importorskip("resource", reason="only Unix tells the processor time of other processes")
 
@@ -129,23 +125,6 @@ def test_an_engine_that_is_asked_for_and_not_installed_is_refused(
     assert found.exit_code == 2, found.output
     assert f"engine {engine} is not installed: " in found.output
     assert f"pip install {engine}" in found.output and len(found.output.strip().splitlines()) == 1
-
-
-INSTALLED = Path(str(crosscheck.__file__)).parents[1]
-
-
-def test_remedies_name_what_pip_finds() -> None:
-    """The distributions of the extras, and no extra of this project, which is in no index."""
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
-    known = {re.split(r"[^\w-]", each)[0] for name in ("peers", "more-peers") for each in extras[name]}
-    said = set()
-    for name, place in BUILT_IN.items():
-        folder = INSTALLED.joinpath(*place.partition(":")[0].split("."))
-        text = "".join(file.read_text(encoding="utf-8") for file in folder.glob("*.py")) if folder.is_dir() else ""
-        found = re.findall(r"pip install ([\w-]+)", text) + re.findall(r'needed\("\w+", "([\w-]+)"\)', text)
-        assert name in OWN_CODE or len(found) == 1, (name, found)
-        said |= set(found)
-    assert said == known
 
 
 @pytest.mark.parametrize(

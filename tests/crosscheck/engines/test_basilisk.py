@@ -1,12 +1,10 @@
 """Basilisk: spacecraft that it represents agree with Pinocchio, pointwise and over time; what it refuses is named."""
 
-import sys
-
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from crosscheck.engines.contract import Effort, EngineMissing, Run, Snapshot
+from crosscheck.engines.contract import Effort, Run, Snapshot
 from crosscheck.engines.conventions import quaternion_of
 from crosscheck.engines.registry import engine
 from flexmb.scene.build import SceneBuilder, angular, linear
@@ -159,9 +157,3 @@ def test_gravity_a_fixed_hub_and_branches_are_refused() -> None:
     for name in ("left", "right"):
         fork.rigid_body(name, mass=1.0, inertia=(0.1, 0.1, 0.1)).revolute(f"to {name}", "arm", name)
     assert "carries two others" in BASILISK.supports(fork.scene()).reason
-
-
-def test_a_missing_library_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "Basilisk", None)
-    with pytest.raises(EngineMissing, match="pip install bsk"):
-        engine("basilisk").version()

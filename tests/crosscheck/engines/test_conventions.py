@@ -1,4 +1,4 @@
-"""Conversions against independent code (SciPy) and their own inverses."""
+"""Conversions against SciPy and their own inverses; the functions of time of other codes against differences."""
 
 import numpy as np
 import pytest
@@ -18,6 +18,8 @@ from crosscheck.engines.conventions import (
     scalar_last,
     shift_wrench,
 )  # fmt: skip
+from crosscheck.engines.functions_of_time import breaks_between, fastest_rate, profile
+from flexmb.scene.functions import Constant, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 
 EPS = np.finfo(float).eps
 CASES = [*np.random.default_rng(0).normal(size=(20, 4)), np.eye(4)[0], np.eye(4)[1], np.eye(4)[2], np.eye(4)[3]]
@@ -76,3 +78,66 @@ def test_frames_compose_and_invert():
     there_and_back = a @ a.inverse()
     assert there_and_back.position == pytest.approx(np.zeros(3), abs=16 * EPS)
     assert there_and_back.rotation == pytest.approx(np.eye(3), abs=16 * EPS)
+
+
+_TIMES = tuple(np.linspace(0.0, 4.0, 41))
+_SMOOTH = [
+    Constant(value=1.5),
+    Ramp(value=0.2, rate=-1.1, start_s=0.5),
+    Sine(amplitude=0.7, angular_frequency_rad_s=2.3, phase_rad=0.4, offset=-0.2),
+    SmoothStep(start_value=-0.5, end_value=1.2, start_s=0.3, duration_s=2.5),
+    SpinUp(rate=3.0, duration_s=2.0),
+    Table(times_s=_TIMES, values=tuple(np.sin(np.array(_TIMES)))),
+]
+
+
+@pytest.mark.parametrize("function", _SMOOTH, ids=lambda f: type(f).__name__)
+def test_rate_and_acceleration_are_the_derivatives(function):
+    f, h = profile(function), 1e-3
+    for t in np.linspace(0.1, 3.9, 24):
+        # Fourth-order central difference: error h^4/30 times the fifth derivative, plus round-off eps/h.
+        near = [f(t + k * h) for k in (-2, -1, 1, 2)]
+        slope = lambda key, v=near: (getattr(v[0], key) - 8 * getattr(v[1], key) + 8 * getattr(v[2], key) - getattr(v[3], key)) / (12 * h)  # noqa: E501, E731
+        assert slope("value") == pytest.approx(f(t).rate, abs=1e-9)
+        if not isinstance(function, SpinUp | SmoothStep) or all(abs(t - b) > 3 * h for b in (2.0, 0.3, 2.8)):
+            assert slope("rate") == pytest.approx(f(t).acceleration, abs=1e-8)
+
+
+def test_end_values():
+    step = profile(SmoothStep(start_value=-0.5, end_value=1.2, start_s=0.3, duration_s=2.5))
+    assert step(0.0) == (-0.5, 0.0, 0.0)
+    assert step(9.0).value == pytest.approx(1.2, rel=1e-15)
+    spin = profile(SpinUp(rate=3.0, duration_s=2.0))
+    assert spin(2.0) == (3.0, 3.0, 0.0)
+    assert spin(np.nextafter(2.0, 0.0)).value == pytest.approx(3.0, rel=1e-14)
+
+
+def test_pulse_is_half_open_and_has_breaks():
+    pulse = Pulse(value=2.0, start_s=1.0, duration_s=0.5)
+    f = profile(pulse)
+    assert [f(t).value for t in (0.999, 1.0, 1.499, 1.5)] == [0.0, 2.0, 2.0, 0.0]
+    assert breaks_between([pulse, SpinUp(rate=1.0, duration_s=1.5), Constant(value=1.0)], 0.0, 2.0) == [1.0, 1.5]
+
+
+def test_table_interpolates_a_quintic_exactly_and_is_undefined_outside():
+    t = np.linspace(0.0, 1.0, 8)
+    f = profile(Table(times_s=tuple(t), values=tuple(t**5)))
+    # round-off of a spline solve with a condition number of order 1e3
+    assert f(0.37) == pytest.approx((0.37**5, 5 * 0.37**4, 20 * 0.37**3), rel=1e-11)
+    assert np.isnan(f(1.01).value)
+
+
+@pytest.mark.parametrize("function", _SMOOTH, ids=lambda f: type(f).__name__)
+def test_fastest_rate_bounds_the_sampled_rate(function):
+    f = profile(function)
+    sampled = max(abs(f(t).rate) for t in np.linspace(0.0, 4.0, 801))
+    assert sampled <= fastest_rate(function) * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("function", _SMOOTH, ids=lambda f: type(f).__name__)
+def test_what_is_kept_for_a_time_is_of_that_time(function):
+    """Engines go back in time when they begin again, and ask twice at the same time."""
+    f = profile(function)
+    for t in (0.3, 0.3, 1.1, 0.3, 0.0, 1.1):
+        assert f(t) == profile(function)(t)
+    assert f(0.3) is f(0.3)

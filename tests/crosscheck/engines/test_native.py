@@ -1,4 +1,6 @@
-"""The three native engines through the contract: where the routes must be equal, and what each says of a scene."""
+"""The native engines through the contract: routes that must be equal, methods of stiff scenes, controllers, events, and
+what each says of a scene.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +10,22 @@ import numpy as np
 import pytest
 
 import flexmb
+import flexmb as fm
 from crosscheck.engines.answers import checked_run
-from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
+from crosscheck.engines.checked import CheckedEngine
+from crosscheck.engines.contract import Effort, Run, Snapshot, Support, Trajectory
+from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.native import NativeEngine, radau5
 from crosscheck.engines.registry import engine
+from flexmb.run.warm_up import pendulum
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.events import EndRun, Impact, SceneEvent
 from flexmb.scene.schema import Scene
 from tests import trees
 from tests.bounds import algebra
+from tests.flexmb.control.scenes import rotor
+from tests.flexmb.control.test_attitude import craft
+from tests.flexmb.control.test_closed_chains import GRASHOF, LAGGING, controlled
 from tests.flexmb.frisch.scenes import clamped
 
 RECURSION, FRISCH, PRINT = "native", "native-frisch", "native-frisch-as-printed"
@@ -158,3 +168,112 @@ def test_a_scene_that_ends_its_own_run_is_refused():
     end = SceneEvent(name="over", watch="rail.translation", level=0.0, actions=(EndRun(),))
     support = engine(RECURSION).supports(falling(end))
     assert support.kind == "no" and 'event "over" ends the run' in support.reason
+
+
+METHODS = {
+    "native-radau5": ("tolerance", "radau5"),
+    "native-exponential": ("tolerance", "exponential"),
+    "native-generalised-alpha": ("step", "generalised_alpha"),
+}
+RUN = Run(np.linspace(0.0, 0.5, 6))
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_the_finest_effort_of_each_agrees_with_dop853(name):
+    scene, (kind, method) = pendulum(), METHODS[name]
+    efforts = engine(name).efforts(scene)
+    assert len(efforts) >= 3
+    assert {(effort.kind, effort.method) for effort in efforts} == {(kind, method)}
+    exact = engine("native").compile(scene).simulate(RUN, Effort("tolerance", 1e-12, "dop853"))
+    done = engine(name).compile(scene).simulate(RUN, efforts[-1])
+    assert done.status == "finished"
+    apart = np.abs(done.markers["centre"].position - exact.markers["centre"].position).max()
+    assert apart < (1e-9 if kind == "tolerance" else 1e-6)
+    # the method is the effort's, whichever engine runs it
+    same = engine("native").compile(scene).simulate(RUN, efforts[-1])
+    assert np.array_equal(same.markers["centre"].position, done.markers["centre"].position)
+
+
+def test_every_method_takes_closures():
+    loop = (
+        SceneBuilder("loop")
+        .rigid_body("rod", mass=1.0, com=(0.5, 0, 0), inertia=(0.1, 0.1, 0.1), nodes={"far": (1.0, 0.0, 0.0)})
+        .spherical("ball", "ground", "rod")
+        .closure("ring", "spherical", "ground", "rod", position_a=(1.0, 0.0, 0.0), node_b="far")
+        .scene()
+    )
+    for name in METHODS:
+        assert engine(name).supports(loop).kind == "exact"
+
+
+LAW = fm.StateSpace(name="law", inputs=("angle",), D=((-1.0,),))
+
+
+class Willing:
+    """An engine that would take any scene."""
+
+    name = "willing"
+
+    def supports(self, scene: fm.Scene) -> Support:
+        return Support("exact")
+
+
+def test_an_engine_without_controllers_refuses_them() -> None:
+    refused = CheckedEngine(Willing()).supports(rotor(LAW))  # type: ignore[arg-type]
+    assert refused.kind == "no"
+    assert '"law": the adapter of engine willing knows no controllers' in refused.reason
+    assert CheckedEngine(Willing()).supports(rotor()).kind == "exact"  # type: ignore[arg-type]
+
+
+def test_the_native_engine_runs_them() -> None:
+    assert CheckedEngine(NativeEngine()).supports(rotor(LAW)).kind == "exact"
+
+
+def test_implicit_methods_take_continuous_ones() -> None:
+    assert CheckedEngine(radau5()).supports(rotor(LAW)).kind == "exact"
+
+
+@pytest.mark.parametrize("name", ["native-radau5", "native-exponential", "native-generalised-alpha"])
+def test_and_those_of_closed_chains(name: str) -> None:
+    """They run as by the engine without Jacobians."""
+    scene, run = controlled(GRASHOF, "drive", LAGGING), Run(np.linspace(0.0, 0.1, 3))
+    assert CheckedEngine(engine(name)).supports(scene).kind == "exact"
+    done, exact = (
+        engine(each).compile(scene).simulate(run, engine(each).efforts(scene)[-1]) for each in (name, "native")
+    )
+    assert done.status == exact.status == "finished"
+    apart = np.abs(done.markers["joint"].position - exact.markers["joint"].position).max()
+    assert apart < (1e-4 if "alpha" in name else 1e-9)
+
+
+def test_a_signal_is_no_profile() -> None:
+    with pytest.raises(NotImplementedError, match="no function of time"):
+        profile(fm.ControlSignal(source="law"))
+
+
+def test_laws_whose_changes_no_record_would_see_are_refused() -> None:
+    law = fm.UserLaw(
+        name="law", inputs=("angle",), function="tests.flexmb.control.laws:proportional", parameters=(1.0,)
+    )
+    assert "would not know its changes" in CheckedEngine(NativeEngine()).supports(rotor(law)).reason
+    assert CheckedEngine(NativeEngine()).supports(craft().scene()).kind == "exact"
+
+
+LATCH = fm.SceneEvent(
+    name="caught", watch="pivot.rotation", level=-1.0, actions=(fm.Latch(coordinate="pivot.rotation"),)
+)
+
+
+def eventful() -> Scene:
+    return fm.SceneBuilder("caught").add(*pendulum().bodies, *pendulum().hinges, *pendulum().markers, LATCH).scene()
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "exudyn", "exudyn-beam", "drake"])
+def test_peers_refuse_scenes_with_events(name: str) -> None:
+    support = CheckedEngine(engine(name)).supports(eventful())
+    assert support.kind == "no" and "caught" in support.reason and "knows no events" in support.reason
+
+
+@pytest.mark.parametrize("name", ["native", "native-composite", "native-frisch", "native-generalised-alpha"])
+def test_our_own_algorithms_run_them(name: str) -> None:
+    assert CheckedEngine(engine(name)).supports(eventful()).kind == "exact"

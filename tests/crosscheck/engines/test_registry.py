@@ -1,12 +1,15 @@
 """Engines are found by name, built in or plugged in, and a missing library says how to get it."""
 
+import re
 import sys
+import tomllib
 from importlib.metadata import EntryPoint
 
 import pytest
 
 from crosscheck.engines import registry
 from crosscheck.engines.contract import EngineMissing
+from tests.repo.project import ROOT
 
 
 class _Plugged:
@@ -54,8 +57,22 @@ def test_plug_in_that_is_no_engine_is_refused(monkeypatch):
         broken.version()
 
 
-@pytest.mark.parametrize(("name", "package"), [("pinocchio", "pin"), ("mujoco", "mujoco")])
-def test_missing_library_names_what_pip_finds(monkeypatch, name, package):
-    monkeypatch.setitem(sys.modules, name, None)
+LIBRARIES = [
+    ("pinocchio", "pinocchio", "pin"), ("mujoco", "mujoco", "mujoco"), ("drake", "pydrake", "drake"),
+    ("dart", "dartpy", "dartpy"), ("basilisk", "Basilisk", "bsk"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "module", "package"), LIBRARIES)
+def test_missing_library_names_what_pip_finds(monkeypatch, name, module, package):
+    monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(EngineMissing, match=f"pip install {package}$"):
         registry.engine(name).version()
+
+
+def test_remedies_are_the_distributions_of_the_extras() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    known = {re.split(r"[^\w-]", each)[0] for name in ("peers", "more-peers") for each in extras[name]}
+    assert {package for *_, package in LIBRARIES} == known - {"exudyn"}, "Exudyn's is tried beside its engines"
+    foreign = set(registry.BUILT_IN) - set(registry.OWN_CODE)
+    assert {name for name, *_ in LIBRARIES} == {name for name in foreign if not name.startswith("exudyn")}

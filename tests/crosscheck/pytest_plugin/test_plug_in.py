@@ -1,4 +1,4 @@
-"""The pytest plug-in, as another project's continuous integration uses it."""
+"""The pytest plug-in, as another project's continuous integration uses it, also with goals and failures of its own."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import pytest
 from crosscheck.conformance import trial
 from crosscheck.engines.registry import engine
 from crosscheck.library import own_files
+from crosscheck.library.expect_file import NAME
 from crosscheck.pytest_plugin import compared, items, request, runs
 from tests.crosscheck.fake_project import fake_project
 from tests.crosscheck.sessions import copy_case, run_here
@@ -217,3 +218,50 @@ def test_the_contract_is_tried_too(inside: pytest.Pytester, monkeypatch: pytest.
     wrong = ran(inside, "--crosscheck-contract", "--crosscheck-engine", "fine", "-k", "hanging-mass or version")
     wrong.assert_outcomes(passed=1, failed=1, deselected=len(items.CLAUSES) - 2)
     wrong.stdout.fnmatch_lines(["*the contract says: `loads[[]hinge]` acts on the outboard body*"])
+
+
+FAILURE = """
+[[expected_failure]]
+engine = "biased"
+channels = ["marker:tip.position", "load:pivot.force"]
+status = "differ"
+reason = "its gravity is a thousandth too large"
+"""
+GOAL = """
+[[goal]]
+engine = "stepper"
+cases = ["single"]
+goals = { load = 1e-3 }
+reason = "its loads are rough"
+"""
+
+
+def test_an_expected_failure_is_one_with_its_reason(inside: pytest.Pytester, case: Path) -> None:
+    Path(NAME).write_text(FAILURE, encoding="utf-8")
+    result = ran(inside, *on(case, "biased"), "-rx")
+    result.assert_outcomes(xfailed=2, passed=3)
+    result.stdout.fnmatch_lines(["*differ, as you expect (*expected_failure[[]0]): its gravity is a*"])
+    result.stdout.fnmatch_lines([f"crosscheck: 1 case on biased, expectations of {NAME}, records in *"])
+
+
+def test_one_that_agrees_fails(inside: pytest.Pytester, case: Path) -> None:
+    Path(NAME).write_text(FAILURE.replace('"load:pivot.force"', '"energy.total"'), encoding="utf-8")
+    result = ran(inside, *on(case, "biased"))
+    result.assert_outcomes(xfailed=1, failed=2 + 1, passed=5 - 4)  # the force fails; energy and its drift agree
+    result.stdout.fnmatch_lines(["*energy.total: agree, expected differ:*you expect it to fail*"])
+
+
+def test_what_passes_by_a_looser_goal_is_counted(inside: pytest.Pytester, case: Path) -> None:
+    Path("mine.toml").write_text(GOAL, encoding="utf-8")
+    result = ran(inside, *on(case, "stepper"), "--crosscheck-expect", "mine.toml", "--junitxml", "junit.xml")
+    result.assert_outcomes(passed=len(CHANNELS))
+    result.stdout.fnmatch_lines(["crosscheck: 2 passed by goals looser than the case's: stepper: its loads are rough"])
+    found = properties_of(inside.path / "junit.xml", "pendulum/single[stepper-load:pivot.force]")
+    assert (float(found["goal"]), float(found["case_goal"])) == (1e-3, 1e-6)
+
+
+def test_a_file_that_is_wrong_is_a_usage_error(inside: pytest.Pytester, case: Path) -> None:
+    Path(NAME).write_text(FAILURE.replace("differ", "crashed"), encoding="utf-8")
+    result = ran(inside, *on(case, "biased"))
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([f"ERROR: --crosscheck: {NAME}: *status*"])

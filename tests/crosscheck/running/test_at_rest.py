@@ -1,20 +1,34 @@
-"""A variant that begins in its equilibrium: nothing accelerates there in any engine; what cannot rest is refused."""
+"""Scenes before they run: equilibria, in which nothing accelerates in any engine; loads that the motion leaves open, by
+the dense route; and doubtful ones, which run with a warning or, strictly, not at all.
+"""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
 
+import flexmb
+from crosscheck.cli.common import sole_writer
+from crosscheck.engines.answers import LOAD_PARTS
 from crosscheck.engines.registry import engine
-from crosscheck.library.find import load_case, shipped_folder
+from crosscheck.library.find import Case, load_case, shipped_folder
 from crosscheck.library.reference import scene_digest
 from crosscheck.running.at_rest import at_rest
 from crosscheck.running.plan import plan, variant_scene
+from crosscheck.running.undetermined import undetermined
+from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, linear
+from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Constant, Sine
+from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import modal_points
+from tests.crosscheck.sessions import PROVIDER, copy_case
+from tests.flexmb.closure import mechanisms
+from tests.flexmb.closure.test_redundant_and_null import pendulum
 from tests.flexmb.surrogate.beams import beam_scene
 
 
@@ -77,3 +91,73 @@ def test_a_variant_in_its_equilibrium_is_another_model_and_a_fault_has_its_own()
     angles = {role: rotation.angle_rad for role, rotation in elbows.items()}
     assert len({round(angle, 9) for angle in angles.values()}) == len(angles)
     assert all(rotation.rate_rad_s == 0.0 for rotation in elbows.values())
+
+
+def latched(scene: s.Scene) -> s.Scene:
+    """Crank and rocker are both latched at 0.1 s: then one of them would do."""
+    stops = tuple(s.Latch(coordinate=f"{hinge}.rotation") for hinge in ("drive", "pivot"))
+    return msgspec.structs.replace(scene, events=(s.SceneEvent(name="stop", watch="time", level=0.1, actions=stops),))
+
+
+DETERMINED = load_scene(Path(__file__).parents[3] / "cases" / "closed_chains" / "four_bar" / "scene.toml")
+SCENES = {
+    "plane": mechanisms.four_bar(), "determined": DETERMINED, "flexible": mechanisms.four_bar(modes=2),
+    "driven": pendulum("weld", driven=s.Constant(value=0.0)), "latched": latched(DETERMINED),
+}  # fmt: skip
+
+
+def by_run(scene: s.Scene) -> set[str]:
+    run = flexmb.simulate(scene, 0.2, samples=9, rtol=1e-8, atol=1e-10)
+    found = set()
+    for name, is_open in run.undetermined.items():
+        if name.endswith(".drive") and name not in run.loads:
+            found.add(f"drive:{name.removesuffix('.drive')}")
+        else:
+            found |= {f"load:{name}.{part}" for part, place in LOAD_PARTS.items() if np.any(is_open[place])}
+    return found
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_is_open_is_what_the_run_finds_open(name):
+    found = undetermined(SCENES[name], 0.2)
+    assert set(found) == by_run(SCENES[name])
+    assert bool(found) == (name in ("plane", "driven", "latched"))
+    assert list(found) == sorted(found)
+
+
+def test_a_latch_opens_nothing_before_it_happens():
+    assert undetermined(SCENES["latched"], 0.05) == () == undetermined(SCENES["latched"])
+
+
+def test_a_tree_has_none():
+    assert undetermined(msgspec.structs.replace(SCENES["plane"], closures=()), 1.0) == ()
+
+
+@pytest.fixture
+def doubtful(tmp_path: Path) -> Case:
+    """The small case with a damper that drives."""
+    folder = copy_case(tmp_path)
+    scene = folder / "scene.toml"
+    text = scene.read_text(encoding="utf-8")
+    assert text.count('type = "revolute"') + text.count('kind = "revolute"') == 1
+    line = next(line for line in text.splitlines() if '"revolute"' in line)
+    scene.write_text(text.replace(line, f"{line}\nrotation = {{ damping_Nms_rad = -0.01 }}"), encoding="utf-8")
+    return load_case(folder)
+
+
+def test_it_is_planned_with_a_warning(doubtful: Case) -> None:
+    with pytest.warns(SceneWarning, match="negative damping"):
+        _, jobs = plan(doubtful, (), PROVIDER)
+    assert jobs and all(not job.error for job in jobs)
+
+
+@pytest.mark.filterwarnings("default")  # what a command warns of is printed, no error
+def test_strictly_its_runs_are_errors(doubtful: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with sole_writer(tmp_path / "strict", strict=True):
+        _, jobs = plan(doubtful, (), PROVIDER)
+    main = [job for job in jobs if job.role == "main"]
+    assert main and all("negative damping" in job.error and job.scene is None for job in main)
+    with sole_writer(tmp_path / "lenient"):
+        plan(doubtful, (), PROVIDER)
+        plan(doubtful, (), PROVIDER, films=True)
+    assert capsys.readouterr().err.count("warning: ") == 1
