@@ -41,8 +41,9 @@ def test_no_test_draws_without_a_seed() -> None:
 
 def test_slow_tests_are_also_those_that_draw() -> None:
     """Nowhere else would they be searched on."""
+    drawn = "tests/crosscheck/report/test_workprecision.py"
     session = subprocess.run(
-        [sys.executable, "-m", "pytest", "-m", "slow", "--collect-only", "-q", "tests/crosscheck/report/test_workprecision.py"],
+        [sys.executable, "-m", "pytest", "-m", "slow", "--collect-only", "-q", drawn],
         capture_output=True, text=True, cwd=ROOT,
     )  # fmt: skip
     assert "test_every_series_comes_back" in session.stdout, session.stdout + session.stderr

@@ -4,8 +4,6 @@ A channel that an engine may offer of a scene is judged by a goal of a compariso
 stored reference, or the case leaves it open and says why. `python -m tests.cases.declared [CASE...]` lists the rest.
 """
 
-from __future__ import annotations
-
 import sys
 import tomllib
 from collections.abc import Iterator

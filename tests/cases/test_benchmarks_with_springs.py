@@ -1,7 +1,5 @@
 """Andrews' mechanism against the equations that the IVP test set prints, to 12 digits; the flyball governor's sums."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The closed-chain family: adapters at the first instant, what they refuse, and its folders judged as a user would."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import msgspec

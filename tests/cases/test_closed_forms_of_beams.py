@@ -1,7 +1,5 @@
 """The closed forms of beams, rotors and booms against routes that share nothing with them: elements, ODE solvers."""
 
-from __future__ import annotations
-
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType

@@ -1,7 +1,5 @@
 """The satellite that unfolds its panels and turns by its wheels: balances across latches, and its linear model."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The deploying boom and the free flexible beam: conservation, the latch's equilibrium, and their folders judged."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lateral buckling of a thin beam that a crank drives: when and how far it gives way, as published."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

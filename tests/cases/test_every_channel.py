@@ -1,7 +1,5 @@
 """No channel of a case is silent: each is judged, or the case says why not. By the run files alone: no engine runs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import msgspec

@@ -1,7 +1,5 @@
 """Beams of level exact at rest against closed forms, publications and Exudyn's beam elements in space."""
 
-from __future__ import annotations
-
 import runpy
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A latch whose impulse leaves modes or wheels as they were is found out by balances and by the reference."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

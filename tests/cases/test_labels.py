@@ -1,7 +1,5 @@
 """What a reference is called follows from the routes that are stored, and what its provenance says of them is true."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

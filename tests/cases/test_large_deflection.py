@@ -4,8 +4,6 @@ Where the truth is known to eight digits the order of convergence is tested, and
 where other codes are the truth, the distance to them against what both leave open.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The misaligned four-bar before its fold: a linear frame, and rods without modes."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The lowest frequency of one panel by modes clamped at its mount, by free-free modes, and with attachments."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,8 +3,6 @@
 Both take the same steps, so their distance is that of rounding, grown by the motion; a planted fault is far above it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """Linkages that move though counting says they cannot: closed forms close the loop, loads are not determined by the
 motion, and a bar that is a little off locks it."""
 
-from __future__ import annotations
-
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType

@@ -1,7 +1,5 @@
 """The rotating shaft: its critical speed and its whirl at a constant speed against Bernoulli's beam with a mass."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Closed forms of the rigid cases against the textbook's equations of motion, integrated here by SciPy; integrals of
 motion and published equations against the stored references."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path

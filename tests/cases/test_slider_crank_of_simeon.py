@@ -1,8 +1,6 @@
 """The flexible slider-crank of the Test Set for IVP Solvers: its printed matrices, and its printed equations of motion,
 integrated by SciPy."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

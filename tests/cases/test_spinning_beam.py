@@ -1,7 +1,5 @@
 """The spin-up cases against published numbers and closed forms, by routes that share as little as possible."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """All cases, strictly, from a fresh clone: what is called resolved holds for whoever gets it, at its last commit."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,8 +1,6 @@
 """Every case of the library, run by every engine that takes it: each verdict is the one that its file expects, within
 its bounds, and no figure is worse than the accepted one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The wheel-gyrostat family against closed forms, and its folders judged as a user would."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

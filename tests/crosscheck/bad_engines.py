@@ -4,8 +4,6 @@
 their process, and need one of their own.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

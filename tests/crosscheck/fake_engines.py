@@ -3,8 +3,6 @@
 They know one scene: a rigid body on a revolute hinge to the ground, axis +-z, mass centre on the body's x axis.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A project as an outsider has it: a case with its stored reference, and a distribution whose plug-ins are engines."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

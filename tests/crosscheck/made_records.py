@@ -1,7 +1,5 @@
 """Records made by hand: what engines might have left behind, judged without running any."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterable
 

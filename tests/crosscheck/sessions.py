@@ -1,7 +1,6 @@
 """Running the small case with the fake engines, whole or with its run file changed."""
 
-from __future__ import annotations
-
+import json
 import shutil
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -62,22 +61,25 @@ def run_case(case: Path, records: Path, asked: tuple[str, ...] = (), **options: 
     return conclude(collect(last_session(read(records))))
 
 
-def compare_engines(
-    folder: Path, engines: tuple[str, ...], goals: str = '"marker:tip.position" = 1e-6', **options: Any
-) -> SessionOutcome:
-    """All pairs of some engines on the pendulum."""
-    names = ", ".join(f'"{name}"' for name in engines)
-    run_file = f"""
+def versus(*engines: str, goals: str = '"marker:tip.position" = 1e-6') -> str:
+    """The part of a run file in which engines run the rigid variant, and all pairs of them are compared."""
+    return f"""
 [[variant]]
 name = "rigid"
-engines = [{names}]
+engines = {json.dumps(engines)}
 
 [[comparison]]
 name = "all"
 variant = "rigid"
 goals = {{ {goals} }}
 """
-    return run_case(copy_case(folder, run_file), folder / "records.jsonl", **options)
+
+
+def compare_engines(
+    folder: Path, engines: tuple[str, ...], goals: str = '"marker:tip.position" = 1e-6', **options: Any
+) -> SessionOutcome:
+    """All pairs of some engines on the pendulum."""
+    return run_case(copy_case(folder, versus(*engines, goals=goals)), folder / "records.jsonl", **options)
 
 
 def only(verdicts: list[Verdict], a: str, b: str) -> Verdict:

@@ -1,7 +1,5 @@
 """`crosscheck run` for an outside engine: goals and efforts of its own, and a baseline since which nothing is worse."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -10,18 +8,9 @@ from typer.testing import CliRunner
 
 from crosscheck import cli
 from crosscheck.sealed.seal import read_results
-from tests.crosscheck.sessions import copy_case, engines_here, sweep_here
+from tests.crosscheck.sessions import copy_case, engines_here, sweep_here, versus
 
-RUN_FILE = """
-[[variant]]
-name = "rigid"
-engines = ["fine", "second"]
-
-[[comparison]]
-name = "all"
-variant = "rigid"
-goals = { "marker:tip.position" = 1e-6, "load" = 1e-6 }
-"""
+RUN_FILE = versus("fine", "second", goals='"marker:tip.position" = 1e-6, "load" = 1e-6')
 EXPECT = """
 [[goal]]
 engine = "sloppy"

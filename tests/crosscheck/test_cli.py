@@ -1,7 +1,5 @@
 """The command line: what it writes, what it says, and its exit codes."""
 
-from __future__ import annotations
-
 import functools
 import shutil
 from pathlib import Path

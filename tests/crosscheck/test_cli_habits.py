@@ -1,7 +1,5 @@
 """Habits of the command lines: versions, JSON and nothing else on stdout, how much is shown, completion, comparing."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

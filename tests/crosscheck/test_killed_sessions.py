@@ -1,7 +1,5 @@
 """A command that is killed leaves nothing of the session before it that would pass for its own."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource
@@ -22,7 +20,7 @@ from crosscheck.records.kinds import RunRecord
 from crosscheck.report.ci import VERDICTS
 from crosscheck.sealed.seal import read_results
 from tests.crosscheck.running.interrupted import EFFORTS, MAIN, RUN_FILE, install_plugs
-from tests.crosscheck.sessions import CASE, copy_case, sweep_here
+from tests.crosscheck.sessions import CASE, copy_case, sweep_here, versus
 from tests.repo.project import ROOT
 
 WIDE = {"COLUMNS": "200"}
@@ -157,16 +155,7 @@ def test_what_a_command_will_write_is_taken_away_before_it_begins(
     assert not any((green / name).exists() for name in gone)
 
 
-NATIVE = """
-[[variant]]
-name = "rigid"
-engines = ["native", "pinocchio"]
-
-[[comparison]]
-name = "all"
-variant = "rigid"
-goals = { "marker:tip.position" = 1e-6 }
-"""
+NATIVE = versus("native", "pinocchio")
 SWEEP = """
 title = "Where the rod is"
 scene = "{scene}"

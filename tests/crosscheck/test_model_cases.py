@@ -1,7 +1,5 @@
 """Scenes and robots without a case folder: what is written for them, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Names that look like markup, through every printer, read back with a parser of each format."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """Folders in which nothing can be written and full disks: one line each, and no result is lost."""
 
-from __future__ import annotations
-
 import errno
 import shutil
 from pathlib import Path

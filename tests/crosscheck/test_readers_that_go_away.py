@@ -1,7 +1,5 @@
 """`crosscheck run ... | head -1`: a command whose reader goes away goes on, and ends as if all had been read."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """Names that users give to commands are looked up before any work: one error, one suggestion, exit code 2."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -3,8 +3,6 @@
 --replay KIND FILE reads one of them again and says what comes of it.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil

@@ -1,7 +1,5 @@
 """A campaign: so many mutants, shared among the kinds, read by worker processes that may die."""
 
-from __future__ import annotations
-
 import json
 import select
 import subprocess

@@ -1,7 +1,5 @@
 """One kind of file: good ones to start from, mutations, the reader, and when an accept is wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ A kind is one entry of `kinds`. `accept` reads a file as its command does, retur
 and raises the kind's documented error where it refuses.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json

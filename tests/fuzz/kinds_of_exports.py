@@ -1,7 +1,5 @@
 """What `crosscheck export` writes and `python -m rebuild` reads: models, modes, references, error bars."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

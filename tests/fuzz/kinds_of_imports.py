@@ -1,7 +1,5 @@
 """What other programs wrote: robots, SID files, finite-element matrices and their nodes."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

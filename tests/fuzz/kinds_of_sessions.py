@@ -1,7 +1,5 @@
 """What sessions and runs leave behind and take up: sealed results, sweeps, references, restarts."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

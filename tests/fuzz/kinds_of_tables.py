@@ -1,7 +1,5 @@
 """What users write beside scenes and cases: measurements, expectations; baselines, scores; beams by special data."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -3,8 +3,6 @@
 A mutant is made from a file and a random generator alone, so that its number and the campaign's seed bring it back.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -1,7 +1,5 @@
 """Mutated files of every kind: refused in words or read as they stand, in bounded time and memory."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re

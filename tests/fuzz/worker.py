@@ -3,8 +3,6 @@
 It is asked by lines of "kind number" on its input and answers each with a line of JSON.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import resource

@@ -3,8 +3,6 @@
 python -m tests.repo.architecture
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """The builder's methods that follow from the schema: `python -m tests.repo.builder` writes flexmb/scene/methods.py."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator
 from inspect import cleandoc
@@ -47,7 +45,6 @@ HEAD = '''\
 Arguments are the keys of the struct without their unit, which is the SI unit that the docstring says.
 """
 
-from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Literal, Self

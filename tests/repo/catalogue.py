@@ -3,8 +3,6 @@
     python -m tests.repo.catalogue
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

@@ -7,8 +7,6 @@ module, outside its functions and classes, is read for numbers that do not exist
 to the function that does it.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import re

@@ -6,8 +6,6 @@
 The page is made of the files alone; the first paragraph of a file is its title, the second says what it shows.
 """
 
-from __future__ import annotations
-
 import ast
 import json
 import os

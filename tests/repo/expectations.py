@@ -1,7 +1,5 @@
 """Writes `docs/crosscheck-expect.schema.json`, by `python -m tests.repo.expectations`."""
 
-from __future__ import annotations
-
 import json
 
 import msgspec

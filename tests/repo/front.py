@@ -7,8 +7,6 @@ What is kept is what the first page of a report computes (`crosscheck.report.spe
 in which an engine reaches an error, relative to the fastest engine at an error of 1e-6, and the median over the charts.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path

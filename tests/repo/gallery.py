@@ -5,8 +5,6 @@
 Stability maps come from the catalogue and from docs/pictures/maps.json, the other pictures from docs/gallery.toml.
 """
 
-from __future__ import annotations
-
 import tomllib
 from typing import NamedTuple
 

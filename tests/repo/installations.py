@@ -1,7 +1,5 @@
 """Distributions of this checkout, and fresh environments to install them in, which fetch nothing."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

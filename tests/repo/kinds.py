@@ -3,8 +3,6 @@
 A place is a `match` over kinds, a chain of `if isinstance`, or an `isinstance` with an `else` that means another kind.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from typing import NamedTuple, get_args

@@ -7,8 +7,6 @@ A picture is an SVG file whose lines are animated by SMIL; it needs no script. W
 draws of it, seen along one direction.
 """
 
-from __future__ import annotations
-
 import sys
 from typing import NamedTuple
 

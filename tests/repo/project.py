@@ -1,7 +1,5 @@
 """The repository as its own tests see it: where it is, what belongs to it, what its metadata says."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path

@@ -3,8 +3,6 @@
 A block that cannot be run in a test says why, in a comment on the line before it: `<!-- not run: takes an hour -->`.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 FILE has a line for each step, its name and whole seconds. The table is printed; `--write` puts it into CONTRIBUTING.md.
 """
 
-from __future__ import annotations
-
 import sys
 from datetime import date
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The GitHub Action is valid, and its script does what it says, run here with the files that a runner would give it."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Every public name of the Python interface is there, under the name the documentation promises."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import re

@@ -1,7 +1,5 @@
 """docs/architecture.md agrees with the tree and the import contracts; each check is shown a page that is wrong."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

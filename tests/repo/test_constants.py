@@ -1,7 +1,5 @@
 """Numbers in the pages that are also constants of the code: constants.toml lists the sentences, and both must agree."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from importlib.util import find_spec

@@ -1,7 +1,5 @@
 """Every element of a scene that exerts, measures, controls or happens has its tests and its row: elements.toml."""
 
-from __future__ import annotations
-
 import ast
 import tomllib
 from functools import cache

@@ -1,7 +1,5 @@
 """The template of an engine is a distribution that installs, is found, and keeps the contract."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

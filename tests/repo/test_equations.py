@@ -1,7 +1,5 @@
 """docs/equations.md is what the generator writes, complete and true; and the generator sees what it must see."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The page of crosscheck-expect.toml: its example holds, its table has every key, its schema is the present one."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """docs/gallery.md is what the generator writes, shows every map and every picture, and none of them is large."""
 
-from __future__ import annotations
-
 from crosscheck.stability.catalogue import stability_maps
 from crosscheck.stability.verdict_file import VERDICTS, read_verdicts
 from tests.repo.gallery import PAGE, PICTURES, other_pictures, page

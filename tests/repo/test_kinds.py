@@ -1,7 +1,5 @@
 """Every place that tells kinds apart knows all of them: what is none of them is refused, by the type checker first."""
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

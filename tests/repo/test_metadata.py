@@ -1,7 +1,5 @@
 """Versions agree, the Python range is one and the same everywhere, extras have a use, the citation is one."""
 
-from __future__ import annotations
-
 import re
 from datetime import date
 from importlib.metadata import version

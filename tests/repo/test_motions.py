@@ -1,7 +1,5 @@
 """docs/motions.md and its moving pictures: all there, small, and really moving; and the first picture of the pages."""
 
-from __future__ import annotations
-
 import re
 from xml.etree import ElementTree
 

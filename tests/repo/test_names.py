@@ -1,7 +1,5 @@
 """Names lead somewhere: what pages, docstrings and comments mention exists, and a class has one name in the house."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections import Counter

@@ -3,8 +3,6 @@
 Their packages are no part of any extra; where one is missing, its tests are skipped.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

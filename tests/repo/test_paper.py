@@ -1,7 +1,5 @@
 """paper/paper.md has the form that the Journal of Open Source Software asks for, and cites what paper/paper.bib has."""
 
-from __future__ import annotations
-
 import re
 
 import yaml

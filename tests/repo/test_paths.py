@@ -1,7 +1,5 @@
 """No file of the project names a path or a package index of somebody's machine."""
 
-from __future__ import annotations
-
 import re
 
 from tests.repo.project import ROOT, text_files

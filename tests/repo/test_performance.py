@@ -1,7 +1,5 @@
 """docs/performance.md is what the generator makes of the kept measurements, and nothing that failed looks met."""
 
-from __future__ import annotations
-
 import os
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A name with an underscore in front is for the module that defines it, and for classes that inherit it."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterable, Iterator, Mapping
 

@@ -1,7 +1,5 @@
 """The README's quick start is two commands that do all their own set-up and name options that exist."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a message tells to install, pip finds: the libraries themselves, not extras of a package that no index has."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Iterator

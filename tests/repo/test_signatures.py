@@ -1,8 +1,6 @@
 """No function has more than eight arguments, but for those whose arguments are options of a command line or keys of the
 schema, from which they are generated."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """The documentation site builds without a warning, and every page is in it; generated pages are up to date."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

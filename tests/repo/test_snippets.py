@@ -1,7 +1,5 @@
 """Every block of Python and of shell in the documentation runs, or says why not; its options exist in any case."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

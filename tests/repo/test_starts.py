@@ -4,8 +4,6 @@ Held by the modules that are loaded, which are the same on every machine, not by
 times. Each start is a process of its own. Which import brought a module tells `python -X importtime`.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """What SECURITY.md says of code in files of others: every place that runs such code is one that the page speaks of."""
 
-from __future__ import annotations
-
 import ast
 import shutil
 from collections.abc import Iterator

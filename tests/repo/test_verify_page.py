@@ -1,7 +1,5 @@
 """docs/verify.md leads to a verdict: its code is run, and what it writes agrees with the stored reference."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

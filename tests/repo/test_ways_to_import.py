@@ -5,8 +5,6 @@ what loaded its modules. Files are asked for by the digest of the code that they
 reader of a zip file, of bytecode without sources or pytest, which rewrites what it imports, has changed nothing.
 """
 
-from __future__ import annotations
-
 import compileall
 import json
 import shutil

@@ -3,8 +3,6 @@
 An sdist makes the same wheel. The fresh environment borrows the dependencies of this one, so that nothing is fetched.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

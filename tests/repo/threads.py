@@ -3,8 +3,6 @@
     python -m tests.repo.threads
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable
 

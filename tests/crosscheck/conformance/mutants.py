@@ -4,8 +4,6 @@ The changes of text are in `mutants.toml`. Scenes with flexible bodies are chang
 has the changes that change no answer, with the reason.
 """
 
-from __future__ import annotations
-
 import itertools
 import sys
 import tomllib

@@ -1,7 +1,5 @@
 """The clauses of the contract can fail: bad engines break those of form, planted faults those of mechanics."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import threading

@@ -1,7 +1,5 @@
 """The clauses of connectors hold for the adapters that have them, and each fails for an adapter with a fault."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace as moved
 from typing import Any

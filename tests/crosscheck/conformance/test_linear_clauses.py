@@ -1,7 +1,5 @@
 """Clauses on derivatives and frequencies: what engines and adapters get wrong in them is noticed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -2,8 +2,6 @@
 in single precision, with bounds of that unit roundoff.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace

@@ -1,7 +1,5 @@
 """Trying an engine in worker processes: what ends, hangs or spoils them breaks one clause, and no other."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable

@@ -5,8 +5,6 @@ modules that do not load. `TIDY` and `UNTIDY` behave strangely but rightly, in w
 Every engine is a sound pendulum (`fake_engines`) but for its one fault.
 """
 
-from __future__ import annotations
-
 import ctypes
 import itertools
 import locale

@@ -5,8 +5,6 @@ Uses only the scene and what crosses the engine boundary. For each body there mu
 bodies and the projections of all hinge loads determine the accelerations, so an engine that passes has them right.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from msgspec.structs import replace
 

@@ -1,7 +1,5 @@
 """Random scenes of rigid bodies: every hinge kind, turned frames, springs, dampers, motors, wheels, point masses."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Random states of a scene, in which engines must agree on accelerations, loads, energies and momenta to round-off."""
 
-from __future__ import annotations
-
 from typing import assert_never
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The contract's check is total: whatever stands in any part of an answer, it is right or it is refused in words."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import fields, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """What the contract's check says of each breach, and what it passes: every part, kind and edge of an answer."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast

@@ -1,7 +1,5 @@
 """Bad plug-ins, installed as plug-ins are: each gets its one status, none is green, none takes others with it."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The engine behind the contract's check: what it refuses in an adapter's place, and which ladder it asks for."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any

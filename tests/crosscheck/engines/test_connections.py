@@ -1,7 +1,5 @@
 """Connectors in other codes: at the first instant to rounding, over time to the error of their steps, or refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import msgspec

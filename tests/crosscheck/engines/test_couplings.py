@@ -1,7 +1,5 @@
 """Couplings in other codes: in Pinocchio to rounding, in MuJoCo softly, elsewhere refused by name."""
 
-from __future__ import annotations
-
 import msgspec
 import numpy as np
 import pytest

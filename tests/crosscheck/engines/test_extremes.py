@@ -1,7 +1,5 @@
 """Envelopes of the library's own engines, by channel; and what the contract refuses."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

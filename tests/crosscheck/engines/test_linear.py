@@ -2,8 +2,6 @@
 of known problems and is little; answers that the contract does not allow are refused.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from typing import Any

@@ -5,8 +5,6 @@ mass matrix and accelerations equal those of Exudyn's floating frame to 1e-9. Fr
 to 1e-7.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -2,8 +2,6 @@
 what each says of a scene.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How fast a scene goes, against formulas; and default steps, which follow that and the run's duration."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

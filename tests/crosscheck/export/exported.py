@@ -1,7 +1,5 @@
 """Cases exported for the tests of this folder, and changes of what was exported."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The archive as files: the same bytes twice, checksums, a folder that is not empty, all that a case has, schemas."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json

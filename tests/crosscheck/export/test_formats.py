@@ -1,7 +1,5 @@
 """URDF, MJCF and Exudyn scripts are read back by their programs, whose accelerations at random states are ours."""
 
-from __future__ import annotations
-
 import runpy
 from pathlib import Path
 from xml.etree import ElementTree

@@ -2,8 +2,6 @@
 body made from the words of the page of keys alone.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

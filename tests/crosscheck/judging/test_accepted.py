@@ -1,7 +1,5 @@
 """Accepted figures: a loss of digits is noticed, noise is not; what is wrong is never accepted."""
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib

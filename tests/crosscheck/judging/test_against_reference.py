@@ -1,7 +1,5 @@
 """An engine against the stored reference: what is judged, with which goals, and what must not pass."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 What the motion leaves open is compared with nothing; what that is, no engine decides.
 """
 
-from __future__ import annotations
-
 import io
 from dataclasses import dataclass, replace
 from pathlib import Path

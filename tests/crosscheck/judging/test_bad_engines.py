@@ -1,7 +1,5 @@
 """No bad engine makes a session green, and none moves a verdict between others, on a tree and on closed chains."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

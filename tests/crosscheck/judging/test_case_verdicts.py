@@ -1,7 +1,5 @@
 """What becomes of recorded runs: nothing that is missing, late, elsewhere or apart at one sample goes unnoticed."""
 
-from __future__ import annotations
-
 from typing import get_args
 
 import msgspec

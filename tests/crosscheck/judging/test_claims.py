@@ -2,8 +2,6 @@
 green in silence.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from pathlib import Path

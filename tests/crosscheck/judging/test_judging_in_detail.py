@@ -1,7 +1,5 @@
 """Judging down to its words and edges: what mutants of it survived until they were looked at."""
 
-from __future__ import annotations
-
 import msgspec
 import numpy as np
 import pytest

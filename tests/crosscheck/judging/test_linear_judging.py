@@ -1,7 +1,5 @@
 """Derivatives and frequencies in verdicts: an engine's own account is part of U, and the worst entry is told."""
 
-from __future__ import annotations
-
 import msgspec
 import numpy as np
 import pytest

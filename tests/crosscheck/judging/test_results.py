@@ -2,8 +2,6 @@
 conserved quantity stands on.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import msgspec

@@ -2,8 +2,6 @@
 figures and words, down to its edges.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 

@@ -4,8 +4,6 @@ The truth is the closed form where the library has one, and the engine's own fin
 conditioning that all runs share shows there, but how errors scatter about the tolerance does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product

@@ -3,8 +3,6 @@ case must say why, and of a guest it must be as others have it.
 What was asked for and is not there is never green either.
 """
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from xml.etree import ElementTree

@@ -4,8 +4,6 @@ All combinations of `ODD` in every input of every judging function; and negative
 in haste, which the same conditions must refuse.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Case folders: the documented example is valid, faulty run files are refused with place and remedy."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 import tomllib

@@ -1,7 +1,5 @@
 """The words by which cases are meant, whoever reads them; and the table of channels, which knows each and no other."""
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 from argparse import Namespace

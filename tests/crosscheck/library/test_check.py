@@ -1,7 +1,5 @@
 """Run files are read as strictly as scenes: every fault has its place and remedy, and all are found at once."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import textwrap

@@ -1,7 +1,5 @@
 """crosscheck-expect.toml and its options: what is read, to which cases it applies, what is refused and how."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

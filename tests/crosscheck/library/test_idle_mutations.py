@@ -1,7 +1,5 @@
 """What symmetry and rest leave out of a motion: mutations that nothing can show, and their near neighbours."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import msgspec

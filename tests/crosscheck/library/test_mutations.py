@@ -1,7 +1,5 @@
 """Every mutation changes what it says and nothing else, and refuses what it cannot change."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import get_args
 

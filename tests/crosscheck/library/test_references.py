@@ -1,7 +1,5 @@
 """The rules of `[reference]` and of anchors, and the files of a reference read back."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -11,18 +9,9 @@ import pytest
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import load_case
 from crosscheck.library.reference import current_reference, parse_values, values_text
-from tests.crosscheck.sessions import copy_case, shipped
+from tests.crosscheck.sessions import copy_case, shipped, versus
 
-GOOD = """
-[[variant]]
-name = "rigid"
-engines = ["fine", "stepper"]
-
-[[comparison]]
-name = "all"
-variant = "rigid"
-goals = { "marker:tip.position" = 1e-6 }
-
+GOOD = versus("fine", "stepper") + """
 [reference]
 variant = "rigid"
 samples = 11

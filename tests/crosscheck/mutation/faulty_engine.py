@@ -1,7 +1,5 @@
 """An engine whose adapter has a fault: another engine's answers, falsified."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Support, Trajectory

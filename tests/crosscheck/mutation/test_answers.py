@@ -2,8 +2,6 @@
 before the stored reference, there only where the true run agrees.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 a mutant has an outcome in the score, and docs/mutations.md has the catalogue as it is.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

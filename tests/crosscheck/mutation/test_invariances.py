@@ -2,8 +2,6 @@
 changed by half is noticed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

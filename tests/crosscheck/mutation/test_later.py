@@ -1,7 +1,5 @@
 """Runs that begin later give the same channels; what is not shifted with them is noticed, one thing after another."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The pytest plug-in, as another project's continuous integration uses it, also with goals and failures of its own."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A session says of an outside engine whether its contract is kept, by which sources; what it claims is no matter."""
 
-from __future__ import annotations
-
 import io
 from importlib.metadata import EntryPoint
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What makes a result is in its key: no source that takes part is missed, and no edit is served from the records."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Records: exact numbers, one line each, readable after a kill, and one writer in a folder, named to a second one."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """How routes make a reference: independence, disagreement, uncertainty, horizon; and anchors between samples."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Making references: what is refused, what is written, and that nothing is half written."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from functools import partial

@@ -1,7 +1,5 @@
 """A witness that is another discretisation: the error of its mesh belongs to what it knows."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Reading what a page's scripts read."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re

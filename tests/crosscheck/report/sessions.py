@@ -1,7 +1,5 @@
 """A session of the small case with many comparisons, some of which are not as expected."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from crosscheck.judging.outcome import SessionOutcome

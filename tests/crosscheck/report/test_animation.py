@@ -1,7 +1,5 @@
 """What an animation shows: every body of every shipped case, and wheels at the angle that mechanics gives them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,8 +3,6 @@
 Skipped where there is no Chromium (or Chrome) with its driver, or no selenium: `test_site.py` holds the main facts.
 """
 
-from __future__ import annotations
-
 import base64
 import io
 import shutil

@@ -1,7 +1,5 @@
 """An engine that joins a case and refuses it: what pages and files say, from the run to the report."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from crosscheck.judging.outcome import SessionOutcome

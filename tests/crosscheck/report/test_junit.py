@@ -1,7 +1,5 @@
 """junit.xml: valid for the readers of such files, with figures, versions, machine and times."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from xml.etree import ElementTree
@@ -11,6 +9,7 @@ import pytest
 from crosscheck.report.junit import write_junit
 from crosscheck.report.unfinished import UNFINISHED
 from tests.crosscheck.report.sessions import session
+from tests.crosscheck.sessions import versus
 
 # The elements and attributes of the strictest common schema, that of Jenkins' xunit plug-in (junit-10.xsd): those that
 # it demands, and all that it takes. Other readers take these, and more.
@@ -32,16 +31,7 @@ CHILDREN = {
     "testcase": {"failure", "skipped", "system-out"},
 }  # fmt: skip
 TIME = re.compile(r"(([0-9]{0,3},)*[0-9]{3}|[0-9]{0,3})*(\.[0-9]*)?")
-MIXED = """
-[[variant]]
-name = "rigid"
-engines = ["fine", "stepper", "absent", "diverger"]
-
-[[comparison]]
-name = "all"
-variant = "rigid"
-goals = { "marker:tip.position" = 1e-6, "load" = 1e-6 }
-"""
+MIXED = versus("fine", "stepper", "absent", "diverger", goals='"marker:tip.position" = 1e-6, "load" = 1e-6')
 
 
 def faults(root: ElementTree.Element) -> list[str]:

@@ -1,7 +1,5 @@
 """Peaks: over all steps where a session has them, else of samples, which says so; and files that show them."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
@@ -24,18 +22,9 @@ from crosscheck.report import write_all
 from crosscheck.report.charts import ROUNDING
 from crosscheck.sealed.seal import read_results
 from tests.crosscheck.report.reading import data_of
-from tests.crosscheck.sessions import copy_case, sweep_here
+from tests.crosscheck.sessions import copy_case, sweep_here, versus
 
-RUN = """
-[[variant]]
-name = "rigid"
-engines = ["fine", "stepper"]
-
-[[comparison]]
-name = "all"
-variant = "rigid"
-goals = { "marker:tip.position" = 1e-6, "load" = 1e-6 }
-"""
+RUN = versus("fine", "stepper", goals='"marker:tip.position" = 1e-6, "load" = 1e-6')
 
 
 @pytest.fixture

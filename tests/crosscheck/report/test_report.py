@@ -1,7 +1,5 @@
 """What a session leaves behind: a report that needs nothing, and files for people and machines."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -19,18 +17,9 @@ from crosscheck.report.html import code
 from crosscheck.report.store import SAMPLES, Store
 from crosscheck.running.plan import plan
 from tests.crosscheck.report.reading import data_of, series_of
-from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, sweep_here
+from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, sweep_here, versus
 
-MIXED = """
-[[variant]]
-name = "rigid"
-engines = ["fine", "stepper", "absent", "diverger"]
-
-[[comparison]]
-name = "all"
-variant = "rigid"
-goals = { "marker:tip.position" = 1e-6, "load" = 1e-6 }
-
+MIXED = versus("fine", "stepper", "absent", "diverger", goals='"marker:tip.position" = 1e-6, "load" = 1e-6') + """
 [[chart]]
 observable = "marker:tip.position"
 variants = ["rigid"]

@@ -1,7 +1,5 @@
 """The report as a folder of pages, as far as it can be held without a browser."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from html.parser import HTMLParser

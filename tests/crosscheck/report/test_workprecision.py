@@ -2,8 +2,6 @@
 session's chart of speed, and its store of series, which come back digit for digit.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

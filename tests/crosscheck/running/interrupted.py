@@ -1,7 +1,5 @@
 """A session that is interrupted as by Ctrl-C in the middle of a job, and goes on later."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -11,7 +9,7 @@ from pathlib import Path
 
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import BrokenLine, RunRecord
-from tests.crosscheck.sessions import copy_case
+from tests.crosscheck.sessions import copy_case, versus
 
 MAIN = "from crosscheck.cli import main; main()"
 PATIENT = """
@@ -39,16 +37,7 @@ def make():
 def fine():
     return Fake("fine")
 """
-RUN_FILE = """
-[[variant]]
-name = "rigid"
-engines = ["fine", "patient"]
-
-[[comparison]]
-name = "all"
-variant = "rigid"
-goals = { "marker:tip.position" = 1e-6 }
-"""
+RUN_FILE = versus("fine", "patient")
 EFFORTS = 4  # of each engine
 
 

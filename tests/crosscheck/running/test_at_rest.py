@@ -2,8 +2,6 @@
 the dense route; and doubtful ones, which run with a warning or, strictly, not at all.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import msgspec

@@ -1,7 +1,5 @@
 """The scheduler of a Dask cluster: the same events as the local pool, and dead workers cost nothing that was done."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -1,7 +1,5 @@
 """Doing a job in this process: what becomes of each answer and each fault of an engine, field by field."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Ctrl-C in a session of the local scheduler (`test_dask` has that of the other)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tests.crosscheck.running.interrupted import install_plugs, interrupt_and_go_on

@@ -1,7 +1,5 @@
 """Efforts besides those of an engine or a case, which engines a chaotic case gives more; how long a session takes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import msgspec

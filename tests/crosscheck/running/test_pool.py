@@ -1,7 +1,5 @@
 """The pool: every job is answered, a worker's death costs only its job, threads are limited, nothing is printed."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

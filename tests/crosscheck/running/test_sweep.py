@@ -1,7 +1,5 @@
 """Whole sessions with the fake engines: every status arises where it should, and only there."""
 
-from __future__ import annotations
-
 import msgspec
 import pytest
 
@@ -11,7 +9,7 @@ from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Limits
-from tests.crosscheck.sessions import CASE, compare_engines, copy_case, only, run_case
+from tests.crosscheck.sessions import CASE, compare_engines, copy_case, only, run_case, versus
 
 GOALS = '"marker:tip" = 1e-6, "load" = 1e-6, "energy" = 1e-6'
 
@@ -107,15 +105,7 @@ def test_an_engine_that_gives_no_result_is_never_green(
 
 
 def test_an_expected_divergence_is_as_expected(tmp_path) -> None:
-    run_file = """
-[[variant]]
-name = "rigid"
-engines = ["fine", "diverger"]
-
-[[comparison]]
-name = "beyond the diverging engine"
-variant = "rigid"
-goals = { "marker:tip.position" = 1e-6 }
+    run_file = versus("fine", "diverger") + """\
 expect = "diverged"
 diverged_s = [0.8, 1.0]
 reason = "it gives up half way"
@@ -147,16 +137,7 @@ def test_conservation_is_judged_against_its_limit(tmp_path) -> None:
 
 
 def test_a_killed_session_resumes_where_it_was(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run_file = """
-[[variant]]
-name = "rigid"
-engines = ["diarist", "fine"]
-
-[[comparison]]
-name = "all"
-variant = "rigid"
-goals = { "marker:tip.position" = 1e-6 }
-"""
+    run_file = versus("diarist", "fine")
     diary, records = tmp_path / "diary", tmp_path / "records.jsonl"
     monkeypatch.setenv("FAKE_ENGINE_DIARY", str(diary))
     folder = copy_case(tmp_path, run_file)

@@ -1,7 +1,5 @@
 """Samples and their statistics against what is known of the distributions."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

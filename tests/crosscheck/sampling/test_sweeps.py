@@ -1,7 +1,5 @@
 """Whole sweeps with the fake engines: reproducible, resumable, nothing counted twice, nothing lost without a word."""
 
-from __future__ import annotations
-
 import csv
 import functools
 import json

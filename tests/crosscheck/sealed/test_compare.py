@@ -1,6 +1,4 @@
-"""What became worse, better, new or gone between two sessions; what results.json holds, and that changes are noticed."""
-
-from __future__ import annotations
+"""What became worse, better, new or gone between two sessions; what results.json holds: a change is noticed."""
 
 import hashlib
 import json

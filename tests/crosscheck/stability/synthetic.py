@@ -1,7 +1,5 @@
 """Maps that need no mechanics: a circle that is known, cells that fail, a worker that dies."""
 
-from __future__ import annotations
-
 import os
 import time
 from dataclasses import replace

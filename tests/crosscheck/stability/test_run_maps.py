@@ -1,7 +1,5 @@
 """Whole maps: verdicts that can fail, failed cells in colours of their own, resuming, and the command."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Runs commands of both command lines one after the other: `python every_table.py FILE`, words of commands in JSON."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What commands print as tables is whole: in a pipe line by line, on a narrow terminal word by word."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty

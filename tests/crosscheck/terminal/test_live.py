@@ -2,8 +2,6 @@
 line for all accepted figures that are stale.
 """
 
-from __future__ import annotations
-
 import io
 import re
 import time

@@ -1,7 +1,5 @@
 """Engines for races: sound ones, and some that pass the verdicts but not their turns."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Benchmarks and charts: who is timed as an equal, what a crash costs, the front, the files."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

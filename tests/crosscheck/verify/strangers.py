@@ -1,7 +1,5 @@
 """Files of strangers: converged runs by another algorithm than the reference's, at times of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

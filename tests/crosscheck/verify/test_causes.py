@@ -1,7 +1,5 @@
 """Causes that are named for wrong files: each for its fault alone, all that explain equally, none for other faults."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

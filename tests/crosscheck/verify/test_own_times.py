@@ -1,7 +1,5 @@
 """Files with times of their own: right ones agree and wrong ones differ, whatever the times."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Strangers' files against stored references, for which no engine runs: what agrees, and what is caught where."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

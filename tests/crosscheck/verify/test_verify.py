@@ -1,7 +1,5 @@
 """Reading somebody's CSV, and guessing what is wrong with it."""
 
-from __future__ import annotations
-
 import re
 from itertools import permutations
 from pathlib import Path
