@@ -1,13 +1,17 @@
-"""Versions agree, the Python range is one and the same everywhere, extras have a use, the citation is one."""
+"""Versions agree, the Python range is one and the same everywhere, extras have a use, messages name what pip finds, the
+citation is one, the paper has its form, and no file names a path of somebody's machine.
+"""
 
 import re
+import tomllib
+from collections.abc import Iterator
 from datetime import date
 from importlib.metadata import version
 
 import pytest
 import yaml
 
-from tests.repo.project import PYPROJECT, ROOT
+from tests.repo.project import PYPROJECT, ROOT, text_files
 
 VERSION = PYPROJECT["project"]["version"]
 
@@ -109,3 +113,92 @@ def test_the_changelog_has_versions_with_dates_and_kinds_of_changes() -> None:
     assert days == sorted(days, reverse=True)
     kinds = set(re.findall(r"^### (.+)$", text, flags=re.MULTILINE))
     assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+
+
+ASKED = re.compile(r"""pip install (?:--?[\w-]+ )*["']*([A-Za-z][\w.-]*(?:\[[\w,-]+\])?)""")
+DISTRIBUTION = re.compile(r"[A-Za-z][\w.-]*(?:\[[\w,-]+\])?")
+NOT_OURS = {"control"}  # python-control, to whose objects a linear model can be given
+
+
+def remedies() -> Iterator[tuple[str, str]]:
+    """File and distribution of every remedy in the sources that is written out."""
+    for package in ("flexmb", "crosscheck"):
+        for file in sorted((ROOT / package).rglob("*.py")):
+            for name in ASKED.findall(file.read_text(encoding="utf-8")):
+                yield str(file.relative_to(ROOT)), name
+
+
+def optional() -> set[str]:
+    """The distributions of the optional dependencies, other than this project's own extras."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    names = {DISTRIBUTION.match(text)[0] for group in extras.values() for text in group}  # type: ignore[index]
+    return {name for name in names if not name.startswith("flexmb")}
+
+
+def test_remedies_name_distributions_that_pip_finds() -> None:
+    known, found = optional() | NOT_OURS, list(remedies())
+    assert len(found) >= 8
+    assert [(file, name) for file, name in found if name not in known] == []
+
+
+def test_extras_of_this_project_are_no_remedy() -> None:
+    assert ASKED.findall("JAX is missing: pip install 'flexmb[jax]'") == ["flexmb[jax]"]
+    assert "flexmb[jax]" not in optional() and "dask[distributed]" in optional()
+
+
+HEAD, _, TEXT = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8").removeprefix("---\n").partition("\n---\n")
+BIBLIOGRAPHY = (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8")
+SECTIONS = [
+    "Summary", "Statement of need", "State of the field", "Software design", "Research impact statement",
+    "AI usage disclosure", "Acknowledgements", "References",
+]  # fmt: skip
+ENTRY = re.compile(r"^@(\w+)\{(\w+),\n(.*?)^\}", re.M | re.S)
+
+
+def test_the_head_has_what_the_journal_reads() -> None:
+    head = yaml.safe_load(HEAD)
+    assert {"title", "tags", "authors", "affiliations", "date", "bibliography"} <= set(head)
+    assert (ROOT / "paper" / head["bibliography"]).is_file()
+    places = {affiliation["index"] for affiliation in head["affiliations"]}
+    assert {author["affiliation"] for author in head["authors"]} <= places
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert [author["name"] for author in head["authors"]] == [author["name"] for author in citation["authors"]]
+
+
+def test_sections_and_length() -> None:
+    """The sections that are required since 2026, in their order, and between 750 and 1750 words."""
+    assert re.findall(r"^# (.+)$", TEXT, re.M) == SECTIONS
+    assert 750 <= len(TEXT.split()) <= 1750
+
+
+def test_what_is_cited_is_in_the_bibliography_and_nothing_else() -> None:
+    entries = {key: fields for _, key, fields in ENTRY.findall(BIBLIOGRAPHY)}
+    assert set(re.findall(r"@(\w+)", TEXT)) == set(entries)
+    for key, fields in entries.items():
+        known = dict(re.findall(r"^  (\w+) = \{(.*)\},?$", fields, re.M))
+        assert {"title", "author", "year"} <= set(known) and key.endswith(known["year"]), key
+        assert re.fullmatch(r"10\.\d{4,}/\S+", known.get("doi", "10.0000/none")), key
+    found = re.findall(r"^  doi = \{(.*)\}", BIBLIOGRAPHY, re.M)
+    assert len(set(found)) == len(found) >= len(entries) - 2  # a report and a site have none
+
+
+# An absolute path below a home, a scratch or a mount folder, or a package index other than by its public name.
+MACHINE = re.compile(
+    r"(?<![\w.:/-])/(?:work|root|home|Users|tmp|opt|mnt|data)/[\w.]|[A-Z]:\\\\|index-url|find-links|localhost:\d"
+)
+
+
+def test_no_machine_paths() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
+        for path in text_files()
+        if path.resolve() != ROOT / "tests" / "repo" / "test_metadata.py"
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if MACHINE.search(line)
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_the_pattern_finds_what_it_looks_for() -> None:
+    assert MACHINE.search("open('/home/me/scene.toml')")
+    assert not MACHINE.search("https://example.org/home/page")

@@ -1,8 +1,13 @@
-"""A name with an underscore in front is for the module that defines it, and for classes that inherit it."""
+"""A name with an underscore in front is for the module that defines it, and for classes that inherit it; no function
+has more than eight arguments, but for those whose arguments are options of a command line or keys of a file.
+"""
 
 import ast
 from collections.abc import Iterable, Iterator, Mapping
 
+import crosscheck.cli
+import flexmb.cli
+from tests.repo import builder
 from tests.repo.project import ROOT
 
 NAMED_TUPLES = {"_asdict", "_fields", "_make", "_replace"}  # underscores keep these apart from fields
@@ -85,3 +90,39 @@ def test_private_names_of_others_are_found() -> None:
     found = sorted(strangers({"one": one, "other": other}))
     assert found == [f"other:{each}" for each in ("1: _kept", "2: _ask", "3: _found", "4: _first", "4: _last")]
     assert strangers({"one": f"{one}\nOne()._ask()"}) == []
+
+
+MOST = 8
+
+
+def long_signatures(source: str) -> Iterator[str]:
+    """Names of the functions with more arguments than that, positional and keyword-only ones, `self` included."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            given = node.args
+            if len(given.posonlyargs) + len(given.args) + len(given.kwonlyargs) > MOST:
+                yield node.name
+
+
+def commands() -> set[tuple[str, str]]:
+    """(file, function) of every command of the command lines."""
+    found = [each.callback for app in (flexmb.cli.app, crosscheck.cli.app) for each in app.registered_commands]
+    return {(f"{each.__module__.replace('.', '/')}.py", each.__name__) for each in found if each is not None}
+
+
+def test_functions_have_few_arguments() -> None:
+    files = [path for package in ("flexmb", "crosscheck") for path in sorted((ROOT / package).rglob("*.py"))]
+    found = {
+        (path.relative_to(ROOT).as_posix(), name)
+        for path in files
+        if path != builder.FILE
+        for name in long_signatures(path.read_text(encoding="utf-8"))
+    }
+    assert found - commands() == set()
+
+
+def test_a_ninth_argument_is_seen() -> None:
+    nine = ", ".join(f"a{i}" for i in range(9))
+    assert list(long_signatures(f"def f({nine}): ...\ndef g({nine[4:]}): ...")) == ["f"]
+    assert list(long_signatures(f"def f(a, /, b, *, {nine[8:]}): ...")) == ["f"]
+    assert list(long_signatures(f"def f({nine[4:]}, *more, **others): ...")) == []
