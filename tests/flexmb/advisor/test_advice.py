@@ -151,12 +151,6 @@ def test_rigid_scenes_get_their_method() -> None:
     assert error(run, fine, scales(wanted, fine)) <= 1e-4
 
 
-@pytest.mark.parametrize(("tolerance", "quantity"), [(0.0, None), (2.0, None), (1e-3, "marker:nose.position")])
-def test_questions_without_sense_are_refused(tolerance: float, quantity: str | None) -> None:
-    with pytest.raises(ValueError):
-        advise(turned(1.0, 0.5), tolerance, quantity, 0.6)
-
-
 def test_what_is_advised_is_what_was_measured(gentle: tuple[fm.Scene, Advice]) -> None:
     scene, advice = gentle
     assert advice.scene == built(scene, tuple((each.body, each.rung) for each in advice.bodies))

@@ -216,7 +216,8 @@ def test_what_is_refused() -> None:
     scene = m.four_bar(rate=2.0, modes=1)
     ruthless = tuple(msgspec.structs.replace(body, level="ruthless") for body in scene.bodies)
     resting = fm.compile(msgspec.structs.replace(scene, bodies=ruthless))
-    for ask in (resting.acceleration_derivatives, resting.evaluation_derivatives):
+    evaluator = lambda _: resting.derivative_evaluator()  # noqa: E731
+    for ask in (resting.acceleration_derivatives, resting.evaluation_derivatives, evaluator):
         with pytest.raises(NotImplementedError, match='"ruthless".*use level "linear"'):
             ask(resting.initial_state)
 

@@ -221,11 +221,6 @@ def test_which_hinges_need_a_matrix(hinge, node, general):
     assert (SEVERAL in contained(system.constants)) == general
 
 
-def test_an_unknown_form_is_refused():
-    with pytest.raises(ValueError, match="'woodbury', 'condensed'"):
-        flexmb.compile(arm(MASSES), "magic")
-
-
 def test_constants_of_appendix_b():
     """(B4) at rest: zeta, Theta and Omega from the modal mass matrix and the shapes of the node."""
     system = flexmb.compile(flexible_chain(2, 6, "ruthless"), "condensed")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -234,23 +233,6 @@ def test_bad_arguments(given, error, message):
     scene = hanging(sampled, msgspec.structs.replace(PID, inputs=("angle", "wish")))
     with pytest.raises(error, match=message):
         fm.ControlledMotion(scene).acceleration_derivatives(started(scene), **given)
-
-
-def test_threads_share_it():
-    """Each at a state of its own: the numbers that one thread finds, to the bit."""
-    scene = hanging(PID)
-    shared, start = fm.ControlledMotion(scene), started(scene)
-    states = [fm.State(start.q + 0.01 * i, start.u - 0.02 * i, start.t) for i in range(8)]
-
-    def ask(motion: fm.ControlledMotion, state: fm.State) -> bytes:
-        found = motion.acceleration_derivatives(state)
-        parts = found.accelerations, found.rates, *found.of_accelerations, *found.of_rates
-        return b"".join(np.asarray(each).tobytes() for each in parts)
-
-    right = [ask(fm.ControlledMotion(scene), state) for state in states]
-    with ThreadPoolExecutor(len(states)) as pool:
-        found = pool.map(lambda i: [ask(shared, states[i]) for _ in range(50)], range(len(states)))
-        assert [set(each) for each in found] == [{each} for each in right]
 
 
 def test_a_system_says_where_controllers_are_chained_through():

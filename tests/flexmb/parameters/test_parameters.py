@@ -316,18 +316,3 @@ def test_against_complex_steps_through_the_dense_route(seed):
         assert error <= 10.0 * bound, name
         planted = (M @ (x[:, j] * (1.0 + 1e-9)) + change)[free]
         assert np.max(np.abs(planted)) / size > 10.0 * bound or not change[free].any()
-
-
-def test_copies_and_threads():
-    """A system's copy finds the same, and so does another thread."""
-    import pickle
-    from concurrent.futures import ThreadPoolExecutor
-
-    system = flexmb.compile(pendulum())
-    p = system.parameters(["bob.mass_kg"])
-    again = pickle.loads(pickle.dumps(system)).parameters(["bob.mass_kg"])
-    with ThreadPoolExecutor(1) as pool:
-        other = pool.submit(p.accelerations, system.initial_state).result()
-    expected = p.accelerations(system.initial_state)
-    np.testing.assert_array_equal(other, expected)
-    np.testing.assert_array_equal(again.accelerations(system.initial_state), expected)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import copy
 import csv
-import pickle
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -133,18 +131,6 @@ def test_a_jump_has_two_sides() -> None:
     assert not np.any(run.loads["foot"])
     load = run.envelope.loads["foot"]
     assert abs(load.least[3] + 70.0) < 1e-12 and 0.21 <= load.t_least[3] < 0.23 and abs(load.greatest[3]) < 1e-12
-
-
-def test_copies_and_threads_have_the_same() -> None:
-    run = fm.simulate(latching(), 1.0, samples=5)
-    copies = [pickle.loads(pickle.dumps(run)), copy.deepcopy(run)]
-    with ThreadPoolExecutor(4) as pool:
-        for made in (copies[0], run):
-            found = list(pool.map(lambda _, made=made: made.envelope, range(8)))
-            assert all(each is found[-1] for each in found[1:]) or len({id(each) for each in found}) <= 4
-    for other in (*copies, pickle.loads(pickle.dumps(run))):
-        for one, two in zip(run.envelope.channels, other.envelope.channels, strict=True):
-            assert one[:2] == two[:2] and np.array_equal(one[2].greatest, two[2].greatest, equal_nan=True)
 
 
 @pytest.mark.parametrize(("method", "settings"), METHODS[::3])

@@ -3,7 +3,6 @@
 import csv
 import math
 import tracemalloc
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -219,13 +218,6 @@ def test_the_memory_of_outputs_is_what_is_reckoned_with():
         tracemalloc.stop()
     assert run.finished
     assert 0.25 < (taken[1] - taken[0]) / (200 * sample_bytes(system)) <= 1.0
-
-
-def test_numbers_of_any_real_type_run_alike():
-    plain = fm.simulate(pendulum(angle=1.0), 0.5, rtol=2.0**-20, samples=5)
-    numbers = {"rtol": np.float32(2.0**-20), "samples": np.int8(5), "max_steps": np.int64(1000)}
-    other = fm.simulate(pendulum(angle=1.0), Fraction(1, 2), **numbers)
-    assert np.array_equal(plain.q, other.q)
 
 
 def test_a_profile_must_cover_the_run():

@@ -135,13 +135,6 @@ def test_copies_with_masses_dampings_and_switch_times_of_their_own(method, setti
         np.testing.assert_allclose(found.q[i], run.q, rtol=0.0, atol=bound * (1.0 + np.max(np.abs(run.q))))
 
 
-def test_threads_change_nothing(system):
-    q, u = starts(system, 40)
-    one, three = (simulate_batch(system, T_END, q=q, u=u, samples=3, threads=k, **FINE) for k in (1, 3))
-    np.testing.assert_array_equal(one.q, three.q)
-    np.testing.assert_array_equal(one.evaluations, three.evaluations)
-
-
 def test_one_of_two_states_may_be_that_of_the_scene(system):
     q, _ = starts(system, 3)
     found = simulate_batch(system, T_END, "rk4", q=q, step=STEP, samples=2)

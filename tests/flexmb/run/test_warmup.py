@@ -64,12 +64,6 @@ def test_nothing_is_compiled_after_the_warm_up(run, arguments):
     assert warmed > 0 and more == 0
 
 
-@pytest.mark.parametrize("names", [{"methods": ["euler"]}, {"algorithms": ["unsplit"]}, {"scenes": ["ring"]}])
-def test_names_that_do_not_exist_are_refused(names):
-    with pytest.raises(ValueError, match="use one of"):
-        warm_up(**names)
-
-
 def test_the_command_line_refuses_them_too(capsys):
     with pytest.raises(SystemExit):
         main(["--scene", "ring"])

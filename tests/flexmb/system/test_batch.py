@@ -84,19 +84,6 @@ def test_any_number_of_copies(chain, n):
     np.testing.assert_array_equal(found.accelerations, whole[:n])
 
 
-def test_threads_change_nothing(chain):
-    q, u, t = states(chain, 1000)
-    one, three = (chain.accelerations_batch(q, u, t, threads=threads) for threads in (1, 3))
-    np.testing.assert_array_equal(one.accelerations, three.accelerations)
-    np.testing.assert_array_equal(one.accelerations, chain.accelerations_batch(q, u, t).accelerations)
-
-
-def test_one_time_for_all(chain):
-    q, u, _ = states(chain, 5)
-    found = chain.accelerations_batch(q, u, 0.3).accelerations
-    np.testing.assert_array_equal(found, chain.accelerations_batch(q, u, np.full(5, 0.3)).accelerations)
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e200])
 def test_a_copy_that_is_not_finite_fails_alone(chain, bad):
     q, u, t = states(chain, 20)
@@ -230,19 +217,3 @@ def replace_hinge(scene: fm.Scene) -> fm.Scene:
     """The same names, another sequence of axes."""
     [hinge] = scene.hinges
     return msgspec.structs.replace(scene, hinges=(msgspec.structs.replace(hinge, sequence="zyx"),))
-
-
-def test_states_that_do_not_fit_are_refused(chain):
-    q, u, t = states(chain, 4)
-    for bad in [(q[:, 1:], u, t), (q, u[1:], t), (q[0], u, t)]:
-        with pytest.raises(ValueError, match="shape|rows"):
-            chain.accelerations_batch(*bad)
-    with pytest.raises(ValueError):
-        chain.accelerations_batch(q, u, t[1:])
-    with pytest.raises(ValueError, match="threads"):
-        chain.accelerations_batch(q, u, t, threads=0)
-    with pytest.raises(ValueError, match="t is nan"):
-        chain.accelerations_batch(q, u, np.nan)
-    batch = Batch([chain, chain])
-    with pytest.raises(ValueError, match="2 copies"):
-        batch.accelerations(q, u, t)

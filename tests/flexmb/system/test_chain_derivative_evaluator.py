@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.run.warm_up import looped
-from flexmb.system.derivative_evaluator import DerivativeEvaluator
 from tests.flexmb.closure import mechanisms as m
 from tests.flexmb.closure.dense_variation import dense
 from tests.flexmb.closure.test_jacobian import MOVING, Linearised
-from tests.flexmb.closure.test_stiff_loops import stiff_four_bar
-from tests.flexmb.system.test_copies import controlled
 
 # Initial values of random loops do not close them: the nearest ones that do are taken, and told.
 pytestmark = pytest.mark.filterwarnings("ignore:.*the nearest values that they allow are taken:flexmb.SceneWarning")
@@ -83,27 +75,6 @@ def test_it_gives_what_dual_numbers_give(name: str) -> None:
     assert np.abs((1.0 + 1e-6) * by_displacement @ allowed - by_displacement @ allowed).max() > off.max()
 
 
-def test_threads_and_copies_have_arrays_of_their_own() -> None:
-    system = fm.compile(MOVING["connected"]())
-    evaluator, states = system.derivative_evaluator(), [moved(system, t) for t in (0.0, 0.05, 0.1)]
-
-    def values(of: DerivativeEvaluator, state: fm.State) -> list[np.ndarray]:
-        return [of(state.t, state.q, state.u).copy(), *(getattr(of, name).copy() for name in NAMES)]
-
-    def same(one: list[np.ndarray], other: list[np.ndarray]) -> bool:
-        return all(np.array_equal(*pair) for pair in zip(one, other, strict=True))
-
-    expected = [values(evaluator, state) for state in states]
-    assert not same(expected[0], expected[1])
-    with ThreadPoolExecutor(3) as pool:
-        found = list(pool.map(lambda i: same(values(evaluator, states[i % 3]), expected[i % 3]), range(60)))
-    assert all(found)
-    for other in (copy.deepcopy(evaluator), pickle.loads(pickle.dumps(evaluator))):
-        assert isinstance(other, DerivativeEvaluator) and same(values(other, states[1]), expected[1])
-    with pytest.raises(ValueError, match="read-only"):
-        evaluator.by_force[:] = 0.0
-
-
 def test_singular_positions_are_told() -> None:
     """All bars of a four-bar on one line: fewer rows are independent; the states before and after it answer again."""
     system = fm.compile(m.windows(1, 30.0))
@@ -117,19 +88,3 @@ def test_singular_positions_are_told() -> None:
     assert told.value.status is fm.Status.CLOSURE_SINGULAR
     evaluator(start.t, start.q, start.u)
     np.testing.assert_array_equal(evaluator.by_force, before)
-
-
-def test_what_is_refused() -> None:
-    system = fm.compile(looped())
-    evaluator, state = system.derivative_evaluator(), system.initial_state
-    with pytest.raises(ValueError, match="give finite numbers"):
-        evaluator(0.0, state.q, state.u + np.nan)
-    with pytest.raises(ValueError, match="numbers in a row"):
-        evaluator(0.0, state.q, state.u[:-1])
-    with pytest.raises(fm.DynamicsError):
-        evaluator(0.0, state.q, np.full(system.nu, 1e200))
-    with pytest.raises(NotImplementedError, match='level "ruthless".*use level "linear" or a better one'):
-        fm.compile(stiff_four_bar("ruthless")).derivative_evaluator()
-    held = controlled()
-    with pytest.raises(NotImplementedError, match="has controllers"):
-        fm.compile(held).derivative_evaluator()

@@ -10,19 +10,22 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.run.warm_up import looped
 from flexmb.system.derivative_evaluator import DerivativeEvaluator
 from tests.flexmb.system.argument_kinds import World
-from tests.flexmb.system.test_copies import controlled
-from tests.flexmb.system.test_evaluator import moving
+from tests.flexmb.system.shared_calls import own_states
 
 
-@pytest.fixture(scope="module")
-def system() -> fm.System:
-    return fm.compile(World().scene)
+Asked = tuple[fm.System, list[fm.State]]
 
 
-def is_right(evaluator: DerivativeEvaluator, system: fm.System, seed: int) -> bool:
-    state = moving(system, seed)
+@pytest.fixture(scope="module", params=[World().scene, looped()], ids=["tree", "closed"])
+def asked(request: pytest.FixtureRequest) -> Asked:
+    system = fm.compile(request.param)
+    return system, own_states(system, system.initial_state)
+
+
+def is_right(evaluator: DerivativeEvaluator, system: fm.System, state: fm.State) -> bool:
     expected = system.acceleration_derivatives(state)
     rates = evaluator(state.t, state.q, state.u)
     names = "by_displacement", "by_speed", "by_force"
@@ -30,16 +33,17 @@ def is_right(evaluator: DerivativeEvaluator, system: fm.System, seed: int) -> bo
     return same and np.array_equal(rates, expected.accelerations)
 
 
-def test_it_gives_the_derivatives_to_the_bit(system: fm.System) -> None:
+def test_it_gives_the_derivatives_to_the_bit(asked: Asked) -> None:
+    system, [state, *others] = asked
     evaluator = system.derivative_evaluator()
-    assert all(is_right(evaluator, system, seed) for seed in range(3))
-    state = moving(system, 5)
+    assert all(is_right(evaluator, system, each) for each in others)
     before = evaluator(state.t, state.q, state.u).copy()
     np.testing.assert_array_equal(evaluator(state.t, state.q.tolist(), state.u.tolist()), before)
 
 
-def test_arrays_are_used_again_and_only_read(system: fm.System) -> None:
-    evaluator, state, other = system.derivative_evaluator(), moving(system, 0), moving(system, 1)
+def test_arrays_are_used_again_and_only_read(asked: Asked) -> None:
+    system, [_, state, other, *_] = asked
+    evaluator = system.derivative_evaluator()
     evaluator(state.t, state.q, state.u)
     seen, kept = evaluator.by_speed, evaluator.by_speed.copy()
     evaluator(other.t, other.q, other.u)
@@ -48,28 +52,13 @@ def test_arrays_are_used_again_and_only_read(system: fm.System) -> None:
         seen[:] = 0.0
 
 
-def test_each_thread_has_arrays_of_its_own(system: fm.System) -> None:
+def test_threads_and_copies_have_arrays_of_their_own(asked: Asked) -> None:
+    system, states = asked
     evaluator = system.derivative_evaluator()
-    assert is_right(evaluator, system, 0)
+    assert is_right(evaluator, system, states[0])
     here = evaluator.by_displacement.copy()
     with ThreadPoolExecutor(3) as pool:
-        assert all(pool.map(lambda seed: is_right(evaluator, system, seed), [1 + i % 5 for i in range(60)]))
-    np.testing.assert_array_equal(evaluator.by_displacement, here)
-
-
-def test_copies_are_evaluators_of_copied_systems(system: fm.System) -> None:
-    evaluator = system.derivative_evaluator()
+        assert all(pool.map(lambda i: is_right(evaluator, system, states[1 + i % 5]), range(60)))
     for other in (copy.deepcopy(evaluator), pickle.loads(pickle.dumps(evaluator))):
-        assert isinstance(other, DerivativeEvaluator) and is_right(other, system, 2)
-
-
-def test_what_is_refused(system: fm.System) -> None:
-    evaluator, state = system.derivative_evaluator(), system.initial_state
-    with pytest.raises(ValueError, match="give finite numbers"):
-        evaluator(0.0, state.q, state.u + np.nan)
-    with pytest.raises(ValueError, match="numbers in a row"):
-        evaluator(0.0, state.q, state.u[:-1])
-    with pytest.raises(fm.DynamicsError):
-        evaluator(0.0, state.q, np.full(system.nu, 1e200))
-    with pytest.raises(NotImplementedError, match="has controllers"):
-        fm.compile(controlled()).derivative_evaluator()
+        assert isinstance(other, DerivativeEvaluator) and is_right(other, system, states[2])
+    np.testing.assert_array_equal(evaluator.by_displacement, here)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from tests.flexmb.system.test_derivatives import asked
 
 
 def with_stop(angle: float) -> fm.System:
@@ -67,32 +66,13 @@ def test_friction_at_rest_is_smooth() -> None:
     np.testing.assert_allclose(d.by_speed, -0.3 / 0.02 / 0.1, rtol=1e-12)
 
 
-def test_what_is_refused() -> None:
-    at = asked("every level")
-    system, state = at.system, at.state
-    for wrong in (np.nan, np.inf):
-        with pytest.raises(ValueError, match="give finite numbers"):
-            q = state.q.copy()
-            q[0] = wrong
-            system.acceleration_derivatives(fm.State(q, state.u))
-        with pytest.raises(ValueError, match="accelerations"):
-            system.inverse_dynamics_derivatives(state, np.full(system.nu, wrong))
-        with pytest.raises(ValueError, match="accelerations"):
-            system.evaluation_derivatives(state, np.full(system.nu, wrong))
-    with pytest.raises(TypeError, match="a State is needed"):
-        system.evaluation_derivatives(state.q)  # type: ignore[call-overload]
-    with pytest.raises(ValueError, match="is no beam of the scene"):
-        system.section_load_derivatives(state, "nobody", [0.0])
-    with pytest.raises(ArithmeticError):
-        system.acceleration_derivatives(system.state(state.q, 1e200 * np.ones(system.nu)))
-
-
 def test_controllers_are_refused_with_the_remedy() -> None:
     from tests.flexmb.system.test_copies import controlled
 
     system = fm.compile(controlled())
     state = system.initial_state
-    for ask in (system.acceleration_derivatives, system.evaluation_derivatives):
+    evaluator = lambda _: system.derivative_evaluator()  # noqa: E731
+    for ask in (system.acceleration_derivatives, system.evaluation_derivatives, evaluator):
         with pytest.raises(NotImplementedError, match=r"has controllers.*open_loop.*ControlledMotion"):
             ask(state)
     opened = fm.compile(fm.open_loop(controlled()))

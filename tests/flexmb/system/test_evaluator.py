@@ -4,7 +4,6 @@ import copy
 import gc
 import pickle
 import sys
-import threading
 import tracemalloc
 import warnings
 import weakref
@@ -16,10 +15,8 @@ import pytest
 
 import flexmb as fm
 from flexmb.entry.object_access import SWITCH
-from flexmb.run.warm_up import looped
 from flexmb.system import evaluator as evaluator_module
 from flexmb.system.algorithms import ALGORITHMS
-from flexmb.system.evaluator import Evaluator
 from tests.benchmarks.rivals import rigid_chain
 from tests.flexmb.system.argument_kinds import World
 from tests.trees import random_scene
@@ -81,19 +78,6 @@ def test_neither_state_nor_evaluators_disturb_each_other(system):
     another(other.t, other.q, other.u), system.accelerations(other), system.mass_matrix(other)
     assert np.array_equal(found, expected)
     assert np.array_equal(state.q, q) and np.array_equal(state.u, u)
-
-
-def test_numbers_of_any_real_type_are_taken(system):
-    evaluator, state = system.evaluator(), moving(system, 0)
-    q, u = np.float32(state.q), np.float32(state.u)
-    expected = evaluator(0.25, q.astype(float), u.astype(float)).copy()
-    strided = np.repeat(q.astype(float), 2)[::2]
-    fixed = q.astype(float)
-    fixed.flags.writeable = False
-    for given in (q, q.astype(float).tolist(), tuple(q.tolist()), strided, fixed, q.astype(">f8")):
-        assert np.array_equal(evaluator(0.25, given, u), expected)
-    assert np.array_equal(evaluator(np.float64(0.25), q, u), expected)
-    assert np.array_equal(evaluator(0, q, u), evaluator(0.0, q, u))
 
 
 @pytest.fixture
@@ -316,23 +300,6 @@ def test_it_holds_what_it_reads():
         assert np.array_equal(evaluator(state.t, state.q, state.u), expected)
 
 
-def test_each_thread_has_its_own(system):
-    states = [moving(system, seed) for seed in range(4)]
-    expected = [system.accelerations(state) for state in states]
-    right = [False] * 4
-
-    def work(i: int, evaluator: Evaluator) -> None:
-        state = states[i]
-        right[i] = all(np.array_equal(evaluator(state.t, state.q, state.u), expected[i]) for _ in range(300))
-
-    threads = [threading.Thread(target=work, args=(i, system.evaluator())) for i in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert all(right)
-
-
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
 def test_copies_have_addresses_of_their_own(system, copied):
     """A copy that kept an address would read freed memory, or write into the original."""
@@ -347,13 +314,3 @@ def test_copies_have_addresses_of_their_own(system, copied):
     assert np.array_equal(system.mass_matrix(state), expected[1])
     with pytest.raises(TypeError, match="cannot be copied"):
         copied(system._invert)
-
-
-def test_closed_chains_and_unknown_algorithms_are_refused(system):
-    with pytest.raises(NotImplementedError, match="use accelerations"):
-        fm.compile(looped()).evaluator()
-    for name in ("nonsense", None, ["articulated"]):
-        with pytest.raises(ValueError, match="algorithm is"):
-            system.evaluator(name)
-        with pytest.raises((ValueError, TypeError)):
-            system.accelerations(system.initial_state, name)

@@ -64,18 +64,6 @@ def test_an_unknown_name_is_answered_with_the_known_ones(system):
         system.coordinate("elbow")
 
 
-def test_states_of_the_wrong_length_are_refused(system):
-    with pytest.raises(ValueError, match=f"q: {system.nq} numbers in a row are needed"):
-        system.state(np.zeros(3), np.zeros(system.nu))
-
-
-def test_a_state_is_a_copy(system):
-    q = system.initial_state.q
-    state = system.state(q, system.initial_state.u)
-    q += 1.0
-    assert np.array_equal(state.q, system.initial_state.q)
-
-
 def test_initial_state_holds_the_scenes_values():
     spin = Sine(amplitude=0.5, angular_frequency_rad_s=2.0, phase_rad=0.3)
     body = {"mass": 1.0, "inertia": (0.1, 0.2, 0.2)}
@@ -91,11 +79,6 @@ def test_initial_state_holds_the_scenes_values():
     state = system.initial_state
     assert state.q == pytest.approx([1, 2, 3, 0.6, 0, 0.8, 0, 0.5 * np.sin(0.3), 0.2])
     assert state.u == pytest.approx([4, 5, 6, 7, 8, 9, np.cos(0.3), 30.0])
-
-
-def test_an_unknown_algorithm_is_refused(system):
-    with pytest.raises(ValueError, match="algorithm is 'magic': use one of 'articulated', 'unsplit'"):
-        system.accelerations(system.initial_state, "magic")
 
 
 @pytest.mark.parametrize("levels", [("full",), ("linear",), ("linear", "full", "ruthless", "rigid")], ids="-".join)

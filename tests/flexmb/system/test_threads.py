@@ -78,14 +78,6 @@ def test_what_is_shared_and_should_not_be_is_noticed():
     assert any(wrong(program("shared_calls", "--spoiled", "long"))[0] for _ in range(5))
 
 
-@pytest.mark.slow
-def test_ten_million_shared_calls():
-    """Evaluator and accelerations, each thread at a state of its own; the figures are printed."""
-    printed = program("shared_campaign", "10000000")
-    print(printed)
-    assert "in all 0 wrong of 10000000" in printed, printed
-
-
 @pytest.mark.parametrize("kernels", [pytest.param("exact", marks=pytest.mark.slow), "general"])  # 14 s to compile
 def test_the_first_calls_of_a_process_may_be_those_of_threads(kernels):
     assert first_word(program("first_calls", "shared", FLEXMB_KERNELS=kernels)) == "right"
