@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
 import flexmb as fm
-from flexmb.scene.schema import Load
 from tests.flexmb.control.scenes import DAMPING, INERTIA, STIFFNESS, pendulum, rotor
 
 GAINS = ((-STIFFNESS, -DAMPING),)
@@ -197,30 +195,6 @@ def test_outside_of_a_run_the_loop_is_open() -> None:
     system = fm.compile(rotor(law))
     fm.simulate(system, 0.5)
     assert system.accelerations(system.initial_state)[0] == 0.0
-
-
-def test_two_runs_are_the_same_bit_for_bit() -> None:
-    law = fm.StateSpace(name="law", inputs=("angle",), A=((-1.0,),), B=((1.0,),), C=((-1.0,),), initial=(0.2,))
-    system = fm.compile(rotor(law))
-    first, second = fm.simulate(system, 1.0), fm.simulate(system, 1.0)
-    assert np.array_equal(first.q, second.q)
-    assert np.array_equal(first.signals["law"], second.signals["law"])
-    assert first.signals["law"][0, 0] == -0.2
-
-
-@pytest.mark.parametrize("period", [None, 0.1])
-def test_a_profile_and_a_controller_on_one_hinge_add_up(period: float | None) -> None:
-    """By a controller that adds them: against the controller alone with the profile as a load about the same axis."""
-    push = fm.Sine(amplitude=0.7, angular_frequency_rad_s=3.0)
-    law = fm.StateSpace(name="pd", inputs=("angle", "rate"), D=GAINS, period_s=period)
-    total = fm.StateSpace(name="law", inputs=("pd", "push[0]"), D=((1.0, 1.0),))
-    both = fm.simulate(rotor(fm.ProfileSensor(name="push", function=push), law, total), 2.0)
-    alone = rotor(msgspec.structs.replace(law, name="law"))
-    load = Load(name="push", body="disc", type="torque", direction=(0.0, 0.0, 1.0), function=push)
-    apart = fm.simulate(msgspec.structs.replace(alone, loads=(load,)), 2.0)
-    assert np.abs(both.q - apart.q).max() < 1e-9
-    assert np.abs(both.work - apart.work).max() < 1e-8
-    assert np.abs(both.signals["law"] - both.signals["pd"]).max() > 0.5
 
 
 @pytest.mark.parametrize("algorithm", ["composite", "frisch", "frisch_as_printed"])

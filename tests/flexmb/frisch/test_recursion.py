@@ -13,7 +13,7 @@ import pytest
 
 import flexmb
 from flexmb.entry import observation
-from flexmb.frisch.nested_system import NestedMotion, NestedSystem
+from flexmb.frisch.nested_system import NestedMotion, NestedSystem, Partitions
 from tests import trees
 from tests.bounds import algebra, backward_error
 from tests.flexmb.frisch.scenes import SMALL, deformed, packed, random_scene
@@ -98,6 +98,56 @@ def test_drives(pair):
     fixed = pair.system.constants.speed["prescribed"] >= 0
     assert np.max(np.abs(pair.motion.drives - tau)[fixed], initial=0.0) <= pair.bound * pair.size
     assert not np.any(pair.motion.drives[~fixed])
+
+
+PARTS = ("X", "I_c", "F", "Gamma", "I_s", "M1", "A", "M2")
+
+
+def test_partitions_are_those_of_the_same_equations(pair):
+    """(111), (128), (136): S' Z S and S' (eta - Z bias) of all partitions, and the forces that they leave over (135).
+
+    Rotation and translation of nests (26), (98), (107), (108), (112), wheels (109), (113), modes (53), (106), (110),
+    (114), suppressed translation (99), (103), (115), and their right sides (80), (81), (87), (100)-(102), (105), (171),
+    (172), (186): one of them with another sign is another matrix, another right side, or another force.
+    """
+    system, found = pair.system, pair.system.partitions(pair.state)
+    S, applied, x = found.S, system.applied(pair.state), found.S @ pair.motion.accelerations + found.bias
+    names, last = system.body_names, len(found.M2)
+    still = np.flatnonzero(~np.any(pair.nested.own_workspace.nest["hinge_map"][:, 3:, :], axis=(1, 2)))
+    loads = system.hinge_loads(pair.state, pair.motion.accelerations)
+    forces = np.concatenate([np.zeros(0), *(list(loads.values())[k][3:] for k in still)])
+    parents = {link.name: link.parent for link in system.links}
+    mass = {link.name: link.model.mass.sum() for link in system.links}
+    armature = system.constants.speed["armature"]  # beside the inertia of the bodies
+    common = [[sum(mass[x] for x in mass if {names[k], names[i]} <= _path(x, parents)) for i in still] for k in still]
+
+    held, blocks = armature * pair.motion.accelerations, np.kron(common, np.eye(3)) if len(still) else 0.0
+
+    def misses(parts: Partitions) -> float:
+        Z, eta = parts.matrix, np.concatenate(parts.eta)
+        size = np.max(np.abs(S.T) @ (np.abs(eta) + np.abs(Z) @ np.abs(x)) + np.abs(applied))
+        left, first = Z @ x - eta, len(parts.X)
+        torques = left[first : first + len(parts.I_s)] - pair.motion.wheel_torques.ravel()
+        return max(
+            np.max(np.abs(S.T @ Z @ S + np.diag(armature) - pair.M)) / np.max(np.abs(pair.M)),
+            np.max(np.abs(S.T @ left + held - applied - pair.motion.drives)) / size,
+            np.max(np.abs(left[len(left) - last :] - forces), initial=0.0) / pair.size,
+            np.max(np.abs(torques), initial=0.0) / pair.size,
+            np.max(np.abs(parts.M2 - blocks), initial=0.0) / sum(mass.values()),
+        )
+
+    assert np.array_equal(found.matrix, found.matrix.T) and misses(found) <= pair.bound
+    wrong = {name: {name: -getattr(found, name)} for name in PARTS if np.any(getattr(found, name))}
+    for i in range(4):
+        if np.any(found.eta[i]):
+            wrong[f"eta_{i + 1}"] = {"eta": tuple(-e if j == i else e for j, e in enumerate(found.eta))}
+    for name, change in wrong.items():
+        assert misses(replace(found, **change)) > 1e6 * pair.bound, name
+
+
+def _path(name: str, parents: dict[str, str]) -> set[str]:
+    """A body and all that carry it."""
+    return {name} | (_path(parents[name], parents) if name in parents else set())
 
 
 def test_ring_of_a_gimbal_without_mass():

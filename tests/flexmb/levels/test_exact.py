@@ -23,7 +23,6 @@ from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.quaternions import rotation_matrix
-from flexmb.scene.strains import points_of_piece
 from flexmb.system.moved_sections import MovedSections, moved_sections
 from flexmb.typing import Real
 from tests.bounds import observed_order, relative
@@ -355,15 +354,6 @@ def test_elastica_is_missed_by_half_the_modes():
     """The negative control: two modes miss what four reach by more than a hundred times."""
     x, y = elastica(10.0)
     assert np.linalg.norm(elastic_tip(2, 10.0) - [x, 0.0, y]) > 100.0 * 3e-5
-
-
-@pytest.mark.parametrize("count", [2, 4, 6, 8])
-def test_default_points_are_enough(count):
-    """Four points more change the tip by less than a tenth of what the modes leave."""
-    x, y = elastica(10.0)
-    default = points_of_piece(body_of(beam(s.Modes(count=count, families=("bending_z",)))))
-    found, finer = elastic_tip(count, 10.0), elastic_tip(count, 10.0, default + 4)
-    assert np.linalg.norm(found - finer) <= 0.1 * np.linalg.norm(finer - [x, 0.0, y]) + 1e-10
 
 
 def test_hung_by_its_tip_it_moves_alike():

@@ -50,28 +50,6 @@ def test_damped_pendulum():
     assert not model.rates.any()
 
 
-def test_pendulum_upside_down():
-    model = fm.linearize(pendulum(angle=np.pi))
-    growth = np.sqrt(2.0 * G * 0.7 / (0.05 + 2.0 * 0.7**2))
-    np.testing.assert_allclose(sorted(model.eigenvalues.real), [-growth, growth], rtol=ROUNDING)
-    assert model.stability.verdict == "unstable"
-    assert "unstable: largest real part" in str(model.stability)
-
-
-def test_double_pendulum():
-    """Two point masses on strings of equal length: w^2 = (2 +- sqrt 2) g / l."""
-    scene = fm.SceneBuilder("double pendulum", gravity=(G, 0.0, 0.0))
-    for name, parent, at in (("a", "ground", 0.0), ("b", "a", 1.0)):
-        scene.rigid_body(name, mass=1.0, com=(1.0, 0.0, 0.0), inertia=(0.0, 0.0, 0.0))
-        scene.revolute(f"h{name}", parent, name, parent_position=(at, 0.0, 0.0))
-    model = fm.linearize(scene.scene())
-    expected = np.sqrt((2.0 + np.array([-1.0, 1.0]) * np.sqrt(2.0)) * G)
-    np.testing.assert_allclose(frequencies(model), expected, rtol=ROUNDING)
-    ratio = model.modes[0].shape[1] / model.modes[0].shape[0]  # b relative to a: sqrt 2 - 1
-    assert ratio == pytest.approx(np.sqrt(2.0) - 1.0, rel=ROUNDING)
-    assert model.modes[0].participation.sum() == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize("level", ["ruthless", "linear", "full", "stiffened"])
 def test_clamped_beam_has_its_modal_frequencies(level):
     """Those of its own K and M to rounding, and (beta L)^2 sqrt(EI / rho A L^4) as far as 16 elements know them."""

@@ -91,15 +91,6 @@ def test_a_pendulum_swings_with_its_closed_form():
     assert run.markers["end"].position[1] == pytest.approx([0.0, -1.0, 0.0], abs=100 * 1e-12)
 
 
-@pytest.mark.parametrize("options", [{"rtol": 1e-11, "atol": 1e-13}, {"method": "rk4", "step": 2e-3}])
-def test_free_bodies_conserve_energy_and_momentum(options):
-    """Drift within 100 tolerances; the RK4 step is chosen for (w h)^4/120 times the run's 20 rad below 1e-10."""
-    run = fm.simulate(tumbling_pair(), 10.0, **options)
-    bound = 100 * 1e-11 if "rtol" in options else 1e-8
-    assert np.abs(run.energy_drift).max() < bound * run.total_energy[0]
-    assert np.abs(run.momentum_drift).max() < bound * np.abs(run.momentum[0]).max()
-
-
 def test_work_of_drive_and_damper_balances_the_energy():
     run = fm.simulate(driven_arm(), 4.0, rtol=1e-11, atol=1e-13)
     assert np.ptp(run.work) > 0.1, "the drive does work worth balancing"
@@ -107,14 +98,6 @@ def test_work_of_drive_and_damper_balances_the_energy():
     t = run.t
     spun = np.where(t < 1.5, t**2 / 1.5 + 1.5 / (2 * np.pi**2) * (np.cos(2 * np.pi * t / 1.5) - 1.0), 2.0 * t - 1.5)
     assert run.q[:, 0] == pytest.approx(spun, abs=10 * EPS * np.abs(spun).max()), "prescribed coordinates are exact"
-
-
-def test_the_answers_of_both_methods_agree():
-    samples = np.linspace(0.0, 2.0, 11)
-    fine = fm.simulate(driven_arm(), 2.0, rtol=1e-12, atol=1e-12, samples=samples)
-    coarse = [fm.simulate(driven_arm(), 2.0, "rk4", step=h, samples=samples) for h in (0.02, 0.01)]
-    errors = [np.abs(run.markers["end"].position - fine.markers["end"].position).max() for run in coarse]
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.3)
 
 
 def test_outputs_have_the_shapes_they_promise():
@@ -183,6 +166,11 @@ def test_steps_stop_where_a_load_switches():
         ({"method": "rk4"}, "give a positive step"),
         ({"method": "rk4", "step": -1.0}, "give a positive step"),
         ({"step": 0.1}, "leave step out"),
+        ({"method": "radau5", "step": 1e-2}, 'method "radau5" chooses its own steps'),
+        ({"method": "generalised_alpha"}, '"generalised_alpha" takes fixed steps, but step is None'),
+        ({"method": "generalised_alpha", "step": 1e-2, "spectral_radius": 1.5}, "spectral_radius is 1.5: from 0"),
+        ({"method": "exponential", "spectral_radius": 0.5}, 'spectral_radius is for method "generalised_alpha"'),
+        ({"method": "radau5", "algorithm": "frisch"}, 'needs Jacobians, which only algorithm "articulated" has'),
         ({"rtol": 1e-17}, "use a value between them"),
         ({"atol": 0.0}, "give a positive one"),
         ({"samples": 1}, "at least 2 output times"),
@@ -202,7 +190,7 @@ def test_steps_stop_where_a_load_switches():
     ],
 )
 def test_settings_that_make_no_sense_are_refused_with_a_remedy(options, remedy):
-    with pytest.raises(ValueError, match=remedy):
+    with pytest.raises((ValueError, NotImplementedError), match=remedy):
         fm.simulate(pendulum(), **({"t_end": 1.0} | options))
 
 

@@ -111,22 +111,6 @@ def test_generalised_alpha_damps_what_its_step_does_not_resolve():
     assert sizes[0.0] < 1e-2 * sizes[1.0]
 
 
-def test_what_is_refused():
-    scene = tumbling_pair()
-    with pytest.raises(ValueError, match='method "radau5" chooses its own steps'):
-        fm.simulate(scene, 1.0, "radau5", step=1e-2)
-    with pytest.raises(ValueError, match='"generalised_alpha" takes fixed steps, but step is None'):
-        fm.simulate(scene, 1.0, "generalised_alpha")
-    with pytest.raises(ValueError, match="spectral_radius is 1.5: from 0"):
-        fm.simulate(scene, 1.0, "generalised_alpha", step=1e-2, spectral_radius=1.5)
-    with pytest.raises(ValueError, match='spectral_radius is for method "generalised_alpha"'):
-        fm.simulate(scene, 1.0, "exponential", spectral_radius=0.5)
-    with pytest.raises(ValueError, match="method is 'euler': use one of 'dop853', 'rk4', 'radau5'"):
-        fm.simulate(scene, 1.0, "euler")
-    with pytest.raises(NotImplementedError, match='needs Jacobians, which only algorithm "articulated" has'):
-        fm.simulate(scene, 1.0, "radau5", algorithm="frisch")
-
-
 @pytest.mark.parametrize("method", ADAPTIVE)
 def test_a_run_that_fails_says_where(method):
     done = fm.simulate(tumbling_pair(), 1.0, method, rtol=1e-9, max_steps=3)

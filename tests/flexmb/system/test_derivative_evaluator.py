@@ -15,7 +15,6 @@ from flexmb.system.derivative_evaluator import DerivativeEvaluator
 from tests.flexmb.system.argument_kinds import World
 from tests.flexmb.system.shared_calls import own_states
 
-
 Asked = tuple[fm.System, list[fm.State]]
 
 
