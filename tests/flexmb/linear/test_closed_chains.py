@@ -9,7 +9,6 @@ import msgspec
 import numpy as np
 import pytest
 from numpy.polynomial import Chebyshev
-from scipy.optimize import brentq, minimize_scalar
 
 import flexmb as fm
 from flexmb.linear.linear_model import LinearModel
@@ -129,30 +128,6 @@ def weighed(lengths: m.FourBar, gravity: float) -> Callable[[float], float]:
         return float(-gravity * sum(0.78 * length * y for length, y in zip(lengths[:3], heights, strict=True)))
 
     return potential
-
-
-@pytest.mark.parametrize("start", [0.3, -0.5])
-def test_four_bar_swings_about_its_equilibrium(start):
-    """Where its potential energy is least, as SciPy finds it, at V''/M: M and V from two circles."""
-    bars, gravity = m.GRASHOF, 9.81
-    potential = weighed(bars, gravity)
-    turn = np.linspace(0.0, 2.0 * np.pi, 91)
-    near = turn[np.argmin([potential(angle) for angle in turn])]
-    V = fitted(potential, minimize_scalar(potential, (near - 0.1, near + 0.1)).x)
-    lowest = brentq(V.deriv(), near - 0.2, near + 0.2, xtol=1e-15)
-    system = fm.compile(m.four_bar(crank=near + start, gravity=gravity, rate=3.0))
-    found = fm.equilibrium(system)
-    assert found.q[0] == pytest.approx(lowest, abs=1e-12) and not np.any(found.u)
-    assert max(max(gap) for gap in system.closure_gaps(found).values()) < 1e-13
-    model = fm.linearize(system, found, held=True)
-    coupler, rocker = (fitted(lambda x, i=i: bars.angles(x)[i], lowest) for i in (0, 1))
-    a, b, c = 1.0, coupler.deriv()(lowest), rocker.deriv()(lowest)
-    axle = bars.crank * np.array([-np.sin(lowest), np.cos(lowest)])
-    middle = axle + 0.5 * bars.coupler * b * np.array([-np.sin(coupler(lowest)), np.cos(coupler(lowest))])
-    crank, rod, rock = (0.78 * length**3 for length in bars[:3])
-    M = crank / 3.0 * a**2 + rod / 12.0 * b**2 + 0.78 * bars.coupler * middle @ middle + rock / 3.0 * c**2
-    assert model.modes[0].frequency_rad_s == pytest.approx(np.sqrt(V.deriv(2)(lowest) / M), rel=1e-11)
-    assert model.stability.verdict == "neutral"
 
 
 @pytest.mark.parametrize("count", [1, 3])
