@@ -1,4 +1,4 @@
-"""Derivatives by recursion: against dual numbers on random trees, and against the dense route's own complex step."""
+"""Derivatives by recursion: against dual numbers on random trees. (The dense route's: system/test_derivatives.py.)"""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb.dense import DenseSystem
 from flexmb.entry import derivatives
 from flexmb.entry.tangent import tangent_workspace
 from flexmb.jain.derivatives.rigid_trees import is_rigid_tree
@@ -17,7 +16,7 @@ from flexmb.scene.schema import Scene
 from flexmb.tables.status import Status
 from tests import trees
 from tests.benchmarks.rivals import flexible_chain, rigid_chain
-from tests.bounds import UNIT_ROUNDOFF, algebra
+from tests.bounds import UNIT_ROUNDOFF
 from tests.flexmb.connectors import connected_scenes
 from tests.flexmb.entry import dual_jacobian
 from tests.flexmb.guards import NOTHING, guarded
@@ -165,36 +164,3 @@ def test_special_kernels_of_rigid_trees_on_single_axes(seed):
     for matrix, expected in zip(matrices, (rows[:, :nq], rows[:, nq : nq + nu]), strict=False):
         assert np.max(np.abs(matrix - expected)) <= limit * np.max(np.abs(expected))
     assert np.max(np.abs(mass(found.system) @ matrices[2] - np.eye(nu))) <= limit
-
-
-@pytest.mark.parametrize(("recipe", "seed"), [("armed rigid", 0), ("full", 0), ("ruthless", 0), ("mixed", 1)])
-def test_inverse_dynamics_against_the_dense_route(recipe, seed):
-    """tau = M rates + c at random rates, by displacement, speed and rate. A planted error of 1e-9 is noticed."""
-    scene = trees.random_scene(seed, replace(RECIPES[recipe], bodies=4))
-    system, dense = flexmb.compile(scene), DenseSystem(scene)
-    c, state, nu = system.constants, system.initial_state, system.nu
-    rates = np.random.default_rng(seed).normal(size=nu)
-    found = np.full((3, nu, nu), np.nan)
-    w = derivatives.derivative_workspace(c, system.nq, nu)
-    y = np.concatenate([state.q, state.u, [0.0]])
-    derivatives.inverse_dynamics_derivatives(0.0, y, rates, *found, c, w)
-    J = np.full((len(y), len(y)), np.nan)
-    assert derivatives.jacobian(0.0, y, J, c, w) == Status.OK
-    N = J[: system.nq, system.nq : -1]
-    M = dense.mass_matrix(state.q).real
-    largest = max(len(member.model.mass) for member in dense.tree.members)
-    limit = algebra(dense.nu, len(dense.tree.members), largest)
-
-    def changes(q: np.ndarray, u: np.ndarray) -> list[np.ndarray]:
-        return [np.imag(part) / H for part in (dense.mass_matrix(q) @ rates, dense.bias(q, u))]
-
-    free = np.flatnonzero(c.speed["prescribed"] < 0)
-    for j in np.random.default_rng(seed).permutation(free)[:10]:  # the dense route takes a second for each
-        unit = 1j * H * np.eye(nu)[j]
-        moved = changes(state.q + N @ unit, state.u + 0j), changes(state.q + 0j, state.u + unit)
-        for which, parts in enumerate(moved):
-            size = sum(np.max(np.abs(part)) for part in parts) + np.max(np.abs(M))
-            error = np.max(np.abs(found[which, :, j] - sum(parts)))
-            assert error <= limit * size, (which, j)
-    assert np.max(np.abs(found[2] - M)) <= limit * np.max(np.abs(M))
-    assert np.max(np.abs(found[2] * (1.0 + 1e-9) - M)) > limit * np.max(np.abs(M))

@@ -1,4 +1,8 @@
-"""Exact derivatives: against the dense route's own complex step, closed forms, and differences as a check of sense."""
+"""Derivatives by dual numbers, where random trees do not come: what is prescribed, springs at rest, time, failures.
+
+On random trees they are those of the recursion (test_derivatives.py), which are held against the dense route's complex
+step and against differences in tests/flexmb/system/test_derivatives.py.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,7 @@ from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.tables.status import Status
 from tests import trees
-from tests.bounds import UNIT_ROUNDOFF, algebra
+from tests.bounds import UNIT_ROUNDOFF
 from tests.flexmb.entry.dual_jacobian import jacobian
 
 H = 2.0**-100
@@ -71,44 +75,6 @@ def terms(dense: DenseSystem, q: np.ndarray, u: np.ndarray, rates: np.ndarray) -
     return [dense.mass_matrix(q) @ rates, dense.bias(q, u), -tau]
 
 
-def directions(found: Linearised, count: int = 3) -> np.ndarray:
-    """Random directions (2 count, nq+nu+1) in which free coordinates change, then free speeds."""
-    nq, speed = found.system.nq, found.system.constants.speed
-    out = np.random.default_rng(7).normal(size=(2 * count, len(found.y)))
-    held = np.flatnonzero(speed["prescribed"] >= 0)
-    out[:, [*speed["coordinate"][held], *(nq + held), -1]] = 0.0
-    out[:count, nq:] = out[count:, :nq] = 0.0
-    return out
-
-
-def backward_errors(found: Linearised, dense: DenseSystem) -> np.ndarray:
-    """By direction d: |M x + d(M udot + c - tau)| for x = J d, in units of the terms it is summed from."""
-    nq, nu = found.system.nq, found.system.nu
-    q, rates = found.y[:nq], found.dy[nq : nq + nu]
-    free = found.system.constants.speed["prescribed"] < 0
-    M = dense.mass_matrix(q)
-    errors = []
-    for d in directions(found):
-        moved = (found.y + 1j * H * d)[:-1]
-        parts = [np.imag(part) / H for part in terms(dense, moved[:nq], moved[nq:], rates)]
-        x = (found.J @ d)[nq : nq + nu]
-        size = np.linalg.norm(M, np.inf) * np.max(np.abs(x)) + sum(np.max(np.abs(part)) for part in parts)
-        errors.append(np.max(np.abs((M @ x + sum(parts))[free])) / size)
-    return np.array(errors)
-
-
-@pytest.mark.parametrize(("recipe", "seed"), [("rigid", 0), ("full", 0), ("full", 1), ("ruthless", 0), ("mixed", 1)])
-def test_accelerations_against_the_dense_route(recipe, seed):
-    """Its matrices are differentiated by themselves, through other code. A planted error of 1e-9 is noticed."""
-    scene = trees.random_scene(seed, replace(RECIPES[recipe], bodies=6))
-    found, dense = linearised(scene), DenseSystem(scene)
-    largest = max(len(member.model.mass) for member in dense.tree.members)
-    bound = algebra(dense.nu, len(dense.tree.members), largest)
-    assert np.max(backward_errors(found, dense)) <= bound
-    found.J[found.system.nq :] *= 1.0 + 1e-9
-    assert np.max(backward_errors(found, dense)) > 10.0 * bound
-
-
 STEPS = 0.5 ** np.arange(20)
 
 
@@ -127,27 +93,6 @@ def rounding_of_limit(levels: int = 6) -> float:
                                / STEPS[:levels] * STEPS[levels - 1])))  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("recipe", "seed"), [(trees.EVERY_LEVEL, 0), (trees.EVERY_LEVEL, 1), (trees.STIFFENED, 2), (trees.EXACT, 0)]
-)
-def test_every_level_hinge_and_row_against_differences(recipe, seed):
-    """Whole columns, also of qdot and of the work's rate, up to what rounding of the right side leaves of differences.
-
-    A solution rounds as cond(M) u, a rate of a coordinate as few u; the smallest step divides both.
-    """
-    found, h = linearised(trees.random_scene(seed, recipe)), 1e-2
-    system, nq = found.system, found.system.nq
-    free = system.constants.speed["prescribed"] < 0
-    M = system.mass_matrix(flexmb.State(found.y[:nq], found.y[nq:-1]))[np.ix_(free, free)]
-    noise = np.full(len(found.y), np.linalg.cond(M, np.inf) * np.max(np.abs(found.dy)))
-    noise[:nq] = 10.0 * max(1.0, np.max(np.abs(found.y)))
-    noise *= 2.0 * UNIT_ROUNDOFF / (h / 2**5)
-    for j in range(len(found.y)):
-        unit = np.eye(len(found.y))[j]
-        expected, doubt = extrapolated(lambda h, unit=unit: right_side(system, 0.0, found.y + h * unit), h)
-        assert np.all(np.abs(found.J[:, j] - expected) <= 30.0 * doubt + noise), j
-
-
 def test_what_is_prescribed_does_not_depend_on_the_state():
     found = linearised(trees.random_scene(0, trees.EVERY_LEVEL))
     nq, speed = found.system.nq, found.system.constants.speed
@@ -155,25 +100,6 @@ def test_what_is_prescribed_does_not_depend_on_the_state():
     places = np.concatenate([speed["coordinate"][held], nq + held])
     assert len(held) > 2
     assert not found.J[:, places].any() and not found.J[places].any() and not found.J[:, -1].any()
-
-
-def test_pendulum():
-    """theta'' = -(m g l sin theta + k theta + d theta') / I about z, m l^2 + I_c = I; power is -d theta'^2."""
-    m, length, I_c, g, k, d, theta, rate = 2.0, 0.7, 0.05, 9.81, 3.0, 0.4, 0.6, -0.3
-    scene = (
-        SceneBuilder("pendulum", gravity=(g, 0.0, 0.0))
-        .rigid_body("bob", mass=m, com=(length, 0.0, 0.0), inertia=(I_c, I_c, I_c))
-        .revolute("pivot", "ground", "bob", angle=theta, rate=rate, stiffness=k, damping=d)
-        .scene()
-    )
-    found, inertia = linearised(scene), m * length**2 + I_c
-    expected = [
-        [0.0, 1.0, 0.0],
-        [-(m * g * length * np.cos(theta) + k) / inertia, -d / inertia, 0.0],
-        [0.0, -2.0 * d * rate, 0.0],
-    ]
-    np.testing.assert_allclose(found.J, expected, rtol=20 * UNIT_ROUNDOFF, atol=0.0)
-    assert not found.rate.any()
 
 
 def test_ball_spring_at_rest():
