@@ -203,14 +203,3 @@ def test_a_limit_is_no_obstacle(method: Any) -> None:
     known = fm.simulate(pendulum(law, torque=TORQUE).scene(), 1.0, samples=11)
     assert np.abs(run.q - known.q).max() < 1e-5
     assert np.abs(run.signals["law"]).max() == 2.0
-
-
-@pytest.mark.parametrize("method", [*ADAPTIVE, "generalised_alpha"])
-def test_a_run_is_taken_up_to_the_last_bit(method: Any) -> None:
-    scene = pendulum(PID, torque=TORQUE).scene()
-    settings: dict[str, Any] = {"step": 1e-3} if method == "generalised_alpha" else {"rtol": 1e-6}
-    whole = fm.simulate(scene, 0.4, method, samples=5, **settings)
-    first = fm.simulate(scene, 0.2, method, samples=3, **settings)
-    second = fm.simulate(scene, 0.4, method, state=first.restart, samples=3, **settings)
-    assert np.array_equal(second.q[-1], whole.q[-1])
-    assert np.array_equal(second.signals["law"][-1], whole.signals["law"][-1])

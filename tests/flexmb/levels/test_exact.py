@@ -22,7 +22,6 @@ from flexmb.modal.strain_field import LINEAR, SQUARE, WHOLE
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
-from flexmb.scene.quaternions import rotation_matrix
 from flexmb.system.moved_sections import MovedSections, moved_sections
 from flexmb.typing import Real
 from tests.bounds import observed_order, relative
@@ -332,30 +331,6 @@ def elastica(P: float) -> tuple[float, float]:
     return float(np.sqrt(2.0 * (2.0 * k * k - 1.0) / P)), float(y)
 
 
-def elastic_tip(count: int, P: float, points: int | None = None, families: Any = ("bending_z",)) -> Real:
-    """Tip of a beam of EI 1 at rest under a tip force P along z or y."""
-    modes, section = s.Modes(count=count, families=families, points=points), stations(1.0, rotary=1e-6)
-    across = (0, 0, 1) if families == ("bending_z",) else (0, 1, 0)
-    scene = beam(modes, section=section).weld("clamp", "ground", "rod").marker("tip", "rod", node="tip")
-    scene.force("P", "rod", node="tip", direction=across, function=s.Constant(value=P))
-    system = flexmb.compile(scene.scene())
-    rest = flexmb.equilibrium(system)
-    return system.evaluate(0.0, rest.q, rest.u).markers["tip"].position
-
-
-@pytest.mark.parametrize(("count", "allowed"), [(2, 2.5e-2), (4, 3e-5), (8, 1e-8)])
-def test_elastica_at_rest(count, allowed):
-    """P L^2 / EI = 10: the tip relative to the length."""
-    x, y = elastica(10.0)
-    assert np.linalg.norm(elastic_tip(count, 10.0) - [x, 0.0, y]) <= allowed
-
-
-def test_elastica_is_missed_by_half_the_modes():
-    """The negative control: two modes miss what four reach by more than a hundred times."""
-    x, y = elastica(10.0)
-    assert np.linalg.norm(elastic_tip(2, 10.0) - [x, 0.0, y]) > 100.0 * 3e-5
-
-
 def test_hung_by_its_tip_it_moves_alike():
     """The same free beam held by its root or by its tip, at one state: markers accelerate alike."""
     systems = []
@@ -377,16 +352,3 @@ def test_hung_by_its_tip_it_moves_alike():
         np.testing.assert_allclose(a.position, b.position, atol=ROUNDING)
         np.testing.assert_allclose(a.velocity, b.velocity, atol=64 * ROUNDING)
         np.testing.assert_allclose(a.acceleration, b.acceleration, atol=64 * ROUNDING * size)
-
-
-def test_roll_up_closes():
-    """An end moment 2 pi EI / L bends a beam of one curvature into a circle."""
-    scene = beam(s.Modes(count=1, families=("bending_z",), points=12), section=stations(1.0, rotary=1e-6))
-    scene.weld("clamp", "ground", "rod").marker("tip", "rod", node="tip")
-    scene.torque("M", "rod", node="tip", direction=(0, 1, 0), function=s.Constant(value=2.0 * np.pi))
-    system = flexmb.compile(scene.scene())
-    rest = flexmb.equilibrium(system)
-    tip = system.evaluate(0.0, rest.q, rest.u).markers["tip"]
-    assert np.linalg.norm(tip.position) < 1e-10
-    np.testing.assert_allclose(tip.rotation, np.eye(3), atol=1e-10)
-    np.testing.assert_allclose(rotation_matrix(tip.quaternion), tip.rotation, atol=ROUNDING)

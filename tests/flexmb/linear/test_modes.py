@@ -87,24 +87,6 @@ def test_free_asymmetric_body_about_its_axes(axis):
     assert not model.rates.any()
 
 
-def test_gyrostat_nutates():
-    """A body at rest with a wheel: h / I_t, the wheel's momentum over the transverse inertia of both."""
-    speed, axial, transverse, I_t = 40.0, 0.02, 0.011, 3.0
-    scene = (
-        fm.SceneBuilder("gyrostat")
-        .rigid_body("bus", mass=10.0, inertia=(I_t, I_t, 2.0))
-        .free("fly", "ground", "bus")
-        .wheel("w", "bus", axis=(0, 0, 1), mass=0.0, axial_inertia=axial, transverse_inertia=transverse, speed=speed)
-        .scene()
-    )
-    model = fm.linearize(scene)
-    assert model.modes[-1].frequency_rad_s == pytest.approx(axial * speed / (I_t + transverse), rel=ROUNDING)
-    assert model.stability.verdict == "neutral"
-    (place,) = [i for i, (name, _) in enumerate(model.inputs) if name == "w.angle"]
-    b = model.B[len(model.rates) :, place]
-    np.testing.assert_allclose(b[[2, 6]], [-1.0 / 2.0, 1.0 / axial + 1.0 / 2.0], rtol=ROUNDING)
-
-
 def test_spherical_pendulum_is_two_plane_ones():
     """A rotation vector stands for the quaternion: three displacements, one of them without a frequency."""
     scene = (

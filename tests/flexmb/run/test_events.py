@@ -121,16 +121,6 @@ def test_a_latched_scene_is_one_with_a_weld():
     assert np.allclose(alone.q[1:], both.q[both.t > t], rtol=0.0, atol=1e-9)
 
 
-def test_two_that_come_at_the_same_time_both_happen():
-    twin = fm.SceneBuilder("twins").rigid_body("a", mass=1.0, inertia=(1.0, 1.0, 1.0))
-    twin = twin.rigid_body("b", mass=1.0, inertia=(1.0, 1.0, 1.0))
-    twin = twin.revolute("ha", "ground", "a", rate=0.7).revolute("hb", "ground", "b", rate=0.7)
-    run = fm.simulate(twin.add(latch("ha", 1.0), latch("hb", 1.0)).scene(), 2.0, samples=5)
-    assert [each.name for each in run.events] == ["ha latches", "hb latches"]
-    assert run.events[0].t == run.events[1].t == pytest.approx(1.0 / 0.7, rel=1e-14)
-    assert np.allclose(run.q[-1], 1.0, rtol=0.0, atol=1e-15)
-
-
 def test_changes_at_times_are_those_of_a_pulse():
     """A force that is switched on and off by events, and the same force as a pulse."""
     def switch(t: float, value: float) -> fm.SceneEvent:
@@ -211,14 +201,6 @@ def test_what_events_cannot_do_is_refused():
         fm.simulate_stages(ball(1.0, impact(1.0)), [fm.RunStage(1.0), fm.RunStage(1.0)])
 
 
-def test_a_run_with_events_is_taken_up():
-    scene = arm(latch("root", 0.0))
-    times = np.linspace(0.0, 3.0, 61)
-    whole, first = fm.simulate(scene, 3.0, samples=times), fm.simulate(scene, 2.0, samples=times[:41])
-    rest = fm.simulate(first.restart.scene, 3.0, state=first.restart, samples=times[40:])
-    assert first.events and np.array_equal(rest.q[1:], whole.q[41:]) and rest.events == ()
-
-
 def test_modes_take_their_part_of_a_latch():
     """Two flexible panels that latch at the same time, or next to it: both momenta and the balance of energy hold."""
     strip = beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=8e-10, Iz=8e-10, rho=2700.0)
@@ -235,18 +217,3 @@ def test_modes_take_their_part_of_a_latch():
     assert np.abs(jump[modes]).max() > 0.1
     assert np.abs(run.momentum_drift).max() < 1e-10
     assert np.abs(run.energy_drift).max() < 1e-9 * run.energy_scale
-
-
-def test_a_closed_chain_has_events_without_impulses():
-    """A motor on a loop is switched off at a time, and the run ends where a coordinate passes a level."""
-    def loop(torque: fm.Function) -> fm.SceneBuilder:
-        scene = fm.SceneBuilder("loop").rigid_body("bob", mass=1.0, com=(1.0, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
-        scene.planar("slide", "ground", "bob", rotation=fm.AngularCoordinate(torque_Nm=torque))
-        return scene.closure("pin", "revolute", "ground", "bob", axis=(0.0, 0.0, 1.0))
-
-    off = fm.Change(path="slide.rotation.torque_Nm", value=fm.Constant(value=0.0))
-    scene = loop(fm.Constant(value=2.0)).event("off", "time", 0.5, off)
-    run = fm.simulate(scene.event("over", "slide.rotation", 1.0, fm.EndRun()).scene(), 5.0, samples=21)
-    pulsed = fm.simulate(loop(fm.Pulse(value=2.0, start_s=0.0, duration_s=0.5)).scene(), run.stopped_at, samples=2)
-    assert [each.name for each in run.events] == ["off", "over"] and run.stopped_at < 5.0
-    assert np.allclose(run.q[-1], pulsed.q[-1], rtol=0.0, atol=1e-9) and run.q[-1, 2] == pytest.approx(1.0, abs=1e-12)
