@@ -125,14 +125,17 @@ def _transformed(scene: Scene, variant: Variant) -> Scene:
 
 
 def _begun(scene: Scene, variant: Variant) -> Scene:
-    """The scene in the state in which the variant begins; a mutated one in its own equilibrium."""
+    """The scene with its loops closed, or in its equilibrium where the variant begins there; a mutated one in its own.
+    """
+    if not scene.constraints and variant.start is msgspec.UNSET:
+        return scene
+    from crosscheck.running import starts  # loads the compiler
+
     match variant.start:
         case msgspec.UnsetType():
-            return scene
+            return starts.closed(scene)
         case "equilibrium":
-            from crosscheck.running.at_rest import at_rest  # loads the compiler
-
-            return at_rest(scene)
+            return starts.at_rest(scene)
         case _:
             assert_never(variant.start)
 

@@ -14,8 +14,9 @@ from crosscheck.engines.answers import LOAD_PARTS
 from crosscheck.engines.registry import engine
 from crosscheck.library.find import Case, load_case, shipped_folder
 from crosscheck.library.reference import scene_digest
-from crosscheck.running.at_rest import at_rest
+from crosscheck.running import starts
 from crosscheck.running.plan import plan, variant_scene
+from crosscheck.running.starts import at_rest
 from crosscheck.running.undetermined import undetermined
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, linear
@@ -159,3 +160,51 @@ def test_strictly_its_runs_are_errors(doubtful: Case, tmp_path: Path, capsys: py
         plan(doubtful, (), PROVIDER)
         plan(doubtful, (), PROVIDER, films=True)
     assert capsys.readouterr().err.count("warning: ") == 1
+
+
+def rough_linkage(off: float) -> Scene:
+    """A four-bar with a gear, whose crank's angle and rate are given; others are `off` (rad), and without rates."""
+    tree = SceneBuilder("linkage", gravity=(0.0, -9.81, 0.0))
+    for name, length in (("crank", 0.4), ("coupler", 1.0), ("rocker", 0.7)):
+        moments = (1e-3, length**3 / 12.0, length**3 / 12.0)
+        tree.rigid_body(name, mass=1.0, com=(0.5 * length, 0.0, 0.0), inertia=moments, nodes={"e": (length, 0.0, 0.0)})
+    tree.rigid_body("gear", mass=0.2, inertia=(1e-3, 1e-3, 1e-3))
+    tree.revolute("A", "ground", "crank", angle=1.0, rate=2.0, given=True)
+    tree.revolute("B", "crank", "coupler", parent_node="e", angle=-0.63)
+    tree.revolute("C", "ground", "rocker", parent_position=(1.1, 0.0, 0.0), angle=1.5016 + off)
+    tree.revolute("G", "ground", "gear", angle=0.5 + off)
+    tree.closure("D", "spherical", "coupler", "rocker", node_a="e", node_b="e")
+    tree.coupling("mesh", "G", {"A": 0.5})
+    return tree.marker("m", "coupler").marker("gear", "gear").scene()
+
+
+def test_every_engine_gets_the_closed_start() -> None:
+    """Pinocchio and MuJoCo begin where flexmb does; before, they began at the values as written, and all differed."""
+    scene = rough_linkage(1e-3)
+    system = flexmb.compile(scene)
+    start = system.initial_state
+    there = system.evaluate(start.t, start.q, start.u).markers
+    begun = starts.closed(scene)
+    assert begun.hinges[0] == scene.hinges[0]  # what is given is kept
+    for name in ("pinocchio", "mujoco"):
+        own = msgspec.structs.replace(begun, closures=(), couplings=())
+        found = engine(name).compile(own).evaluate().markers
+        for marker, ours in there.items():
+            assert np.abs(found[marker].position - ours.position).max() <= 1e-14
+            assert np.abs(found[marker].velocity - ours.velocity).max() <= 1e-13
+    apart = engine("pinocchio").compile(msgspec.structs.replace(scene, closures=(), couplings=())).evaluate().markers
+    assert np.abs(apart["m"].velocity - there["m"].velocity).max() > 1e-2
+
+
+def test_a_closed_start_is_left_as_it_is() -> None:
+    begun = starts.closed(rough_linkage(1e-3))
+    assert starts.closed(begun) is begun
+    tree = held(Constant(value=1.0))
+    assert starts.closed(tree) is tree
+
+
+def test_a_start_that_nothing_closes_is_left_to_the_engines() -> None:
+    scene = rough_linkage(1e-3)
+    far = msgspec.structs.replace(scene.hinges[2], parent_position_m=(9.0, 0.0, 0.0))
+    scene = msgspec.structs.replace(scene, hinges=(*scene.hinges[:2], far, scene.hinges[3]))
+    assert starts.closed(scene) is scene
