@@ -78,6 +78,15 @@ def axis_rotation(axis: ArrayLike, angle: float) -> Real:
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
 
+def axes_with(axis: Real, column: int) -> Real:
+    """A rotation (3,3) with `axis` as its column number `column`."""
+    helper = np.eye(3)[np.argmin(np.abs(axis))]
+    second = np.cross(axis, helper)
+    second /= np.linalg.norm(second)
+    columns = [axis, second, np.cross(axis, second)]
+    return np.stack(np.roll(np.array(columns), column, axis=0), axis=1)
+
+
 def quaternion_rate(quaternion: ArrayLike, omega: ArrayLike) -> Real:
     """d/dt of wxyz for the angular velocity `omega` in the turning (outboard) axes: 1/2 q o (0, omega)."""
     w, x, y, z = quaternion

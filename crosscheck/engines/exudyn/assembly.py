@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import TypeGuard, assert_never
 
 import numpy as np
@@ -132,8 +133,8 @@ def deforming(body: Body, node: str) -> bool:
     return flexible(body) and node_shape(body, node, np.eye(3)).deforms
 
 
-def assemble(scene: Scene) -> Assembly:
-    """Build the Exudyn system of a scene that `supports` accepted."""
+def assemble(scene: Scene, kept: Mapping[str, Sequence[int]] = MappingProxyType({})) -> Assembly:
+    """Build the Exudyn system of a scene that `supports` accepted; `kept`: axes that closures suppress, if not all."""
     shop = Workshop(np.array(scene.gravity_m_s2), unconstrained(scene))
     held = _held_nodes(scene)
     placed: dict[str, Placed] = {}
@@ -150,7 +151,7 @@ def assemble(scene: Scene) -> Assembly:
     for mass in scene.point_masses:
         guides[mass.name], carrier = _point_mass(shop, placed[mass.body].at(mass.node), mass)
         carriers.append(carrier)
-    closures = {closure.name: _closure(shop, placed, closure) for closure in scene.closures}
+    closures = {each.name: _closure(shop, placed, each, kept.get(each.name)) for each in scene.closures}
     for connector in scene.connectors:
         if isinstance(connector, BetweenNodes):
             _connect(shop, placed, connector)
@@ -314,12 +315,14 @@ def _section_marker(shop: Workshop, parent: Placed, node: str) -> int:
     )
 
 
-def _closure(shop: Workshop, placed: dict[str, Placed], closure: Closure) -> ExudynLink:
+def _closure(
+    shop: Workshop, placed: dict[str, Placed], closure: Closure, kept: Sequence[int] | None
+) -> ExudynLink:
     """A joint between two frames that exist already."""
     ports = [
         _end(shop, placed, each.body, each.node, frame(each.position_m, each.quaternion)) for each in ends(closure)
     ]
-    return joints.closure(shop, closure.name, closure.type, ports, _unit(closure.axis))
+    return joints.closure(shop, closure.name, closure.type, ports, _unit(closure.axis), kept)
 
 
 def _end(shop: Workshop, placed: dict[str, Placed], body: str, node: str, own: Frame) -> HingePort:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, assert_never
+from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.conventions import axes_with
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
 from crosscheck.engines.exudyn.loads import along_axis
 from crosscheck.engines.exudyn.motion import FrameMotion, across, across_quaternion, initial
@@ -110,8 +111,10 @@ def spherical(
     return ExudynLink(name, (), tuple(connectors), markers[1], (ball, port.carrier, carrier)), carrier
 
 
-CONSTRAINED: dict[ClosureKind, list[int]] = {
+CONSTRAINED: dict[ClosureKind, Sequence[int]] = {
     "weld": [1, 1, 1, 1, 1, 1],
+    "revolute": [1, 1, 1, 1, 1, 0],
+    "spherical": [1, 1, 1, 0, 0, 0],
     "prismatic": [1, 1, 0, 1, 1, 1],
     "cylindrical": [1, 1, 0, 1, 1, 0],
     "universal": [1, 1, 1, 0, 0, 1],
@@ -120,19 +123,24 @@ CONSTRAINED: dict[ClosureKind, list[int]] = {
 """Displacements along and turns about x, y, z of frame A that a closure's joint suppresses, z being its axis."""
 
 
-def closure(shop: Workshop, name: str, kind: ClosureKind, ports: Sequence[HingePort], axis: Real) -> ExudynLink:
-    """A joint of some kind between two ports; `axis` (3,) has the same components in both frames."""
-    turn = _axes_with(axis, 2) if kind in WITH_AXIS else np.eye(3)
+def closure(
+    shop: Workshop, name: str, kind: ClosureKind, ports: Sequence[HingePort], axis: Real,
+    kept: Sequence[int] | None = None,
+) -> ExudynLink:  # fmt: skip
+    """A joint of some kind between two ports; `axis` (3,) has the same components in both frames.
+
+    `kept`: which of the kind's `CONSTRAINED` it suppresses, where others would do it twice. Of two turns either may be
+    left out: Exudyn's equation for the other is that of a joint that is free about z.
+    """
+    turn = axes_with(axis, 2) if kind in WITH_AXIS else np.eye(3)
     markers = [shop.marker(port.carrier, port.position, port.zero @ turn) for port in ports]
-    match kind:
-        case "revolute":
-            joint = shop.items.RevoluteJointZ(markerNumbers=markers)
-        case "spherical":
-            joint = shop.items.SphericalJoint(markerNumbers=markers)
-        case "weld" | "prismatic" | "cylindrical" | "universal" | "planar":
-            joint = shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=CONSTRAINED[kind])
-        case _:
-            assert_never(kind)
+    if kept is None and kind == "revolute":
+        joint = shop.items.RevoluteJointZ(markerNumbers=markers)
+    elif kept is None and kind == "spherical":
+        joint = shop.items.SphericalJoint(markerNumbers=markers)
+    else:
+        axes = list(CONSTRAINED[kind] if kept is None else kept)
+        joint = shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=axes)
     return ExudynLink(name, (), ((shop.mbs.AddObject(joint), True),), markers[1])
 
 
@@ -165,7 +173,7 @@ def chain(
 
 def _markers(shop: Workshop, a: Carrier, p: Real, b: Carrier, q: Real, axis: Real, coordinate: Coordinate) -> list:
     """Markers on both sides with the axis along z (revolute) or x (prismatic), as Exudyn's joints want it."""
-    axes = _axes_with(axis, 2 if coordinate.ANGULAR else 0)
+    axes = axes_with(axis, 2 if coordinate.ANGULAR else 0)
     return [shop.marker(a, p, axes), shop.marker(b, q, axes)]
 
 
@@ -219,12 +227,3 @@ def _prescribed(
         offsetUserFunction_t=lambda mbs, t, item, offset: f(t).rate,
     )
     return f, shop.mbs.AddObject(constraint)
-
-
-def _axes_with(axis: Real, column: int) -> Real:
-    """A rotation (3,3) with `axis` as its column number `column`."""
-    helper = np.eye(3)[np.argmin(np.abs(axis))]
-    second = np.cross(axis, helper)
-    second /= np.linalg.norm(second)
-    columns = [axis, second, np.cross(axis, second)]
-    return np.stack(np.roll(np.array(columns), column, axis=0), axis=1)

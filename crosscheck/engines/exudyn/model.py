@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from crosscheck.engines.contract import Effort, MarkerPath, Run, Snapshot, Trajectory
-from crosscheck.engines.exudyn.assembly import assemble
 from crosscheck.engines.exudyn.balance import energy_and_momentum
 from crosscheck.engines.exudyn.connections import Connected, connected
+from crosscheck.engines.exudyn.independent import independent, opening
 from crosscheck.engines.exudyn.kkt import body_mass_matrix, initial_state
 from crosscheck.engines.exudyn.markers import marker_path, marker_snapshot
 from crosscheck.engines.exudyn.modal import NodeShape
-from crosscheck.engines.exudyn.solve import integrate
+from crosscheck.engines.exudyn.solve import ExudynSolution, integrate
 from crosscheck.engines.exudyn.state import CarrierPath, States, carrier_path
 from crosscheck.engines.exudyn.wrench import drives, link_wrenches
 from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs
@@ -22,7 +24,7 @@ from flexmb.typing import Real
 class ExudynModel:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.assembly = assemble(scene)
+        self.assembly, self._whole = independent(scene)
 
     def warm_up(self) -> None:
         """Nothing to compile."""
@@ -48,7 +50,7 @@ class ExudynModel:
         )
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
-        solution = integrate(self.assembly, run.times, effort)
+        solution = self._still_closed(integrate(self.assembly, run.times, effort))
         states = solution.states
         # the solvers' own first multipliers are good to 1e-7 only
         states.multipliers[:1] = initial_state(self.assembly).multipliers
@@ -63,6 +65,17 @@ class ExudynModel:
             connectors=held.between, hinge_forces=held.along,
             wall_s=solution.wall_s, evaluations=solution.evaluations, **linear.as_outputs,
         )  # fmt: skip
+
+    def _still_closed(self, solution: ExudynSolution) -> ExudynSolution:
+        """A run, cut where what was left out as redundant opens."""
+        if self._whole is None:
+            return solution
+        good, name = opening(self._whole, solution.states)
+        if not name:
+            return solution
+        why = f'closure "{name}" opened: rows that are redundant where the run begins are not at t = '
+        at = f"{solution.states.times[good]:g} s"
+        return replace(solution, states=solution.states.cut(good), status="diverged", message=why + at)
 
     def markers(self, states: States) -> dict[str, MarkerPath]:
         """Their motion in a run."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pinocchio as pin
 
 from crosscheck.engines.conventions import cross
 from crosscheck.engines.links import closed_frames
 from crosscheck.engines.pinocchio.tree import PinocchioTree, placement
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Closure, Scene
 from flexmb.typing import Real
 
 # Proximal iterations stop at a residual: absolute, relative, regularisation, the most iterations. Regularised by 1e-12,
@@ -16,14 +18,19 @@ from flexmb.typing import Real
 _PROXIMAL = (1e-15, 1e-15, 1e-12, 100)
 
 
-class PinocchioClosures:
-    """The closures of a scene on its tree. `solve` leaves their loads for `loads` and `on_joints`."""
+def of_its_own(scene: Scene) -> bool:
+    """Whether Pinocchio has joints of its own for all closures of a scene."""
+    return all(closure.type in ("weld", "spherical") for closure in scene.closures)
 
-    def __init__(self, tree: PinocchioTree, scene: Scene) -> None:
-        self._model, self._names = tree.model, [closure.name for closure in scene.closures]
+
+class PinocchioClosures:
+    """Closures of a scene on its tree. `solve` leaves their loads for `loads` and `on_joints`."""
+
+    def __init__(self, tree: PinocchioTree, scene: Scene, closures: Sequence[Closure]) -> None:
+        self._model, self._names = tree.model, [closure.name for closure in closures]
         self._constraints = pin.StdVec_RigidConstraintModel()
         self._sides: list[tuple[int, int]] = []
-        for closure in scene.closures:
+        for closure in closures:
             kind = pin.ContactType.CONTACT_6D if closure.type == "weld" else pin.ContactType.CONTACT_3D
             ends = closed_frames(scene, tree.links, closure)
             joints = tuple(tree.joints[at.link] if at.link >= 0 else 0 for at in ends)

@@ -12,10 +12,10 @@ import pinocchio as pin
 
 from crosscheck.engines.conventions import quaternion_rate, scalar_first, scalar_last
 from crosscheck.engines.links import Ball, Floating, Scalar
-from crosscheck.engines.pinocchio.closures import PinocchioClosures
+from crosscheck.engines.pinocchio.closures import PinocchioClosures, of_its_own
 from crosscheck.engines.pinocchio.connections import PinocchioConnections
-from crosscheck.engines.pinocchio.couplings import PinocchioCouplings
 from crosscheck.engines.pinocchio.forces import PlacedLoads
+from crosscheck.engines.pinocchio.rows import PinocchioRows
 from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, initial_state
 from crosscheck.engines.rigid_tree import FreeCoordinates, JointForces, Slot, TreeState
 from flexmb.scene.functions import Constant
@@ -50,11 +50,13 @@ class Dynamics:
         self.data = tree.model.createData()
         self.forces = JointForces(tree.slots, tree.model.nv, scalar_first)
         self.loads = PlacedLoads(tree, scene)
-        self.closures = PinocchioClosures(tree, scene)
         self.connections = PinocchioConnections(tree, scene)
         self._coordinates = FreeCoordinates(tree.slots, tree.model.nq, tree.model.nv)
         self.driven: list[PinocchioSlot] = self._coordinates.driven
-        self.couplings = PinocchioCouplings(tree, scene, [slot.v for slot in self.driven])
+        closed = () if self.driven or scene.couplings or not of_its_own(scene) else scene.closures
+        self.closures = PinocchioClosures(tree, scene, closed)
+        rest = () if closed else scene.closures
+        self.rows = PinocchioRows(tree, scene, rest, [slot.v for slot in self.driven])
         self._ballasted = tree.model.copy()
         self._ballasted.armature[self._coordinates.driven_v] = BALLAST
         self._ballasted_data = self._ballasted.createData()
@@ -78,11 +80,11 @@ class Dynamics:
         return PinocchioSolution(a, drive, acting.power + float(drive @ state.v[D]))
 
     def acting(self, t: float, state: TreeState) -> Acting:
-        """With the loads of couplings, whose power is zero."""
+        """With the loads of rows, whose power is zero."""
         acting = self._applied(t, state)
-        if not self.couplings:
+        if not self.rows:
             return acting
-        efforts = self.couplings.efforts(state.q, self._accelerations(state, acting))
+        efforts = self.rows.efforts(state, self._accelerations(state, acting))
         return acting._replace(tau=acting.tau + efforts)
 
     def _applied(self, t: float, state: TreeState) -> Acting:
@@ -131,8 +133,8 @@ class Dynamics:
     def resolve_loads(self, t: float, state: TreeState, acceleration: Real) -> None:
         """Fill `data.f` with the wrench of parent on child of every joint, in joint axes about the joint origin."""
         wrenches = self._wrenches(t, state)[0] if self.loads or self.connections else None
-        if self.closures:
-            closing = self.closures.on_joints()
+        closing = self.closures.on_joints() if self.closures else self.rows.on_joints() if self.rows else None
+        if closing is not None:
             for joint, applied in enumerate(wrenches or ()):
                 closing[joint] = closing[joint] + applied
             wrenches = closing

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, EngineMissing, Model
-from crosscheck.engines.links import Scalar, links, obstacle
+from crosscheck.engines.links import obstacle
 from crosscheck.engines.peer import PeerEngine
 from crosscheck.engines.scipy_loop import RTOL_LADDER
+from flexmb.scene.hinges import ClosureKind
 from flexmb.scene.schema import Scene
 
 MOST_JOINTS = 500
@@ -37,8 +40,7 @@ class PinocchioEngine(PeerEngine):
         if len(scene.hinges) > MOST_JOINTS:
             return f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
         offers = {"screws": True, "couplings": True, "armatures": True}
-        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), KNOWN, **offers)
-        return reason or (_beside_closures(scene) if scene.closures else "")
+        return obstacle(scene, "Pinocchio", get_args(ClosureKind), KNOWN, **offers)
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
         return RTOL_LADDER
@@ -47,16 +49,3 @@ class PinocchioEngine(PeerEngine):
         from crosscheck.engines.pinocchio.model import compiled
 
         return compiled(scene)
-
-
-def _beside_closures(scene: Scene) -> str:
-    """What this adapter does not combine with closed loops, "" if there is nothing."""
-    if scene.couplings:
-        return f'coupling "{scene.couplings[0].name}": not beside closures in the adapter of Pinocchio'
-    for link in links(scene):
-        if not link.freedoms:
-            return f'hinge "{link.joint}" is a weld, which takes a prescribed joint here: not beside closures'
-        for freedom in link.freedoms:
-            if isinstance(freedom, Scalar) and freedom.prescribed is not None:
-                return f'"{link.joint}" is prescribed: not beside closures in Pinocchio'
-    return ""

@@ -1,0 +1,92 @@
+"""Closed loops in Exudyn whose closures suppress some motion twice, as the pins of every plane mechanism do.
+
+Its solvers divide by the multipliers' matrix, which is singular then: they stop at t = 0. Closures therefore suppress
+only what nothing suppresses before them, which leaves the motion as it is, and the loads that the motion determines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.exudyn.assembly import Assembly, assemble
+from crosscheck.engines.exudyn.joints import CONSTRAINED
+from crosscheck.engines.exudyn.state import States
+from flexmb.scene.schema import Scene
+from flexmb.typing import Real
+
+DEPENDENT = 1e-9
+"""Singular values of normalised rows that count as zero: loops begin closed to 1e-12 or less."""
+OPENED = 1e-3
+"""How far (m, or sine of an angle) what is left out may open in a run: at an exceptional position of the start, rows
+seem redundant that are not."""
+
+
+def independent(scene: Scene) -> tuple[Assembly, Assembly | None]:
+    """The system of a scene, with closures that suppress nothing twice; and with whole ones where that differs."""
+    whole = assemble(scene)
+    if not scene.closures or _rank(whole) == _rows(whole):
+        return whole, None
+    kept = {closure.name: [0] * 6 for closure in scene.closures}
+    rank = _rank(assemble(scene, kept))
+    for closure in scene.closures:
+        for axis in np.flatnonzero(CONSTRAINED[closure.type]).tolist():
+            kept[closure.name][axis] = 1
+            more = _rank(assemble(scene, kept))
+            kept[closure.name][axis] = int(more > rank)
+            rank = max(rank, more)
+    return assemble(scene, kept), whole
+
+
+def opening(whole: Assembly, states: States) -> tuple[int, str]:
+    """The first sample at which a whole closure is open, and its name; the number of samples and "" if none is."""
+    data = whole.shop.mbs.systemData
+    rows = {name: list(data.GetObjectLTGAE(link.connectors[0][0])) for name, link in whole.closures.items()}
+    with _solver(whole) as (solver, n):
+        for sample in range(len(states.times)):
+            data.SetODE2Coordinates(states.q[sample])
+            data.SetODE2Coordinates_t(states.v[sample])
+            solver.ComputeAlgebraicEquations(whole.shop.mbs, False)
+            gap = np.abs(np.array(solver.GetSystemResidual())[n:])
+            for name, own in rows.items():
+                if not np.max(gap[own]) <= OPENED:
+                    return sample, name
+    return len(states.times), ""
+
+
+def _rank(assembly: Assembly) -> int:
+    """Number of independent rows of all constraints where the run begins."""
+    C = _jacobian(assembly)
+    norms = np.linalg.norm(C, axis=1)
+    scaled = C[norms > 0.0] / norms[norms > 0.0][:, None]
+    return int(np.sum(np.linalg.svd(scaled, compute_uv=False) > DEPENDENT))
+
+
+def _rows(assembly: Assembly) -> int:
+    """Number of rows that constrain anything."""
+    return int(np.sum(np.linalg.norm(_jacobian(assembly), axis=1) > 0.0))
+
+
+def _jacobian(assembly: Assembly) -> Real:
+    """(k, n) of all constraints where the run begins."""
+    with _solver(assembly) as (solver, n):
+        k = solver.GetAEsize()
+        solver.SetSystemJacobian(np.zeros((n + k, n + k)))
+        solver.ComputeJacobianAE(assembly.shop.mbs, velocityLevel=False)
+        return np.array(solver.GetSystemJacobian())[n:, :n]
+
+
+@contextmanager
+def _solver(assembly: Assembly) -> Iterator[tuple[Any, int]]:
+    """Exudyn's solver at the initial state, for single evaluations, and the number of coordinates."""
+    exu, mbs = assembly.shop.exu, assembly.shop.mbs
+    settings = exu.SimulationSettings()
+    settings.solution.file.write = False
+    settings.timeIntegration.verboseMode = 0
+    solver = exu.MainSolverImplicitSecondOrder()
+    solver.InitializeSolver(mbs, settings)
+    yield solver, len(mbs.systemData.GetODE2Coordinates())
+    solver.FinalizeSolver(mbs, settings)

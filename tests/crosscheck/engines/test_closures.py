@@ -1,0 +1,133 @@
+"""Closures of every kind in other codes, beside drives and couplings too: motion and loads of the first instant."""
+
+from __future__ import annotations
+
+import warnings
+from functools import cache
+from typing import get_args
+
+import msgspec
+import numpy as np
+import pytest
+
+import flexmb as fm
+from crosscheck.engines.contract import Effort, Run
+from crosscheck.engines.registry import engine
+from crosscheck.running import starts
+from flexmb.scene.build import angular, linear
+from flexmb.scene.hinges import WITH_AXIS, ClosureKind
+from flexmb.scene.schema import Closure, Scene
+
+KINDS = get_args(ClosureKind)
+Z = (0.0, 0.0, 1.0)
+SLANTED = (0.6, 0.0, 0.8)
+
+
+@cache
+def loop(kind: ClosureKind) -> Scene:
+    """Three bodies with seven freedoms, of which the closure to the ground leaves one at least; it fits as they begin.
+
+    One coordinate is prescribed, and two are coupled where that leaves freedoms.
+    """
+    tree = fm.SceneBuilder("loop", gravity=(0.4, -0.3, -9.81))
+    for k, name in enumerate(("one", "two", "three")):
+        moments = np.diag([0.02, 0.05 + 0.01 * k, 0.06])
+        tree.rigid_body(
+            name, mass=1.0 + 0.3 * k, com=(0.2, 0.05, -0.1), inertia=moments, nodes={"e": (0.5, 0.1 * k, 0.05)}
+        )
+    tree.spherical(
+        "a", "ground", "one", quaternion=(0.7, 0.1, 0.5, 0.5), angular_velocity=(0.5, -0.3, 0.7), damping=0.1
+    )
+    motion = fm.Sine(amplitude=0.4, angular_frequency_rad_s=3.0)
+    first, second = angular(prescribed=motion), angular(angle=-0.4, stiffness=2.0)
+    tree.universal("b", "one", "two", parent_node="e", first=first, second=second)
+    rail, turn = linear(position=0.2, rate=-0.06), angular(angle=0.7, rate=-0.6)
+    tree.cylindrical("c", "two", "three", parent_node="e", axis=(0.36, 0.48, 0.8), rotation=turn, translation=rail)
+    if kind not in ("weld", "prismatic", "revolute"):
+        tree.coupling("screw", "c", {("c", "rotation"): 0.1}, coordinate="translation", offset=0.13)
+    scene = tree.marker("tip", "three", node="e").scene()
+    system = fm.compile(scene, kernels="general")
+    begin = system.initial_state
+    tip = system.evaluate(begin.t, begin.q, begin.u).markers["tip"]
+    there = {"position_a_m": tuple(tip.position.tolist()), "quaternion_a": tuple(tip.quaternion.tolist())}
+    axis = SLANTED if kind in WITH_AXIS else Z
+    closure = Closure(name="loop", type=kind, body_a="ground", body_b="three", node_b="e", axis=axis, **there)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fm.SceneWarning)  # its speeds need to fit only roughly
+        return starts.closed(msgspec.structs.replace(scene, closures=(closure,)))
+
+
+def off(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
+    """Largest difference of named arrays, relative to the largest number of all."""
+    assert one.keys() == other.keys()
+    size = max(float(np.max(np.abs(each))) for each in one.values())
+    return max(float(np.max(np.abs(one[name] - other[name]))) for name in one) / size
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", ["pinocchio", "exudyn"])
+def test_every_kind_has_the_same_loads(name: str, kind: ClosureKind) -> None:
+    """Before, Pinocchio closed loops by welds and ball joints only, and neither beside a drive nor beside couplings."""
+    pytest.importorskip(name)
+    scene = loop(kind)
+    if name == "exudyn":  # it has no couplings
+        scene = msgspec.structs.replace(scene, couplings=())
+    assert engine(name).supports(scene).kind == "exact"
+    mine, theirs = (engine(each).compile(scene).evaluate() for each in ("native", name))
+    assert off(mine.loads, theirs.loads) <= 1e-11
+    assert off(mine.drives, theirs.drives) <= 1e-11
+    if kind != "weld":  # by which the marker rests
+        assert off(*({"tip": each.markers["tip"].acceleration} for each in (mine, theirs))) <= 1e-11
+
+
+@pytest.mark.parametrize("kind", ["universal", "planar"])
+def test_pinocchio_keeps_them_over_time(kind: ClosureKind) -> None:
+    pytest.importorskip("pinocchio")
+    scene, run = loop(kind), Run(np.linspace(0.0, 0.3, 4))
+    mine = engine("native").compile(scene).simulate(run, Effort("tolerance", 1e-11, "dop853"))
+    theirs = engine("pinocchio").compile(scene).simulate(run, Effort("tolerance", 1e-11, "DOP853"))
+    assert np.max(np.abs(mine.markers["tip"].position - theirs.markers["tip"].position)) <= 1e-9
+    assert off(mine.loads, theirs.loads) <= 1e-8
+
+
+def pinned(crank: float, coupler: float, rocker: float, ground: float, angles: tuple[float, float, float]) -> Scene:
+    """A plane four-bar with four revolute pins: three of 18 rows are redundant."""
+    tree = fm.SceneBuilder("pinned", gravity=(0.0, -9.81, 0.0))
+    for name, length in (("crank", crank), ("coupler", coupler), ("rocker", rocker)):
+        moments = (1e-3, length**3 / 12.0, length**3 / 12.0)
+        tree.rigid_body(
+            name, mass=length, com=(0.5 * length, 0.0, 0.01), inertia=moments, nodes={"e": (length, 0.0, 0.0)}
+        )
+    tree.revolute("drive", "ground", "crank", angle=angles[0], rate=2.0, given=True)
+    tree.revolute("pin", "crank", "coupler", parent_node="e", angle=angles[1])
+    tree.revolute("pivot", "ground", "rocker", parent_position=(ground, 0.0, 0.0), angle=angles[2])
+    tree.closure("loop", "revolute", "coupler", "rocker", node_a="e", node_b="e")
+    return tree.marker("joint", "coupler", node="e").scene()
+
+
+def test_four_pins_have_the_same_motion_in_three_codes() -> None:
+    """Before, Exudyn stopped at t = 0, as its rows were redundant, and Pinocchio refused the pin."""
+    pytest.importorskip("exudyn")
+    pytest.importorskip("pinocchio")
+    scene, run = starts.closed(pinned(0.3, 0.8, 0.7, 1.0, (1.0, -0.43, 1.8))), Run(np.linspace(0.0, 0.2, 3))
+    efforts = {
+        "native": Effort("tolerance", 1e-10, "dop853"),
+        "pinocchio": Effort("tolerance", 1e-9, "DOP853"),
+        "exudyn": Effort("step", 1e-3, "TrapezoidalIndex2"),
+    }
+    found = {name: engine(name).compile(scene).simulate(run, effort) for name, effort in efforts.items()}
+    assert all(each.status == "finished" for each in found.values())
+    mine, bounds = found["native"], {"pinocchio": (1e-8, 1e-8), "exudyn": (2e-5, 1e-3)}
+    for name, (of_place, of_load) in bounds.items():
+        theirs = found[name]
+        assert np.abs(mine.markers["joint"].position - theirs.markers["joint"].position).max() <= of_place
+        for each, load in mine.loads.items():  # in the plane forces are determined, and the torque about its normal
+            assert np.abs((load - theirs.loads[each])[:, [2, 3, 4]]).max() <= of_load * 10.0
+
+
+def test_rows_that_only_seem_redundant_are_told() -> None:
+    """A rhombus that is folded flat at the start, where one row more is redundant than elsewhere."""
+    pytest.importorskip("exudyn")
+    scene, run = pinned(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0)), Run(np.linspace(0.0, 0.5, 6))
+    found = engine("exudyn").compile(scene).simulate(run, Effort("step", 1e-3, "TrapezoidalIndex2"))
+    assert found.status == "diverged" and 'closure "loop" opened: rows that are redundant' in found.message
