@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import partial
 from typing import Any, assert_never
@@ -33,7 +33,7 @@ from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.asking import Given, asked, everything
 from flexmb.system.derivative_evaluator import DerivativeRoute
-from flexmb.system.load_axes import Axes
+from flexmb.system.load_axes import Axes, Redundant
 from flexmb.system.mechanics import Mechanics
 from flexmb.system.observables import Evaluation
 from flexmb.system.section_loads import AllLoads
@@ -133,8 +133,9 @@ class Constraints:
         return found
 
     def hinge_loads(
-        self, state: State, accelerations: Real | None, axes: Axes, about: tuple[str, str] | None
-    ) -> dict[str, Real]:
+        self, state: State, accelerations: Real | None, axes: Axes, about: tuple[str, str] | None,
+        redundant: Redundant = "open",
+    ) -> dict[str, Real]:  # fmt: skip
         """See `System.hinge_loads`."""
         if accelerations is not None:
             raise NotImplementedError(
@@ -142,7 +143,29 @@ class Constraints:
                 "trees only: leave accelerations out, or prescribe coordinates"
             )
         t, y = self._system.layout.entering(state)
-        return self._referred(self._motion(t, y, "articulated"), state, axes, about)
+        motion = self._motion(t, y, "articulated")
+        match redundant:
+            case "open":
+                return self._referred(motion, state, axes, about)
+            case "least_norm":
+                return self._referred(motion._replace(spread=None), state, axes, about)
+            case _:
+                assert_never(redundant)
+
+    def total_load(self, state: State, signs: Mapping[str, float], about: tuple[str, str]) -> Real:
+        """See `System.total_load`; `signs` of the loads by the names of joints."""
+        t, y = self._system.layout.entering(state)
+        motion = self._motion(t, y, "articulated")
+
+        def summed(loads: dict[str, Real]) -> Real:
+            there = self._system.in_axes(state, loads, axes="world", about=about)
+            return np.asarray(np.sum([sign * there[name] for name, sign in signs.items()], axis=0))
+
+        found = finite_result(summed(self._by_load(motion.hinges, motion.closures)), t)
+        if motion.spread is None:
+            return found
+        changes = np.array([summed(each) for each in self._changes(motion.spread)])
+        return np.where(motion.spread.leaves_open(changes), np.nan, found)
 
     def loads_across(self, state: State, axes: Axes, about: tuple[str, str] | None) -> dict[str, Real]:
         """The same loads, and also at a singular position in a run."""

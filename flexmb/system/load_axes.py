@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal, get_args
 
 import numpy as np
 
+from flexmb.scene.schema import Scene
 from flexmb.system.frames import MotionTables, hinge_frames, node_pose
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables import arguments
 from flexmb.typing import Real
 
 Axes = Literal["world", "inboard", "outboard"]
+Redundant = Literal["open", "least_norm"]
+"""What is given for loads that the motion does not determine: NaN, or those of the least loads of closures."""
+
+
+def held_by(scene: Scene, joints: Sequence[str], on: str) -> dict[str, float]:
+    """The signs with which the loads of some hinges and closures act on a body, by name; ValueError for others."""
+    if isinstance(joints, str) or len(set(joints)) < max(1, len(joints)):
+        raise ValueError(f"joints is {joints!r}: give the names of hinges and closures, each once")
+    sides = {hinge.name: (hinge.parent, hinge.child) for hinge in scene.hinges}
+    sides |= {closure.name: (closure.body_a, closure.body_b) for closure in scene.closures}
+    found = {}
+    for name in joints:
+        if name not in sides:
+            raise ValueError(f"there is no hinge or closure {name!r}; there are {', '.join(sorted(sides))}")
+        if on not in sides[name] or sides[name][0] == sides[name][1]:
+            raise ValueError(f'"{name}" joins "{sides[name][0]}" and "{sides[name][1]}": its load on {on!r} is none')
+        found[name] = 1.0 if on == sides[name][1] else -1.0
+    return found
 
 
 def referred(

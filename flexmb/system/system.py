@@ -12,7 +12,7 @@ speeds in the same order. `system.coordinate(name)` and `system.speed(name)` giv
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, get_args, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ from flexmb.system.derivative_records import (
 )
 from flexmb.system.evaluator import Evaluator, fresh_evaluator
 from flexmb.system.linearisation import Linearisation
-from flexmb.system.load_axes import Axes, referred
+from flexmb.system.load_axes import Axes, Redundant, held_by, referred
 from flexmb.system.mass_properties import MassProperties, mass_properties
 from flexmb.system.mechanics import Mechanics, Precision
 from flexmb.system.observables import Evaluation
@@ -386,16 +386,20 @@ class System(Mechanics):
         *,
         axes: Axes = "world",
         about: tuple[str, str] | None = None,
+        redundant: Redundant = "open",
     ) -> dict[str, Real]:
         """Total load (6,) [torque; force] across each hinge, and closure, on the outboard body (body_b).
 
         Of the free motion, or of the motion with given `accelerations` (nu,), Jain & Rodriguez (44). axes: "world", or
         those of each hinge's own frame "inboard" or "outboard" (of a closure A and B). about: (body, node), a point
-        that moves with the deformation, or ("ground", "origin"); by default each hinge's outboard point. ValueError for
-        unknown axes or an unknown node.
+        that moves with the deformation, or ("ground", "origin"); by default each hinge's outboard point. redundant:
+        components that the motion does not determine are "open", which is NaN, or those of the closures' loads of
+        "least_norm", one choice of infinitely many; see `total_load` for sums. ValueError for unknown words or an
+        unknown node.
         """
+        arguments.one_of("redundant", redundant, get_args(Redundant))
         if self.constraints is not None:
-            return self.constraints.hinge_loads(state, accelerations, axes, about)
+            return self.constraints.hinge_loads(state, accelerations, axes, about, redundant)
         t, y = self.layout.entering(state)
         if accelerations is None:
             loads, w = np.zeros((len(self.links), 6)), self.own_recursion_workspace
@@ -405,6 +409,21 @@ class System(Mechanics):
             rates = self.layout.rates("accelerations", accelerations)
             loads, w = self.inverse_at(t, y, rates)[1], self.own_workspace
         return referred(self, w, self.by_hinge(finite_result(loads, t)), axes, about)
+
+    def total_load(
+        self, state: State, joints: Sequence[str], on: str, *, about: tuple[str, str] | None = None
+    ) -> Real:
+        """Sum (6,) [torque; force] of the loads that some hinges and closures exert on a body, World axes.
+
+        NaN only where the motion leaves the sum itself open: how two parallel pins share a force follows from
+        flexibility alone, but not their sum. about: as of `hinge_loads`, by default the origin of the body. ValueError
+        for joints that are not there, are named twice or do not hold the body, and for an unknown node.
+        """
+        signs, about = held_by(self.scene, joints, on), about or (on, "origin")
+        if self.constraints is not None:
+            return self.constraints.total_load(state, signs, about)
+        loads = self.hinge_loads(state, about=about)
+        return np.sum([sign * loads[name] for name, sign in signs.items()], axis=0)
 
     def referred_loads(
         self, state: State, loads: dict[str, Real], axes: Axes = "world", about: tuple[str, str] | None = None

@@ -64,6 +64,9 @@ def of_any(system: fm.System, state: fm.State) -> Calls:
         found.add(of_system(kind, name), getattr(system, name), {"state": state}, LOOKS.get(name, itself), state=at)
     found.add(of_system(kind, "hinge_loads, outboard"), lambda state: system.hinge_loads(state, axes="outboard"),
               {"state": state}, state=at)  # fmt: skip
+    hinge = system.scene.hinges[0]
+    found.add(of_system(kind, "total_load"), lambda state: system.total_load(state, [hinge.name], hinge.child),
+              {"state": state}, state=at)  # fmt: skip
     for algorithm in algorithms_of(system):
         asked = {"algorithm": algorithm}
         found.add(of_system(kind, f"accelerations, {algorithm}"), system.accelerations, {"state": state, **asked},
