@@ -35,7 +35,7 @@ class MujocoEngine(PeerEngine):
         return mujoco.__version__
 
     def obstacle(self, scene: Scene) -> str:
-        reason = obstacle(scene, "MuJoCo", ("spherical",), KNOWN, couplings=True, armatures=True)
+        reason = obstacle(scene, "MuJoCo", ("spherical", "revolute"), KNOWN, couplings=True, armatures=True)
         return reason or inertia_obstacle((each for each in links(scene) if not is_bare_frame(each)), "MuJoCo")
 
     def supports(self, scene: Scene) -> Support:

@@ -18,7 +18,14 @@ from crosscheck.engines.links import Link, Scalar, closed_frames, links
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.linear import linearised
 from crosscheck.engines.mujoco.observer import MujocoObserver
-from crosscheck.engines.mujoco.tree import MujocoClosure, MujocoCoupling, build_tree, initial_state, joint_name
+from crosscheck.engines.mujoco.tree import (
+    MujocoClosure,
+    MujocoCoupling,
+    build_tree,
+    initial_state,
+    joined_points,
+    joint_name,
+)
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import coupled
@@ -36,7 +43,7 @@ class MujocoModel:
     def __init__(self, scene: Scene) -> None:
         chain = links(scene)
         closures = tuple(
-            MujocoClosure(closure.name, *closed_frames(scene, chain, closure)) for closure in scene.closures
+            MujocoClosure(each.name, *closed_frames(scene, chain, each), joined_points(each)) for each in scene.closures
         )
         gravity = np.array(scene.gravity_m_s2, dtype=float)
         self._tree = build_tree(chain, gravity, closures, _couplings(scene, chain))

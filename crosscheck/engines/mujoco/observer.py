@@ -75,14 +75,19 @@ class MujocoObserver:
     def _closed(self, data: mujoco.MjData) -> dict[str, Real]:
         """[torque; force] of every closure on body_b about frame B, and of every coupling along what it leads.
 
-        The three rows of a closure are along World's axes, of A less B; the only row of a coupling is its load.
+        The three rows of each point of a closure are along World's axes, of A less B; the only row of a coupling is its
+        load.
         """
-        forces = self._rows(data)
-        of_closures = forces[: 3 * len(self._closures)].reshape(-1, 3)
-        found = {
-            closed.name: np.concatenate([np.zeros(3), -force])
-            for closed, force in zip(self._closures, of_closures, strict=True)
-        }
+        found, start = {}, 0
+        for number, closed in enumerate(self._closures):
+            found[closed.name] = np.zeros(6)
+            body = 0 if closed.b.link < 0 else self._tree.bodies[closed.b.link]
+            place = data.xpos[body] + data.xmat[body].reshape(3, 3) @ closed.b.frame.position
+            for _, site in closed.sites(number):
+                force = -self._rows(data)[start : start + 3]
+                torque = cross(data.site(site).xpos - place, force)
+                found[closed.name] += np.concatenate([torque, force])
+                start += 3
         for coupling, size in zip(self._couplings, self._held(data).tolist(), strict=True):
             found[coupling.name] = coupling.load(size, data.xaxis[coupling.slots[0].joint].copy())
         return found
@@ -94,7 +99,7 @@ class MujocoObserver:
 
     def _held(self, data: mujoco.MjData) -> Real:
         """Loads of the couplings."""
-        return self._rows(data)[3 * len(self._closures) :]
+        return self._rows(data)[3 * sum(len(closed.points) for closed in self._closures) :]
 
     def _marker(self, at: Attachment, data: mujoco.MjData) -> MarkerSnapshot:
         body = self._tree.bodies[at.link]

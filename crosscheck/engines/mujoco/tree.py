@@ -22,19 +22,40 @@ from crosscheck.engines.conventions import quaternion_of, rotation_matrix
 from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, by_motion
 from crosscheck.engines.peer import is_bare_frame
 from crosscheck.engines.rigid_tree import Slot, scene_start
+from flexmb.scene.hinges import Closure
 from flexmb.typing import Real
 
 ARMATURE = 1e20
 LEAST_INERTIA = 1e-14
+ARM = 0.1  # m, of points that stay together
 
 
 @dataclass(frozen=True)
 class MujocoClosure:
-    """A ball joint that closes a loop between frames `a` and `b`, as soft as MuJoCo's defaults make it."""
+    """A joint that closes a loop between frames `a` and `b`, as soft as MuJoCo's defaults make it.
+
+    `points` (n, 3) of both frames stay together: one for a ball joint, two on the axis of a pin.
+    """
 
     name: str
     a: Attachment
     b: Attachment
+    points: Real
+
+    def sites(self, number: int) -> list[tuple[str, str]]:
+        """Names of the sites of all points on A and on B, of the closure of this number."""
+        return [(f"closure {number}a.{k}", f"closure {number}b.{k}") for k in range(len(self.points))]
+
+
+def joined_points(closure: Closure) -> Real:
+    """(n, 3) points of both frames that a closure keeps together."""
+    match closure.type:
+        case "spherical":
+            return np.zeros((1, 3))
+        case "revolute":
+            return ARM * np.outer([-1.0, 1.0], closure.axis)
+        case _:
+            raise NotImplementedError(f'closure "{closure.name}", which `obstacle` refuses, has reached the adapter')
 
 
 @dataclass(frozen=True)
@@ -96,7 +117,8 @@ def build_tree(
         _close(spec, bodies, closed, i)
     for coupling in couplings:
         _couple(spec, coupling)
-    if couplings:  # its solver stops at errors relative to the mean inertia, in which an armature would hide them
+    driven = any(isinstance(each, Scalar) and each.prescribed is not None for link in links for each in link.freedoms)
+    if couplings or (closures and driven):  # its solver stops at errors relative to the mean inertia, armatures too
         spec.option.tolerance = 0.0
     model = spec.compile()
     ids = np.array([model.body(_body_name(link)).id for link in links], dtype=np.intp)
@@ -114,15 +136,15 @@ def _inboard(flight: Floating) -> list[float]:
 
 
 def _close(spec: mujoco.MjSpec, bodies: list[mujoco.MjsBody], closed: MujocoClosure, number: int) -> None:
-    """An equality constraint between two sites: with a body and an anchor it would close where coordinates are zero."""
-    names = []
-    for side, at in zip("ab", (closed.a, closed.b), strict=True):
-        names.append(f"closure {number}{side}")
-        body = bodies[at.link] if at.link >= 0 else spec.worldbody
-        body.add_site(name=names[-1], pos=at.frame.position, quat=at.frame.quaternion)
-    spec.add_equality(
-        type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE, name1=names[0], name2=names[1]
-    )
+    """Equality constraints between sites: with a body and an anchor they would close where coordinates are zero."""
+    for names, point in zip(closed.sites(number), closed.points, strict=True):
+        for name, at in zip(names, (closed.a, closed.b), strict=True):
+            body = bodies[at.link] if at.link >= 0 else spec.worldbody
+            place = at.frame.position + at.frame.rotation @ point
+            body.add_site(name=name, pos=place, quat=at.frame.quaternion)
+        spec.add_equality(
+            type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE, name1=names[0], name2=names[1]
+        )
 
 
 def _couple(spec: mujoco.MjSpec, coupling: MujocoCoupling) -> None:

@@ -125,6 +125,21 @@ def test_four_pins_have_the_same_motion_in_three_codes() -> None:
             assert np.abs((load - theirs.loads[each])[:, [2, 3, 4]]).max() <= of_load * 10.0
 
 
+def test_mujoco_keeps_pins_softly() -> None:
+    """Two points on the axis: the motion opens by its softness, and loads act with the same signs at the same point."""
+    pytest.importorskip("mujoco")
+    scene, run = starts.closed(pinned(0.3, 0.8, 0.7, 1.0, (1.0, -0.43, 1.8))), Run(np.linspace(0.0, 0.2, 3))
+    assert engine("mujoco").supports(scene).kind == "surrogate"
+    mine = engine("native").compile(scene).simulate(run, Effort("tolerance", 1e-9, "dop853"))
+    theirs = engine("mujoco").compile(scene).simulate(run, Effort("step", 5e-4, "RK4"))
+    assert np.abs(mine.markers["joint"].position - theirs.markers["joint"].position).max() <= 2e-4
+    known = [2, 3, 4]
+    assert np.allclose(mine.loads["loop"][-1, known], theirs.loads["loop"][-1, known], atol=2e-3)
+    weld = msgspec.structs.replace(scene.closures[0], type="weld")
+    refused = engine("mujoco").supports(msgspec.structs.replace(scene, closures=(weld,)))
+    assert refused.kind == "no" and "of type weld" in refused.reason
+
+
 def test_rows_that_only_seem_redundant_are_told() -> None:
     """A rhombus that is folded flat at the start, where one row more is redundant than elsewhere."""
     pytest.importorskip("exudyn")
