@@ -10,12 +10,6 @@ from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 @kernel
 def factorise(t, y, scene, c, w):
     """Factors to w, with the functions of time of `scene` and the free speeds of c; returns a status code."""
-    return factorise_at(t, y, scene, c, w)
-
-
-@helper
-def factorise_at(t, y, scene, c, w):
-    """`factorise` as a part of other kernels."""
     load_state(t, y, scene, w)
     return OK if innovations.factorise(c, w) else NOT_POSITIVE_DEFINITE
 

@@ -19,7 +19,9 @@ import numpy as np
 
 from flexmb.entry import factorisation
 from flexmb.entry.tangent import TangentWorkspace, tangent_workspace
+from flexmb.jain import innovations
 from flexmb.jain.response import Response, response
+from flexmb.jain.sweeps import inward
 from flexmb.jit.bundle import bundle
 from flexmb.jit.complex_numbers import COMPLEX
 from flexmb.jit.duals import rate, seeded
@@ -28,6 +30,7 @@ from flexmb.jit.wide_arrays import as_complex
 from flexmb.motion.coordinates import configuration_rate, hinge_forces, load_state
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.features import ARMATURES
+from flexmb.tables.one_buffer import in_one_buffer, places
 from flexmb.tables.status import NOT_CONVERGED, OK
 from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real
@@ -67,6 +70,8 @@ class Shifted:
     c: ShiftedConstants
     w: ShiftedWorkspace
     x: ShiftedResponse
+    numbers: Real  # of w, all of them
+    place: Index  # (n,) in these, of the real part of each number of `StiffPart.plain`
 
 
 @bundle
@@ -75,6 +80,9 @@ class StiffPart:
 
     scene: Constants
     tangent: TangentWorkspace
+    plain: Workspace  # with the configuration and M_m of every body, which are real
+    numbers: Real  # of this workspace, all of them
+    place: Index  # (n,) in these, of each number
     first: Shifted
     second: Shifted
     time: Real  # (1,) s
@@ -96,18 +104,26 @@ def stiff_part(c: Constants, nq: int, nu: int) -> StiffPart:
     for body in c.body:
         hinged[body["u_index"] : body["u_index"] + body["nv"]] = 1
     hinged[c.speed["prescribed"] >= 0] = 0
+    plain, numbers = in_one_buffer(workspace(c, nq, nu))
+    place = places(plain, numbers, plain)
+    first, second = (_shifted(c, plain) for _ in range(2))
     return StiffPart(
-        scene=c, tangent=tangent_workspace(c, nq, nu), first=_shifted(c, nq, nu), second=_shifted(c, nq, nu),
-        time=np.zeros(1), state=np.zeros(nq + nu + 1), stiffness=np.zeros(nu), damping=np.zeros(nu), hinged=hinged,
+        scene=c, tangent=tangent_workspace(c, nq, nu), plain=plain, numbers=numbers, place=place, first=first,
+        second=second, time=np.zeros(1), state=np.zeros(nq + nu + 1), stiffness=np.zeros(nu), damping=np.zeros(nu),
+        hinged=hinged,
     )  # fmt: skip
 
 
-def _shifted(c: Constants, nq: int, nu: int) -> Shifted:
-    tables, answers = workspace(c, nq, nu), response(c)
+def _shifted(c: Constants, plain: Workspace) -> Shifted:
+    answers = response(c)
+    w = ShiftedWorkspace(**{field.name: as_complex(getattr(plain, field.name)) for field in fields(plain)})
+    w, numbers = in_one_buffer(w)
     return Shifted(
         c=ShiftedConstants(**{field.name: as_complex(getattr(c, field.name)) for field in fields(c)}),
-        w=ShiftedWorkspace(**{field.name: as_complex(getattr(tables, field.name)) for field in fields(tables)}),
+        w=w,
         x=ShiftedResponse(**{field.name: as_complex(getattr(answers, field.name)) for field in fields(answers)}),
+        numbers=numbers,
+        place=places(w, numbers, plain),
     )
 
 
@@ -128,6 +144,8 @@ def settle_at(t, y, s):
     for j in range(w.u.shape[0]):
         s.stiffness[j] = -rate(w.speed[j].applied, BY_COORDINATES) if s.hinged[j] == 1 else 0.0
         s.damping[j] = -rate(w.speed[j].applied, BY_SPEEDS) if s.hinged[j] == 1 else 0.0
+    load_state(t, s.state, c, s.plain)
+    innovations.inertias(c, s.plain)
     return OK
 
 
@@ -142,17 +160,21 @@ def shift(a, b, second, s):
 
 @helper
 def _factorise(a, b, s, m):
-    """NOT_CONVERGED where E has no factors: a shorter step may have."""
+    """NOT_CONVERGED where E has no factors: a shorter step may have.
+
+    The masses, which are real, are those that `settle_at` has left: complex numbers begin with the elimination.
+    """
     c = s.scene
+    for i in range(m.place.shape[0]):
+        m.numbers[m.place[i]] = s.numbers[s.place[i]]
+        m.numbers[m.place[i] + 1] = 0.0
     for k in range(c.body.shape[0]):
         for n in range(c.body[k].modes):
             for i in range(c.body[k].modes):
-                m.c.mff[k, n, i] = c.mff[k, n, i] + a * c.damping[k, n, i] + b * c.stiffness[k, n, i]
+                m.w.pff[k, n, i] += a * c.damping[k, n, i] + b * c.stiffness[k, n, i]
     for j in range(c.speed.shape[0]):
         m.c.speed[j].armature = c.speed[j].armature + a * s.damping[j] + b * s.stiffness[j]
-    m.w.displaced[0] = 1
-    status = factorisation.factorise_at(s.time[0], s.state, c, m.c, m.w)
-    return OK if status == OK else NOT_CONVERGED
+    return OK if inward(m.c, m.w) else NOT_CONVERGED
 
 
 @kernel

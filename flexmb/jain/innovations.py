@@ -27,7 +27,7 @@ from flexmb.jain.ports import mode_motion
 from flexmb.jain.response import port_response
 from flexmb.jain.sweeps import inward
 from flexmb.jain.wheels import spin_axis, wheel_forces
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, kernel
 from flexmb.levels.body import body_inertia
 from flexmb.spatial.spatial_vector import axpy6, dot6, less6, shift_force, store6, vec6
 from flexmb.spatial.vector import dot, scale, vec3
@@ -36,6 +36,13 @@ from flexmb.spatial.vector import dot, scale, vec3
 @helper
 def factorise(c, w):
     """Factors of M at the configuration in w.q; False where a D is not positive definite: w.fault names the body."""
+    inertias(c, w)
+    return inward(c, w)
+
+
+@kernel
+def inertias(c, w):
+    """M_m of every body at the configuration in w.q, before any elimination."""
     for j in range(w.u.shape[0]):  # the sweeps also eliminate bias forces, which are unwanted here
         w.u[j] = 0.0
         w.speed[j].applied = 0.0
@@ -43,7 +50,6 @@ def factorise(c, w):
     for k in range(c.body.shape[0]):
         body_inertia(c, w, k)
         wheel_forces(c, w, k)
-    return inward(c, w)
 
 
 @helper
