@@ -14,7 +14,16 @@ from flexmb.tables.features import LEVEL
 LEVELS: tuple[FidelityLevel, ...] = tuple(module.LEVEL for module in (rigid, ruthless, linear, full, stiffened, exact))
 BY_NAME = {level.name: level for level in LEVELS}
 
+
+@helper
+def _no_inertia(c, w, k):
+    """What a level without inertia points has of them."""
+
+
 _inertia_and_bias = numbered("inertia_and_bias", LEVEL, [level.inertia_and_bias for level in LEVELS])
+_of_points = numbered(
+    "of_points", LEVEL, [_no_inertia if level.by_strain else level.inertia_and_bias for level in LEVELS]
+)
 _without_masses = numbered("without_masses", LEVEL, [level.without_masses for level in LEVELS])
 AT_REST = f"{LEVEL} {[level.at_rest for level in LEVELS].index(True)}"
 """The feature of scenes that contain bodies with the kinematics of their undeformed shape."""
@@ -29,6 +38,12 @@ _AT_REST = np.array([level.at_rest for level in LEVELS])
 def body_inertia(c, w, k):
     """M_m and b_m of body k at its level."""
     _inertia_and_bias(c, c.body[k].level, c, w, k)
+
+
+@helper
+def inertia_of_points(c, w, k):
+    """The same, of a body whose inertia is that of its inertia points; nothing where it is that of its sections."""
+    _of_points(c, c.body[k].level, c, w, k)
 
 
 @helper

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import kernel
 from flexmb.levels import full
 from flexmb.levels.level import FidelityLevel, InertiaTables, six
 from flexmb.levels.masses import modal_masses
@@ -18,7 +18,7 @@ from flexmb.modal.integrals import TurningPoints, modal_integrals
 from flexmb.typing import Real
 
 
-@helper
+@kernel
 def inertia_and_bias(c, w, k):
     """The sum over all points of body k, after modal masses that are zero unless a matrix was added to them."""
     modal_masses(c, w, k)

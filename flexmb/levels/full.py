@@ -7,7 +7,7 @@ evaluation needs no sum over these points. Points with turning inertia, or with 
 
 import numpy as np
 
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.strips import ROW, put, put_across, strip, width
 from flexmb.levels.affine_integrals import axial_vector, columns_of, sum_integrals, symmetric_part, table_of_products
 from flexmb.levels.level import FidelityLevel, InertiaTables, six
@@ -34,7 +34,7 @@ from flexmb.spatial.vector import (
 )
 
 
-@helper
+@kernel
 def inertia_and_bias(c, w, k):
     """Modal masses, then coupling and bias of the polynomial part, then the summed points."""
     modal_masses(c, w, k)

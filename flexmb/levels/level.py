@@ -37,7 +37,7 @@ class InertiaTables:
 
 @dataclass(frozen=True, eq=False)
 class FidelityLevel:
-    """One fidelity level. `inertia_and_bias(c, w, k)` is its kernel, see `flexmb.levels`.
+    """One fidelity level. `inertia_and_bias(c, w, k)` is its kernel, see `flexmb.levels`; a helper where it is short.
 
     `tables(model, wheels)` computes the tables of a body, whose last `wheels` points are its despun wheels.
     `without_masses` is the kernel for bodies whose modes are condensed. It omits what is constant at this level and in

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, kernel
 from flexmb.levels.level import FidelityLevel, InertiaTables, six, sixes
 from flexmb.levels.summed_point import add_point
 from flexmb.modal.first_order import FirstOrder, first_order
@@ -29,7 +29,7 @@ from flexmb.spatial.vector import add, axpy, cross, dot, scale, store3, sub, sym
 from flexmb.tables.arrays import SLOPE
 
 
-@helper
+@kernel
 def inertia_and_bias(c, w, k):
     """The body's first-order tables at eta and etadot, then its wheels."""
     nm = c.body[k].modes

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, kernel
 from flexmb.levels import full
 from flexmb.levels.level import FidelityLevel, InertiaTables
 from flexmb.levels.summed_point import add_point
@@ -25,7 +25,7 @@ from flexmb.spatial.spatial_vector import ZERO6, add6, store6
 from flexmb.spatial.vector import add, add3, axpy, cross, dot, scale, store3, vec3
 
 
-@helper
+@kernel
 def inertia_and_bias(c, w, k):
     """The sum over all points of body k."""
     zero = (0.0, 0.0, 0.0)

@@ -8,6 +8,7 @@ what it does: a line after every use, and where there is none for some seconds, 
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import logging
 import multiprocessing
@@ -162,12 +163,14 @@ def _use(name: str) -> Used:
     from flexmb.ready.uses import uses
 
     start, trouble = perf_counter(), ""
+    gc.disable()  # a compiler's objects live on or die by themselves: circles among millions are sought between uses
     logging.getLogger("flexmb.jit").setLevel(logging.ERROR)  # no messages that kernels are being compiled
     progress.spent.clear()
     try:
         dict(uses())[name]()
     except Exception:
         trouble = f"\n{traceback.format_exc()}"
+    gc.collect()
     return Used(name, perf_counter() - start, trouble, dict(progress.spent))
 
 

@@ -18,7 +18,7 @@ from flexmb.jit.kernel import helper, sweep
 from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import put, strip, width
 from flexmb.levels import exact, full
-from flexmb.levels.body import LEVELS, body_inertia, is_at_rest
+from flexmb.levels.body import LEVELS, inertia_of_points, is_at_rest
 from flexmb.levels.section_motion import move_sections
 from flexmb.spatial.inertia import inertia_times, load_inertia, rotate_inertia, shift_inertia, store_inertia
 from flexmb.spatial.rows import column3, put3, store_column3, strips3
@@ -75,7 +75,10 @@ def _in_floats(c, w, d, k, V, A):
         put(e, e.etad[k], n, strip(w, w.etad[k], n))
     if has(c, SECTIONS):
         move_sections(c, e, k)
-    body_inertia(c, e, k)
+    if has(c, FULL) and c.body[k].level == FULL_NUMBER:
+        full.inertia_and_bias(c, e, k)
+    elif has(c, EXACT):
+        exact.inertia_and_bias(c, e, k)
     _force(c, w, e, k, A)
 
 
@@ -110,7 +113,7 @@ def _along(c, w, d, k, A, start, stop):
             mode = first - 3 if first < 3 + nm else first - 3 - nm
             strained_force(c, e, k, A, (max(mode, 0), mode + count if first >= 3 else 0))
         else:
-            body_inertia(c, e, k)
+            inertia_of_points(c, e, k)
             _force(c, w, e, k, A)
         for lane in range(count):
             _keep(c, w, d, k, first + lane, lane)
