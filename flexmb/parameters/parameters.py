@@ -41,6 +41,8 @@ from flexmb.parameters.tables import (
     wholes,
 )
 from flexmb.parameters.together import derivatives_together
+from flexmb.scene.bodies import BeamBody
+from flexmb.scene.pieces import cuts
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
@@ -296,6 +298,15 @@ _OF_TABLES = {
 """Tables whose contents change at some numbers, and what that means."""
 
 
+def _or_whole(number: Number) -> str:
+    """The other remedy for a place on a beam that is cut: how its modes change with a cut is known to fewer digits."""
+    if number.name.endswith((".x_m", ".length_m")):
+        for body in number.own_scene.bodies:
+            if number.name.startswith(f"{body.name}.") and isinstance(body, BeamBody) and cuts(body):
+                return f'; or leave beam "{body.name}" in one piece by cuts = []'
+    return ""
+
+
 class _Differentiation:
     """The tables of a scene as functions of each of its numbers."""
 
@@ -337,6 +348,7 @@ class _Differentiation:
             raise ParameterError(
                 f'parameter "{number.name}" = {number.value:g}: the motion has no derivative by it ({error}); take a '
                 "value at which nothing appears, vanishes or changes its order, or another parameter"
+                f"{_or_whole(number)}"
             ) from None
 
     def by_all(self, chosen: Sequence[Number], known: Mapping[str, Derivative]) -> list[Derivative]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 import flexmb
+from flexmb.parameters import spectral
 from flexmb.parameters.parameters import ParameterError
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import TipMass
@@ -84,3 +86,23 @@ def test_what_appears_or_vanishes_is_refused():
     assert system.parameters(["panel.points.0.mass_kg"]).errors[0] < 1e-9
     with pytest.raises(ParameterError, match=r"what the tables contain depends on it.*take a value at which"):
         system.parameters(["panel.points.0.inertia_kg_m2.0.0"])
+
+
+def test_the_place_of_a_cut_names_the_remedy(monkeypatch):
+    """Of a beam of level exact that is cut where a bob hangs; modes are known to no digits here."""
+    monkeypatch.setattr(spectral, "LARGEST", -1.0)
+
+    def said(cuts: tuple[str, ...] | None) -> str:
+        builder = SceneBuilder("frame", gravity=(0.0, 0.0, -9.81))
+        modes = s.Modes(count=0, polynomials=s.StrainPolynomials(torsion=2, bending_y=2, bending_z=2), cuts=cuts)
+        builder.beam("stem", length=2.0, elements=12, section=SQUARE, level="exact", nodes={"port": 0.8}, modes=modes)
+        builder.rigid_body("bob", mass=1.0, com=(0.0, 0.1, 0.0), inertia=(0.1, 0.1, 0.1))
+        builder.weld("clamp", "ground", "stem")
+        builder.revolute("pin", "stem", "bob", axis=(0.0, 0.0, 1.0), parent_node="port")
+        system = flexmb.compile(replace(builder.scene(), allow=("uncut_beam",)))
+        with pytest.raises(ParameterError) as refused:
+            system.parameters(["stem.nodes.port.x_m"])
+        return str(refused.value)
+
+    assert 'leave beam "stem" in one piece by cuts = []' in said(None)
+    assert "cuts" not in said(())
