@@ -3,6 +3,8 @@
 Refinement finds a known boundary to one of the finest cells; no number that is none puts one where the theory has it.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable
 from dataclasses import replace
