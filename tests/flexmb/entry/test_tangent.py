@@ -1,7 +1,7 @@
-"""Derivatives by dual numbers, where random trees do not come: what is prescribed, springs at rest, time, failures.
+"""Derivatives by dual numbers against differences, and where random trees do not come: springs at rest, time, failures.
 
 On random trees they are those of the recursion (test_derivatives.py), which are held against the dense route's complex
-step and against differences in tests/flexmb/system/test_derivatives.py.
+step in tests/flexmb/system/test_derivatives.py.
 """
 
 from __future__ import annotations
@@ -91,6 +91,27 @@ def rounding_of_limit(levels: int = 6) -> float:
     """The most by which rounding of f moves the limit, in units of that over the smallest step, h / 2^(levels - 1)."""
     return float(np.sum(np.abs(extrapolated(lambda h: np.where(STEPS[:levels] == abs(h), h, 0.0), 1.0, levels)[0]
                                / STEPS[:levels] * STEPS[levels - 1])))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("recipe", "seed"), [(trees.EVERY_LEVEL, 0), (trees.EVERY_LEVEL, 1), (trees.STIFFENED, 2), (trees.EXACT, 0)]
+)
+def test_every_level_hinge_and_row_against_differences(recipe, seed):
+    """Whole columns, also of qdot and of the work's rate, up to what rounding of the right side leaves of differences.
+
+    A solution rounds as cond(M) u, a rate of a coordinate as few u; the smallest step divides both.
+    """
+    found, h = linearised(trees.random_scene(seed, recipe)), 1e-2
+    system, nq = found.system, found.system.nq
+    free = system.constants.speed["prescribed"] < 0
+    M = system.mass_matrix(flexmb.State(found.y[:nq], found.y[nq:-1]))[np.ix_(free, free)]
+    noise = np.full(len(found.y), np.linalg.cond(M, np.inf) * np.max(np.abs(found.dy)))
+    noise[:nq] = 10.0 * max(1.0, np.max(np.abs(found.y)))
+    noise *= 2.0 * UNIT_ROUNDOFF / (h / 2**5)
+    for j in range(len(found.y)):
+        unit = np.eye(len(found.y))[j]
+        expected, doubt = extrapolated(lambda h, unit=unit: right_side(system, 0.0, found.y + h * unit), h)
+        assert np.all(np.abs(found.J[:, j] - expected) <= 30.0 * doubt + noise), j
 
 
 def test_what_is_prescribed_does_not_depend_on_the_state():

@@ -9,7 +9,6 @@ import msgspec
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import flexmb
 from flexmb.dense.jets import Jet
@@ -320,15 +319,6 @@ def _between(first: s.BeamStation, last: s.BeamStation) -> s.BeamStation:
 
     names = s.BeamStation.__struct_fields__
     return s.BeamStation(**{name: mean(getattr(first, name), getattr(last, name)) for name in names})
-
-
-def elastica(P: float) -> tuple[float, float]:
-    """Tip of a cantilever of length and EI 1 under a tip force P across it, in closed form by elliptic integrals."""
-    k = brentq(lambda k: ellipk(k * k) - ellipkinc(np.arcsin(1.0 / (k * np.sqrt(2.0))), k * k) - np.sqrt(P),
-               np.sqrt(0.5) + 1e-12, 1.0 - 1e-14, xtol=1e-16)  # fmt: skip
-    phi = np.arcsin(1.0 / (k * np.sqrt(2.0)))
-    y = 1.0 - 2.0 / np.sqrt(P) * (ellipe(k * k) - ellipeinc(phi, k * k))
-    return float(np.sqrt(2.0 * (2.0 * k * k - 1.0) / P)), float(y)
 
 
 def test_hung_by_its_tip_it_moves_alike():

@@ -234,6 +234,29 @@ def test_statics_are_exact_with_any_number_of_modes(count: int) -> None:
         np.testing.assert_allclose([found.torsion[i], *found.bending[i]], moment, atol=1e-8)
 
 
+def test_stresses_of_a_bent_pulled_and_twisted_beam() -> None:
+    """sigma = N/A + M c/I: the side toward which the force lifts the tip is compressed; and T r / J."""
+    pull, lift, twist, c = 0.1, 1e-3, 2e-3, 0.01
+    scene = (
+        fm.SceneBuilder("cantilever")
+        .beam("beam", length=LENGTH, elements=4, section=SECTION, modes=fm.Modes(count=0, static=True))
+        .weld("clamp", "ground", "beam")
+        .force("pull", "beam", node="tip", direction=(1, 0, 0), function=fm.Constant(value=pull))
+        .force("lift", "beam", node="tip", direction=(0, 1, 0), function=fm.Constant(value=lift))
+        .torque("twist", "beam", node="tip", direction=(1, 0, 0), function=fm.Constant(value=twist))
+        .scene()
+    )
+    system = fm.compile(scene)
+    found = system.section_loads(fm.equilibrium(system), "beam", [0.0, 1.0])
+    bent = 2e-3  # what the deflection changes: it takes pull * deflection from lift * arm
+    moment = lift * np.array([2.0, 1.0])
+    for y, sign in ((0.0, 0.0), (c, -1.0), (-c, 1.0)):
+        expected = pull / AREA + sign * moment * c / IZ
+        np.testing.assert_allclose(found.normal_stress(E, y=y, z=0.0), expected, rtol=bent)
+    GJ = scene.bodies[0].stations[0].GJ_Nm2
+    np.testing.assert_allclose(found.torsion_stress(2.7e10, 0.02), 2.7e10 * 0.02 * twist / GJ, rtol=bent)
+
+
 @pytest.mark.parametrize("theory", ["timoshenko", "euler-bernoulli"])
 def test_strains_and_stresses_of_a_coupled_section(theory: Any) -> None:
     """A tip load on a uniform cantilever: compliance times the load of the section, and the strain of a fibre."""
