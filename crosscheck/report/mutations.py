@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from flexmb.scene.reading import read_bytes
+from flexmb.scene.reading import read_text
 
 FILE = "mutation.json"
 _Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
@@ -83,7 +83,7 @@ def read_scores(out: Path) -> Scores:
     if not file.is_file():
         return Scores()
     try:
-        found = msgspec.json.decode(read_bytes(file), type=_File)
+        found = msgspec.json.decode(read_text(file), type=_File)
     except (ValueError, OSError, RecursionError) as error:
         return Scores(error=f"{FILE} cannot be read: {error}")
     cases = {each.case: _score(each) for each in found.cases}

@@ -155,6 +155,8 @@ def test_mutation_scores_are_shown(tmp_path: Path) -> None:
     (tmp_path / FILE).write_text("{", encoding="utf-8")
     write_all(tmp_path / "records.jsonl", tmp_path)
     assert "mutation.json cannot be read" in index.read_text(encoding="utf-8")
+    (tmp_path / FILE).write_bytes(b'{"cases": [], "\xc0": 1}')  # in a part that nothing reads
+    assert "not UTF-8" in read_scores(tmp_path).error
     assert read_scores(tmp_path / "nowhere").cases == {}
 
 
