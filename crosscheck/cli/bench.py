@@ -54,8 +54,8 @@ def bench(
     if not 0.0 < accuracy < inf:
         common.refuse(f"--accuracy {accuracy:g}: give a positive number such as 1e-4")
     chosen = common.asked(cases, engine or (), variant or (), time_limit)
+    from crosscheck.terminal.listings import print_bench
     from crosscheck.terminal.progress import LiveProgress
-    from crosscheck.terminal.timings import print_bench
     from crosscheck.timing.bench import bench as bench_case
     from crosscheck.timing.benchmark_json import MISSING, available, benchmark_document
 

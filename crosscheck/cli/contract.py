@@ -12,7 +12,7 @@ import typer
 
 from crosscheck.cli import common
 from crosscheck.cli.common import app, console, print_json, verbosity
-from crosscheck.conformance.limit import CLAUSE_LIMIT_S
+from crosscheck.conformance import CLAUSE_LIMIT_S
 from flexmb.scene.problems import closest
 
 

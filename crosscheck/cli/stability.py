@@ -46,7 +46,7 @@ def stability(
     from crosscheck.stability.run import PROVIDER, maps_of
     from crosscheck.stability.verdict_file import VERDICTS
     from crosscheck.terminal.listings import maps_table
-    from crosscheck.terminal.map_runs import run_and_draw
+    from crosscheck.terminal.many_runs import run_and_draw
 
     common.check_limit(time_limit)
     known = maps_of(PROVIDER)

@@ -39,7 +39,7 @@ def sweep_parameters(
 
     from crosscheck.sampling.run import SUMMARY, run_sweep
     from crosscheck.sampling.statistics import summarise
-    from crosscheck.terminal.sampling import print_summary, sampling_bar
+    from crosscheck.terminal.many_runs import print_summary, sampling_bar
 
     common.check_limit(time_limit)
     with common.sole_writer(out):

@@ -8,15 +8,38 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from crosscheck.conformance.contents import to_offer
-from crosscheck.conformance.digits import told_apart
 from crosscheck.conformance.scenes import simple_scenes
 from crosscheck.engines.answers import checked_precision
 from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import UNIT_ROUNDOFF, Effort, Engine, Model, Run, Snapshot, Trajectory
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
+
+LEAST, MOST = 3, 17  # significant digits; 17 tell any two floating-point numbers apart
+
+
+def told_apart(first: ArrayLike, second: ArrayLike, allowed: ArrayLike = 0.0) -> tuple[str, str]:
+    """Both in the same number of significant digits, from three: the least that shows every difference of components
+    by more than `allowed`.
+
+    Of arrays of different shapes each has three.
+    """
+    a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    if a.shape != b.shape:
+        return _shown(a, LEAST), _shown(b, LEAST)
+    differ = ~(np.abs(a - b) <= allowed) & ~(np.isnan(a) & np.isnan(b))
+    pairs = [(float(x), float(y)) for x, y in zip(a[differ].flat, b[differ].flat, strict=True)]
+    digits = next((n for n in range(LEAST, MOST) if all(f"{x:.{n}g}" != f"{y:.{n}g}" for x, y in pairs)), MOST)
+    return _shown(a, digits), _shown(b, digits)
+
+
+def _shown(values: np.ndarray, digits: int) -> str:
+    text = [f"{float(each):.{digits}g}" for each in values.flat]
+    return f"[{' '.join(text)}]" if values.ndim else text[0]
+
 
 # Pointwise results need one linear solve. Minimal coordinates have errors of about 1e-14, redundant ones with
 # Euler parameters of about 1e-11. A wrong sign or frame changes the first digit.

@@ -16,9 +16,9 @@ from multiprocessing import get_all_start_methods, get_context
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from crosscheck.conformance import CLAUSE_LIMIT_S
 from crosscheck.conformance.catalogue import CLAUSES, SHOWN
 from crosscheck.conformance.clause import Clause, ClauseBroken, NotOffered
-from crosscheck.conformance.limit import CLAUSE_LIMIT_S
 from crosscheck.engines.answers import BrokenContract, checked_precision, clean, describe
 from crosscheck.engines.contract import Engine, EngineMissing, Precision
 from crosscheck.engines.registry import PROVIDER, NoSuchEngine, find_engine

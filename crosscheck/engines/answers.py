@@ -31,7 +31,7 @@ from crosscheck.engines.contract import (
 )
 from crosscheck.engines.extremes import fault as fault_of_extremes
 from crosscheck.engines.extremes import has_extremes
-from crosscheck.engines.linear.answer import fault as fault_of_linear
+from crosscheck.engines.linear.outputs import fault as fault_of_linear
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.trajectories import first_samples
 from flexmb.run.channels import channels_of

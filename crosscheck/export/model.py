@@ -2,7 +2,7 @@
 
 Everything is by name and in SI. What a scene leaves to the reader of its schema is written out here: every joint is a
 list of turns, slides, ball joints and free flights between two frames, wheels and point masses are bodies with a joint
-of their own, and a beam is its modes and inertia points (`crosscheck.export.modal`). docs/export.md explains each key.
+of their own, and a beam is its modes and inertia points (`modal_data`). docs/export.md explains each key.
 """
 
 from __future__ import annotations
@@ -13,16 +13,18 @@ import msgspec
 import numpy as np
 
 from crosscheck.engines.conventions import rotation_matrix
-from crosscheck.export.modal import modal_data
 from crosscheck.library.case_error import CaseError
 from flexmb.modal.flexible import flexible_model
+from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, SecondOrder
+from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, SidBody, Vector
 from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import Hinge
-from flexmb.scene.schema import PointMass, Scene, Wheel
+from flexmb.scene.schema import Level, PointMass, Scene, Wheel
 from flexmb.scene.tree import ordered, rest_frames
 from flexmb.surrogate.lumping import rigid_equivalent
+from flexmb.typing import Real
 
 FORMAT = "crosscheck export 1"
 AS_IN_THE_SCENE = ("closures", "connectors", "sensors", "controllers", "events")
@@ -180,3 +182,42 @@ def _function(function: Function | None) -> Any:
 
 def _plain(item: Any) -> Any:
     return msgspec.to_builtins(item)
+
+
+INTEGRALS = ("s0", "s1", "J0", "J1", "J2", "C0", "C1", "M_ff", "spatial_mass")
+
+
+def modal_data(model: FlexibleModel, level: Level) -> dict[str, Any]:
+    """The content of `modal/<body>.json`: arrays of n points and m modes, in the order of `FlexibleModel`."""
+    integrals = modal_integrals(model)
+    points = {
+        "mass_kg": model.mass, "position_m": model.position, "translation_modes": model.translation,
+        "rotation_modes": model.rotation, "mass_centre_offset_m": model.com_offset, "inertia_kg_m2": model.inertia,
+    }  # fmt: skip
+    return {
+        "level": level,
+        "clamped": model.clamped,
+        "modes": model.mode_count,
+        "stiffness": _listed(model.stiffness),
+        "damping": _listed(model.damping),
+        "points": {name: _listed(values) for name, values in points.items()} | _field(model.second),
+        "nodes": {name: _node(node) for name, node in model.nodes.items()},
+        "integrals": {"mass": integrals.mass} | {name: _listed(getattr(integrals, name)) for name in INTEGRALS},
+    }
+
+
+def _node(node: FlexibleNode) -> dict[str, Any]:
+    return {
+        "position_m": _listed(node.position), "rotation": _listed(node.rotation),
+        "translation_modes": _listed(node.translation), "rotation_modes": _listed(node.rotation_modes),
+    } | _field(node.second)  # fmt: skip
+
+
+def _field(second: SecondOrder | None) -> dict[str, Any]:
+    if second is None:
+        return {}
+    return {"second_translation": _listed(second.translation), "second_rotation": _listed(second.rotation)}
+
+
+def _listed(values: Real) -> Any:
+    return np.asarray(values, dtype=float).tolist()

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 
 from crosscheck.export.formats.written import Written
+from crosscheck.export.metadata import COLLECTION, LICENCE, cite
 from crosscheck.library.basis import basis
-from crosscheck.library.cite import COLLECTION, LICENCE, cite
 from crosscheck.library.find import Case
 from crosscheck.library.reference import StoredReference
 

@@ -22,8 +22,8 @@ from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, not_de
 from crosscheck.library.case import ComparisonSide
 from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import StoredReference
+from crosscheck.records.kinds import RecordedReference, ReferenceGoals
 from crosscheck.records.packing import unpack
-from crosscheck.records.recorded_reference import RecordedReference, ReferenceGoals
 from flexmb.kept import kept
 from flexmb.typing import Real
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from crosscheck.engines.registry import BUILT_IN
 from crosscheck.judging.applicable import Inapplicable, set_apart
 from crosscheck.judging.case_verdicts import judge
-from crosscheck.judging.claims import idle_claims
 from crosscheck.judging.figures import recordable
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.unjudged import Unjudged, unjudged
 from crosscheck.judging.verdict import Verdict
+from crosscheck.library.claims import ClaimedFailure, ClaimedGoals
 from crosscheck.records.kinds import ENVELOPE, ContractState
 from flexmb.kept import kept
+from flexmb.run.channels import matches
 
 NO_REFERENCE = "has a recipe of a reference, no reference yet: crosscheck regenerate {}"
 FAULTS = ("failed", "crashed", "did not finish")  # of an engine that was asked to run
@@ -304,3 +305,42 @@ def _absences(case: CaseResults) -> list[Absence]:
         if result.status != "finished":
             found.append(Absence(case.case.case, variant, engine, role, result.status, result.message))
     return found
+
+
+def idle_claims(
+    cases: Sequence[CaseResults], verdicts: Mapping[str, Sequence[Verdict]], inapplicable: Iterable[Inapplicable]
+) -> tuple[str, ...]:
+    """Each pattern of channels that names none in any case of its entry, with its place.
+
+    Only entries all of whose cases are in the session are judged, and engines that finished everything there: what the
+    others would offer is not known.
+    """
+    apart = tuple(inapplicable)
+    places: dict[tuple[str, str, str], list[CaseResults]] = {}  # place, engine, pattern
+    for case in cases:
+        claims = case.case.claims
+        named: list[tuple[ClaimedGoals | ClaimedFailure, str]]
+        named = [(each, pattern) for each in claims.goals for pattern in each.goals]
+        named += [(each, pattern) for each in claims.failures for pattern in each.channels]
+        for each, pattern in named:
+            if each.whole:
+                places.setdefault((each.place, each.engine, pattern), []).append(case)
+    found = []
+    for (place, engine, pattern), group in places.items():
+        names = {case.case.case for case in group}
+        judged = [each for name in names for each in verdicts[name] if _judges(each, engine)]
+        known = {each.channel for each in judged}
+        known |= {each.channel for each in apart if each.case in names and each.engine == engine}
+        certain = judged and all(_finished(case, engine) for case in group)
+        if certain and not any(matches(pattern, channel) for channel in known):
+            found.append(f'{place}: "{pattern}" names no channel of {engine} that is judged: correct it')
+    return tuple(found)
+
+
+def _judges(verdict: Verdict, engine: str) -> bool:
+    return verdict.kind != "control" and any(side == engine for _, side in verdict.sides)
+
+
+def _finished(case: CaseResults, engine: str) -> bool:
+    mine = [result for (_, name, role), result in case.results.items() if name == engine and role == "main"]
+    return bool(mine) and all(result.status == "finished" for result in mine)

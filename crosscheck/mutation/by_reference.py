@@ -17,8 +17,8 @@ from crosscheck.judging.verdict import Signal, compare
 from crosscheck.library.patterns import most_specific
 from crosscheck.mutation.score import ShownIn
 from crosscheck.mutation.subject import JudgedVariant
-from crosscheck.records.recorded_reference import ReferenceGoals
-from crosscheck.running.reference_record import recorded_reference
+from crosscheck.records.kinds import ReferenceGoals
+from crosscheck.running.plan import recorded_reference
 from flexmb.kept import kept
 from flexmb.typing import Real
 

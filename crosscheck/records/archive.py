@@ -21,9 +21,8 @@ import msgspec
 from crosscheck.engines.extremes import ROWS, has_extremes, width
 from crosscheck.library.channels import part_of
 from crosscheck.library.check import check_recorded
-from crosscheck.records.kinds import BrokenLine, CaseRecord, Record, RunRecord, Written
+from crosscheck.records.kinds import BrokenLine, CaseRecord, Record, RecordedReference, RunRecord, Written
 from crosscheck.records.packing import Packed, packed_bytes, unpack
-from crosscheck.records.recorded_reference import RecordedReference
 from flexmb.output.whole import whole_file
 from flexmb.output.writing import folder, writing
 from flexmb.scene.reading import MIB, allowance, regular_size

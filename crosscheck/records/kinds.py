@@ -1,4 +1,7 @@
-"""The kinds of records, which are the lines of a records file; the key "record" names the kind."""
+"""The kinds of records, which are the lines of a records file; the key "record" names the kind.
+
+The record of a case holds its stored reference, so that runs can be judged without the case's folder.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,29 @@ from crosscheck.library.case import Provenance, RunFile
 from crosscheck.library.claims import Claims
 from crosscheck.records.drawing import Drawing
 from crosscheck.records.packing import Packed
-from crosscheck.records.recorded_reference import RecordedReference
+
+
+class ReferenceGoals(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Goals and scales of an engine's comparison with the reference, by patterns of channels."""
+
+    goals: dict[str, float]
+    scales: dict[str, float] = {}
+
+
+class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The reference of `variant`: channels (T, k) at `times` (T,), their `uncertainties` (SI), and the engines that are
+    compared with it (`asked`). `routes` say how its numbers were made; older records have none. If the stored files
+    cannot be used, `fault` says why, and there are no arrays.
+    """
+
+    variant: str
+    asked: dict[str, ReferenceGoals]
+    times: Packed | None = None
+    channels: dict[str, Packed] = {}
+    uncertainties: dict[str, float] = {}
+    routes: tuple[str, ...] = ()
+    fault: str = ""
+
 
 ENVELOPE = "envelope"  # the role of a run that is made for its extremes over all steps
 

@@ -28,7 +28,7 @@ RECORDING = (
     "crosscheck.engines.checked",
     "crosscheck.engines.answers",
     "crosscheck.engines.contract",
-    "crosscheck.engines.linear.answer",
+    "crosscheck.engines.linear.outputs",
     "crosscheck.engines.signals",
     "crosscheck.engines.trajectories",
     "crosscheck.records.kinds",

@@ -1,15 +1,21 @@
-"""Writing both files of a reference, or none."""
+"""Both files of a reference: what may change in them, none beyond the stated uncertainty unless its provenance is
+changed as well; and writing both of them, or none.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import tomlkit
 
-from crosscheck.library.reference import KNOWLEDGE, VALUES, Knowledge
+from crosscheck.library.reference import KNOWLEDGE, VALUES, Knowledge, StoredReference
+from crosscheck.references.agreement import Agreed
 from flexmb.output.whole import whole_file, write_whole
+from flexmb.run.channels import distance, unit
 
 HEADER = "Written by `crosscheck regenerate`, with reference.csv; nobody edits it. docs/references.md explains it."
 
@@ -47,3 +53,57 @@ def write_both(folder: Path, values: str, knowledge: str) -> None:
             elif file.read_bytes() != content:
                 write_whole(file, content)
         raise
+
+
+CLOCK = 1e-9  # relative difference of times that are the same
+GROWTH = 100.0  # allowed ratio of uncertainties: at other sample times U may be estimated by a weaker rule
+
+
+def beyond_uncertainty(before: StoredReference, now: Agreed) -> list[str]:
+    """How the reference `now` contradicts what `before` had stated; empty if it confirms it.
+
+    A channel that is gone, an earlier horizon, values farther apart than was stated and an uncertainty that has grown
+    by more than `GROWTH` are contradictions. More channels, samples and digits are not.
+    """
+    return list(_changes(before, now))
+
+
+def largest_share(before: StoredReference, now: Agreed) -> float:
+    """The largest change of a channel that both have, relative to the uncertainty that was stated."""
+    ours, theirs = _shared(before, now)
+    shares = (
+        float(np.max(distance(channel, now.channels[channel][ours], before.channels[channel][theirs]), initial=0.0))
+        / before.knowledge.channels[channel].uncertainty
+        for channel in now.channels
+        if channel in before.channels
+    )
+    return max(shares, default=0.0)
+
+
+def _changes(before: StoredReference, now: Agreed) -> Iterator[str]:
+    if now.times[-1] < before.times[-1] * (1.0 - CLOCK):
+        yield f"the horizon is {now.times[-1]:g} s, it was {before.times[-1]:g} s"
+    ours, theirs = _shared(before, now)
+    if not len(ours):
+        yield "none of its times is one of before"
+        return
+    for channel, rows in before.channels.items():
+        stated, symbol = before.knowledge.channels[channel].uncertainty, unit(channel)
+        if channel not in now.channels or now.channels[channel].shape[1] != rows.shape[1]:
+            yield f"{channel} is not there any more"
+            continue
+        apart = distance(channel, now.channels[channel][ours], rows[theirs])
+        worst = int(np.argmax(apart))
+        if not apart[worst] <= stated:
+            when = before.times[theirs][worst]
+            yield f"{channel} differs by {apart[worst]:.3g} {symbol} at t = {when:.6g} s, stated was {stated:.2g}"
+        grown = now.known[channel].uncertainty
+        if not grown <= GROWTH * stated:
+            yield f"{channel} is known to {grown:.2g} {symbol}, stated in {KNOWLEDGE} was {stated:.2g}"
+
+
+def _shared(before: StoredReference, now: Agreed) -> tuple[np.ndarray, np.ndarray]:
+    """The places of the times that both have, in `now` and in `before`."""
+    nearest = np.argmin(np.abs(before.times[None, :] - now.times[:, None]), axis=1)
+    same = np.abs(before.times[nearest] - now.times) <= CLOCK * before.times[-1]
+    return np.flatnonzero(same), nearest[same]

@@ -24,8 +24,7 @@ from crosscheck.library.reference import (
 )
 from crosscheck.references.agreement import Agreed, agree
 from crosscheck.references.anchors import meet
-from crosscheck.references.change import beyond_uncertainty, largest_share
-from crosscheck.references.files import knowledge_text, write_both
+from crosscheck.references.files import beyond_uncertainty, knowledge_text, largest_share, write_both
 from crosscheck.references.routes import RouteSignals, run_routes
 from crosscheck.running.plan import sample_times
 from crosscheck.running.pool import run_jobs

@@ -3,23 +3,28 @@
 verdicts.json, report/, summary.md, junit.xml, results.json, the badge and, of sessions with envelopes, envelope.csv.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from crosscheck.judging.outcome import SessionOutcome, conclude
-from crosscheck.judging.results import collect
+from crosscheck.judging.results import Session, collect
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import Record
+from crosscheck.records.machine import environment
 from crosscheck.records.session import standing
 from crosscheck.report.ci import VERDICTS, write_summary, write_verdicts
 from crosscheck.report.junit import write_junit
 from crosscheck.report.mutations import read_scores
+from crosscheck.report.peaks import FILE as ENVELOPES
 from crosscheck.report.peaks import write_envelope
-from crosscheck.report.site import Material, write_single, write_site
-from crosscheck.report.unfinished import mark_unfinished
+from crosscheck.report.site import Material, write_single, write_site, write_unfinished
 from crosscheck.sealed.badge import write_badges
 from crosscheck.sealed.document import results_of
 from crosscheck.sealed.seal import write_results
+from flexmb.output.whole import clear_parts, take_away
+from flexmb.output.writing import folder
 
 __all__ = ["Choice", "SessionOutcome", "mark_unfinished", "write_all"]
 
@@ -46,3 +51,22 @@ def write_all(
     material = Material(session, outcome, read_scores(out))
     page = write_single(material, out) if single_file else write_site(material, out)
     return outcome, page
+
+
+UNFINISHED = SessionOutcome(verdicts={}, absences=[], unfinished=True)
+
+
+def mark_unfinished(records: Path, out: Path) -> None:
+    """Let all outputs in `out` say that the session which writes the file `records` is unfinished.
+
+    `verdicts.json` is removed, since an empty list of verdicts would look like success, and `envelope.csv`. No other
+    process may write into the folder.
+    """
+    clear_parts(folder(out))
+    take_away(out / VERDICTS)
+    take_away(out / ENVELOPES)
+    write_results(results_of(Session((environment(),), ()), UNFINISHED, records), out)
+    write_junit(UNFINISHED, out / "junit.xml")
+    write_summary(UNFINISHED, out / "summary.md")
+    write_badges(UNFINISHED, out)
+    write_unfinished(UNFINISHED, out)

@@ -23,8 +23,7 @@ from distributed.scheduler import KilledWorker
 
 from crosscheck.library.own_files import code_here
 from crosscheck.running.dask_worker import Crew, do_job
-from crosscheck.running.scheduler import Event, Events, Work
-from crosscheck.running.waiting import Waiting
+from crosscheck.running.scheduler import Event, Events, Waiting, Work
 from crosscheck.running.worker import START_LIMIT_S, TICK_S
 
 ANSWER_S = 10.0  # time limit for the answer of a Dask scheduler

@@ -16,8 +16,7 @@ from crosscheck.engines.registry import NoSuchEngine, find_engine
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.made_by import made_by
 from crosscheck.records.packing import pack
-from crosscheck.running.job import Done, Job
-from crosscheck.running.ladder import extended
+from crosscheck.running.job import Done, Job, extended
 from crosscheck.running.rung import Solved, solve_rung
 from flexmb.scene.schema import Scene
 

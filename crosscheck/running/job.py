@@ -1,15 +1,41 @@
-"""What a worker is told to do. This file imports little, so that workers start quickly."""
+"""What a worker is told to do, and at which efforts. This file imports little, so that workers start quickly."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
+import msgspec
+
 from crosscheck.engines.contract import Effort, LinearPart
+from crosscheck.library.case import Variant
+from crosscheck.library.efforts import continued, with_extra
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
+
+
+def extended(ladder: Sequence[Effort], extra: Sequence[float], finer: int) -> tuple[Effort, ...]:
+    """An engine's ladder, with `extra` values for the method of its finest effort, and then `finer` efforts more."""
+    finest = ladder[-1]
+    alike = [each for each in ladder if (each.kind, each.method) == (finest.kind, finest.method)]
+    others = tuple(each for each in ladder if (each.kind, each.method) != (finest.kind, finest.method))
+    values = with_extra([each.value for each in alike], extra)
+    return (*others, *(replace(finest, value=value) for value in (*values, *continued(finest.kind, values, finer))))
+
+
+def with_efforts(variant: Variant, engine: str, extra: Sequence[float]) -> Variant:
+    """The variant with extra values in the last ladder that it prescribes for an engine, if it prescribes one."""
+    places = [place for place, ladder in enumerate(variant.efforts) if ladder.engine == engine]
+    if not places or not extra:
+        return variant
+    ladders = list(variant.efforts)
+    last = ladders[places[-1]]
+    ladders[places[-1]] = msgspec.structs.replace(last, values=with_extra(last.values, extra))
+    return msgspec.structs.replace(variant, efforts=tuple(ladders))
+
 
 MAIN, REFINED = "main", "refined"
 
@@ -29,7 +55,7 @@ class Job:
 
     `provider` is "module:function", which returns the engines by name; `maker` is the module that makes this engine, or
     "". `efforts` replaces the engine's ladder unless it is empty; otherwise that gets the values `extra` and `finer`
-    efforts more (`crosscheck.running.ladder`). `finest_only` runs only the last effort. Efforts too coarse to enter the
+    efforts more (`crosscheck.running.job`). `finest_only` runs only the last effort. Efforts too coarse to enter the
     uncertainty store only the channels `kept`. `done` are the runs already recorded for this very scene. A job with an
     `error` cannot be run. It is stopped after `time_limit_s`; `expected_s` is what it took the last time, None if
     unknown. A `lean` job runs each effort once, even a short one, and stores only `kept`. `linear` is what it asks of

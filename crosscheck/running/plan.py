@@ -16,17 +16,16 @@ from crosscheck.drawing.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.engines.contract import Effort, LinearPart
 from crosscheck.engines.linear.coordinates import coordinate_names, is_counted
 from crosscheck.engines.registry import OWN_CODE, home
-from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, RunFile, Variant
+from crosscheck.library.case import TAKES_APART, CaseError, Comparison, Control, Refined, RunFile, Variant
 from crosscheck.library.digests import case_digests
 from crosscheck.library.find import Case
 from crosscheck.library.mutations import mutate
-from crosscheck.library.reference import has_reference, scene_digest
-from crosscheck.library.selection import alone, joining, select
+from crosscheck.library.reference import current_reference, has_reference, scene_digest
+from crosscheck.library.selection import alone, goals_for_reference, joining, select
 from crosscheck.records.drawing import FILM, Drawing
-from crosscheck.records.kinds import ENVELOPE, CaseRecord, VariantInfo
-from crosscheck.running.job import MAIN, REFINED, Job
-from crosscheck.running.ladder import with_efforts
-from crosscheck.running.reference_record import recorded_reference
+from crosscheck.records.kinds import ENVELOPE, CaseRecord, RecordedReference, ReferenceGoals, VariantInfo
+from crosscheck.records.packing import pack
+from crosscheck.running.job import MAIN, REFINED, Job, with_efforts
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from flexmb.scene.bodies import BeamBody, Modes, RigidBody, SidBody, StrainPolynomials
 from flexmb.scene.check import SceneWarning, check_and_warn, check_scene
@@ -310,3 +309,31 @@ def _on_beams(scene: Scene, **changes: object) -> Scene:
         msgspec.structs.replace(body, **changes) if isinstance(body, BeamBody) else body for body in scene.bodies
     )
     return msgspec.structs.replace(scene, bodies=bodies)
+
+
+def recorded_reference(case: Case, run: RunFile) -> RecordedReference | None:
+    """The case's stored reference with the engines of the reduced run file `run` that are compared with it.
+
+    None if there is no reference or no such engine. If the stored files cannot be used or belong to another scene, the
+    record contains the fault, so that these comparisons show as not run.
+    """
+    recipe = case.run.reference
+    if recipe is None or not has_reference(case.folder):
+        return None
+    running = [engine for variant in run.variants if variant.name == recipe.variant for engine in variant.engines]
+    found = goals_for_reference(case.run, running)
+    asked = {engine: ReferenceGoals(goals=goals, scales=scales) for engine, (goals, scales) in found.items()}
+    if not asked:
+        return None
+    try:
+        stored = current_reference(case)
+    except CaseError as error:
+        return RecordedReference(variant=recipe.variant, asked=asked, fault=str(error))
+    return RecordedReference(
+        variant=recipe.variant,
+        asked=asked,
+        times=pack(stored.times),
+        channels={name: pack(rows) for name, rows in stored.channels.items()},
+        uncertainties={name: known.uncertainty for name, known in stored.knowledge.channels.items()},
+        routes=stored.knowledge.routes,
+    )

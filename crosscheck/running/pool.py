@@ -13,8 +13,7 @@ import time
 from multiprocessing.connection import wait
 
 from crosscheck.running.processes import memory_limit, memory_of
-from crosscheck.running.scheduler import Event, Events, Work
-from crosscheck.running.waiting import Waiting
+from crosscheck.running.scheduler import Event, Events, Waiting, Work
 from crosscheck.running.worker import SPAWN, TICK_S, Method, Worker, keep_short
 
 

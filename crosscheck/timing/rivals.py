@@ -23,11 +23,9 @@ from crosscheck.judging.verdict import Finding
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
 from crosscheck.records.archive import read
-from crosscheck.records.kinds import RunRecord
-from crosscheck.records.recorded_reference import RecordedReference, ReferenceGoals
+from crosscheck.records.kinds import RecordedReference, ReferenceGoals, RunRecord
 from crosscheck.running.job import Job
-from crosscheck.running.plan import plan
-from crosscheck.running.reference_record import recorded_reference
+from crosscheck.running.plan import plan, recorded_reference
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import Listener, run_planned
 from crosscheck.timing.turns import Timed, in_turns

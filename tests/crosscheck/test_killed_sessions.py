@@ -130,7 +130,7 @@ def test_a_session_says_unfinished_before_it_touches_the_records(green: Path, mo
             ["invariance.json"],
         ),
         (
-            "crosscheck.terminal.map_runs.run_map", ["stability", "definiteness", "-o", "OUT"],
+            "crosscheck.terminal.many_runs.run_map", ["stability", "definiteness", "-o", "OUT"],
             ["definiteness.svg", "maps.json"],
         ),
         ("crosscheck.sampling.run._jobs", ["sweep", "SWEEP", "-o", "OUT"], ["samples.csv", "summary.json"]),

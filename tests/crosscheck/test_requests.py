@@ -89,7 +89,7 @@ def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for place in ("running.sweep.sweep", "running.sweep.run_planned", "timing.bench.bench", "timing.chart.chart",
                   "mutation.campaign.run_campaign", "mutation.invariance_runs.run_invariances",
-                  "conformance.trial.try_engine", "terminal.map_runs.run_and_draw"):  # fmt: skip
+                  "conformance.trial.try_engine", "terminal.many_runs.run_and_draw"):  # fmt: skip
         monkeypatch.setattr(f"crosscheck.{place}", begun)
 
 

@@ -6,8 +6,8 @@
 import re
 from collections.abc import Iterator
 
+from crosscheck.export.metadata import cite
 from crosscheck.library.basis import basis
-from crosscheck.library.cite import cite
 from crosscheck.library.find import Case, shipped_cases
 from crosscheck.library.reference import has_reference, load_reference
 from tests.repo.project import ROOT

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import dartpy
 import numpy as np
 
 from crosscheck.engines.conventions import cross, quaternion_rate, rotate_spatial, rotation_matrix, rotation_vector
-from crosscheck.engines.dart.forces import DartLoads
 from crosscheck.engines.dart.tree import DartTree, initial_state
 from crosscheck.engines.links import Ball, Floating
-from crosscheck.engines.rigid_tree import FreeCoordinates, JointForces, TreeState
+from crosscheck.engines.rigid_tree import FreeCoordinates, JointForces, PointLoad, TreeState, placed_loads
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -104,3 +104,34 @@ def _rotation_vector(quaternion: Real) -> Real:
     vector = rotation_vector(quaternion)
     angle = np.sqrt(vector @ vector)
     return vector * (1.0 - 2.0 * np.pi / angle) if 1e-5 < angle < 1e-2 else vector
+
+
+class DartLoads:
+    """Loads at nodes, put on the bodies of a tree that is in the state of the time asked for."""
+
+    def __init__(self, tree: DartTree, scene: Scene) -> None:
+        self._skeleton = tree.skeleton
+        self._loads = [_DartLoad(tree.bodies[link], load) for link, load in placed_loads(scene, tree.links)]
+
+    def __bool__(self) -> bool:
+        return bool(self._loads)
+
+    def apply(self, t: float) -> float:
+        """Replace what acts on the bodies; returns the power (W)."""
+        self._skeleton.clearExternalForces()
+        return sum(load.apply(t) for load in self._loads)
+
+
+class _DartLoad:
+    def __init__(self, body: dartpy.dynamics.BodyNode, load: PointLoad) -> None:
+        self._body, self._load = body, load
+
+    def apply(self, t: float) -> float:
+        R = self._body.getWorldTransform().rotation()
+        vector, point = self._load.in_world(t, R), self._load.point
+        turning = self._body.getAngularVelocity()
+        if not self._load.is_force:
+            self._body.addExtTorque(vector, False)
+            return float(vector @ turning)
+        self._body.addExtForce(vector, point, False, True)
+        return float(vector @ (self._body.getLinearVelocity() + cross(turning, R @ point)))

@@ -13,8 +13,7 @@ from crosscheck.engines.connections import along_hinges
 from crosscheck.engines.conventions import Frame, frame, rotation_matrix
 from crosscheck.engines.exudyn import joints, springs
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
-from crosscheck.engines.exudyn.joints import ExudynLink, HingePort
-from crosscheck.engines.exudyn.loads import along_axis
+from crosscheck.engines.exudyn.joints import ExudynLink, HingePort, along_axis
 from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
 from crosscheck.engines.exudyn.motion import AT_REST, FrameMotion, across_quaternion
 from crosscheck.engines.exudyn.sections import BeamElement, BeamSection, SpatialBeam, spatial_beam

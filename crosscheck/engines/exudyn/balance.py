@@ -9,9 +9,9 @@ from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.carriers import Carrier
 from crosscheck.engines.exudyn.joints import Stage
 from crosscheck.engines.exudyn.motion import initial
-from crosscheck.engines.exudyn.rotations import local_rate_map
+from crosscheck.engines.exudyn.rotations import local_rate_map, logarithm
+from crosscheck.engines.exudyn.sections import BeamElement
 from crosscheck.engines.exudyn.state import CarrierPath, States, set_state
-from crosscheck.engines.exudyn.strains import strain_energy
 from flexmb.typing import Real
 
 Paths = dict[int, CarrierPath]
@@ -99,3 +99,14 @@ def _flexible(assembly: Assembly, carrier: Carrier, path: CarrierPath, states: S
     first = carrier.data.first + path.eta @ carrier.data.shape.T
     moment = carrier.data.mass * path.position + np.einsum("tij,tj->ti", path.rotation, first)
     return kinetic, conjugate[:, :3], angular, moment
+
+
+def strain_energy(elements: tuple[BeamElement, ...], paths: dict[int, CarrierPath]) -> Real:
+    """(T,) of all elements: half their length times strain' K strain."""
+    found = np.zeros(len(paths[-1].position))
+    for element in elements:
+        left, right = paths[element.left.key], paths[element.right.key]
+        turn = np.swapaxes(left.rotation, 1, 2) @ right.rotation
+        apart = np.einsum("tji,tj->ti", left.rotation, right.position - left.position)
+        found += 0.5 / element.length * (logarithm(turn, apart) - element.rest) ** 2 @ element.stiffness
+    return found

@@ -14,12 +14,23 @@ import numpy as np
 
 from crosscheck.engines.conventions import axes_with
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
-from crosscheck.engines.exudyn.loads import along_axis
 from crosscheck.engines.exudyn.motion import FrameMotion, across, across_quaternion, initial
 from crosscheck.engines.functions_of_time import Profile, profile
 from flexmb.scene.freedoms import Ball, Coordinate
 from flexmb.scene.hinges import WITH_AXIS, ClosureKind
 from flexmb.typing import Real
+
+
+def along_axis(f: Callable[[float], Profile], axis: Sequence[float]) -> Callable[[Any, float, Any], list[float]]:
+    """The user function of a load f(t) along an axis (3,). Exudyn takes a list in half the time of an array."""
+    x, y, z = map(float, axis)
+
+    def load(mbs: Any, t: float, unit: Any) -> list[float]:
+        value = f(t).value
+        return [value * x, value * y, value * z]
+
+    return load
+
 
 Outboard = Callable[[FrameMotion], Carrier]
 """Makes the carrier beyond a link, given the motion of the outboard hinge frame."""

@@ -8,10 +8,9 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, MarkerPath, Run, Snapshot, Trajectory
 from crosscheck.engines.exudyn.balance import energy_and_momentum
-from crosscheck.engines.exudyn.connections import Connected, connected
+from crosscheck.engines.exudyn.connections import Connected, connected, marker_path, marker_snapshot
 from crosscheck.engines.exudyn.independent import independent, opening
 from crosscheck.engines.exudyn.kkt import body_mass_matrix, initial_state
-from crosscheck.engines.exudyn.markers import marker_path, marker_snapshot
 from crosscheck.engines.exudyn.modal import NodeShape
 from crosscheck.engines.exudyn.solve import ExudynSolution, integrate
 from crosscheck.engines.exudyn.state import CarrierPath, States, carrier_path

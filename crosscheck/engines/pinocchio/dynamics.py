@@ -13,8 +13,7 @@ import pinocchio as pin
 from crosscheck.engines.conventions import quaternion_rate, scalar_first, scalar_last
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.closures import PinocchioClosures, of_its_own
-from crosscheck.engines.pinocchio.connections import PinocchioConnections
-from crosscheck.engines.pinocchio.forces import PlacedLoads
+from crosscheck.engines.pinocchio.forces import PinocchioConnections, PlacedLoads
 from crosscheck.engines.pinocchio.rows import PinocchioRows
 from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, initial_state
 from crosscheck.engines.rigid_tree import FreeCoordinates, JointForces, Slot, TreeState

@@ -5,9 +5,8 @@ from crosscheck.mutation.invariances.clock import CLOCK
 from crosscheck.mutation.invariances.counterpart import Counterpart, Invariance, NotApplicable
 from crosscheck.mutation.invariances.later import LATER
 from crosscheck.mutation.invariances.mirrored import MIRRORED
-from crosscheck.mutation.invariances.order import REORDERED
 from crosscheck.mutation.invariances.placed import MOVED, TURNED
-from crosscheck.mutation.invariances.restated import RESTATED
+from crosscheck.mutation.invariances.restated import REORDERED, RESTATED
 from crosscheck.mutation.invariances.units import RESCALED
 
 INVARIANCES = (TURNED, MOVED, BOOSTED, CLOCK, LATER, REORDERED, RESCALED, MIRRORED, RESTATED)

@@ -1,16 +1,20 @@
-"""Sections of beams stated at another reference point, as matrices: the same beams in other numbers.
+"""The same scene in other words: everything declared in the opposite order, since references are by name; and sections
+of beams stated at another reference point, as matrices.
 
-Results that change here depend on where the section's axis was drawn, as they do when the transport of stiffness or
-inertia leaves out a coupling of extension, bending and torsion. Each station is stated at a point of its own.
+Results that change with the latter depend on where the section's axis was drawn, as they do when the transport of
+stiffness or inertia leaves out a coupling of extension, bending and torsion. Each station is stated at a point of its
+own.
 """
 
 from __future__ import annotations
 
 from math import sqrt
 
+import msgspec
 from msgspec.structs import replace
 
 from crosscheck.mutation.invariances.counterpart import Counterpart, Invariance, NotApplicable
+from crosscheck.mutation.invariances.linearised import relation
 from flexmb.scene.bodies import BeamBody, BeamStation, Body
 from flexmb.scene.schema import Scene
 from flexmb.scene.sections import restated, stiffness_on_axis
@@ -38,3 +42,20 @@ def _beside(station: BeamStation, step: tuple[float, float]) -> BeamStation:
 
 
 RESTATED = Invariance("restated", "sections of beams stated at another reference point", _restated)
+
+
+COLLECTIONS = (
+    "bodies", "hinges", "closures", "couplings", "connectors", "wheels", "point_masses", "loads", "markers",
+    "modal_states",
+)  # fmt: skip
+
+
+def _reordered(scene: Scene) -> Counterpart:
+    changes = {name: getattr(scene, name)[::-1] for name in COLLECTIONS}
+    if all(len(items) < 2 for items in changes.values()):
+        raise NotApplicable("there is one of each thing only")
+    other = msgspec.structs.replace(scene, **changes)
+    return Counterpart(other, lambda times, channels: channels, linear=relation(scene, other))
+
+
+REORDERED = Invariance("reordered", "bodies, hinges and all else declared in the opposite order", _reordered)

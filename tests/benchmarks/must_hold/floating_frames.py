@@ -133,7 +133,7 @@ def _exudyn(scene: Scene, times: np.ndarray, bending: float) -> Iterator[Setting
 
 
 def _tip(assembly: Any, states: Any) -> np.ndarray:
-    from crosscheck.engines.exudyn.markers import marker_path
+    from crosscheck.engines.exudyn.connections import marker_path
     from crosscheck.engines.exudyn.state import carrier_path
 
     (tip,) = (marker for marker in assembly.scene.markers if marker.name == MARKER)

@@ -15,10 +15,10 @@ from typer.testing import CliRunner
 
 from crosscheck.cli import app
 from crosscheck.export.archive import SUMS, archive, case_files, uncertainty_text, write_archive
+from crosscheck.export.metadata import cite
 from crosscheck.export.model import model_data
 from crosscheck.export.schemas import FILES, FOLDER, schema_files, schema_text
 from crosscheck.library.case_error import CaseError
-from crosscheck.library.cite import cite
 from crosscheck.library.find import Case, load_case, resolve, shipped_folder
 from crosscheck.library.reference import load_reference, parse_values
 from tests.crosscheck.export.exported import scene_of

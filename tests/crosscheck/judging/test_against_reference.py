@@ -14,8 +14,8 @@ from crosscheck.library.find import load_case
 from crosscheck.library.reference import KNOWLEDGE, VALUES
 from crosscheck.library.selection import goals_for_reference
 from crosscheck.records.archive import read
+from crosscheck.records.kinds import ReferenceGoals
 from crosscheck.records.packing import pack, unpack
-from crosscheck.records.recorded_reference import ReferenceGoals
 from crosscheck.records.session import last_session
 from crosscheck.references.regenerate import regenerate
 from tests.crosscheck.sessions import PROVIDER, copy_case, run_here, sweep_here

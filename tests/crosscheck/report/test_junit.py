@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+from crosscheck.report import UNFINISHED
 from crosscheck.report.junit import write_junit
-from crosscheck.report.unfinished import UNFINISHED
 from tests.crosscheck.report.sessions import session
 from tests.crosscheck.sessions import versus
 

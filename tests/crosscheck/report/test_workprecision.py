@@ -17,9 +17,8 @@ from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import collect
 from crosscheck.library.find import load_case
 from crosscheck.records.archive import read
-from crosscheck.records.kinds import CaseRecord, Record, RunRecord
+from crosscheck.records.kinds import CaseRecord, Record, RecordedReference, ReferenceGoals, RunRecord
 from crosscheck.records.packing import pack, unpack
-from crosscheck.records.recorded_reference import RecordedReference, ReferenceGoals
 from crosscheck.report import workprecision
 from crosscheck.report.speed import REACHED, fastest, standing, unit_of_time
 from crosscheck.report.store import Store

@@ -14,7 +14,7 @@ from crosscheck.library.with_claims import with_claims
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.expected import BESIDES_S, OTHER_CODES, Remaining, expected_seconds
-from crosscheck.running.ladder import extended, with_efforts
+from crosscheck.running.job import extended, with_efforts
 from crosscheck.running.rung import repeats_of
 from tests.crosscheck.fake_engines import COARSE, STEPS
 from tests.crosscheck.sessions import copy_case, sweep_here

@@ -20,7 +20,7 @@ from crosscheck.references.regenerate import regenerate
 from crosscheck.running.job import Job
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
-from crosscheck.terminal.timings import seconds
+from crosscheck.terminal.listings import seconds
 from crosscheck.timing import turns
 from crosscheck.timing.bench import CaseBench, Contest, bench
 from crosscheck.timing.benchmark_json import benchmark_document

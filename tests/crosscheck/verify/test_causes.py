@@ -15,9 +15,9 @@ from crosscheck.verify.against_case import CsvOutcome, verify_csv
 from crosscheck.verify.clock import find_shift
 from crosscheck.verify.columns import VerifyError
 from crosscheck.verify.evidence import Evidence, turned
-from crosscheck.verify.mass import total_mass
 from crosscheck.verify.outcome import outcome_json
 from crosscheck.verify.points import about_mass_centre, about_other_points
+from crosscheck.verify.target import total_mass
 from flexmb.scene.bodies import BeamBody, BeamStation, Modes, SidBody
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real

@@ -55,6 +55,7 @@ def test_every_field_is_scratch_or_found_or_kept() -> None:
     assert {each.name for each in fields(ClosureWorkspace)} == SCRATCH | FOUND | KEPT
     assert len(SCRATCH) + len(FOUND) + len(KEPT) == len(fields(ClosureWorkspace))
 
+
 LOAD = r"\brow\[(.*\]\.load|['\"]load['\"]\])"
 
 

@@ -32,6 +32,7 @@ def cross(v: tuple[float, float, float]) -> Real:
     x, y, z = v
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
+
 AXIS = cross((1.0, 0.0, 0.0))
 WINDOW = 1e-4
 Along = Callable[[float], Real]

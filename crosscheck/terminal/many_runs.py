@@ -1,18 +1,74 @@
-"""A sweep on the terminal: a bar while it runs, a table of its statistics, and failures."""
+"""Stability maps and sweeps on the terminal: a bar while they run, then verdicts or statistics, and failures."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 from rich.console import Console
 from rich.progress import TimeRemainingColumn
+from rich.text import Text
 
+from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.sampling.statistics import Distribution, Estimated, SweepSummary
+from crosscheck.stability.map import StabilityMap
+from crosscheck.stability.picture import draw
+from crosscheck.stability.run import Finished, run_map
+from crosscheck.stability.verdict_file import VERDICTS, take_away_verdicts, write_verdicts
 from crosscheck.terminal.progress import bars
 from crosscheck.terminal.text import marked, words
 from flexmb.output.listing import Listing, figures, names
+from flexmb.output.whole import take_away
+from flexmb.output.writing import folder
+
+
+def run_and_draw(
+    console: Console, chosen: Sequence[str], out: Path, pictures: Path, *, depth: int | None, fresh: bool,
+    limits: Limits, scheduler: Scheduler,
+) -> int:  # fmt: skip
+    """Run maps, draw them, write their verdicts; the exit code: 0 if all agree, else 1."""
+    verdicts = []
+    folder(pictures)
+    take_away_verdicts(chosen, pictures / VERDICTS)
+    for name in chosen:
+        take_away(pictures / f"{name}.svg")
+    for name in chosen:
+        done = _run_map(console, name, out / f"{name}.jsonl", depth, fresh, limits, scheduler)
+        picture = draw(done, pictures / f"{name}.svg")
+        verdicts.append(done.verdict)
+        write_verdicts([done.verdict], pictures / VERDICTS)  # one by one: another process may write its own
+        console.print(_verdict_line(done, picture), soft_wrap=True)
+    good = sum(verdict.ok for verdict in verdicts)
+    colour = "green" if good == len(verdicts) else "red"
+    console.print(words(f"{good} of {len(verdicts)} maps agree with their overlays", f"bold {colour}"))
+    return 0 if good == len(verdicts) else 1
+
+
+def _run_map(
+    console: Console, name: str, records: Path, depth: int | None, fresh: bool, limits: Limits, scheduler: Scheduler
+) -> Finished:
+    with bars(console, TimeRemainingColumn()) as progress:
+        task = progress.add_task(name, total=None)
+
+        def hear(what: StabilityMap, done: int, known: int) -> None:
+            progress.update(task, completed=done, total=known, description=f"{name}: cells known so far")
+
+        return run_map(
+            name, records, depth=depth, fresh=fresh, limits=limits, scheduler=scheduler, listener=hear
+        )
+
+
+def _verdict_line(done: Finished, picture: Path) -> Text:
+    verdict = done.verdict
+    cells = ", ".join(f"{count} {name}" for name, count in verdict.cells.items())
+    far = "beyond the map" if verdict.distance < 0 else f"{verdict.distance}"
+    text = f"{verdict.map}: {verdict.status}, farthest cell from the overlay {far}; {cells}; {verdict.seconds:.0f} s"
+    worst = "" if verdict.ok or not verdict.worst else f"; {verdict.worst}"
+    mark = ("✓", "green") if verdict.ok else ("✕", "red")
+    return marked(*mark, f"{text}{worst} -> {picture}")
+
 
 QUANTILES = {"0.05": "5 %", "0.5": "median", "0.95": "95 %"}
 SHOWN = 5  # failures; summary.json has all
